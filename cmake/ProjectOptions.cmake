@@ -1,0 +1,20 @@
+# Warnings and sanitizers as one target that is never exported.
+option(STEMVO_WARNINGS_AS_ERRORS "Treat warnings as errors (set by the presets)" OFF)
+option(STEMVO_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
+
+add_library(stemvo_options INTERFACE)
+target_compile_options(stemvo_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                                                -Wold-style-cast -Woverloaded-virtual)
+if(STEMVO_WARNINGS_AS_ERRORS)
+  target_compile_options(stemvo_options INTERFACE -Werror)
+endif()
+if(STEMVO_SANITIZE)
+  target_compile_options(stemvo_options INTERFACE -fsanitize=address,undefined
+                                                  -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(stemvo_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "stemvo/error.hpp"
+#include "stemvo/evaluation/metrics.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/stem/stem.hpp"
+
+namespace stemvo {
+
+/// Keys `input.*`.
+struct InputOptions {
+  std::string camera = "auto";
+};
+
+/// Keys `two_view.*`.
+struct TwoViewOptions {
+  double sigma_px = 1.0;             ///< of eq. (5)-(6), in input pixels
+  double homography_ratio = 0.40;    ///< R_H above it: homography (while initialising)
+  std::string estimator = "magsac";  ///< `magsac` or `ransac`, of OpenCV
+  double inlier_threshold_px = 0.5;  ///< of the robust estimators
+  double confidence = 0.9999;
+  int max_iterations = 1000;
+  bool refine = true;  ///< nonlinear refinement of R, t on the inliers
+  double refine_loss_px = 0.3;
+};
+
+/// Keys `odometry.*`.
+struct OdometryOptions {
+  std::string composition = "right";  ///< `right`: R_c R; `paper`: R R_c
+  std::string gate = "translation";   ///< `translation`, `paper` (drops the rotation too), `off`
+  int min_inliers = 20;               ///< fewer: the frame is lost
+  double standing_flow_px = 0.15;     ///< median flow below it: standing still
+  double min_parallax_px = 0.6;       ///< median rotation-free flow below it: creeping
+};
+
+/// Keys `scale.*`.
+struct ScaleOptions {
+  std::string source = "constant";  ///< `constant` or `ground_truth`
+  double constant_m = 1.0;          ///< per frame
+  double camera_height_m = 1.65;    ///< recorded for later use by the metric scale
+};
+
+/// The whole configuration. Defaults stand here, once; config/default.yaml is generated from them.
+struct Config {
+  InputOptions input;
+  StemOptions stem;
+  FeatureOptions features;
+  TwoViewOptions two_view;
+  OdometryOptions odometry;
+  ScaleOptions scale;
+  EvaluationOptions evaluation;
+  std::uint64_t seed = 1;
+};
+
+/// Reads a YAML file over `base`. Errors with file and line: not YAML, unknown or duplicated key,
+/// wrong type, value out of range.
+[[nodiscard]] Expected<Config> load_config(const std::filesystem::path& file,
+                                           const Config& base = {});
+/// `key=value` of --set, e.g. "stem.filter=10".
+[[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
+/// Ranges and choices of every key; written so that NaN fails.
+[[nodiscard]] Status validate(const Config& config);
+/// YAML with every key, exact (numbers round-trip).
+[[nodiscard]] std::string dump_config(const Config& config);
+
+}  // namespace stemvo

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "stemvo/evaluation/trajectory.hpp"
+#include "stemvo/geometry/alignment.hpp"
+
+namespace stemvo {
+
+/// Keys `evaluation.*` of the configuration.
+struct EvaluationOptions {
+  /// Empty: 100, 200, .. 800 m, or 10, 20, .. 50 m where the path is shorter than 100 m.
+  std::vector<double> segment_lengths_m;
+};
+
+/// Root mean square position error after each kind of alignment.
+struct AbsoluteTrajectoryError {
+  double none_m = 0.0;
+  double scale_m = 0.0;
+  double se3_m = 0.0;
+  double sim3_m = 0.0;
+};
+
+/// Everything that needs ground truth. Both trajectories are first moved to start at the identity.
+struct Metrics {
+  double path_length_m = 0.0;           ///< of the ground truth
+  double average_offset_m = 0.0;        ///< paper: mean of |dx| + |dz|, no alignment
+  double null_offset_m = 0.0;           ///< the same for a trajectory that never moves
+  std::optional<double> t_rel_percent;  ///< nullopt: no segment fits
+  std::optional<double> r_rel_deg_per_100m;
+  std::vector<double> segment_lengths_m;
+  int num_segments = 0;
+  AbsoluteTrajectoryError ate_rmse;
+  double rpe_rotation_deg = 0.0;  ///< mean over steps of 1 frame
+};
+
+/// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. Both have the same length
+/// (checked), at least one pose.
+[[nodiscard]] Metrics evaluate(std::span<const Rigid3> estimate,
+                               std::span<const Rigid3> ground_truth,
+                               const EvaluationOptions& options = {});
+
+/// The estimate moved to start at the identity and then fitted to the ground truth (also moved).
+[[nodiscard]] Trajectory align_trajectory(std::span<const Rigid3> estimate,
+                                          std::span<const Rigid3> ground_truth,
+                                          Alignment alignment);
+
+}  // namespace stemvo

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "stemvo/error.hpp"
+#include "stemvo/stem/channel.hpp"
+
+namespace stemvo {
+
+/// Keys `features.*` of the configuration.
+struct FeatureOptions {
+  std::string method = "klt";  ///< `klt`, `orb` or `sift`
+  int max_features = 1500;     ///< keypoints aimed at per frame
+  int grid_columns = 16;       ///< quota per cell = max_features / (columns * rows)
+  int grid_rows = 6;
+  double corner_quality = 0.005;         ///< klt: least corner response over the strongest
+  double min_distance_px = 8.0;          ///< klt: between keypoints, in input pixels
+  int klt_window = 21;                   ///< klt: pixels of the tracked picture, odd
+  int klt_levels = 4;                    ///< klt: pyramid levels
+  double max_forward_backward_px = 0.5;  ///< klt: input pixels
+  int fast_threshold = 10;               ///< orb
+  double ratio = 0.8;                    ///< sift: best over second-best descriptor distance
+};
+
+/// Correspondences of two frames, in input pixels.
+struct Matches {
+  std::vector<Eigen::Vector2d> prev_uv;
+  std::vector<Eigen::Vector2d> cur_uv;
+  std::vector<int> track_ids;  ///< klt: the same id while a point is followed; else -1
+  int num_keypoints = 0;       ///< found or asked for, before matching
+};
+
+/// Finds correspondences between the last picture it was given and the next one. Stateful (it holds
+/// the last picture); the same pictures give the same matches, whatever the number of threads.
+class FrontEnd {
+ public:
+  virtual ~FrontEnd() = default;
+  /// Matches from the previous picture (none on the first). A picture of another size starts over.
+  [[nodiscard]] virtual Matches process(const ChannelImage& image) = 0;
+};
+
+/// Error: unknown method (lists the known ones).
+[[nodiscard]] Expected<std::unique_ptr<FrontEnd>> create_front_end(const FeatureOptions& options);
+
+}  // namespace stemvo

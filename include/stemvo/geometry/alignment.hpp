@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+
+#include <Eigen/Core>
+
+namespace stemvo {
+
+/// How an estimate is fitted to the ground truth before its error is taken.
+enum class Alignment { kNone, kScale, kSe3, kSim3 };
+
+/// target = scale * rotation * source + translation.
+struct Similarity3 {
+  double scale = 1.0;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+};
+
+/// Least-squares fit of positions (Umeyama 1991; kScale: s = sum(x.y)/sum(x.x) about the origin, as
+/// kitti-odom-eval does). Same length, any number of points; identity where the fit is undefined.
+[[nodiscard]] Similarity3 align_positions(std::span<const Eigen::Vector3d> source,
+                                          std::span<const Eigen::Vector3d> target,
+                                          Alignment alignment);
+
+}  // namespace stemvo

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+
+namespace stemvo {
+
+/// Pinhole camera without distortion (KITTI is rectified). Pixels: the centre of the top-left pixel
+/// is (0, 0). Camera axes: x right, y down, z forward.
+struct Camera {
+  double fx_px = 0.0;
+  double fy_px = 0.0;
+  double cx_px = 0.0;
+  double cy_px = 0.0;
+  int width_px = 0;
+  int height_px = 0;
+
+  /// 3x3 intrinsics K.
+  [[nodiscard]] Eigen::Matrix3d matrix() const {
+    Eigen::Matrix3d k;
+    k << fx_px, 0.0, cx_px, 0.0, fy_px, cy_px, 0.0, 0.0, 1.0;
+    return k;
+  }
+  /// Pixel -> point on the plane z = 1.
+  [[nodiscard]] Eigen::Vector2d normalize(const Eigen::Vector2d& uv) const {
+    return {(uv.x() - cx_px) / fx_px, (uv.y() - cy_px) / fy_px};
+  }
+  /// Point in camera coordinates (z != 0) -> pixel. Points behind the camera are projected as well:
+  /// the caller checks z > 0.
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point) const {
+    return {fx_px * point.x() / point.z() + cx_px, fy_px * point.y() / point.z() + cy_px};
+  }
+  /// Mean focal length, to turn pixel thresholds into normalised ones.
+  [[nodiscard]] double mean_focal_px() const { return 0.5 * (fx_px + fy_px); }
+};
+
+}  // namespace stemvo

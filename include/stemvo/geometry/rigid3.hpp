@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace stemvo {
+
+using Matrix34d = Eigen::Matrix<double, 3, 4>;
+
+/// Rigid motion `b_from_a`: x_in_b = rotation * x_in_a + translation. The quaternion is kept at
+/// unit length by every operation, so long chains stay orthonormal.
+struct Rigid3 {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Rigid3() = default;
+  Rigid3(const Eigen::Quaterniond& rotation_in, const Eigen::Vector3d& translation_in)
+      : rotation(rotation_in.normalized()), translation(translation_in) {}
+
+  /// From [R | t]; R is replaced by the nearest rotation (pose files are orthonormal to 1e-7 only).
+  [[nodiscard]] static Rigid3 from_matrix(const Matrix34d& matrix);
+  [[nodiscard]] static Rigid3 from_matrix(const Eigen::Matrix3d& rotation,
+                                          const Eigen::Vector3d& translation);
+
+  [[nodiscard]] Eigen::Matrix3d rotation_matrix() const { return rotation.toRotationMatrix(); }
+  [[nodiscard]] Matrix34d matrix() const;
+  [[nodiscard]] Rigid3 inverse() const;
+  /// Angle of the rotation, in [0, pi] rad; exact for small angles.
+  [[nodiscard]] double angle_rad() const;
+};
+
+/// c_from_a = c_from_b * b_from_a.
+[[nodiscard]] Rigid3 operator*(const Rigid3& c_from_b, const Rigid3& b_from_a);
+/// x_in_b = b_from_a * x_in_a.
+[[nodiscard]] Eigen::Vector3d operator*(const Rigid3& b_from_a, const Eigen::Vector3d& x_in_a);
+
+/// Cross-product matrix: skew(a) * b == a x b.
+[[nodiscard]] Eigen::Matrix3d skew(const Eigen::Vector3d& a);
+/// Rotation of |w| rad about w (Rodrigues); so3_log is its inverse, |result| <= pi.
+[[nodiscard]] Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
+[[nodiscard]] Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
+
+}  // namespace stemvo

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+/// A point seen by two cameras, in coordinates of the previous one.
+struct TriangulatedPoint {
+  Eigen::Vector3d in_prev = Eigen::Vector3d::Zero();
+  double cos_parallax = 1.0;  ///< cosine of the angle between the two viewing rays
+  bool finite = false;        ///< false: rays (nearly) parallel, in_prev is meaningless
+};
+
+/// Linear (DLT) triangulation of normalised image points (plane z = 1).
+[[nodiscard]] TriangulatedPoint triangulate(const Rigid3& cur_from_prev,
+                                            const Eigen::Vector2d& prev_xy,
+                                            const Eigen::Vector2d& cur_xy);
+
+/// The paper's closed depth in the previous camera (eq. (8)-(10), corrected):
+/// Z = -(T_1 - x' T_3) / ((R_1 - x' R_3) . (x, y, 1)); uses x' alone. Not finite when the
+/// denominator vanishes.
+[[nodiscard]] double depth_in_prev(const Rigid3& cur_from_prev,
+                                   const Eigen::Vector2d& prev_xy,
+                                   const Eigen::Vector2d& cur_xy);
+
+}  // namespace stemvo

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/config.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/geometry/two_view_motion.hpp"
+#include "stemvo/stem/stem.hpp"
+
+namespace stemvo {
+
+/// What became of a frame. Every frame has a pose whatever its state.
+enum class FrameState {
+  kFirst,         ///< the world's origin
+  kInitializing,  ///< measured by the initial H/F selection
+  kTracking,      ///< rotation and direction measured
+  kStanding,      ///< no motion
+  kCreeping,      ///< rotation measured; too little parallax for a direction: the last one is kept
+  kRotating,      ///< pure rotation measured
+  kGated,         ///< rotation measured; the forward motion gate refused the direction
+  kLost,          ///< nothing measured: the last motion is continued
+  kBroken,        ///< no picture: the last motion is continued
+};
+[[nodiscard]] std::string_view to_string(FrameState state);
+/// First, initialising, tracking, standing, creeping and rotating frames count as measured.
+[[nodiscard]] bool is_measured(FrameState state);
+
+/// Milliseconds per stage of one frame.
+struct StageTimes {
+  double stem_ms = 0.0;
+  double features_ms = 0.0;
+  double pose_ms = 0.0;
+};
+
+/// One row of frames.csv.
+struct FrameResult {
+  FrameState state = FrameState::kFirst;
+  Rigid3 world_from_camera;
+  int num_matches = 0;
+  int num_inliers = 0;
+  double homography_score = 0.0;   ///< S_H
+  double fundamental_score = 0.0;  ///< S_F
+  double homography_ratio = 0.0;   ///< R_H
+  TwoViewModel model = TwoViewModel::kNone;
+  StageTimes times;
+};
+
+/// The facade: frames in, poses out, one at a time, no look-ahead.
+class Odometry {
+ public:
+  /// Loads the model. Errors: those of Stem::create and create_front_end.
+  [[nodiscard]] static Expected<Odometry> create(const Config& config,
+                                                 const Camera& camera,
+                                                 const std::filesystem::path& models_dir);
+  Odometry(Odometry&&) noexcept;
+  Odometry& operator=(Odometry&&) noexcept;
+  ~Odometry();
+
+  /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked).
+  [[nodiscard]] FrameResult process(const cv::Mat& frame);
+  /// A frame that could not be read: keeps the clock running.
+  [[nodiscard]] FrameResult process_missing();
+
+  /// Of the last frame processed, for pictures.
+  [[nodiscard]] const ChannelImage& channel_image() const;
+  [[nodiscard]] const Matches& matches() const;
+  [[nodiscard]] const std::vector<char>& inlier_mask() const;
+  [[nodiscard]] const StemInfo& stem_info() const;
+
+ private:
+  struct Impl;
+  explicit Odometry(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stemvo

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stemvo/error.hpp"
+#include "stemvo/stem/channel.hpp"
+
+namespace stemvo {
+
+/// Keys `stem.*` of the configuration.
+struct StemOptions {
+  /// Name in models/manifest.yaml, path of an .onnx (with a manifest.yaml beside it), `gray`, or
+  /// `input_layer` (filters 0, 1, 2 = R, G, B).
+  std::string model = "default";
+  int filter = 0;
+  int sampling_px = 0;               ///< divisor of the native stride; 0: the native stride itself
+  std::string upsample = "bicubic";  ///< `bicubic` (to the input's size) or `native`
+  double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
+  double stretch_high_percent = 99.5;
+  double stretch_memory = 0.95;  ///< share of the last limits kept at each frame
+};
+
+/// What is known of the loaded network, for reports (config.yaml, metrics.json).
+struct StemInfo {
+  std::string model;   ///< as asked for
+  std::string layer;   ///< empty for gray and input_layer
+  std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
+  int num_filters = 1;
+  int native_stride_px = 1;
+  int sampling_px = 1;
+};
+
+/// One filter of the first layer of a network: frame in, channel out. Movable; `apply` is const and
+/// gives the same bytes whatever the number of threads (cv::setNumThreads).
+class Stem {
+ public:
+  /// Loads and checks the model. Errors: unknown name (lists the known ones), hash other than in
+  /// the manifest, not ONNX, inputs or outputs other than 1x3xHxW -> 1xCxhxw float, filter outside
+  /// [0, C), sampling_px not a divisor of the stride (lists the allowed values).
+  [[nodiscard]] static Expected<Stem> create(const StemOptions& options,
+                                             const std::filesystem::path& models_dir);
+
+  Stem(Stem&&) noexcept;
+  Stem& operator=(Stem&&) noexcept;
+  ~Stem();
+
+  [[nodiscard]] const StemInfo& info() const;
+  /// Frame: CV_8UC3 in RGB order or CV_8UC1 (replicated to three planes). The one filter chosen.
+  /// Error: the frame is smaller than the kernel, or the runtime refused it.
+  [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
+  /// All filters of the layer from one pass, in order.
+  [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const;
+
+ private:
+  struct Impl;
+  explicit Stem(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Float channel -> 8-bit picture: percentile limits that follow the drive slowly, so that a patch
+/// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
+/// brings it to the input's size (PixelMap is adjusted; no resampling between pixels).
+class ChannelStretch {
+ public:
+  explicit ChannelStretch(const StemOptions& options);
+  [[nodiscard]] ChannelImage apply(const Channel& channel);
+
+ private:
+  StemOptions options_;
+  bool has_limits_ = false;
+  double low_ = 0.0;
+  double high_ = 1.0;
+};
+
+}  // namespace stemvo

@@ -1,0 +1,2 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/geometry/rigid3.hpp"
