@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+
+#include "stemvo/error.hpp"
+#include "stemvo/odometry/odometry.hpp"
+
+namespace stemvo {
+
+/// Writes frames.csv row by row, so that a run that is killed keeps the rows it had. Columns:
+/// frame, timestamp_s, state, matches, inliers, s_h, s_f, r_h, model, stem_ms, features_ms,
+/// pose_ms.
+class FramesCsv {
+ public:
+  /// Replaces the file and writes the header. Error: it cannot be written.
+  [[nodiscard]] static Expected<FramesCsv> create(const std::filesystem::path& file);
+
+  FramesCsv(FramesCsv&&) noexcept;
+  FramesCsv& operator=(FramesCsv&&) noexcept;
+  ~FramesCsv();
+
+  /// Frame in the folder's numbering. A failed write is kept for `close`.
+  void write(std::size_t frame, double timestamp_s, const FrameResult& result);
+  /// Flushes. Error: any write since `create` failed (disk full). Write nothing afterwards.
+  [[nodiscard]] Status close();
+
+ private:
+  struct Impl;
+  explicit FramesCsv(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stemvo

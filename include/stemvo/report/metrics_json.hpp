@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "stemvo/error.hpp"
+#include "stemvo/evaluation/metrics.hpp"
+
+namespace stemvo {
+
+/// What metrics.json holds. Everything in `metrics` is null in the file without ground truth.
+struct MetricsReport {
+  std::string stemvo_version;
+  std::string sequence;         ///< folder name, e.g. "03"
+  std::size_t first_frame = 0;  ///< in the folder's numbering
+  std::size_t num_frames = 0;   ///< key `frames`
+  std::string model;            ///< as asked for, e.g. "default", "gray"
+  int filter = 0;
+  double fps = 0.0;  ///< frames over wall time, process start to trajectory written
+  std::string scale_source;
+  double tracked_fraction = 0.0;  ///< frames whose pose was measured, over all
+  std::optional<Metrics> metrics;
+};
+
+/// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
+/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
+/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg. Numbers round-trip; a number that is
+/// not finite becomes null. Error: the file cannot be written.
+[[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
+                                        const MetricsReport& report);
+
+/// The same numbers as an aligned table; each row names its alignment, the trajectory that never
+/// moves stands beside the offset. Ends with a newline.
+[[nodiscard]] std::string format_metrics_table(const MetricsReport& report);
+
+}  // namespace stemvo

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "stemvo/error.hpp"
+#include "stemvo/evaluation/trajectory.hpp"
+
+namespace stemvo {
+
+/// Top view of a drive: x to the right, z (forward) up, metres, equal axes. Poses are drawn as they
+/// are; give both trajectories in the same world (first pose = identity).
+struct TrajectoryPlot {
+  std::string title;     ///< UTF-8, may be empty
+  std::string subtitle;  ///< the numbers, one line; may be empty
+  Trajectory estimate;   ///< at least one pose (checked)
+  std::optional<Trajectory> ground_truth;
+};
+
+/// 1600 x about 1200 pixels. The same plot gives the same bytes on one machine (the fonts are the
+/// system's). Positions that are not finite are left out. Error: the file cannot be written.
+[[nodiscard]] Status write_trajectory_png(const std::filesystem::path& file,
+                                          const TrajectoryPlot& plot);
+/// The same drawing as vectors.
+[[nodiscard]] Status write_trajectory_svg(const std::filesystem::path& file,
+                                          const TrajectoryPlot& plot);
+
+}  // namespace stemvo
