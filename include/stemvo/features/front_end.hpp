@@ -42,6 +42,9 @@ class FrontEnd {
   virtual ~FrontEnd() = default;
   /// Matches from the previous picture (none on the first). A picture of another size starts over.
   [[nodiscard]] virtual Matches process(const ChannelImage& image) = 0;
+  /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
+  /// not followed further. Front ends without tracks ignore it.
+  virtual void keep(const std::vector<char>& is_good) { static_cast<void>(is_good); }
 };
 
 /// Error: unknown method (lists the known ones).

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "features/descriptor_front_end.hpp"
+
+#include <algorithm>
+
+#include "features/grid_quota.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Detectors are asked for more than the quota so that every cell can choose its strongest.
+constexpr int kOversampling = 4;
+
+cv::Ptr<cv::Feature2D> create_feature(DescriptorFrontEnd::Kind kind,
+                                      const FeatureOptions& options) {
+  const int num_asked = kOversampling * options.max_features;
+  if (kind == DescriptorFrontEnd::Kind::kOrb) {
+    return cv::ORB::create(num_asked, 1.2F, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
+                           options.fast_threshold);
+  }
+  return cv::SIFT::create(num_asked);
+}
+
+/// Strongest first; ties by place, so that the order never depends on the detector's threads.
+bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
+  if (a.response != b.response) {
+    return a.response > b.response;
+  }
+  return a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x;
+}
+
+}  // namespace
+
+DescriptorFrontEnd::DescriptorFrontEnd(Kind kind, const FeatureOptions& options)
+    : kind_(kind), options_(options), feature_(create_feature(kind, options)) {}
+
+Matches DescriptorFrontEnd::process(const ChannelImage& image) {
+  Described current = describe(image);
+  Matches matches;
+  matches.num_keypoints = static_cast<int>(current.uv.size());
+  if (last_.size == current.size) {
+    for (const cv::DMatch& pair : match(last_, current)) {
+      matches.prev_uv.push_back(last_.uv[static_cast<std::size_t>(pair.queryIdx)]);
+      matches.cur_uv.push_back(current.uv[static_cast<std::size_t>(pair.trainIdx)]);
+      matches.track_ids.push_back(-1);
+    }
+  }
+  last_ = std::move(current);
+  return matches;
+}
+
+DescriptorFrontEnd::Described DescriptorFrontEnd::describe(const ChannelImage& image) const {
+  std::vector<cv::KeyPoint> found;
+  feature_->detect(image.pixels, found);
+  std::sort(found.begin(), found.end(), is_stronger);
+  GridQuota quota(options_, image.pixels.size());
+  std::vector<cv::KeyPoint> kept;
+  for (const cv::KeyPoint& keypoint : found) {
+    if (quota.take(keypoint.pt)) {
+      kept.push_back(keypoint);
+    }
+  }
+  Described described;
+  described.size = image.pixels.size();
+  if (kept.empty()) {
+    return described;
+  }
+  feature_->compute(image.pixels, kept, described.descriptors);
+  described.uv.reserve(kept.size());
+  for (const cv::KeyPoint& keypoint : kept) {
+    described.uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
+  }
+  return described;
+}
+
+std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,
+                                                  const Described& cur) const {
+  if (prev.descriptors.empty() || cur.descriptors.empty()) {
+    return {};
+  }
+  if (kind_ == Kind::kOrb) {
+    std::vector<cv::DMatch> pairs;
+    cv::BFMatcher(cv::NORM_HAMMING, /*crossCheck=*/true)
+        .match(prev.descriptors, cur.descriptors, pairs);
+    return pairs;
+  }
+  std::vector<std::vector<cv::DMatch>> best_two;
+  cv::BFMatcher(cv::NORM_L2).knnMatch(prev.descriptors, cur.descriptors, best_two, 2);
+  std::vector<cv::DMatch> pairs;
+  for (const std::vector<cv::DMatch>& candidates : best_two) {
+    if (candidates.size() == 2 &&
+        candidates[0].distance < options_.ratio * static_cast<double>(candidates[1].distance)) {
+      pairs.push_back(candidates[0]);
+    }
+  }
+  return pairs;
+}
+
+}  // namespace stemvo

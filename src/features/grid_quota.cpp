@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "features/grid_quota.hpp"
+
+#include <algorithm>
+
+namespace stemvo {
+
+GridQuota::GridQuota(const FeatureOptions& options, cv::Size picture_size)
+    : columns_(std::max(1, options.grid_columns)),
+      rows_(std::max(1, options.grid_rows)),
+      quota_(std::max(1, options.max_features / (columns_ * rows_))),
+      size_(picture_size),
+      counts_(static_cast<std::size_t>(columns_ * rows_), 0) {}
+
+std::size_t GridQuota::cell_of(const cv::Point2f& picture_uv) const {
+  const auto cell = [](float position, int extent, int num_cells) {
+    const int index =
+        static_cast<int>(position * static_cast<float>(num_cells) / static_cast<float>(extent));
+    return std::clamp(index, 0, num_cells - 1);
+  };
+  const int column = cell(picture_uv.x, size_.width, columns_);
+  const int row = cell(picture_uv.y, size_.height, rows_);
+  return static_cast<std::size_t>(row * columns_ + column);
+}
+
+bool GridQuota::has_room(const cv::Point2f& picture_uv) const {
+  return counts_[cell_of(picture_uv)] < quota_;
+}
+
+bool GridQuota::take(const cv::Point2f& picture_uv) {
+  int& count = counts_[cell_of(picture_uv)];
+  if (count >= quota_) {
+    return false;
+  }
+  ++count;
+  return true;
+}
+
+int GridQuota::num_free() const {
+  int num_free = 0;
+  for (const int count : counts_) {
+    num_free += quota_ - count;
+  }
+  return num_free;
+}
+
+}  // namespace stemvo

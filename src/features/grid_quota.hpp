@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/features/front_end.hpp"
+
+namespace stemvo {
+
+/// Counts keypoints per cell of a picture, so that no part of it takes all of them.
+class GridQuota {
+ public:
+  /// Quota per cell = max_features / cells, at least 1.
+  GridQuota(const FeatureOptions& options, cv::Size picture_size);
+
+  [[nodiscard]] bool has_room(const cv::Point2f& picture_uv) const;
+  /// Takes a place in the point's cell; false when the cell is full.
+  bool take(const cv::Point2f& picture_uv);
+  /// Places left in all cells together.
+  [[nodiscard]] int num_free() const;
+
+ private:
+  [[nodiscard]] std::size_t cell_of(const cv::Point2f& picture_uv) const;
+
+  int columns_;
+  int rows_;
+  int quota_;
+  cv::Size size_;
+  std::vector<int> counts_;
+};
+
+}  // namespace stemvo
