@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::dataset {
+
+/// A complete PNG as 8-bit picture: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors, naming
+/// the file: cannot be opened; not a PNG; cut off; damaged. A picture is never partly decoded: the
+/// chunks are walked to the end first, because some decoders fill what is missing with gray.
+[[nodiscard]] Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color);
+
+}  // namespace stemvo::dataset
