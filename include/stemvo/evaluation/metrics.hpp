@@ -43,6 +43,11 @@ struct Metrics {
                                std::span<const Rigid3> ground_truth,
                                const EvaluationOptions& options = {});
 
+/// The paper's offset, (E_x + E_y) / N_f: mean of |dx| + |dz| between the poses as they are
+/// (KITTI's ground plane is x-z). Same length, at least one pose (checked).
+[[nodiscard]] double average_offset_m(std::span<const Rigid3> estimate,
+                                      std::span<const Rigid3> ground_truth);
+
 /// The estimate moved to start at the identity and then fitted to the ground truth (also moved).
 [[nodiscard]] Trajectory align_trajectory(std::span<const Rigid3> estimate,
                                           std::span<const Rigid3> ground_truth,

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/evaluation/metrics.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "stemvo/check.hpp"
+
+namespace stemvo {
+
+namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
+constexpr double kShortPath_m = 100.0;       // below it no devkit segment fits
+constexpr double kDevkitLengths_m[] = {100, 200, 300, 400, 500, 600, 700, 800};
+constexpr double kShortLengths_m[] = {10, 20, 30, 40, 50};
+
+std::vector<Eigen::Vector3d> positions(std::span<const Rigid3> poses) {
+  std::vector<Eigen::Vector3d> result;
+  result.reserve(poses.size());
+  for (const Rigid3& pose : poses) {
+    result.push_back(pose.translation);
+  }
+  return result;
+}
+
+/// Metres driven up to each frame.
+std::vector<double> distances_m(std::span<const Rigid3> poses) {
+  std::vector<double> result(poses.size(), 0.0);
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    result[i] = result[i - 1] + (poses[i].translation - poses[i - 1].translation).norm();
+  }
+  return result;
+}
+
+Trajectory transform(std::span<const Rigid3> poses, const Similarity3& similarity) {
+  const Eigen::Quaterniond rotation(similarity.rotation);
+  Trajectory result;
+  result.reserve(poses.size());
+  for (const Rigid3& pose : poses) {
+    result.emplace_back(rotation * pose.rotation,
+                        similarity.scale * (rotation * pose.translation) + similarity.translation);
+  }
+  return result;
+}
+
+/// Both start at the identity. Umeyama's fit on positions.
+Trajectory align(std::span<const Rigid3> estimate,
+                 std::span<const Rigid3> ground_truth,
+                 Alignment alignment) {
+  return transform(estimate,
+                   align_positions(positions(estimate), positions(ground_truth), alignment));
+}
+
+double position_rmse_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    sum += (estimate[i].translation - ground_truth[i].translation).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(estimate.size()));
+}
+
+/// What is left of the true motion first -> last after undoing the estimated one (devkit).
+Rigid3 motion_error(std::span<const Rigid3> estimate,
+                    std::span<const Rigid3> ground_truth,
+                    std::size_t first,
+                    std::size_t last) {
+  const Rigid3 estimated = estimate[first].inverse() * estimate[last];
+  const Rigid3 truth = ground_truth[first].inverse() * ground_truth[last];
+  return estimated.inverse() * truth;
+}
+
+double mean_rotation_error_deg(std::span<const Rigid3> estimate,
+                               std::span<const Rigid3> ground_truth) {
+  if (estimate.size() < 2) {
+    return 0.0;
+  }
+  double sum_rad = 0.0;
+  for (std::size_t i = 1; i < estimate.size(); ++i) {
+    sum_rad += motion_error(estimate, ground_truth, i - 1, i).angle_rad();
+  }
+  return kDegPerRad * sum_rad / static_cast<double>(estimate.size() - 1);
+}
+
+/// First frame more than `length_m` behind `first`; the number of frames when there is none.
+std::size_t segment_end(std::span<const double> distances, std::size_t first, double length_m) {
+  std::size_t last = first;
+  while (last < distances.size() && !(distances[last] > distances[first] + length_m)) {
+    ++last;
+  }
+  return last;
+}
+
+/// t_rel and r_rel: mean over all segments of all lengths, each divided by its nominal length.
+void add_segment_errors(std::span<const Rigid3> estimate,
+                        std::span<const Rigid3> ground_truth,
+                        Metrics& metrics) {
+  const std::vector<double> distances = distances_m(ground_truth);
+  double t_sum = 0.0;
+  double r_sum_rad_per_m = 0.0;
+  for (std::size_t first = 0; first < ground_truth.size(); first += kFirstFrameStep) {
+    for (const double length_m : metrics.segment_lengths_m) {
+      const std::size_t last = segment_end(distances, first, length_m);
+      if (last == distances.size()) {
+        continue;
+      }
+      const Rigid3 error = motion_error(estimate, ground_truth, first, last);
+      t_sum += error.translation.norm() / length_m;
+      r_sum_rad_per_m += error.angle_rad() / length_m;
+      ++metrics.num_segments;
+    }
+  }
+  if (metrics.num_segments > 0) {
+    metrics.t_rel_percent = 100.0 * t_sum / metrics.num_segments;
+    metrics.r_rel_deg_per_100m = 100.0 * kDegPerRad * r_sum_rad_per_m / metrics.num_segments;
+  }
+}
+
+std::vector<double> segment_lengths(const EvaluationOptions& options, double path_length_m) {
+  if (!options.segment_lengths_m.empty()) {
+    return options.segment_lengths_m;
+  }
+  if (path_length_m < kShortPath_m) {
+    return {std::begin(kShortLengths_m), std::end(kShortLengths_m)};
+  }
+  return {std::begin(kDevkitLengths_m), std::end(kDevkitLengths_m)};
+}
+
+}  // namespace
+
+double average_offset_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
+  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
+  STEMVO_CHECK(!estimate.empty(), "at least one pose");
+  double sum = 0.0;
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    const Eigen::Vector3d offset = estimate[i].translation - ground_truth[i].translation;
+    sum += std::abs(offset.x()) + std::abs(offset.z());
+  }
+  return sum / static_cast<double>(estimate.size());
+}
+
+Metrics evaluate(std::span<const Rigid3> estimate,
+                 std::span<const Rigid3> ground_truth,
+                 const EvaluationOptions& options) {
+  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
+  STEMVO_CHECK(!estimate.empty(), "at least one pose");
+  const Trajectory est = relative_to_first(estimate);
+  const Trajectory truth = relative_to_first(ground_truth);
+
+  Metrics metrics;
+  metrics.path_length_m = distances_m(truth).back();
+  metrics.average_offset_m = average_offset_m(est, truth);
+  metrics.null_offset_m = average_offset_m(Trajectory(truth.size()), truth);
+  metrics.segment_lengths_m = segment_lengths(options, metrics.path_length_m);
+  add_segment_errors(est, truth, metrics);
+  metrics.ate_rmse.none_m = position_rmse_m(est, truth);
+  metrics.ate_rmse.scale_m = position_rmse_m(align(est, truth, Alignment::kScale), truth);
+  metrics.ate_rmse.se3_m = position_rmse_m(align(est, truth, Alignment::kSe3), truth);
+  metrics.ate_rmse.sim3_m = position_rmse_m(align(est, truth, Alignment::kSim3), truth);
+  metrics.rpe_rotation_deg = mean_rotation_error_deg(est, truth);
+  return metrics;
+}
+
+Trajectory align_trajectory(std::span<const Rigid3> estimate,
+                            std::span<const Rigid3> ground_truth,
+                            Alignment alignment) {
+  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
+  return align(relative_to_first(estimate), relative_to_first(ground_truth), alignment);
+}
+
+}  // namespace stemvo

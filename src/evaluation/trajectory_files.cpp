@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include <fmt/core.h>
+
+#include "evaluation/text_file.hpp"
+#include "stemvo/check.hpp"
+#include "stemvo/evaluation/trajectory.hpp"
+
+namespace stemvo {
+
+namespace {
+
+/// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
+constexpr double kRotationTolerance = 1e-3;
+
+Expected<Rigid3> pose_from_matrix_row(const std::vector<double>& numbers) {
+  const Matrix34d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kRotationTolerance)) {
+    return fail(fmt::format(
+        "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
+        deviation));
+  }
+  if (!(rotation.determinant() > 0.0)) {
+    return fail("expected a rotation in the first three columns, found a reflection");
+  }
+  return Rigid3::from_matrix(matrix);
+}
+
+Expected<Rigid3> pose_from_quaternion_row(const std::vector<double>& n) {
+  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
+  if (!(std::abs(rotation.norm() - 1.0) <= kRotationTolerance)) {
+    return fail(
+        fmt::format("expected a quaternion of length 1 in the last four numbers, found {:.6g}",
+                    rotation.norm()));
+  }
+  return Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]));
+}
+
+tl::unexpected<Error> fail_at(const std::filesystem::path& file,
+                              std::size_t index,
+                              const Error& error) {
+  return fail(fmt::format("{}:{}: {}", file.string(), index + 1, error.message));
+}
+
+/// Empty lines at the end of a file are no poses; within it they would shift the frame numbers.
+void drop_empty_tail(std::vector<std::string_view>& lines) {
+  while (!lines.empty() && split_words(lines.back()).empty()) {
+    lines.pop_back();
+  }
+}
+
+tl::unexpected<Error> fail_empty(const std::filesystem::path& file) {
+  return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
+}
+
+}  // namespace
+
+Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
+  const Expected<std::string> text = read_text_file(file);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  std::vector<std::string_view> lines = split_lines(*text);
+  drop_empty_tail(lines);
+  Trajectory poses;
+  poses.reserve(lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const Expected<Rigid3> pose = parse_numbers(lines[i], 12).and_then(pose_from_matrix_row);
+    if (!pose) {
+      return fail_at(file, i, pose.error());
+    }
+    poses.push_back(*pose);
+  }
+  if (poses.empty()) {
+    return fail_empty(file);
+  }
+  return poses;
+}
+
+Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file) {
+  const Expected<std::string> text = read_text_file(file);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  const std::vector<std::string_view> lines = split_lines(*text);
+  TimedTrajectory result;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string_view line = lines[i].substr(0, lines[i].find('#'));
+    if (split_words(line).empty()) {
+      continue;
+    }
+    const Expected<std::vector<double>> numbers = parse_numbers(line, 8);
+    if (!numbers) {
+      return fail_at(file, i, numbers.error());
+    }
+    const Expected<Rigid3> pose = pose_from_quaternion_row(*numbers);
+    if (!pose) {
+      return fail_at(file, i, pose.error());
+    }
+    result.timestamps_s.push_back(numbers->front());
+    result.world_from_camera.push_back(*pose);
+  }
+  if (result.world_from_camera.empty()) {
+    return fail_empty(file);
+  }
+  return result;
+}
+
+Status write_kitti_trajectory(const std::filesystem::path& file,
+                              std::span<const Rigid3> world_from_camera) {
+  std::string text;
+  for (const Rigid3& pose : world_from_camera) {
+    const Matrix34d matrix = pose.matrix();
+    for (int i = 0; i < 12; ++i) {
+      // + 0.0 turns -0 into 0.
+      fmt::format_to(std::back_inserter(text), "{:.12e}{}", matrix(i / 4, i % 4) + 0.0,
+                     i == 11 ? '\n' : ' ');
+    }
+  }
+  return write_text_file(file, text);
+}
+
+Status write_tum_trajectory(const std::filesystem::path& file,
+                            std::span<const double> timestamps_s,
+                            std::span<const Rigid3> world_from_camera) {
+  STEMVO_CHECK(timestamps_s.size() == world_from_camera.size(), "one timestamp per pose");
+  std::string text;
+  for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
+    const Eigen::Vector3d t = world_from_camera[i].translation.array() + 0.0;
+    const Eigen::Array4d q = world_from_camera[i].rotation.coeffs().array() + 0.0;
+    fmt::format_to(std::back_inserter(text),
+                   "{:.9f} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e} {:.12e}\n",
+                   timestamps_s[i], t.x(), t.y(), t.z(), q[0], q[1], q[2], q[3]);
+  }
+  return write_text_file(file, text);
+}
+
+}  // namespace stemvo
