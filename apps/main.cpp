@@ -1,2 +1,6 @@
 // SPDX-License-Identifier: MIT
-int main() { return 0; }
+#include <fmt/core.h>
+
+#include "stemvo/config.hpp"
+
+int main() { fmt::print("{}", stemvo::dump_config({})); }

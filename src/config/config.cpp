@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/config.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "config/config_fields.hpp"
+#include "config/config_text.hpp"
+#include "config/config_yaml.hpp"
+
+namespace stemvo {
+namespace {
+
+Expected<std::string> read_text(const std::filesystem::path& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error)) {
+    return fail(fmt::format("{}: expected a configuration file, found a folder", file.string()));
+  }
+  std::ifstream in(file, std::ios::binary);
+  if (!in) {
+    return fail(fmt::format("{}: expected a configuration file, found none that can be read ({})",
+                            file.string(), std::strerror(errno)));
+  }
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+/// A list is written as in the file; anything else is taken as it stands, so that a path may hold
+/// any character.
+std::string read_assigned(const std::string& text, const config::Field& field) {
+  if (!std::holds_alternative<std::vector<double>*>(field.value)) {
+    const std::string problem = config::parse_scalar(field, text);
+    return problem.empty() ? config::violation_of(field) : problem;
+  }
+  const Expected<YAML::Node> value = config::parse_document(text, "value");
+  return value ? config::read_value(*value, field) : value.error().message;
+}
+
+}  // namespace
+
+Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
+  const Expected<std::string> text = read_text(file);
+  if (!text) {
+    return tl::unexpected(text.error());
+  }
+  const Expected<YAML::Node> root = config::parse_document(*text, file.string());
+  if (!root) {
+    return tl::unexpected(root.error());
+  }
+  Config result = base;
+  std::vector<config::Field> fields = config::fields_of(result);
+  if (Status status = config::read_document(*root, file.string(), fields); !status) {
+    return tl::unexpected(status.error());
+  }
+  return result;
+}
+
+Status apply_override(Config& config, const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos) {
+    return fail(fmt::format("--set {}: expected key=value, as in stem.filter=10", assignment));
+  }
+  const std::string name = assignment.substr(0, equals);
+  const std::string source = "--set " + name;
+  Config changed = config;
+  const std::vector<config::Field> fields = config::fields_of(changed);
+  const auto field = std::find_if(fields.begin(), fields.end(),
+                                  [&name](const config::Field& f) { return f.name() == name; });
+  if (field == fields.end()) {
+    const std::string section = name.substr(0, name.find('.'));
+    const bool is_section = std::any_of(fields.begin(), fields.end(),
+                                        [&](const auto& f) { return f.section == section; });
+    return fail(source + ": " + config::unknown_key(is_section ? section : "", fields));
+  }
+  const std::string problem = read_assigned(assignment.substr(equals + 1), *field);
+  if (!problem.empty()) {
+    return fail(source + ": " + problem);
+  }
+  config = changed;
+  return {};
+}
+
+Status validate(const Config& config) {
+  Config copy = config;
+  for (const config::Field& field : config::fields_of(copy)) {
+    if (const std::string problem = config::violation_of(field); !problem.empty()) {
+      return fail(field.name() + ": " + problem);
+    }
+  }
+  if (!(config.stem.stretch_low_percent < config.stem.stretch_high_percent)) {
+    return fail(fmt::format(
+        "stem.stretch_low_percent: expected less than stem.stretch_high_percent ({}), found {}",
+        config.stem.stretch_high_percent, config.stem.stretch_low_percent));
+  }
+  return {};
+}
+
+std::string dump_config(const Config& config) {
+  Config copy = config;
+  std::string text;
+  std::string_view section;
+  for (const config::Field& field : config::fields_of(copy)) {
+    if (field.section != section) {
+      section = field.section;
+      text += section.empty() ? "\n" : fmt::format("{}{}:\n", text.empty() ? "" : "\n", section);
+    }
+    const std::string_view indent = section.empty() ? "" : "  ";
+    text += fmt::format("{0}# {1}\n{0}{2}: {3}\n", indent, field.help, field.key,
+                        config::format_value(field));
+  }
+  return text;
+}
+
+}  // namespace stemvo

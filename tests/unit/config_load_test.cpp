@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "stemvo/config.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+class ConfigLoad : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    file_ = std::filesystem::temp_directory_path() /
+            ("stemvo_config_" + std::to_string(::getpid()) + "_" + name + ".yaml");
+  }
+  void TearDown() override { std::filesystem::remove(file_); }
+
+  Expected<Config> load(const std::string& text) {
+    std::ofstream(file_, std::ios::binary) << text;
+    return load_config(file_);
+  }
+  /// The error without the folder: "<name>.yaml:3: ...".
+  std::string error_of(const std::string& text) {
+    const Expected<Config> config = load(text);
+    if (config) {
+      return "no error";
+    }
+    EXPECT_THAT(config.error().message, Not(HasSubstr("\n")));
+    EXPECT_THAT(config.error().message, StartsWith(file_.string()));
+    return config.error().message.substr(file_.string().size());
+  }
+
+  std::filesystem::path file_;
+};
+
+TEST_F(ConfigLoad, ReadsEveryKindOfValueOverTheDefaults) {
+  const Expected<Config> config = load(
+      "stem:\n  model: input_layer\n  filter: 2\n"
+      "two_view:\n  refine: false\n  sigma_px: 2.5\n"
+      "evaluation:\n  segment_lengths_m: [10, 20.5]\n"
+      "seed: 18446744073709551615\n");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->stem.model, "input_layer");
+  EXPECT_EQ(config->stem.filter, 2);
+  EXPECT_FALSE(config->two_view.refine);
+  EXPECT_EQ(config->two_view.sigma_px, 2.5);
+  EXPECT_THAT(config->evaluation.segment_lengths_m, ::testing::ElementsAre(10.0, 20.5));
+  EXPECT_EQ(config->seed, std::numeric_limits<std::uint64_t>::max());
+  EXPECT_EQ(config->features.method, Config{}.features.method);
+}
+
+TEST_F(ConfigLoad, EmptyFileAndEmptySectionAreTheDefaults) {
+  EXPECT_EQ(dump_config(load("").value()), dump_config({}));
+  EXPECT_EQ(dump_config(load("stem:\n# filter: 3\n").value()), dump_config({}));
+}
+
+TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
+  EXPECT_THAT(error_of("stem:\n  model: gray\n  filtre: 3\n"),
+              StartsWith(":3: stem.filtre: unknown key; known keys of stem: model, filter, "));
+  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"),
+              StartsWith(":2: stm: unknown key; known keys: input, stem, features, "));
+  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", seed"));
+}
+
+TEST_F(ConfigLoad, DuplicatedKeyNamesBothLines) {
+  EXPECT_THAT(error_of("stem:\n  filter: 3\n  filter: 4\n"),
+              StartsWith(":3: stem.filter: duplicated key; it stands on line 2 already"));
+  EXPECT_THAT(error_of("stem:\n  filter: 3\nseed: 1\nstem:\n  model: gray\n"),
+              StartsWith(":4: stem: duplicated key; it stands on line 1 already"));
+}
+
+TEST_F(ConfigLoad, WrongTypeSaysWhatWasExpectedAndFound) {
+  EXPECT_EQ(error_of("stem:\n  filter: ten\n"),
+            ":2: stem.filter: expected a whole number, found 'ten'");
+  EXPECT_EQ(error_of("stem:\n  filter: 1.5\n"),
+            ":2: stem.filter: expected a whole number, found '1.5'");
+  EXPECT_EQ(error_of("stem:\n  filter: [1]\n"),
+            ":2: stem.filter: expected one value, found a list");
+  EXPECT_EQ(error_of("stem:\n  filter:\n"), ":2: stem.filter: expected one value, found nothing");
+  EXPECT_EQ(error_of("stem: 3\n"), ":1: stem: expected keys with values, found a value");
+  EXPECT_EQ(error_of("- 1\n- 2\n"), ":1: expected keys with values, found a list");
+  EXPECT_EQ(error_of("two_view:\n  refine: yes\n"),
+            ":2: two_view.refine: expected true or false, found 'yes'");
+  EXPECT_EQ(error_of("evaluation:\n  segment_lengths_m: 10, 20\n"),
+            ":2: evaluation.segment_lengths_m: expected a list of numbers like [100, 200], found "
+            "'10, 20'");
+  EXPECT_EQ(error_of("evaluation:\n  segment_lengths_m: [10, [20]]\n"),
+            ":2: evaluation.segment_lengths_m: expected a list of numbers, found a list in it");
+}
+
+TEST_F(ConfigLoad, ValueOutOfRangeNamesTheLine) {
+  EXPECT_EQ(error_of("seed: 1\nstem:\n  filter: -1\n"),
+            ":3: stem.filter: expected a whole number of at least 0, found -1");
+  EXPECT_EQ(error_of("features:\n  method: surf\n"),
+            ":2: features.method: expected one of klt, orb, sift, found 'surf'");
+  EXPECT_EQ(error_of("features:\n  klt_window: 20\n"),
+            ":2: features.klt_window: expected a whole number odd, from 3 to 201, found 20");
+  EXPECT_EQ(error_of("scale:\n  constant_m: nan\n"),
+            ":2: scale.constant_m: expected a number above 0, found nan");
+  EXPECT_EQ(error_of("scale:\n  constant_m: inf\n"),
+            ":2: scale.constant_m: expected a number above 0, found inf");
+  EXPECT_EQ(error_of("seed: -1\n"), ":1: seed: expected a whole number of at least 0, found '-1'");
+  EXPECT_EQ(error_of("stem:\n  filter: 99999999999\n"),
+            ":2: stem.filter: expected a whole number, found '99999999999'");
+}
+
+TEST_F(ConfigLoad, LeadingZerosAreDecimal) {
+  EXPECT_EQ(load("stem:\n  filter: 010\n")->stem.filter, 10);
+}
+
+TEST_F(ConfigLoad, NotYamlNamesTheLine) {
+  EXPECT_THAT(error_of("seed: 1\nstem: [1,\n"), StartsWith(":3: not YAML: "));
+  EXPECT_THAT(error_of("seed: 1\n---\nseed: 2\n"),
+              HasSubstr("expected one YAML document, found 2"));
+  EXPECT_THAT(error_of(std::string("\x89PNG\r\n\x1a\n\0\0", 10)), HasSubstr(": not YAML: "));
+}
+
+TEST_F(ConfigLoad, MissingFileIsNamed) {
+  const Expected<Config> config = load_config(file_.string() + ".none");
+  ASSERT_FALSE(config);
+  EXPECT_THAT(config.error().message, HasSubstr(file_.string() + ".none"));
+  EXPECT_THAT(load_config(std::filesystem::temp_directory_path()).error().message,
+              HasSubstr("found a folder"));
+}
+
+TEST_F(ConfigLoad, DumpReadsBackToTheSameBits) {
+  Config config;
+  config.stem.model = "models/a b: \"c\" #\n\xc3\xa9.onnx";
+  config.two_view.sigma_px = 0.1 + 0.2;
+  config.two_view.refine_loss_px = std::nextafter(1.0, 2.0);
+  config.scale.constant_m = 1e-300;
+  config.scale.camera_height_m = 1e22;
+  config.evaluation.segment_lengths_m = {1.0 / 3.0, 5.0};
+  config.seed = std::numeric_limits<std::uint64_t>::max();
+  const Expected<Config> read = load(dump_config(config));
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->stem.model, config.stem.model);
+  EXPECT_EQ(read->two_view.sigma_px, config.two_view.sigma_px);
+  EXPECT_EQ(read->two_view.refine_loss_px, config.two_view.refine_loss_px);
+  EXPECT_EQ(read->scale.constant_m, config.scale.constant_m);
+  EXPECT_EQ(read->evaluation.segment_lengths_m, config.evaluation.segment_lengths_m);
+  EXPECT_EQ(dump_config(*read), dump_config(config));
+  for (const char* model : {"null", "~", "10", "true", "-", "- a", "a: b", "#x"}) {
+    config.stem.model = model;
+    const Expected<Config> again = load(dump_config(config));
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->stem.model, model);
+  }
+}
+
+TEST(ConfigOverride, SetsOneKey) {
+  Config config;
+  ASSERT_TRUE(apply_override(config, "stem.filter=10"));
+  ASSERT_TRUE(apply_override(config, "stem.model=models/odd: name=1.onnx"));
+  ASSERT_TRUE(apply_override(config, "evaluation.segment_lengths_m=[10,20]"));
+  ASSERT_TRUE(apply_override(config, "seed=7"));
+  EXPECT_EQ(config.stem.filter, 10);
+  EXPECT_EQ(config.stem.model, "models/odd: name=1.onnx");
+  EXPECT_THAT(config.evaluation.segment_lengths_m, ::testing::ElementsAre(10.0, 20.0));
+  EXPECT_EQ(config.seed, 7U);
+  ASSERT_TRUE(apply_override(config, "evaluation.segment_lengths_m=[]"));
+  EXPECT_TRUE(config.evaluation.segment_lengths_m.empty());
+}
+
+TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
+  Config config;
+  const auto error_of = [&config](const std::string& assignment) {
+    const Status status = apply_override(config, assignment);
+    EXPECT_EQ(dump_config(config), dump_config({}));
+    return status ? std::string("no error") : status.error().message;
+  };
+  EXPECT_THAT(error_of("stem.filtre=1"),
+              StartsWith("--set stem.filtre: unknown key; known keys of stem: model, "));
+  EXPECT_THAT(error_of("stm=1"), StartsWith("--set stm: unknown key; known keys: input, "));
+  EXPECT_THAT(error_of("stem=1"), StartsWith("--set stem: unknown key; known keys of stem: "));
+  EXPECT_THAT(error_of("stem.filter"), HasSubstr("expected key=value"));
+  EXPECT_EQ(error_of("stem.filter=a"), "--set stem.filter: expected a whole number, found 'a'");
+  EXPECT_EQ(error_of("scale.source=gps"),
+            "--set scale.source: expected one of constant, ground_truth, found 'gps'");
+  EXPECT_EQ(error_of("stem.model="), "--set stem.model: expected a text, found nothing");
+  EXPECT_EQ(error_of("evaluation.segment_lengths_m=[10,-20]"),
+            "--set evaluation.segment_lengths_m: expected a number above 0, found -20");
+  EXPECT_THAT(error_of("evaluation.segment_lengths_m=[10"), HasSubstr("not YAML"));
+}
+
+TEST(ConfigValidate, EveryNumberRefusesNan) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(validate({}));
+  const auto refuses = [nan](auto&& member) {
+    Config config;
+    member(config) = nan;
+    return !validate(config);
+  };
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.sigma_px; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.homography_ratio; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.scale.constant_m; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.features.min_distance_px; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.stem.stretch_low_percent; }));
+  Config config;
+  config.evaluation.segment_lengths_m = {100.0, nan};
+  EXPECT_FALSE(validate(config));
+}
+
+TEST(ConfigValidate, PercentilesMustBeInOrder) {
+  Config config;
+  config.stem.stretch_low_percent = 99.9;
+  ASSERT_FALSE(validate(config));
+  EXPECT_THAT(validate(config).error().message,
+              StartsWith("stem.stretch_low_percent: expected less than "));
+}
+
+TEST(ConfigFiles, DefaultYamlIsWhatTheProgramWrites) {
+  std::ifstream in(STEMVO_SOURCE_DIR "/config/default.yaml", std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  EXPECT_EQ(text, dump_config({}))
+      << "config/default.yaml is stale: run 'stemvo --dump-config > config/default.yaml'";
+}
+
+TEST(ConfigFiles, PaperYamlLoads) {
+  const Expected<Config> config = load_config(STEMVO_SOURCE_DIR "/config/paper.yaml");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_TRUE(validate(*config));
+  EXPECT_EQ(config->stem.filter, 10);
+  EXPECT_EQ(config->odometry.composition, "paper");
+  EXPECT_EQ(config->odometry.gate, "paper");
+}
+
+}  // namespace
+}  // namespace stemvo
