@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+# Thin calls to the scripts and presets; `make help` lists them.
+JOBS ?= $(shell nproc)
+
+.PHONY: help setup build demo test format check-format lint clean
+
+help:
+	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
+	@echo "make build         install what is missing, build the program build/release/stemvo"
+	@echo "make test          install what is missing, build, run all tests"
+	@echo "make format        rewrite the C++ sources in the project's format"
+	@echo "make check-format  fail where a source is not in that format or names no licence"
+	@echo "make lint          run clang-tidy over the library and the program"
+	@echo "make clean         remove what was built (build/venv and ONNX Runtime stay)"
+
+setup:
+	@tools/setup.sh
+
+build: setup
+	@echo "==> Building build/release/stemvo"
+	@cmake --preset release --log-level=WARNING >build/setup/configure.log || { cat build/setup/configure.log; exit 1; }
+	@cmake --build --preset release --parallel $(JOBS) --target stemvo_app
+
+demo: build
+	@tools/demo.sh
+
+test: build
+	@echo "==> Building the tests"
+	@cmake --build --preset release --parallel $(JOBS)
+	@echo "==> Running all tests"
+	@ctest --preset release --parallel $(JOBS)
+
+format: setup
+	@tools/format.sh
+
+check-format: setup
+	@tools/format.sh --check
+
+lint: setup
+	@tools/lint.sh
+
+clean:
+	@rm -rf build/release build/dev build/asan build/tidy build/demo

@@ -1,0 +1,165 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, a Python environment.
+# Safe to repeat; takes about a second when nothing is missing. Called by `make build`.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+readonly LOGS=build/setup
+readonly VENV=build/venv
+readonly ORT_DIR=third_party/onnxruntime/lib
+
+# docs/dependencies.md says why each is here.
+readonly PACKAGES=(
+  build-essential cmake ninja-build pkg-config ccache git ca-certificates
+  libopencv-dev libeigen3-dev libceres-dev libyaml-cpp-dev libcli11-dev libspdlog-dev libfmt-dev
+  nlohmann-json3-dev libexpected-dev libtbb-dev libcairo2-dev fonts-dejavu-core
+  libgtest-dev libgmock-dev python3 python3-venv
+)
+
+say() { printf '==> %s\n' "$*"; }
+die() {
+  printf 'setup: %s\n' "$*" >&2
+  exit 1
+}
+
+# The last lines of a log that name a dead network, whichever client wrote it.
+network_failed() {
+  grep -qiE 'could not resolve|temporary failure|unable to connect|cannot initiate the connection|failed to establish|connection (refused|timed out|reset|failed)|connecttimeout|read timed out|network is unreachable|name or service not known|max retries' "$@"
+}
+
+check_system() {
+  local id="unknown" version=""
+  if [[ -r /etc/os-release ]]; then
+    id=$(. /etc/os-release && echo "${ID:-unknown}")
+    version=$(. /etc/os-release && echo "${VERSION_ID:-}")
+  fi
+  case "$id-$version" in
+    debian-12 | debian-13 | ubuntu-24.04) ;;
+    *)
+      [[ -n "${STEMVO_SKIP_APT:-}" ]] && return
+      die "expected Debian 12, Debian 13 or Ubuntu 24.04, found '$id $version': install the equivalents of these packages, then repeat with STEMVO_SKIP_APT=1: ${PACKAGES[*]}"
+      ;;
+  esac
+  case "$(uname -m)" in
+    x86_64 | aarch64) ;;
+    *) die "expected an x86_64 or aarch64 machine, found $(uname -m): ONNX Runtime has no library for it" ;;
+  esac
+}
+
+missing_packages() {
+  local installed
+  installed=$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' "${PACKAGES[@]}" 2>/dev/null |
+    sed -n 's/^installed //p' || true)
+  comm -23 <(printf '%s\n' "${PACKAGES[@]}" | sort -u) <(sort -u <<<"$installed")
+}
+
+install_packages() {
+  [[ -n "${STEMVO_SKIP_APT:-}" ]] && return
+  local missing as_root=()
+  mapfile -t missing < <(missing_packages)
+  ((${#missing[@]} == 0)) && return
+  local by_hand="run as root: apt-get update && apt-get install ${missing[*]}"
+  if ((EUID != 0)); then
+    command -v sudo >/dev/null || die "packages are missing, you are not root and there is no sudo; $by_hand"
+    # Without a terminal sudo cannot ask for a password.
+    if [[ -t 0 ]]; then sudo -v || die "packages are missing and sudo refused; $by_hand"
+    else sudo -n true 2>/dev/null || die "packages are missing and sudo wants a password; $by_hand"; fi
+    as_root=(sudo)
+  fi
+  as_root+=(env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300)
+  say "Installing ${#missing[@]} apt packages (log: $LOGS/apt.log): ${missing[*]}"
+  # A broken third-party source must not stop us: only the install decides.
+  "${as_root[@]}" update </dev/null >"$LOGS/apt.log" 2>&1 || true
+  if ! "${as_root[@]}" install -y --no-install-recommends "${missing[@]}" </dev/null >>"$LOGS/apt.log" 2>&1; then
+    network_failed "$LOGS/apt.log" && die "no network: apt-get could not fetch the packages (log: $LOGS/apt.log)"
+    die "apt-get install failed: $(grep -m1 '^E:' "$LOGS/apt.log" || echo unknown) (log: $LOGS/apt.log)"
+  fi
+}
+
+# version_at_least FOUND NEEDED
+version_at_least() { [[ "$(printf '%s\n%s\n' "$2" "$1" | sort -V | head -n1)" == "$2" ]]; }
+
+check_toolchain() {
+  local cxx=${CXX:-g++} needed=12 found
+  # CXX may carry a launcher or flags ("ccache g++"): ask it as it is.
+  # shellcheck disable=SC2086
+  found=$($cxx -dumpfullversion -dumpversion 2>/dev/null) || die "no C++ compiler: '$cxx' does not run"
+  # shellcheck disable=SC2086
+  $cxx --version | grep -qi clang && needed=15
+  version_at_least "$found" "$needed" || die "compiler too old: '$cxx' is version $found, needed $needed or newer (set CXX)"
+  found=$(cmake --version 2>/dev/null | sed -n '1s/[^0-9]*//p') || true
+  [[ -n "$found" ]] || die "cmake does not run"
+  version_at_least "$found" 3.25 || die "cmake too old: $(command -v cmake) is version $found, needed 3.25 or newer"
+}
+
+# The first Python that the pinned wheels exist for and that can make environments.
+find_python() {
+  local python
+  for python in python3 /usr/bin/python3; do
+    if "$python" -c 'import sys, ensurepip, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null; then
+      echo "$python"
+      return
+    fi
+  done
+  die "no Python 3.11 to 3.14 with the venv module: expected python3 on PATH or /usr/bin/python3 to be one"
+}
+
+pip_failed() { # pip_failed WHAT LOG
+  network_failed "$2" && die "no network: pip could not fetch $1 (log: $2)"
+  die "pip could not fetch $1: $(grep -m1 -E '^ *ERROR' "$2" || echo unknown) (log: $2)"
+}
+
+make_venv() {
+  local python wanted files=(tools/requirements.txt tools/requirements-format.txt)
+  # The path is part of it because scripts of an environment hold it.
+  wanted="$PWD $(cat "${files[@]}" | sha256sum)"
+  if [[ -f $VENV/stamp && "$(<"$VENV/stamp")" == "$wanted" ]] && "$VENV/bin/python" -c '' 2>/dev/null; then
+    return
+  fi
+  python=$(find_python)
+  say "Making the Python environment $VENV (log: $LOGS/venv.log)"
+  rm -rf "$VENV"
+  "$python" -m venv "$VENV" >"$LOGS/venv.log" 2>&1 || die "'$python -m venv $VENV' failed (log: $LOGS/venv.log)"
+  "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --only-binary=:all: \
+    --require-hashes "${files[@]/#/--requirement=}" </dev/null >>"$LOGS/venv.log" 2>&1 ||
+    pip_failed "the Python packages" "$LOGS/venv.log"
+  echo "$wanted" >"$VENV/stamp"
+}
+
+# Only the library inside the wheel is used, so one Python tag serves every Python.
+install_onnxruntime() {
+  local version=1.31.1 sha256 stamp=$ORT_DIR/SHA256SUMS wheel
+  case "$(uname -m)" in
+    x86_64) sha256=74a6a52994616c4d18b33db1e13c226333a70a6ba07480a5cab9c2a50dff1430 ;;
+    aarch64) sha256=dcaedc50333876f3829ab966b242147f0e548229e29c36fe44622ecf748c25ee ;;
+  esac
+  if grep -qsF "# wheel $sha256" "$stamp" && (cd "$ORT_DIR" && sha256sum --check --status SHA256SUMS); then
+    return
+  fi
+  say "Fetching ONNX Runtime $version to $ORT_DIR (log: $LOGS/onnxruntime.log)"
+  rm -rf "$ORT_DIR" "$LOGS/onnxruntime"
+  mkdir -p "$ORT_DIR" "$LOGS/onnxruntime"
+  "$VENV/bin/python" -m pip download --disable-pip-version-check --no-input --no-deps --only-binary=:all: \
+    --platform "manylinux_2_28_$(uname -m)" --python-version 3.13 --implementation cp --abi cp313 \
+    --dest "$LOGS/onnxruntime" "onnxruntime==$version" </dev/null >"$LOGS/onnxruntime.log" 2>&1 ||
+    pip_failed "onnxruntime==$version" "$LOGS/onnxruntime.log"
+  wheel=$(echo "$LOGS"/onnxruntime/*.whl)
+  [[ "$(sha256sum <"$wheel")" == "$sha256  -" ]] ||
+    die "$wheel: expected SHA256 $sha256, found $(sha256sum <"$wheel" | cut -d' ' -f1)"
+  "$VENV/bin/python" -m zipfile -e "$wheel" "$LOGS/onnxruntime"
+  cp "$LOGS"/onnxruntime/onnxruntime/capi/libonnxruntime.so.* "$ORT_DIR/"
+  cp "$LOGS"/onnxruntime/onnxruntime/{LICENSE,ThirdPartyNotices.txt} "$ORT_DIR/"
+  ln -sf "libonnxruntime.so.$version" "$ORT_DIR/libonnxruntime.so.1"
+  rm -rf "$LOGS/onnxruntime"
+  (cd "$ORT_DIR" && { echo "# wheel $sha256"; sha256sum libonnxruntime.so.1 "libonnxruntime.so.$version"; } >SHA256SUMS.new)
+  mv "$ORT_DIR/SHA256SUMS.new" "$stamp"
+}
+
+mkdir -p "$LOGS" "$ORT_DIR" 2>/dev/null && [[ -w $LOGS && -w $ORT_DIR ]] ||
+  die "$PWD/build and $PWD/$ORT_DIR must be writable: they may belong to root from an earlier 'sudo make'"
+check_system
+install_packages
+check_toolchain
+make_venv
+install_onnxruntime
