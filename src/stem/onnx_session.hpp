@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/error.hpp"
+
+struct OrtApi;
+struct OrtEnv;
+struct OrtMemoryInfo;
+struct OrtSession;
+
+namespace stemvo::internal {
+
+/// Something of ONNX Runtime, freed by the runtime's own release function.
+template <typename T>
+using OnnxHandle = std::unique_ptr<T, void (*)(T*)>;
+
+/// A stem's graph, loaded: `image` 1x3xHxW float -> `channels` 1xCxhxw float. The only class that
+/// sees ONNX Runtime. Single-threaded inside; `run` may be called from several threads at once.
+class OnnxSession {
+ public:
+  /// `model` holds the bytes of the .onnx file, `label` is what messages call it (its path).
+  /// Errors: not a model, other names, element types, ranks or shapes than above.
+  [[nodiscard]] static Expected<OnnxSession> create(const std::string& label,
+                                                    std::string_view model);
+
+  [[nodiscard]] int num_filters() const { return num_filters_; }
+  /// The only size of image the graph takes; 0 where an axis is free.
+  [[nodiscard]] cv::Size fixed_size() const { return fixed_size_; }
+
+  /// Size of each channel for an image of this size, by asking the graph. Error: it refused.
+  [[nodiscard]] Expected<cv::Size> channel_size(cv::Size image_size) const;
+
+  /// One pass. `image`: 3 planes of image_size; `channels`: num_filters() planes of channel_size.
+  /// Both are used where they are, without a copy. Error: the runtime refused.
+  [[nodiscard]] Status run(const float* image,
+                           cv::Size image_size,
+                           float* channels,
+                           cv::Size channel_size) const;
+
+ private:
+  OnnxSession(std::string label,
+              const OrtApi& api,
+              OnnxHandle<OrtEnv> env,
+              OnnxHandle<OrtMemoryInfo> memory,
+              OnnxHandle<OrtSession> session);
+  [[nodiscard]] Status check_graph();
+
+  std::string label_;
+  const OrtApi* api_;
+  OnnxHandle<OrtEnv> env_;  // must outlive the session: declared before it
+  OnnxHandle<OrtMemoryInfo> memory_;
+  OnnxHandle<OrtSession> session_;
+  int num_filters_ = 0;
+  cv::Size fixed_size_;
+};
+
+}  // namespace stemvo::internal

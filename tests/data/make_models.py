@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Writes tests/data/stems/*.onnx: tiny stems with weights by formula (the tests compute the same
+ones, see tests/support/tiny_stem.hpp), and models that must be refused.
+
+    python3 tests/data/make_models.py       # needs numpy and onnx
+"""
+
+import pathlib
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+OUT = pathlib.Path(__file__).parent / "stems"
+MEAN = np.array([120.0, 115.0, 110.0], np.float32)
+
+
+def weights(filters, kernel):
+    """Filter 0 is a box over all colours; the others are whole numbers with no symmetry."""
+    o, c, y, x = np.meshgrid(range(filters), range(3), range(kernel), range(kernel), indexing="ij")
+    w = ((7 * o + 5 * c + 3 * y + 11 * x + o * x * y) % 13 - 6) / (20.0 * kernel)
+    w[0] = 1.0 / (3 * kernel * kernel)
+    return w.astype(np.float32)
+
+
+def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W")):
+    constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
+                 numpy_helper.from_array(weights(filters, kernel), "weights")]
+    nodes = [helper.make_node("Sub", ["image", "mean"], ["centred"]),
+             helper.make_node("Conv", ["centred", "weights"], ["response" if layer_norm else "channels"],
+                              kernel_shape=[kernel] * 2, strides=[stride] * 2, pads=pads)]
+    if layer_norm:
+        constants += [numpy_helper.from_array(np.full((1, 1, 1, 1), 1e-6, np.float32), "epsilon")]
+        nodes += [helper.make_node("ReduceMean", ["response"], ["m"], axes=[1]),
+                  helper.make_node("Sub", ["response", "m"], ["d"]),
+                  helper.make_node("Mul", ["d", "d"], ["d2"]),
+                  helper.make_node("ReduceMean", ["d2"], ["v"], axes=[1]),
+                  helper.make_node("Add", ["v", "epsilon"], ["ve"]),
+                  helper.make_node("Sqrt", ["ve"], ["s"]),
+                  helper.make_node("Div", ["d", "s"], ["channels"])]
+    write(name, nodes, [value("image", [1, 3, *size])], [value("channels", [1, filters, "h", "w"])], constants)
+
+
+def value(name, shape, kind=TensorProto.FLOAT):
+    return helper.make_tensor_value_info(name, kind, shape)
+
+
+def write(name, nodes, inputs, outputs, constants=()):
+    graph = helper.make_graph(nodes, name, inputs, outputs, list(constants))
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], producer_name="stemvo tests")
+    model.ir_version = 7
+    onnx.checker.check_model(model)
+    (OUT / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
+
+
+def identity(name, inputs, outputs):
+    """A model of the given shapes that copies its input, to be refused at load."""
+    write(name, [helper.make_node("Identity", [inputs[0].name], [outputs[0].name])], inputs, outputs)
+
+
+def main():
+    OUT.mkdir(exist_ok=True)
+    none = [0, 0, 0, 0]
+    stem("plain_k4s4", 3, 4, 4, none)
+    stem("norm_k4s4", 6, 4, 4, none, layer_norm=True)
+    stem("plain_k3s2p1", 3, 3, 2, [1, 1, 1, 1])
+    stem("plain_k3s2same", 3, 3, 2, [0, 0, 1, 1])
+    stem("plain_k7s2p3", 3, 7, 2, [3, 3, 3, 3])
+    stem("fixed_k4s4", 3, 4, 4, none, size=(32, 48))
+
+    picture, shape = ["H", "W"], [1, 3, "H", "W"]
+    identity("wrong_input_name", [value("x", shape)], [value("channels", shape)])
+    identity("wrong_output_name", [value("image", shape)], [value("y", shape)])
+    identity("wrong_rank", [value("image", [3, *picture])], [value("channels", [3, *picture])])
+    identity("wrong_planes", [value("image", [1, 1, *picture])], [value("channels", [1, 1, *picture])])
+    identity("wrong_type", [value("image", shape, TensorProto.UINT8)], [value("channels", shape, TensorProto.UINT8)])
+    write("wrong_free_filters", [helper.make_node("Compress", ["image", "which"], ["channels"], axis=1)],
+          [value("image", shape)], [value("channels", [1, "C", *picture])],
+          [numpy_helper.from_array(np.array([True, False, True]), "which")])
+    write("wrong_two_inputs", [helper.make_node("Add", ["image", "more"], ["channels"])],
+          [value("image", shape), value("more", shape)], [value("channels", shape)])
+    write("wrong_two_outputs", [helper.make_node("Identity", ["image"], ["channels"]),
+                                helper.make_node("Neg", ["image"], ["more"])],
+          [value("image", shape)], [value("channels", shape), value("more", shape)])
+    write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
+          [value("image", shape)], [value("channels", [1, *picture])])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stem/onnx_session.hpp"
+
+namespace stemvo::internal {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string read_model(const std::string& name) {
+  std::ifstream file(std::string(STEMVO_SOURCE_DIR) + "/tests/data/stems/" + name,
+                     std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string error_of(const std::string& name, const std::string& bytes) {
+  const auto session = OnnxSession::create(name, bytes);
+  return session ? "no error" : session.error().message;
+}
+
+TEST(OnnxSession, LoadsAStem) {
+  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->num_filters(), 3);
+  EXPECT_EQ(session->fixed_size(), cv::Size(0, 0));
+  EXPECT_EQ(session->channel_size({31, 17}).value(), cv::Size(7, 4));
+}
+
+TEST(OnnxSession, LoadsAStemOfOneSize) {
+  const auto session = OnnxSession::create("fixed", read_model("fixed_k4s4.onnx"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->fixed_size(), cv::Size(48, 32));
+  EXPECT_EQ(session->channel_size({48, 32}).value(), cv::Size(12, 8));
+  EXPECT_THAT(session->channel_size({40, 32}).error().message,
+              AllOf(HasSubstr("fixed: ONNX Runtime"), Not(HasSubstr("\n"))));
+}
+
+TEST(OnnxSession, RunsOnTheCallersBuffers) {
+  auto created = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
+  ASSERT_TRUE(created) << created.error().message;
+  const OnnxSession session = std::move(*created);  // still works after a move
+  const std::vector<float> image(3 * 8 * 8, 100.0F);
+  std::vector<float> channels(3 * 2 * 2, -1.0F);
+  const Status status = session.run(image.data(), {8, 8}, channels.data(), {2, 2});
+  ASSERT_TRUE(status) << status.error().message;
+  for (int i = 0; i < 4; ++i) {  // filter 0 is the mean over the window, less the mean colour
+    EXPECT_NEAR(channels[static_cast<std::size_t>(i)], -15.0F, 1e-4F);
+  }
+  EXPECT_THAT(session.run(image.data(), {8, 8}, channels.data(), {1, 2}).error().message,
+              HasSubstr("plain: ONNX Runtime"));
+}
+
+TEST(OnnxSession, RefusesWhatIsNoModel) {
+  EXPECT_THAT(error_of("a.onnx", "this is not a model"), HasSubstr("a.onnx: ONNX Runtime: "));
+  EXPECT_THAT(error_of("a.onnx", ""), HasSubstr("a.onnx: ONNX Runtime: "));
+  const std::string whole = read_model("norm_k4s4.onnx");
+  for (std::size_t size = 1; size < whole.size(); size += 97) {
+    EXPECT_NE(error_of("cut.onnx", whole.substr(0, size)), "no error") << size;
+  }
+}
+
+TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"wrong_input_name", "expected input 'image float 1x3xHxW', found 'x float 1x3x?x?'"},
+      {"wrong_output_name",
+       "expected output 'channels float 1xCxhxw' with C known, found 'y float 1x3x?x?'"},
+      {"wrong_rank", "expected input 'image float 1x3xHxW', found 'image float 3x?x?'"},
+      {"wrong_planes", "expected input 'image float 1x3xHxW', found 'image float 1x1x?x?'"},
+      {"wrong_type", "expected input 'image float 1x3xHxW', found 'image uint8 1x3x?x?'"},
+      {"wrong_free_filters",
+       "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
+      {"wrong_two_inputs", "expected 1 input and 1 output, found 2 and 1"},
+      {"wrong_two_outputs", "expected 1 input and 1 output, found 1 and 2"},
+      {"wrong_output_rank",
+       "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
+  };
+  for (const auto& [name, message] : cases) {
+    EXPECT_EQ(error_of(name, read_model(name + ".onnx")), name + ": " + message);
+  }
+}
+
+}  // namespace
+}  // namespace stemvo::internal
