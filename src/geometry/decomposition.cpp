@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/geometry/decomposition.hpp"
+
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+namespace stemvo {
+namespace {
+
+using Svd3 = Eigen::JacobiSVD<Eigen::Matrix3d>;
+
+/// What the 8 hypotheses share: A = K^-1 H K = U diag(d1, d2, d3) V^T.
+struct FaugerasTerms {
+  Eigen::Matrix3d u;
+  Eigen::Matrix3d v;
+  double sign = 1.0;  ///< det U det V
+  double d1 = 0.0;
+  double d2 = 0.0;
+  double d3 = 0.0;
+};
+
+/// Rotation about y of the case d' = +d2 and reflection of the case d' = -d2 (Faugeras & Lustman
+/// 1988, eq. 12 to 16); x1 and x3 are the signed parts of the plane's normal.
+PlanarMotion planar_hypothesis(const FaugerasTerms& f, double x1, double x3, bool d2_positive) {
+  const double product = x1 * x3 * (f.d1 * f.d1 - f.d3 * f.d3);
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+  if (d2_positive) {
+    const double s = product / ((f.d1 + f.d3) * f.d2);
+    const double c = (f.d2 * f.d2 + f.d1 * f.d3) / ((f.d1 + f.d3) * f.d2);
+    rotation << c, 0.0, -s, 0.0, 1.0, 0.0, s, 0.0, c;
+    translation = Eigen::Vector3d(x1, 0.0, -x3);
+  } else {
+    const double s = product / ((f.d1 - f.d3) * f.d2);
+    const double c = (f.d1 * f.d3 - f.d2 * f.d2) / ((f.d1 - f.d3) * f.d2);
+    rotation << c, 0.0, s, 0.0, -1.0, 0.0, s, 0.0, -c;
+    translation = Eigen::Vector3d(x1, 0.0, x3);
+  }
+  PlanarMotion motion;
+  motion.cur_from_prev = Rigid3::from_matrix(f.sign * f.u * rotation * f.v.transpose(),
+                                             (f.u * translation).normalized());
+  motion.normal_in_prev = (f.v * Eigen::Vector3d(x1, 0.0, x3)).normalized();
+  if (motion.normal_in_prev.z() < 0.0) {
+    motion.normal_in_prev *= -1.0;
+  }
+  return motion;
+}
+
+}  // namespace
+
+std::vector<PlanarMotion> decompose_homography(const Eigen::Matrix3d& homography,
+                                               const Camera& camera) {
+  const Eigen::Matrix3d k = camera.matrix();
+  const Eigen::Matrix3d a = k.inverse() * homography * k;
+  if (!a.allFinite()) {
+    return {};
+  }
+  const Svd3 svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d d = svd.singularValues();
+  constexpr double kMinRatio = 1.00001;
+  constexpr double kMaxRatio = 1e9;  // beyond, d2 is rounding and the matrix has rank 1
+  // Negated, so that 0/0 is refused as well.
+  if (!(d(0) / d(1) >= kMinRatio && d(0) / d(1) <= kMaxRatio && d(1) / d(2) >= kMinRatio)) {
+    return {};
+  }
+  FaugerasTerms f{svd.matrixU(), svd.matrixV(), 1.0, d(0), d(1), d(2)};
+  f.sign = f.u.determinant() * f.v.determinant() < 0.0 ? -1.0 : 1.0;
+  const double range = f.d1 * f.d1 - f.d3 * f.d3;
+  const double x1 = std::sqrt((f.d1 * f.d1 - f.d2 * f.d2) / range);
+  const double x3 = std::sqrt((f.d2 * f.d2 - f.d3 * f.d3) / range);
+  std::vector<PlanarMotion> hypotheses;
+  hypotheses.reserve(8);
+  for (const bool d2_positive : {true, false}) {
+    for (const double sign1 : {1.0, -1.0}) {
+      for (const double sign3 : {1.0, -1.0}) {
+        hypotheses.push_back(planar_hypothesis(f, sign1 * x1, sign3 * x3, d2_positive));
+      }
+    }
+  }
+  return hypotheses;
+}
+
+std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
+  if (!essential.allFinite()) {
+    return {};
+  }
+  const Svd3 svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d w;
+  w << 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0;
+  const Eigen::Matrix3d& u = svd.matrixU();
+  const Eigen::Matrix3d v_t = svd.matrixV().transpose();
+  const double sign = u.determinant() * v_t.determinant() < 0.0 ? -1.0 : 1.0;
+  const Eigen::Matrix3d first = sign * u * w * v_t;
+  const Eigen::Matrix3d second = sign * u * w.transpose() * v_t;
+  const Eigen::Vector3d t = u.col(2).normalized();
+  return {Rigid3::from_matrix(first, t), Rigid3::from_matrix(second, t),
+          Rigid3::from_matrix(first, -t), Rigid3::from_matrix(second, -t)};
+}
+
+Eigen::Matrix3d essential_from_fundamental(const Eigen::Matrix3d& fundamental,
+                                           const Camera& camera) {
+  const Eigen::Matrix3d k = camera.matrix();
+  return k.transpose() * fundamental * k;
+}
+
+Eigen::Matrix3d fundamental_from_essential(const Eigen::Matrix3d& essential, const Camera& camera) {
+  const Eigen::Matrix3d k_inverse = camera.matrix().inverse();
+  return k_inverse.transpose() * essential * k_inverse;
+}
+
+Eigen::Matrix3d essential_from_motion(const Rigid3& cur_from_prev) {
+  return skew(cur_from_prev.translation) * cur_from_prev.rotation_matrix();
+}
+
+}  // namespace stemvo

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo::testing {
+
+/// Angle between two rotations, exact near zero.
+inline double rotation_error_rad(const Rigid3& a, const Rigid3& b) {
+  return Rigid3(a.rotation * b.rotation.conjugate(), Eigen::Vector3d::Zero()).angle_rad();
+}
+
+/// Angle between two directions, exact near zero; NaN where one has no length.
+inline double direction_error_rad(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const Eigen::Vector3d u = a / a.norm();
+  const Eigen::Vector3d v = b / b.norm();
+  return 2.0 * std::atan2((u - v).norm(), (u + v).norm());
+}
+
+inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Largest difference of an entry; NaN fails. For vectors and matrices of the same size.
+MATCHER_P2(IsNear, expected, tolerance, "is near the expected matrix") {
+  const double error = (arg - expected).cwiseAbs().maxCoeff();
+  *result_listener << "largest difference " << error << "\n" << arg;
+  return (arg - expected).allFinite() && error <= tolerance;
+}
+
+/// Rotation within tolerance rad and translation within tolerance; NaN fails.
+MATCHER_P2(IsNearMotion, expected, tolerance, "is near the expected motion") {
+  const double angle = rotation_error_rad(arg, expected);
+  const double distance = (arg.translation - expected.translation).norm();
+  *result_listener << "rotation differs by " << angle << " rad, translation by " << distance;
+  return angle <= tolerance && distance <= tolerance;
+}
+
+MATCHER(IsFiniteMotion, "has no NaN") {
+  return arg.rotation.coeffs().allFinite() && arg.translation.allFinite();
+}
+
+}  // namespace stemvo::testing

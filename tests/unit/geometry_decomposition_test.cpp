@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "stemvo/geometry/decomposition.hpp"
+#include "support/matchers.hpp"
+#include "support/synthetic_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::direction_error_rad;
+using testing::IsNear;
+using testing::kitti_camera;
+using testing::rotation_error_rad;
+using testing::SceneRandom;
+
+struct PlantedPlane {
+  Rigid3 cur_from_prev;  ///< |translation| == 1
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double distance = 1.0;
+};
+
+PlantedPlane planted_plane(std::uint64_t seed) {
+  SceneRandom random(seed);
+  PlantedPlane plane;
+  plane.cur_from_prev = random.motion(0.5);
+  plane.normal = random.direction();
+  plane.normal *= plane.normal.z() < 0.0 ? -1.0 : 1.0;
+  plane.distance = random.uniform(1.5, 10.0);
+  return plane;
+}
+
+Eigen::Matrix3d euclidean_homography(const PlantedPlane& plane) {
+  return plane.cur_from_prev.rotation_matrix() +
+         plane.cur_from_prev.translation * plane.normal.transpose() / plane.distance;
+}
+
+Eigen::Matrix3d pixel_homography(const PlantedPlane& plane) {
+  const Eigen::Matrix3d k = kitti_camera().matrix();
+  return k * euclidean_homography(plane) * k.inverse();
+}
+
+double motion_error(const Rigid3& found, const Rigid3& expected) {
+  return std::max(rotation_error_rad(found, expected),
+                  direction_error_rad(found.translation, expected.translation));
+}
+
+/// How far lambda * h is from R + mu * T n^T, for the best lambda and mu.
+double reproduction_error(const Eigen::Matrix3d& h, const PlanarMotion& motion) {
+  const Eigen::Matrix3d r = motion.cur_from_prev.rotation_matrix();
+  const Eigen::Matrix3d tn = motion.cur_from_prev.translation * motion.normal_in_prev.transpose();
+  Eigen::Matrix<double, 9, 2> a;
+  a.col(0) = h.reshaped();
+  a.col(1) = -tn.reshaped();
+  const Eigen::Matrix<double, 9, 1> b = r.reshaped();
+  const Eigen::Vector2d x = (a.transpose() * a).ldlt().solve(a.transpose() * b);
+  return (a * x - b).cwiseAbs().maxCoeff();
+}
+
+TEST(DecomposeHomography, TrueMotionIsAmongTheEight) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const PlantedPlane plane = planted_plane(seed);
+    const auto hypotheses = decompose_homography(pixel_homography(plane), kitti_camera());
+    ASSERT_EQ(hypotheses.size(), 8U);
+    double best = std::numeric_limits<double>::infinity();
+    for (const PlanarMotion& hypothesis : hypotheses) {
+      best = std::min(best, std::max(motion_error(hypothesis.cur_from_prev, plane.cur_from_prev),
+                                     direction_error_rad(hypothesis.normal_in_prev, plane.normal)));
+    }
+    EXPECT_LE(best, 1e-9) << "seed " << seed;
+  }
+}
+
+TEST(DecomposeHomography, EveryHypothesisReproducesTheHomography) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const PlantedPlane plane = planted_plane(seed);
+    const Eigen::Matrix3d h = euclidean_homography(plane);
+    for (const PlanarMotion& hypothesis :
+         decompose_homography(pixel_homography(plane), kitti_camera())) {
+      EXPECT_NEAR(hypothesis.cur_from_prev.translation.norm(), 1.0, 1e-12);
+      EXPECT_NEAR(hypothesis.normal_in_prev.norm(), 1.0, 1e-12);
+      EXPECT_GE(hypothesis.normal_in_prev.z(), 0.0);
+      EXPECT_LE(reproduction_error(h, hypothesis), 1e-9) << "seed " << seed;
+    }
+  }
+}
+
+TEST(DecomposeHomography, SignAndScaleDoNotMatter) {
+  const PlantedPlane plane = planted_plane(3);
+  for (const double scale : {-1.0, 1e-6, -3e5}) {
+    double best = std::numeric_limits<double>::infinity();
+    for (const PlanarMotion& hypothesis :
+         decompose_homography(scale * pixel_homography(plane), kitti_camera())) {
+      best = std::min(best, motion_error(hypothesis.cur_from_prev, plane.cur_from_prev));
+    }
+    EXPECT_LE(best, 1e-9) << "scale " << scale;
+  }
+}
+
+TEST(DecomposeHomography, RefusesWhatDoesNotDecompose) {
+  const Camera camera = kitti_camera();
+  const Eigen::Matrix3d k = camera.matrix();
+  const Eigen::Matrix3d rotation = so3_exp(Eigen::Vector3d(0.01, -0.2, 0.03)).toRotationMatrix();
+  EXPECT_TRUE(decompose_homography(k * rotation * k.inverse(), camera).empty());
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Zero(), camera).empty());
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Identity(), camera).empty());
+  // Rank 1.
+  EXPECT_TRUE(decompose_homography(Eigen::Matrix3d::Ones(), camera).empty());
+  for (const double broken :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Eigen::Matrix3d h = pixel_homography(planted_plane(1));
+    h(1, 2) = broken;
+    EXPECT_TRUE(decompose_homography(h, camera).empty());
+  }
+  EXPECT_TRUE(decompose_homography(pixel_homography(planted_plane(1)), Camera{}).empty());
+}
+
+TEST(DecomposeHomography, SingularMatrixStaysFinite) {
+  // A plane through the centre of the current camera: rank 2.
+  PlantedPlane plane = planted_plane(5);
+  plane.distance = plane.normal.dot(plane.cur_from_prev.inverse().translation);
+  ASSERT_NEAR(euclidean_homography(plane).determinant(), 0.0, 1e-12);
+  for (const PlanarMotion& hypothesis :
+       decompose_homography(pixel_homography(plane), kitti_camera())) {
+    EXPECT_THAT(hypothesis.cur_from_prev, testing::IsFiniteMotion());
+    EXPECT_TRUE(hypothesis.normal_in_prev.allFinite());
+  }
+}
+
+TEST(DecomposeEssential, TrueMotionIsAmongTheFour) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SceneRandom random(seed);
+    const Rigid3 truth = random.motion(0.5);
+    const double scale = random.uniform(-5.0, 5.0);
+    double best = std::numeric_limits<double>::infinity();
+    for (const Rigid3& hypothesis : decompose_essential(scale * essential_from_motion(truth))) {
+      EXPECT_NEAR(hypothesis.translation.norm(), 1.0, 1e-12);
+      EXPECT_NEAR(hypothesis.rotation_matrix().determinant(), 1.0, 1e-12);
+      best = std::min(best, motion_error(hypothesis, truth));
+    }
+    EXPECT_LE(best, 1e-9) << "seed " << seed;
+  }
+}
+
+TEST(DecomposeEssential, EveryHypothesisReproducesTheMatrixUpToSign) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    const Eigen::Matrix3d e = essential_from_motion(SceneRandom(seed).motion(0.5));
+    for (const Rigid3& hypothesis : decompose_essential(e)) {
+      const Eigen::Matrix3d found = essential_from_motion(hypothesis);
+      EXPECT_LE(std::min((found - e).norm(), (found + e).norm()), 1e-9) << "seed " << seed;
+    }
+  }
+}
+
+TEST(DecomposeEssential, FourDifferentMotions) {
+  const auto hypotheses = decompose_essential(essential_from_motion(SceneRandom(2).motion(0.5)));
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_GT(motion_error(hypotheses[i], hypotheses[j]), 0.1);
+    }
+  }
+}
+
+TEST(DecomposeEssential, BrokenMatrixGivesNoNan) {
+  Eigen::Matrix3d with_nan = Eigen::Matrix3d::Identity();
+  with_nan(0, 2) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d ones = Eigen::Matrix3d::Ones();
+  for (const Eigen::Matrix3d& e : {with_nan, zero, ones}) {
+    for (const Rigid3& hypothesis : decompose_essential(e)) {
+      EXPECT_THAT(hypothesis, testing::IsFiniteMotion());
+    }
+  }
+}
+
+TEST(EssentialMatrix, HoldsForMatchesAndConvertsToPixelsAndBack) {
+  const testing::Scene scene = testing::make_scene({.num_points = 50, .seed = 4});
+  const Eigen::Matrix3d e = essential_from_motion(scene.cur_from_prev);
+  const Eigen::Matrix3d f = fundamental_from_essential(e, scene.camera);
+  EXPECT_THAT(essential_from_fundamental(f, scene.camera), IsNear(e, 1e-12));
+  ASSERT_EQ(scene.prev_uv.size(), 50U);
+  for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
+    const Eigen::Vector3d line = f * scene.prev_uv[i].homogeneous();
+    const double distance_px = line.dot(scene.cur_uv[i].homogeneous()) / line.head<2>().norm();
+    EXPECT_NEAR(distance_px, 0.0, 1e-8);
+  }
+}
+
+}  // namespace
+}  // namespace stemvo
