@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string_view>
+
+namespace stemvo {
+
+/// Version of the library, with the git commit it was built from where there was one (marked where
+/// the tree had changes): "0.1.0", "0.1.0+1a2b3c4d5e6f" or "0.1.0+1a2b3c4d5e6f.dirty".
+[[nodiscard]] std::string_view version();
+
+}  // namespace stemvo
