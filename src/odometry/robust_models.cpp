@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/robust_models.hpp"
+
+#include <vector>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+
+namespace stemvo {
+namespace {
+
+/// Below this OpenCV's estimators have nothing to choose from, and some versions crash.
+constexpr std::size_t kMinMatches = 8;
+
+std::vector<cv::Point2d> to_points(std::span<const Eigen::Vector2d> uv) {
+  std::vector<cv::Point2d> points;
+  points.reserve(uv.size());
+  for (const Eigen::Vector2d& point : uv) {
+    points.emplace_back(point.x(), point.y());
+  }
+  return points;
+}
+
+cv::UsacParams usac_params(const TwoViewOptions& options, std::uint64_t seed) {
+  cv::UsacParams params;
+  params.confidence = options.confidence;
+  params.isParallel = false;
+  params.maxIterations = options.max_iterations;
+  params.threshold = options.inlier_threshold_px;
+  params.sampler = cv::SAMPLING_UNIFORM;
+  params.randomGeneratorState = static_cast<int>(seed & 0x7fffffffU);
+  const bool is_magsac = options.estimator == "magsac";
+  params.score = is_magsac ? cv::SCORE_METHOD_MAGSAC : cv::SCORE_METHOD_RANSAC;
+  params.loMethod = is_magsac ? cv::LOCAL_OPTIM_SIGMA : cv::LOCAL_OPTIM_NULL;
+  return params;
+}
+
+/// Some methods return nothing or several stacked solutions: only a finite 3x3 is a model.
+std::optional<Eigen::Matrix3d> to_model(const cv::Mat& matrix) {
+  if (matrix.rows != 3 || matrix.cols != 3) {
+    return std::nullopt;
+  }
+  Eigen::Matrix3d model;
+  cv::cv2eigen(matrix, model);
+  if (!model.allFinite() || !(model.norm() > 0.0)) {
+    return std::nullopt;
+  }
+  return model;
+}
+
+/// Runs one of OpenCV's estimators; its exceptions mean degenerate input here.
+template <typename Estimator>
+std::optional<Eigen::Matrix3d> run_guarded(std::span<const Eigen::Vector2d> prev_uv,
+                                           std::span<const Eigen::Vector2d> cur_uv,
+                                           const Estimator& estimator) {
+  if (prev_uv.size() < kMinMatches || prev_uv.size() != cur_uv.size()) {
+    return std::nullopt;
+  }
+  try {
+    return to_model(estimator(to_points(prev_uv), to_points(cur_uv)));
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+std::optional<Eigen::Matrix3d> estimate_homography(std::span<const Eigen::Vector2d> prev_uv,
+                                                   std::span<const Eigen::Vector2d> cur_uv,
+                                                   const TwoViewOptions& options,
+                                                   std::uint64_t seed) {
+  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
+    return cv::findHomography(prev, cur, cv::noArray(), usac_params(options, seed));
+  });
+}
+
+std::optional<Eigen::Matrix3d> estimate_fundamental(std::span<const Eigen::Vector2d> prev_uv,
+                                                    std::span<const Eigen::Vector2d> cur_uv,
+                                                    const TwoViewOptions& options,
+                                                    std::uint64_t seed) {
+  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
+    return cv::findFundamentalMat(prev, cur, cv::noArray(), usac_params(options, seed));
+  });
+}
+
+std::optional<Eigen::Matrix3d> estimate_essential(std::span<const Eigen::Vector2d> prev_uv,
+                                                  std::span<const Eigen::Vector2d> cur_uv,
+                                                  const Camera& camera,
+                                                  const TwoViewOptions& options,
+                                                  std::uint64_t seed) {
+  cv::Mat intrinsics;
+  cv::eigen2cv(camera.matrix(), intrinsics);
+  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
+    return cv::findEssentialMat(prev, cur, intrinsics, intrinsics, cv::noArray(), cv::noArray(),
+                                cv::noArray(), usac_params(options, seed));
+  });
+}
+
+}  // namespace stemvo

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "stemvo/config.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/odometry/odometry.hpp"
+
+namespace stemvo {
+
+/// What two frames tell about the motion between them.
+struct MeasuredMotion {
+  FrameState state = FrameState::kLost;
+  Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (standing, rotating, lost)
+  TwoViewModel model = TwoViewModel::kNone;
+  double homography_score = 0.0;   ///< S_H
+  double fundamental_score = 0.0;  ///< S_F
+  double homography_ratio = 0.0;   ///< R_H
+  double parallax_px = 0.0;        ///< median flow that no rotation explains
+  double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess
+  int num_inliers = 0;
+  std::vector<char> inlier_mask;  ///< one per match
+};
+
+/// Two-frame motion, paper section 3.5-3.7: score H against F while initialising, the essential
+/// matrix afterwards, the point test, then refinement of R and t on the inliers.
+class TwoViewEstimator {
+ public:
+  TwoViewEstimator(const Config& config, const Camera& camera);
+
+  /// Matches in input pixels. `is_initializing`: let R_H choose the model.
+  [[nodiscard]] MeasuredMotion measure(std::span<const Eigen::Vector2d> prev_uv,
+                                       std::span<const Eigen::Vector2d> cur_uv,
+                                       bool is_initializing,
+                                       std::uint64_t seed) const;
+
+ private:
+  struct Models {
+    std::optional<Eigen::Matrix3d> homography;
+    std::optional<Eigen::Matrix3d> essential;
+  };
+  [[nodiscard]] Models score_models(std::span<const Eigen::Vector2d> prev_uv,
+                                    std::span<const Eigen::Vector2d> cur_uv,
+                                    bool is_initializing,
+                                    std::uint64_t seed,
+                                    MeasuredMotion& result) const;
+  void refine(std::span<const Eigen::Vector2d> prev_uv,
+              std::span<const Eigen::Vector2d> cur_uv,
+              MeasuredMotion& result) const;
+
+  TwoViewOptions options_;
+  OdometryOptions odometry_;
+  Camera camera_;
+};
+
+}  // namespace stemvo
