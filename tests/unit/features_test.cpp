@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "features/grid_quota.hpp"
+#include "stemvo/features/front_end.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A smooth random texture seen from `shift` further to the right and below.
+cv::Mat textured_picture(cv::Size size, cv::Point2d shift) {
+  cv::RNG random(7);
+  cv::Mat noise(size.height + 64, size.width + 64, CV_32F);
+  random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+  cv::GaussianBlur(noise, noise, {}, 1.5);
+  cv::normalize(noise, noise, 0.0, 255.0, cv::NORM_MINMAX);
+  cv::Mat picture;
+  const cv::Matx23d crop(1.0, 0.0, 32.0 + shift.x, 0.0, 1.0, 32.0 + shift.y);
+  cv::warpAffine(noise, picture, crop, size, cv::INTER_CUBIC | cv::WARP_INVERSE_MAP);
+  picture.convertTo(picture, CV_8U);
+  return picture;
+}
+
+ChannelImage image_of(const cv::Mat& picture, double scale = 1.0, double offset_px = 0.0) {
+  return {picture, {Eigen::Vector2d::Constant(scale), Eigen::Vector2d::Constant(offset_px)}};
+}
+
+double median_error_px(const Matches& matches, const Eigen::Vector2d& expected_flow) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+    errors.push_back((matches.cur_uv[i] - matches.prev_uv[i] - expected_flow).norm());
+  }
+  std::sort(errors.begin(), errors.end());
+  return errors.empty() ? 1e9 : errors[errors.size() / 2];
+}
+
+class FrontEndTest : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    FeatureOptions options;
+    options.method = GetParam();
+    front_end_ = std::move(create_front_end(options).value());
+  }
+  std::unique_ptr<FrontEnd> front_end_;
+};
+
+TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
+  const cv::Size size(480, 200);
+  const Matches none = front_end_->process(image_of(textured_picture(size, {0.0, 0.0}), 2.0, 1.5));
+  EXPECT_TRUE(none.cur_uv.empty());
+  const Matches matches =
+      front_end_->process(image_of(textured_picture(size, {3.3, -1.7}), 2.0, 1.5));
+  EXPECT_GT(matches.cur_uv.size(), 150U);
+  EXPECT_LE(median_error_px(matches, {-6.6, 3.4}), GetParam() == "klt" ? 0.1 : 1.5);
+}
+
+TEST_P(FrontEndTest, GivesTheSameMatchesForAnyNumberOfThreads) {
+  std::vector<Eigen::Vector2d> reference;
+  for (const int num_threads : {1, 2, 4}) {
+    cv::setNumThreads(num_threads);
+    SetUp();
+    const cv::Size size(320, 160);
+    static_cast<void>(front_end_->process(image_of(textured_picture(size, {0.0, 0.0}))));
+    const Matches matches = front_end_->process(image_of(textured_picture(size, {2.0, 1.0})));
+    if (reference.empty()) {
+      reference = matches.cur_uv;
+    }
+    EXPECT_EQ(matches.cur_uv, reference) << num_threads << " threads";
+  }
+  cv::setNumThreads(-1);
+}
+
+TEST_P(FrontEndTest, ABlankOrResizedPictureStartsOver) {
+  const cv::Mat blank(160, 320, CV_8U, cv::Scalar(90));
+  static_cast<void>(front_end_->process(image_of(textured_picture({320, 160}, {0.0, 0.0}))));
+  EXPECT_LT(front_end_->process(image_of(blank)).cur_uv.size(), 20U);
+  EXPECT_TRUE(
+      front_end_->process(image_of(textured_picture({200, 100}, {0.0, 0.0}))).cur_uv.empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, FrontEndTest, testing::Values("klt", "orb", "sift"));
+
+TEST(KltFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
+  const auto front_end = create_front_end({});
+  const cv::Size size(480, 200);
+  Matches first;
+  for (int i = 0; i < 2; ++i) {
+    first = front_end.value()->process(image_of(textured_picture(size, {1.0 * i, 0.0})));
+  }
+  std::vector<char> is_good(first.track_ids.size(), 1);
+  ASSERT_GT(is_good.size(), 10U);
+  is_good[3] = 0;
+  front_end.value()->keep(is_good);
+  const Matches second = front_end.value()->process(image_of(textured_picture(size, {2.0, 0.0})));
+  std::map<int, Eigen::Vector2d> second_prev;
+  for (std::size_t i = 0; i < second.track_ids.size(); ++i) {
+    second_prev[second.track_ids[i]] = second.prev_uv[i];
+  }
+  EXPECT_EQ(second_prev.count(first.track_ids[3]), 0U);
+  int num_continued = 0;
+  for (std::size_t i = 0; i < first.track_ids.size(); ++i) {
+    const auto found = second_prev.find(first.track_ids[i]);
+    if (found != second_prev.end()) {
+      ++num_continued;
+      EXPECT_LT((found->second - first.cur_uv[i]).norm(), 1e-6);
+    }
+  }
+  EXPECT_GT(num_continued, static_cast<int>(first.track_ids.size()) / 2);
+}
+
+TEST(GridQuota, GivesEveryCellItsShare) {
+  FeatureOptions options;
+  options.max_features = 24;
+  options.grid_columns = 4;
+  options.grid_rows = 3;
+  GridQuota quota(options, {400, 300});
+  EXPECT_TRUE(quota.take({10.0F, 10.0F}));
+  EXPECT_TRUE(quota.take({20.0F, 20.0F}));
+  EXPECT_FALSE(quota.take({30.0F, 30.0F}));
+  EXPECT_TRUE(quota.take({399.9F, 299.9F}));
+}
+
+TEST(FrontEnd, UnknownMethodIsAnErrorThatNamesTheKnownOnes) {
+  FeatureOptions options;
+  options.method = "surf";
+  const auto front_end = create_front_end(options);
+  ASSERT_FALSE(front_end.has_value());
+  EXPECT_NE(front_end.error().message.find("klt, orb or sift"), std::string::npos);
+  EXPECT_NE(front_end.error().message.find("surf"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "odometry/motion_chain.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr double kDeg = std::numbers::pi / 180.0;
+
+/// A measured motion from prev_from_cur (what the car did), as the estimator reports it.
+MeasuredMotion driven(const Eigen::Vector3d& direction,
+                      double yaw_deg,
+                      FrameState state = FrameState::kTracking) {
+  MeasuredMotion motion;
+  motion.state = state;
+  motion.cur_from_prev = Rigid3(so3_exp({0.0, yaw_deg * kDeg, 0.0}), direction).inverse();
+  motion.parallax_px = 5.0;
+  motion.runner_up_ratio = 0.1;
+  return motion;
+}
+
+MotionChain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
+  ScaleOptions scale;
+  scale.constant_m = step_m;
+  MotionChain chain(options, scale);
+  chain.start();
+  return chain;
+}
+
+TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
+  MotionChain chain = make_chain({}, 0.7);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
+}
+
+TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
+  OdometryOptions paper;
+  paper.composition = "paper";
+  MotionChain right = make_chain();
+  MotionChain wrong = make_chain(paper);
+  Rigid3 truth;
+  for (int i = 0; i < 36; ++i) {  // a right turn over a road that rolls
+    const Eigen::Vector3d turn(0.01, 10.0 * kDeg, 0.05 * std::sin(0.5 * i));
+    const Rigid3 prev_from_cur(so3_exp(turn), Eigen::Vector3d(0.1, 0.05, 1.0).normalized());
+    truth = truth * prev_from_cur;
+    MeasuredMotion motion = driven(Eigen::Vector3d::UnitZ(), 0.0);
+    motion.cur_from_prev = prev_from_cur.inverse();
+    right.add(motion);
+    wrong.add(motion);
+  }
+  EXPECT_LT((right.world_from_camera().translation - truth.translation).norm(), 1e-9);
+  EXPECT_LT(right.world_from_camera().rotation.angularDistance(truth.rotation), 1e-9);
+  EXPECT_GT((wrong.world_from_camera().translation - truth.translation).norm(), 0.1);
+}
+
+TEST(MotionChain, GateNeverDropsTheRotation) {
+  MotionChain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 5.0 * kDeg, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);  // last direction goes on
+}
+
+TEST(MotionChain, ThePapersGateDropsBoth) {
+  OdometryOptions options;
+  options.gate = "paper";
+  MotionChain chain = make_chain(options);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 0.0, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.0, 1e-12);
+}
+
+TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
+  MotionChain chain = make_chain();
+  EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
+  MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
+  doubtful.runner_up_ratio = 0.9;
+  EXPECT_EQ(chain.add(doubtful), FrameState::kGated);
+}
+
+TEST(MotionChain, CreepingKeepsTheDirectionAndStandingStays) {
+  MotionChain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  MeasuredMotion creeping = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kCreeping);
+  creeping.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
+  chain.add(creeping);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 1.0 * kDeg, 1e-12);
+  MeasuredMotion standing;
+  standing.state = FrameState::kStanding;
+  chain.add(standing);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
+}
+
+TEST(MotionChain, ABrokenFrameIsBridged) {
+  MotionChain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.extrapolate(/*has_picture=*/false);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last picture, two frames away
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.0, 1e-12);
+  MeasuredMotion lost;
+  EXPECT_EQ(chain.add(lost), FrameState::kLost);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 6.0 * kDeg, 1e-9);  // half the turn more
+}
+
+}  // namespace
+}  // namespace stemvo
