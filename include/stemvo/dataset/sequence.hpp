@@ -23,15 +23,16 @@ struct FrameRange {
 /// "A:B", "A:" or ":B"; nullopt end means the last frame. Error: not of that form, or A >= B.
 struct FrameRangeRequest {
   std::size_t begin = 0;
-  std::optional<std::size_t> end;
+  std::optional<std::size_t> end = std::nullopt;
 };
 [[nodiscard]] Expected<FrameRangeRequest> parse_frame_range(const std::string& text);
 
 /// Keys `input.*` of the configuration, and the program's --frames and --gt.
 struct SequenceOptions {
   std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
-  std::optional<FrameRangeRequest> frames;
-  std::optional<std::filesystem::path> ground_truth;  ///< else ../../poses/NN.txt if it exists
+  std::optional<FrameRangeRequest> frames = std::nullopt;
+  /// Else ../../poses/NN.txt if it exists.
+  std::optional<std::filesystem::path> ground_truth = std::nullopt;
 };
 
 /// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt.

@@ -12,7 +12,8 @@ namespace stemvo {
 
 /// A rendered street in KITTI layout with exact poses.
 struct SyntheticDriveOptions {
-  std::optional<std::filesystem::path> trajectory;  ///< KITTI poses to drive along; else own curve
+  /// KITTI poses to drive along; else own curve.
+  std::optional<std::filesystem::path> trajectory = std::nullopt;
   int num_frames = 100;                             ///< with a trajectory: at most its length
   std::uint64_t seed = 1;
   int width_px = 1241;
