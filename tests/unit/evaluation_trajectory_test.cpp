@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <string>
+#include <tuple>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stemvo/evaluation/trajectory.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::stemvo::testing::read_all;
+using ::stemvo::testing::TempFolder;
+using ::testing::HasSubstr;
+
+constexpr char kIdentityRow[] = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+
+/// A bent path whose poses have nothing round in them.
+Trajectory bent_path(int num_poses) {
+  Trajectory poses;
+  for (int i = 0; i < num_poses; ++i) {
+    poses.emplace_back(so3_exp({0.01 * i, -0.03 * i, 0.002 * i}),
+                       Eigen::Vector3d(0.1 * i * i, -0.05 * i, 1234.5 + 1.1 * i));
+  }
+  return poses;
+}
+
+void expect_near(const Trajectory& found, const Trajectory& expected, double tolerance) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_LE((found[i].matrix() - expected[i].matrix()).cwiseAbs().maxCoeff(), tolerance) << i;
+  }
+}
+
+TEST(KittiTrajectory, ComesBackAsItWasWritten) {
+  const TempFolder folder;
+  const Trajectory poses = bent_path(50);
+  ASSERT_TRUE(write_kitti_trajectory(folder / "poses.txt", poses));
+  const Expected<Trajectory> found = read_kitti_trajectory(folder / "poses.txt");
+  ASSERT_TRUE(found) << found.error().message;
+  expect_near(*found, poses, 1e-8);
+}
+
+TEST(KittiTrajectory, HasTwelveNumbersSingleSpacesAndNineDigits) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_kitti_trajectory(
+      folder / "poses.txt", Trajectory{Rigid3(so3_exp({0, 0, 0}), {-0.0, 1.0 / 3.0, -2.0})}));
+  const std::string text = read_all(folder / "poses.txt");
+  EXPECT_THAT(text, HasSubstr(" 3.33333333"));
+  EXPECT_EQ(text.find("-0.0"), std::string::npos) << text;
+  EXPECT_EQ(text.find("  "), std::string::npos) << text;
+  EXPECT_EQ(text.find(" \n"), std::string::npos) << text;
+  EXPECT_EQ(std::count(text.begin(), text.end(), ' '), 11) << text;
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+}
+
+TEST(KittiTrajectory, ReadsWindowsLineEndsTabsAndEmptyLinesAtTheEnd) {
+  const TempFolder folder;
+  const auto file =
+      folder.file("a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\r\n+1\t0 0 5 0 1 0 0 0 0 1 7\r\n\n \n");
+  const Expected<Trajectory> found = read_kitti_trajectory(file);
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_EQ(found->size(), 2U);
+  EXPECT_EQ((*found)[1].translation, Eigen::Vector3d(5, 0, 7));
+}
+
+TEST(KittiTrajectory, MakesRoundedRotationsExact) {
+  const TempFolder folder;
+  const auto file = folder.file("a.txt", "0.9999 0 0.0141 0 0 1 0 0 -0.0141 0 0.9999 0\n");
+  const Expected<Trajectory> found = read_kitti_trajectory(file);
+  ASSERT_TRUE(found) << found.error().message;
+  const Eigen::Matrix3d rotation = found->front().rotation_matrix();
+  EXPECT_TRUE((rotation.transpose() * rotation).isIdentity(1e-14));
+}
+
+/// Second line of a file, and what the message must say of it.
+class BrokenKittiLine : public ::testing::TestWithParam<std::tuple<std::string, std::string>> {};
+
+TEST_P(BrokenKittiLine, IsNamedWithFileAndLine) {
+  const TempFolder folder;
+  const auto& [line, complaint] = GetParam();
+  const auto file = folder.file("broken.txt", kIdentityRow + line + "\n" + kIdentityRow);
+  const Expected<Trajectory> found = read_kitti_trajectory(file);
+  ASSERT_FALSE(found);
+  EXPECT_THAT(found.error().message, HasSubstr(file.string() + ":2: "));
+  EXPECT_THAT(found.error().message, HasSubstr(complaint));
+  EXPECT_EQ(found.error().message.find('\n'), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    KittiTrajectory,
+    BrokenKittiLine,
+    ::testing::Values(
+        std::tuple("1 0 0 0 0 1 0 0 0 0 1", "expected 12 numbers, found 11"),
+        std::tuple("1 1 0 0 0 0 1 0 0 0 0 1 0", "expected 12 numbers, found 13"),
+        std::tuple("", "expected 12 numbers, found 0"),
+        std::tuple("1 0 0 zero 0 1 0 0 0 0 1 0", "expected a finite number, found 'zero'"),
+        std::tuple("1 0 0 1,5 0 1 0 0 0 0 1 0", "found '1,5'"),
+        std::tuple("1 0 0 nan 0 1 0 0 0 0 1 0", "expected a finite number, found 'nan'"),
+        std::tuple("1 0 0 0 0 1 0 -inf 0 0 1 0", "expected a finite number, found '-inf'"),
+        std::tuple("1 0 0 1e999 0 1 0 0 0 0 1 0", "found '1e999'"),
+        std::tuple("2 0 0 0 0 1 0 0 0 0 1 0", "R^T R off the identity by 3"),
+        std::tuple("0 0 0 0 0 0 0 0 0 0 0 0", "expected a rotation"),
+        std::tuple("1 0 0 0 0 1 0 0 0 0 -1 0", "found a reflection")));
+
+TEST(KittiTrajectory, NamesAFileThatIsMissingEmptyOrAFolder) {
+  const TempFolder folder;
+  const auto message = [](const std::filesystem::path& file) {
+    const Expected<Trajectory> found = read_kitti_trajectory(file);
+    return found ? std::string("no error") : found.error().message;
+  };
+  EXPECT_THAT(message(folder / "none.txt"), HasSubstr("none.txt: cannot read: No such file"));
+  EXPECT_THAT(message(folder.path()), HasSubstr("found a folder"));
+  EXPECT_THAT(message(folder.file("empty.txt", "")), HasSubstr("empty.txt: expected at least one"));
+  EXPECT_THAT(message(folder.file("blank.txt", "\n \n")), HasSubstr("expected at least one pose"));
+}
+
+TEST(KittiTrajectory, SaysThatItCannotBeWritten) {
+  const Status no_folder = write_kitti_trajectory("/nonexistent/poses.txt", bent_path(1));
+  ASSERT_FALSE(no_folder);
+  EXPECT_THAT(no_folder.error().message, HasSubstr("/nonexistent/poses.txt: cannot write: "));
+  const Status disk_full = write_kitti_trajectory("/dev/full", bent_path(100));
+  ASSERT_FALSE(disk_full);
+  EXPECT_THAT(disk_full.error().message, HasSubstr("/dev/full: cannot write: "));
+}
+
+TEST(TumTrajectory, ComesBackAsItWasWritten) {
+  const TempFolder folder;
+  const Trajectory poses = bent_path(20);
+  std::vector<double> times_s;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    times_s.push_back(0.1036224 * static_cast<double>(i));
+  }
+  ASSERT_TRUE(write_tum_trajectory(folder / "tum.txt", times_s, poses));
+  const Expected<TimedTrajectory> found = read_tum_trajectory(folder / "tum.txt");
+  ASSERT_TRUE(found) << found.error().message;
+  expect_near(found->world_from_camera, poses, 1e-8);
+  EXPECT_THAT(found->timestamps_s, ::testing::Pointwise(::testing::DoubleNear(1e-9), times_s));
+}
+
+TEST(TumTrajectory, SkipsCommentsAndBlankLinesButCountsThem) {
+  const TempFolder folder;
+  const auto good = folder.file("a.txt", "# t x y z\n\n1.5 1 2 3 0 0 0 1 # here\n");
+  const Expected<TimedTrajectory> found = read_tum_trajectory(good);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_EQ(found->timestamps_s, std::vector<double>{1.5});
+  EXPECT_EQ(found->world_from_camera[0].translation, Eigen::Vector3d(1, 2, 3));
+
+  const auto bad = read_tum_trajectory(folder.file("b.txt", "# t x y z\n\n1.5 1 2 3 0 0 1\n"));
+  ASSERT_FALSE(bad);
+  EXPECT_THAT(bad.error().message, HasSubstr("b.txt:3: expected 8 numbers, found 7"));
+  const auto long_q =
+      read_tum_trajectory(folder.file("c.txt", "1 1 2 3 0 0 0 1\n1 1 2 3 0 0 1 1\n"));
+  ASSERT_FALSE(long_q);
+  EXPECT_THAT(long_q.error().message, HasSubstr("c.txt:2: expected a quaternion of length 1"));
+  EXPECT_FALSE(read_tum_trajectory(folder.file("d.txt", "# nothing\n")));
+}
+
+TEST(RelativeToFirst, StartsAtTheIdentityAndKeepsTheMotions) {
+  const Trajectory poses = bent_path(5);
+  const Trajectory moved = relative_to_first(poses);
+  EXPECT_EQ(moved.front().matrix(), Rigid3().matrix());
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Rigid3 before = poses[i - 1].inverse() * poses[i];
+    const Rigid3 after = moved[i - 1].inverse() * moved[i];
+    EXPECT_LE((before.matrix() - after.matrix()).cwiseAbs().maxCoeff(), 1e-9);
+  }
+  EXPECT_TRUE(relative_to_first({}).empty());
+}
+
+TEST(RescaleSteps, KeepsDirectionsAndRotationsAndTakesTheTrueLengths) {
+  Trajectory estimate(4);
+  estimate[1] = Rigid3(so3_exp({0, 0.1, 0}), {0, 0, 10});    // ahead, far too long
+  estimate[2] = Rigid3(so3_exp({0, 0.2, 0}), {0, 0, 10});    // stands still
+  estimate[3] = Rigid3(so3_exp({0, 0.3, 0}), {0.3, 0, 10});  // to the right, too short
+  Trajectory truth(4);
+  truth[1].translation = {0, 0, 1};
+  truth[2].translation = {0, 0, 2};
+  truth[3].translation = {0, 3, 6};  // 5 m
+  const Trajectory rescaled = rescale_steps(estimate, truth);
+  ASSERT_EQ(rescaled.size(), 4U);
+  EXPECT_LE((rescaled[1].translation - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LE((rescaled[2].translation - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LE((rescaled[3].translation - Eigen::Vector3d(5, 0, 1)).norm(), 1e-12);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(rescaled[i].rotation.coeffs(), estimate[i].rotation.coeffs());
+  }
+  EXPECT_THROW((void)rescale_steps(estimate, Trajectory(3)), std::logic_error);
+}
+
+}  // namespace
+}  // namespace stemvo
