@@ -1,0 +1,45 @@
+# `cmake --install`: the program, the static libraries, what they need at run time, and a CMake package.
+#   bin/stemvo  lib/libstemvo*.a  lib/stemvo/libonnxruntime.so.1  lib/cmake/stemvo  include/stemvo
+#   share/stemvo/{models,config}  share/doc/stemvo
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/stemvo)
+set(runtime_dir ${CMAKE_INSTALL_LIBDIR}/stemvo)
+
+install(DIRECTORY include/stemvo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(DIRECTORY models config DESTINATION share/stemvo)
+install(FILES LICENSE DESTINATION share/doc/stemvo)
+
+set_target_properties(stemvo_geometry PROPERTIES EXPORT_NAME geometry)
+install(TARGETS stemvo stemvo_geometry EXPORT stemvoTargets)
+install(EXPORT stemvoTargets NAMESPACE stemvo:: DESTINATION ${package_dir})
+
+if(TARGET stemvo_app)
+  file(RELATIVE_PATH runtime_from_bin /prefix/${CMAKE_INSTALL_BINDIR} /prefix/${runtime_dir})
+  set_target_properties(stemvo_app PROPERTIES INSTALL_RPATH "$ORIGIN/${runtime_from_bin}")
+  install(TARGETS stemvo_app)
+endif()
+
+# ONNX Runtime under its own name, and a link for its SONAME: older releases carry the whole version
+# in the SONAME, newer ones only the 1.
+get_target_property(onnxruntime_library stemvo_onnxruntime IMPORTED_LOCATION)
+file(REAL_PATH "${onnxruntime_library}" onnxruntime_library)
+cmake_path(GET onnxruntime_library FILENAME onnxruntime_name)
+install(FILES "${onnxruntime_library}" DESTINATION ${runtime_dir})
+if(NOT onnxruntime_name STREQUAL "libonnxruntime.so.1")
+  file(MAKE_DIRECTORY "${PROJECT_BINARY_DIR}/install")
+  file(CREATE_LINK "${onnxruntime_name}" "${PROJECT_BINARY_DIR}/install/libonnxruntime.so.1" SYMBOLIC)
+  install(FILES "${PROJECT_BINARY_DIR}/install/libonnxruntime.so.1" DESTINATION ${runtime_dir})
+endif()
+cmake_path(GET onnxruntime_library PARENT_PATH onnxruntime_dir)
+install(FILES "${onnxruntime_dir}/LICENSE" "${onnxruntime_dir}/ThirdPartyNotices.txt"
+        DESTINATION share/doc/stemvo/onnxruntime OPTIONAL)
+
+configure_package_config_file(cmake/stemvoConfig.cmake.in ${PROJECT_BINARY_DIR}/install/stemvoConfig.cmake
+                              INSTALL_DESTINATION ${package_dir} PATH_VARS runtime_dir NO_SET_AND_CHECK_MACRO)
+# Below 1.0 a new minor version may break its users.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/install/stemvoConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/install/stemvoConfig.cmake
+              ${PROJECT_BINARY_DIR}/install/stemvoConfigVersion.cmake DESTINATION ${package_dir})
