@@ -19,8 +19,9 @@ struct TrajectoryPlot {
   std::optional<Trajectory> ground_truth;
 };
 
-/// 1600 x about 1200 pixels. The same plot gives the same bytes on one machine (the fonts are the
-/// system's). Positions that are not finite are left out. Error: the file cannot be written.
+/// 1100 to 1600 pixels wide, 800 to 1430 high, after the drive's shape. The same plot gives the
+/// same bytes on one machine (the fonts are the system's). Positions that are not finite are left
+/// out. Error: the file cannot be written.
 [[nodiscard]] Status write_trajectory_png(const std::filesystem::path& file,
                                           const TrajectoryPlot& plot);
 /// The same drawing as vectors.

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#include "report/text_table.hpp"
+
+#include <algorithm>
+
+#include <fmt/core.h>
+
+#include "stemvo/check.hpp"
+
+namespace stemvo {
+
+namespace {
+
+/// Characters shown, not bytes: continuation bytes of UTF-8 take no room.
+std::size_t width(const std::string& cell) {
+  return static_cast<std::size_t>(std::count_if(cell.begin(), cell.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
+  }));
+}
+
+}  // namespace
+
+void TextTable::add(std::vector<std::string> cells) {
+  STEMVO_CHECK(!cells.empty() && cells.size() <= alignment_.size(), "one cell per column");
+  rows_.push_back(std::move(cells));
+}
+
+void TextTable::rule() { rows_.emplace_back(); }
+
+std::string TextTable::str() const {
+  std::vector<std::size_t> widths(alignment_.size(), 0);
+  for (const auto& row : rows_) {
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      widths[c] = std::max(widths[c], width(row[c]));
+    }
+  }
+  std::size_t total = 2 * (widths.size() - 1);
+  for (const std::size_t w : widths) {
+    total += w;
+  }
+  std::string text;
+  for (const auto& row : rows_) {
+    std::string line = row.empty() ? std::string(total, '-') : "";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string padding(widths[c] - width(row[c]), ' ');
+      line += c > 0 ? "  " : "";
+      line += alignment_[c] == 'r' ? padding + row[c] : row[c] + padding;
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + '\n';
+  }
+  return text;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace stemvo {
+
+/// Rows of cells, columns two blanks apart, nothing behind the last cell of a row.
+class TextTable {
+ public:
+  /// One character per column: 'l' left, 'r' right.
+  explicit TextTable(std::string alignment) : alignment_(std::move(alignment)) {}
+
+  /// At most as many cells as columns (checked).
+  void add(std::vector<std::string> cells);
+  /// A line under the last row.
+  void rule();
+  [[nodiscard]] std::string str() const;
+
+ private:
+  std::string alignment_;
+  std::vector<std::vector<std::string>> rows_;  ///< an empty row is a rule
+};
+
+}  // namespace stemvo
