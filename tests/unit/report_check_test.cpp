@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <tuple>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stemvo/report/check.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::stemvo::testing::TempFolder;
+using ::testing::HasSubstr;
+
+constexpr char kMetrics[] = R"({"t_rel_percent": 0.83, "tracked_fraction": 1.0, "frames": 400,
+  "r_rel_deg_per_100m": null, "scale_source": "constant", "segment_lengths_m": [100.0],
+  "ate_rmse_m": {"none": 2.5, "sim3": 1.25}, "gone": null})";
+
+Expected<std::vector<ThresholdResult>> check(const std::string& thresholds,
+                                             const std::string& metrics = kMetrics) {
+  const TempFolder folder;
+  return check_metrics(folder.file("metrics.json", metrics),
+                       folder.file("thresholds.yaml", thresholds));
+}
+
+TEST(Check, PassesWhatIsWithinItsBounds) {
+  const auto results = check(
+      "# a comment\n"
+      "t_rel_percent: {max: 1.0}\n"
+      "tracked_fraction: {min: 0.99, max: 1}\n"
+      "ate_rmse_m.none:\n  max: 3\n"
+      "frames: {min: 400}\n");
+  ASSERT_TRUE(results) << results.error().message;
+  ASSERT_EQ(results->size(), 5U);
+  EXPECT_TRUE(all_passed(*results));
+  EXPECT_EQ((*results)[0].key, "t_rel_percent");
+  EXPECT_EQ((*results)[0].bound, "<= 1");
+  EXPECT_EQ((*results)[0].value, "0.83");
+  EXPECT_EQ((*results)[1].bound, ">= 0.99");
+  EXPECT_EQ((*results)[3].key, "ate_rmse_m.none");
+  EXPECT_EQ((*results)[3].value, "2.5");
+}
+
+TEST(Check, FailsWhatIsBeyondABound) {
+  const auto results = check("t_rel_percent: {max: 0.82}\nate_rmse_m.sim3: {min: 1.3, max: 2}\n");
+  ASSERT_TRUE(results) << results.error().message;
+  EXPECT_FALSE(all_passed(*results));
+  EXPECT_FALSE((*results)[0].passed);
+  EXPECT_FALSE((*results)[1].passed);
+  EXPECT_TRUE((*results)[2].passed);
+}
+
+TEST(Check, FailsAMetricThatIsNull) {
+  const auto results =
+      check("r_rel_deg_per_100m: {max: 100}\ngone.none: {max: 100}\nt_rel_percent: {max: 1}\n");
+  ASSERT_TRUE(results) << results.error().message;
+  EXPECT_FALSE((*results)[0].passed);
+  EXPECT_EQ((*results)[0].value, "null");
+  EXPECT_FALSE((*results)[1].passed);
+  EXPECT_TRUE((*results)[2].passed);
+}
+
+TEST(Check, ShowsTheDigitsThatDecide) {
+  const auto results = check("t_rel_percent: {max: 0.83}\n", R"({"t_rel_percent": 0.8300000001})");
+  ASSERT_TRUE(results);
+  EXPECT_FALSE(results->front().passed);
+  EXPECT_EQ(results->front().value, "0.8300000001");
+}
+
+TEST(Check, TableNamesValueBoundAndResult) {
+  const auto results = check("t_rel_percent: {max: 0.5}\nframes: {min: 10}\n");
+  ASSERT_TRUE(results);
+  const std::string table = format_check_table(*results);
+  EXPECT_THAT(table, ::testing::ContainsRegex("t_rel_percent +0\\.83 +<= 0\\.5 +FAILED\n"));
+  EXPECT_THAT(table, ::testing::ContainsRegex("frames +400 +>= 10 +ok\n"));
+  EXPECT_THAT(table, HasSubstr("1 of 2 bounds not kept\n"));
+  EXPECT_THAT(format_check_table({(*results)[1]}), HasSubstr("all 1 bounds kept\n"));
+}
+
+/// Thresholds, and what the message must say of them.
+class BrokenThresholds : public ::testing::TestWithParam<std::tuple<std::string, std::string>> {};
+
+TEST_P(BrokenThresholds, AreNamedWithTheirLine) {
+  const auto& [thresholds, complaint] = GetParam();
+  const auto results = check(thresholds);
+  ASSERT_FALSE(results);
+  EXPECT_THAT(results.error().message, HasSubstr("thresholds.yaml:"));
+  EXPECT_THAT(results.error().message, HasSubstr(complaint));
+  EXPECT_EQ(results.error().message.find('\n'), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Check,
+    BrokenThresholds,
+    ::testing::Values(
+        std::tuple("frames: {min: 1}\nt_rel: {max: 1}\n", ":2: expected a metric of"),
+        std::tuple("ate_rmse_m.se4: {max: 1}\n", "found 'ate_rmse_m.se4'"),
+        std::tuple("frames.sub: {max: 1}\n", "found 'frames.sub'"),
+        std::tuple("t_rel_percent: {maximum: 1}\n",
+                   ":1: t_rel_percent: expected min or max, found 'maximum'"),
+        std::tuple("t_rel_percent: 1.0\n", "expected {max: NUMBER} or {min: NUMBER}, found '1.0'"),
+        std::tuple("t_rel_percent:\n", "expected {max: NUMBER}"),
+        std::tuple("t_rel_percent: {}\n", "expected {max: NUMBER}"),
+        std::tuple("t_rel_percent: {max: low}\n",
+                   "t_rel_percent.max: expected a finite number, found 'low'"),
+        std::tuple("t_rel_percent: {max: nan}\n", "expected a finite number"),
+        std::tuple("t_rel_percent: {max: .nan}\n", "expected a finite number"),
+        std::tuple("t_rel_percent: {max: .inf}\n", "expected a finite number"),
+        std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 numbers, found 0"),
+        std::tuple("frames: {min: 1}\nframes: {min: 2}\n", ":2: expected frames once"),
+        std::tuple("frames: {min: 1, min: 2}\n", "expected min once"),
+        std::tuple("frames: {min: 1\n", "not YAML"),
+        std::tuple("- frames\n", "expected lines like"),
+        std::tuple("", "expected lines like"),
+        std::tuple("[a]: {min: 1}\n", "expected the name of a metric")));
+
+TEST(Check, NamesMetricsThatCannotBeRead) {
+  const std::string thresholds = "t_rel_percent: {max: 1}\n";
+  const auto message = [&](const std::string& metrics) {
+    const auto results = check(thresholds, metrics);
+    return results ? std::string("no error") : results.error().message;
+  };
+  EXPECT_THAT(message("{\"t_rel_percent\": NaN}"),
+              HasSubstr("metrics.json: not JSON: parse error at line 1"));
+  EXPECT_THAT(message(""), HasSubstr("not JSON"));
+  EXPECT_THAT(message("[]"), HasSubstr("expected a JSON object, found array"));
+  EXPECT_THAT(message(R"({"t_rel_percent": "low"})"),
+              HasSubstr("t_rel_percent: expected a number, found string"));
+  EXPECT_THAT(message(R"({"t_rel_percent": true})"), HasSubstr("expected a number, found boolean"));
+  EXPECT_THAT(message(R"({"t_rel_percent": 1e999})"), HasSubstr("not JSON"));
+
+  const TempFolder folder;
+  const auto file = folder.file("t.yaml", thresholds);
+  const auto no_metrics = check_metrics(folder / "none.json", file);
+  ASSERT_FALSE(no_metrics);
+  EXPECT_THAT(no_metrics.error().message, HasSubstr("none.json: cannot read"));
+  const auto no_thresholds = check_metrics(file, folder / "none.yaml");
+  ASSERT_FALSE(no_thresholds);
+  EXPECT_THAT(no_thresholds.error().message, HasSubstr("none.yaml: cannot read"));
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "stemvo/report/evaluate_report.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::stemvo::testing::read_all;
+using ::stemvo::testing::TempFolder;
+using ::testing::HasSubstr;
+
+Trajectory circle(int num_poses, double step_m) {
+  Trajectory poses(1);
+  for (int i = 1; i < num_poses; ++i) {
+    poses.push_back(poses.back() * Rigid3(so3_exp({0, 0.01, 0}), {0, 0, step_m}));
+  }
+  return poses;
+}
+
+/// Truth of 299 m; an estimate that is 2 % too long, as KITTI and as TUM.
+struct Files {
+  TempFolder folder;
+  std::filesystem::path truth = folder / "truth.txt";
+  std::filesystem::path kitti = folder / "estimate.txt";
+  std::filesystem::path tum = folder / "estimate_tum.txt";
+
+  Files() {
+    const Trajectory estimate = circle(300, 1.02);
+    std::vector<double> times_s(300);
+    for (std::size_t i = 0; i < 300; ++i) {
+      times_s[i] = 0.1 * static_cast<double>(i);
+    }
+    EXPECT_TRUE(write_kitti_trajectory(truth, circle(300, 1.0)));
+    EXPECT_TRUE(write_kitti_trajectory(kitti, estimate));
+    EXPECT_TRUE(write_tum_trajectory(tum, times_s, estimate));
+  }
+};
+
+TEST(EvaluateFiles, ScoresKittiAndTumAlikeAndAddsTheNullRow) {
+  const Files files;
+  const auto report = evaluate_files({files.truth, {files.kitti, files.tum}, Alignment::kNone, {}});
+  ASSERT_TRUE(report) << report.error().message;
+  ASSERT_EQ(report->rows.size(), 2U);
+  EXPECT_EQ(report->num_poses, 300U);
+  const Metrics& metrics = report->rows[0].metrics;
+  EXPECT_NEAR(metrics.t_rel_percent.value(), 2.0, 0.2);
+  EXPECT_GT(metrics.average_offset_m, 0.5);
+  EXPECT_NEAR(report->rows[1].metrics.average_offset_m, metrics.average_offset_m, 1e-6);
+  EXPECT_EQ(report->never_moves.metrics.average_offset_m, metrics.null_offset_m);
+}
+
+TEST(EvaluateFiles, AppliesTheAlignment) {
+  const Files files;
+  for (const Alignment alignment : {Alignment::kScale, Alignment::kSim3}) {
+    const auto report = evaluate_files({files.truth, {files.kitti}, alignment, {}});
+    ASSERT_TRUE(report) << report.error().message;
+    const Metrics& metrics = report->rows[0].metrics;
+    EXPECT_LE(metrics.t_rel_percent.value(), 1e-6);
+    EXPECT_LE(metrics.average_offset_m, 1e-6);
+    EXPECT_GT(metrics.ate_rmse.none_m, 0.5) << "stays that of the file as it is";
+  }
+  // SE(3) puts the circle's centre right: the offset gets smaller only if the fit is kept.
+  const auto none = evaluate_files({files.truth, {files.kitti}, Alignment::kNone, {}});
+  const auto se3 = evaluate_files({files.truth, {files.kitti}, Alignment::kSe3, {}});
+  ASSERT_TRUE(none && se3);
+  EXPECT_NEAR(se3->rows[0].metrics.t_rel_percent.value(),
+              none->rows[0].metrics.t_rel_percent.value(), 1e-6);
+  EXPECT_LT(se3->rows[0].metrics.average_offset_m, 0.8 * none->rows[0].metrics.average_offset_m);
+}
+
+TEST(EvaluateFiles, NamesTheFileThatDoesNotFit) {
+  const Files files;
+  const auto message = [&](const std::filesystem::path& truth,
+                           const std::filesystem::path& estimate) {
+    const auto report = evaluate_files({truth, {files.kitti, estimate}, Alignment::kNone, {}});
+    return report ? std::string("no error") : report.error().message;
+  };
+  const auto one = files.folder.file("one.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  EXPECT_THAT(message(files.truth, one), HasSubstr("one.txt: expected 300 poses as in "));
+  EXPECT_THAT(message(files.truth, one), HasSubstr("found 1 (poses are compared line by line"));
+  const auto tum = files.folder.file("tum.txt", "# TUM\n0.5 0 0 0 0 0 0 1\n");
+  EXPECT_THAT(message(files.truth, tum), HasSubstr("nothing is matched by time"));
+  EXPECT_THAT(message(files.truth, files.folder / "none.txt"), HasSubstr("none.txt: cannot read"));
+  EXPECT_THAT(message(files.folder / "none.txt", files.kitti), HasSubstr("none.txt: cannot read"));
+  const auto eleven = files.folder.file("eleven.txt", "1 0 0 0 0 1 0 0 0 0 1\n");
+  EXPECT_THAT(message(files.truth, eleven),
+              HasSubstr("eleven.txt:1: expected 12 numbers, found 11"));
+}
+
+TEST(EvaluateFiles, TableAndJsonSayTheSame) {
+  const Files files;
+  const auto report = evaluate_files({files.truth, {files.kitti}, Alignment::kScale, {}});
+  ASSERT_TRUE(report);
+  const std::string table = format_evaluation_table(*report);
+  EXPECT_THAT(table, ::testing::ContainsRegex("alignment +scale"));
+  EXPECT_THAT(table, ::testing::ContainsRegex("estimate.txt +0\\.00 "));
+  EXPECT_THAT(table, HasSubstr("(never moves)"));
+  EXPECT_THAT(table, HasSubstr("segments of 100..800 m"));
+
+  ASSERT_TRUE(write_evaluation_json(files.folder / "out.json", *report));
+  const auto json = nlohmann::json::parse(read_all(files.folder / "out.json"));
+  EXPECT_EQ(json["alignment"], "scale");
+  EXPECT_EQ(json["poses"], 300);
+  ASSERT_EQ(json["estimates"].size(), 1U);
+  EXPECT_EQ(json["estimates"][0]["file"], files.kitti.string());
+  EXPECT_EQ(json["estimates"][0]["t_rel_percent"].get<double>(),
+            report->rows[0].metrics.t_rel_percent.value());
+  EXPECT_EQ(json["never_moves"]["average_offset_m"].get<double>(),
+            report->never_moves.metrics.null_offset_m);
+}
+
+TEST(ParseAlignment, KnowsItsFourWords) {
+  for (const std::string word : {"none", "scale", "se3", "sim3"}) {
+    ASSERT_TRUE(parse_alignment(word)) << word;
+    EXPECT_EQ(to_string(*parse_alignment(word)), word);
+  }
+  const auto unknown = parse_alignment("7dof");
+  ASSERT_FALSE(unknown);
+  EXPECT_THAT(unknown.error().message,
+              HasSubstr("expected none, scale, se3 or sim3, found '7dof'"));
+}
+
+}  // namespace
+}  // namespace stemvo

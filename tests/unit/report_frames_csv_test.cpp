@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include <clocale>
+#include <locale>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stemvo/report/frames_csv.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::stemvo::testing::read_all;
+using ::stemvo::testing::TempFolder;
+using ::testing::HasSubstr;
+
+constexpr char kHeader[] =
+    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms\n";
+
+FrameResult tracked() {
+  FrameResult result;
+  result.state = FrameState::kTracking;
+  result.num_matches = 812;
+  result.num_inliers = 640;
+  result.homography_score = 1234.5678;
+  result.fundamental_score = 4321.0;
+  result.homography_ratio = 0.22221;
+  result.model = TwoViewModel::kEssential;
+  result.times = {1.25, 12.5, 3.0004};
+  return result;
+}
+
+TEST(FramesCsv, HoldsOneRowPerFrame) {
+  const TempFolder folder;
+  Expected<FramesCsv> csv = FramesCsv::create(folder / "frames.csv");
+  ASSERT_TRUE(csv) << csv.error().message;
+  csv->write(100, 10.3622, FrameResult());
+  csv->write(101, 10.466, tracked());
+  ASSERT_TRUE(csv->close());
+  EXPECT_EQ(read_all(folder / "frames.csv"),
+            std::string(kHeader) +
+                "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000\n"
+                "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
+                "1.250,12.500,3.000\n");
+}
+
+TEST(FramesCsv, KeepsTheRowsOfARunThatNeverEnds) {
+  const TempFolder folder;
+  Expected<FramesCsv> csv = FramesCsv::create(folder / "frames.csv");
+  ASSERT_TRUE(csv);
+  csv->write(0, 0.0, FrameResult());
+  EXPECT_THAT(read_all(folder / "frames.csv"), HasSubstr("\n0,0,first,"));
+}
+
+/// A number format with a decimal comma and dots between thousands.
+struct CommaNumbers : std::numpunct<char> {
+  [[nodiscard]] char do_decimal_point() const override { return ','; }
+  [[nodiscard]] char do_thousands_sep() const override { return '.'; }
+  [[nodiscard]] std::string do_grouping() const override { return "\3"; }
+};
+
+TEST(FramesCsv, DoesNotFollowTheLocale) {
+  const TempFolder folder;
+  const std::locale before = std::locale::global(std::locale(std::locale(), new CommaNumbers));
+  Expected<FramesCsv> csv = FramesCsv::create(folder / "frames.csv");
+  ASSERT_TRUE(csv);
+  csv->write(1234567, 1.5, tracked());
+  const Status closed = csv->close();
+  std::locale::global(before);
+  ASSERT_TRUE(closed);
+  EXPECT_THAT(read_all(folder / "frames.csv"),
+              HasSubstr("\n1234567,1.5,tracking,812,640,1234.568,"));
+}
+
+TEST(FramesCsv, SaysThatItCannotBeWritten) {
+  const Expected<FramesCsv> no_folder = FramesCsv::create("/nonexistent/frames.csv");
+  ASSERT_FALSE(no_folder);
+  EXPECT_THAT(no_folder.error().message, HasSubstr("/nonexistent/frames.csv: cannot write: "));
+  const Expected<FramesCsv> disk_full = FramesCsv::create("/dev/full");
+  ASSERT_FALSE(disk_full);
+  EXPECT_THAT(disk_full.error().message, HasSubstr("No space left"));
+}
+
+}  // namespace
+}  // namespace stemvo

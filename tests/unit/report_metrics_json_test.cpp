@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "stemvo/report/metrics_json.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::stemvo::testing::read_all;
+using ::stemvo::testing::TempFolder;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+
+MetricsReport example() {
+  Metrics metrics;
+  metrics.path_length_m = 145.25;
+  metrics.average_offset_m = 1.0 / 3.0;
+  metrics.null_offset_m = 79.25;
+  metrics.t_rel_percent = 0.97;
+  metrics.r_rel_deg_per_100m = 1.72;
+  metrics.segment_lengths_m = {100, 200};
+  metrics.num_segments = 5;
+  metrics.ate_rmse = {4.0, 3.0, 2.0, 1.0};
+  metrics.rpe_rotation_deg = 0.0456;
+  return {.stemvo_version = "0.1.0",
+          .sequence = "00",
+          .first_frame = 20,
+          .num_frames = 200,
+          .model = "default",
+          .filter = 7,
+          .fps = 31.5,
+          .scale_source = "ground_truth",
+          .tracked_fraction = 0.995,
+          .metrics = metrics};
+}
+
+nlohmann::json written(const MetricsReport& report) {
+  const TempFolder folder;
+  const Status status = write_metrics_json(folder / "metrics.json", report);
+  EXPECT_TRUE(status) << status.error().message;
+  const std::string text = read_all(folder / "metrics.json");
+  EXPECT_TRUE(text.ends_with("}\n"));
+  return nlohmann::json::parse(text);
+}
+
+TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
+  const nlohmann::json json = written(example());
+  EXPECT_EQ(json["stemvo_version"], "0.1.0");
+  EXPECT_EQ(json["sequence"], "00");
+  EXPECT_EQ(json["first_frame"], 20);
+  EXPECT_EQ(json["frames"], 200);
+  EXPECT_EQ(json["model"], "default");
+  EXPECT_EQ(json["filter"], 7);
+  EXPECT_EQ(json["fps"], 31.5);
+  EXPECT_EQ(json["scale_source"], "ground_truth");
+  EXPECT_EQ(json["tracked_fraction"], 0.995);
+  EXPECT_EQ(json["path_length_m"], 145.25);
+  EXPECT_EQ(json["average_offset_m"].get<double>(), 1.0 / 3.0);
+  EXPECT_EQ(json["null_offset_m"], 79.25);
+  EXPECT_EQ(json["t_rel_percent"], 0.97);
+  EXPECT_EQ(json["r_rel_deg_per_100m"], 1.72);
+  EXPECT_EQ(json["segment_lengths_m"], nlohmann::json({100.0, 200.0}));
+  EXPECT_EQ(json["segments"], 5);
+  EXPECT_EQ(json["ate_rmse_m"]["none"], 4.0);
+  EXPECT_EQ(json["ate_rmse_m"]["scale"], 3.0);
+  EXPECT_EQ(json["ate_rmse_m"]["se3"], 2.0);
+  EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
+  EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
+  EXPECT_EQ(json.size(), 18U);
+}
+
+TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
+  MetricsReport report = example();
+  report.metrics.reset();
+  const nlohmann::json json = written(report);
+  for (const char* key :
+       {"path_length_m", "average_offset_m", "null_offset_m", "t_rel_percent", "r_rel_deg_per_100m",
+        "segment_lengths_m", "segments", "ate_rmse_m", "rpe_rotation_deg"}) {
+    ASSERT_TRUE(json.contains(key)) << key;
+    EXPECT_TRUE(json[key].is_null()) << key;
+  }
+  EXPECT_EQ(json["frames"], 200);
+}
+
+TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
+  MetricsReport report = example();
+  report.metrics->t_rel_percent.reset();
+  report.metrics->average_offset_m = std::numeric_limits<double>::quiet_NaN();
+  report.fps = std::numeric_limits<double>::infinity();
+  const nlohmann::json json = written(report);
+  EXPECT_TRUE(json["t_rel_percent"].is_null());
+  EXPECT_TRUE(json["average_offset_m"].is_null());
+  EXPECT_TRUE(json["fps"].is_null());
+}
+
+TEST(MetricsJson, SurvivesNamesThatAreNotUtf8AndFoldersThatAreNotThere) {
+  MetricsReport report = example();
+  report.sequence = "\xff\"quoted\"";
+  EXPECT_THAT(written(report)["sequence"].get<std::string>(), HasSubstr("\"quoted\""));
+  const Status status = write_metrics_json("/nonexistent/metrics.json", report);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, HasSubstr("/nonexistent/metrics.json: cannot write"));
+}
+
+TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
+  const std::string table = format_metrics_table(example());
+  EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +none"));
+  EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +none"));
+  EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +none"));
+  EXPECT_THAT(table, ContainsRegex("never moved +79\\.25  m +none"));
+  EXPECT_THAT(table, ContainsRegex("ATE +4\\.00  m +none"));
+  EXPECT_THAT(table, ContainsRegex("ATE +3\\.00  m +scale"));
+  EXPECT_THAT(table, ContainsRegex("ATE +2\\.00  m +se3"));
+  EXPECT_THAT(table, ContainsRegex("ATE +1\\.00  m +sim3"));
+  EXPECT_THAT(table, HasSubstr("mean over 5 segments of 100..200 m"));
+  EXPECT_THAT(table, HasSubstr("each step rescaled to its true length"));
+  EXPECT_THAT(table, HasSubstr("200 frames (20:220)"));
+  EXPECT_EQ(table.find(" \n"), std::string::npos) << "blanks at the end of a line";
+}
+
+TEST(MetricsTable, SaysWhatIsMissing) {
+  MetricsReport report = example();
+  report.metrics->t_rel_percent.reset();
+  report.metrics->num_segments = 0;
+  EXPECT_THAT(format_metrics_table(report), HasSubstr("no segment fits into the drive"));
+  report.metrics.reset();
+  EXPECT_THAT(format_metrics_table(report), HasSubstr("No ground truth"));
+}
+
+}  // namespace
+}  // namespace stemvo
