@@ -103,8 +103,8 @@ TEST_F(ConfigLoad, WrongTypeSaysWhatWasExpectedAndFound) {
 }
 
 TEST_F(ConfigLoad, ValueOutOfRangeNamesTheLine) {
-  EXPECT_EQ(error_of("seed: 1\nstem:\n  filter: -1\n"),
-            ":3: stem.filter: expected a whole number of at least 0, found -1");
+  EXPECT_EQ(error_of("seed: 1\nstem:\n  filter: -2\n"),
+            ":3: stem.filter: expected a whole number of at least -1, found -2");
   EXPECT_EQ(error_of("features:\n  method: surf\n"),
             ":2: features.method: expected one of klt, orb, sift, found 'surf'");
   EXPECT_EQ(error_of("features:\n  klt_window: 20\n"),

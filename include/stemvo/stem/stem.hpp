@@ -16,7 +16,7 @@ struct StemOptions {
   /// Name in models/manifest.yaml, path of an .onnx (with a manifest.yaml beside it), `gray`, or
   /// `input_layer` (filters 0, 1, 2 = R, G, B).
   std::string model = "default";
-  int filter = 0;
+  int filter = -1;                   ///< -1: the manifest's default_filter (gray, input_layer: 0)
   int sampling_px = 0;               ///< divisor of the native stride; 0: the native stride itself
   std::string upsample = "bicubic";  ///< `bicubic` (to the input's size) or `native`
   double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
@@ -29,6 +29,7 @@ struct StemInfo {
   std::string model;   ///< as asked for
   std::string layer;   ///< empty for gray and input_layer
   std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
+  int filter = 0;      ///< the one chosen, never -1
   int num_filters = 1;
   int native_stride_px = 1;
   int sampling_px = 1;
@@ -64,6 +65,7 @@ class Stem {
 /// Float channel -> 8-bit picture: percentile limits that follow the drive slowly, so that a patch
 /// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
 /// brings it to the input's size (PixelMap is adjusted; no resampling between pixels).
+/// A channel without contrast becomes one gray and leaves the limits as they were; NaN becomes 0.
 class ChannelStretch {
  public:
   explicit ChannelStretch(const StemOptions& options);

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+#include "stemvo/check.hpp"
+#include "stemvo/stem/stem.hpp"
+
+namespace stemvo {
+namespace {
+
+// Enough for percentiles to a hundredth of the range, few enough to cost nothing.
+constexpr int kSamplesWanted = 20000;
+// Of the larger limit's magnitude: below it, the spread is rounding.
+constexpr double kLeastContrast = 1e-5;
+constexpr double kMiddleGray = 128.0;
+
+/// Finite values on a grid of the channel, the same pixels in every frame.
+std::vector<float> sample(const cv::Mat& values) {
+  const int step = std::max(
+      1, static_cast<int>(std::sqrt(static_cast<double>(values.total()) / kSamplesWanted)));
+  std::vector<float> samples;
+  samples.reserve(values.total() / static_cast<std::size_t>(step * step) + values.total() / 100);
+  for (int row = step / 2; row < values.rows; row += step) {
+    const float* const pixels = values.ptr<float>(row);
+    for (int col = step / 2; col < values.cols; col += step) {
+      if (std::isfinite(pixels[col])) {
+        samples.push_back(pixels[col]);
+      }
+    }
+  }
+  return samples;
+}
+
+/// `samples` is reordered.
+double percentile(std::vector<float>& samples, double percent) {
+  const double last = static_cast<double>(samples.size() - 1);
+  const auto rank = static_cast<std::ptrdiff_t>(std::lround(last * percent / 100.0));
+  const auto place = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
+  std::nth_element(samples.begin(), place, samples.end());
+  return *place;
+}
+
+bool has_contrast(double low, double high) {
+  return high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20});
+}
+
+/// Picture pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
+PixelMap upsampled(const PixelMap& map, int factor) {
+  PixelMap up;
+  up.scale = map.scale / factor;
+  up.offset_px = map.offset_px + (0.5 / factor - 0.5) * map.scale;
+  return up;
+}
+
+}  // namespace
+
+ChannelStretch::ChannelStretch(const StemOptions& options) : options_(options) {}
+
+ChannelImage ChannelStretch::apply(const Channel& channel) {
+  STEMVO_CHECK(channel.values.type() == CV_32FC1 && !channel.values.empty(),
+               "a channel is one plane of floats");
+  std::vector<float> samples = sample(channel.values);
+  if (!samples.empty()) {
+    const double low = percentile(samples, options_.stretch_low_percent);
+    const double high = percentile(samples, options_.stretch_high_percent);
+    if (has_contrast(low, high)) {
+      const double memory = has_limits_ ? options_.stretch_memory : 0.0;
+      low_ = memory * low_ + (1.0 - memory) * low;
+      high_ = memory * high_ + (1.0 - memory) * high;
+      has_limits_ = true;
+    }
+  }
+  const double gain = has_limits_ ? 255.0 / (high_ - low_) : 0.0;
+  const double bias = has_limits_ ? -gain * low_ : kMiddleGray;
+
+  const int factor = static_cast<int>(std::lround(channel.map.scale.x()));
+  STEMVO_CHECK(channel.map.scale.x() == factor && channel.map.scale.y() == factor,
+               "a channel's sampling is a whole number of pixels");
+  ChannelImage image;
+  image.map = channel.map;
+  channel.values.convertTo(image.pixels, CV_8U, gain, bias);
+  if (options_.upsample == "bicubic" && factor > 1) {
+    cv::Mat large;
+    cv::resize(image.pixels, large, {}, factor, factor, cv::INTER_CUBIC);
+    image.pixels = std::move(large);
+    image.map = upsampled(channel.map, factor);
+  }
+  return image;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "stem/model_file.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "stem/sampling.hpp"
+#include "stem/window_check.hpp"
+
+namespace stemvo::internal {
+namespace {
+
+constexpr const char* kManifest = "manifest.yaml";
+
+Expected<ModelEntry> find_by_path(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) {
+    return fail(fmt::format("{}: no such file", file.string()));
+  }
+  const std::filesystem::path manifest = std::filesystem::absolute(file).parent_path() / kManifest;
+  if (!std::filesystem::exists(manifest, ignored)) {
+    return fail(fmt::format(
+        "{}: expected a {} beside it, which says kernel, stride and padding, found none",
+        file.string(), kManifest));
+  }
+  const auto entries = load_manifest(manifest);
+  if (!entries) {
+    return tl::unexpected<Error>(entries.error());
+  }
+  const auto found = std::find_if(entries->begin(), entries->end(), [&](const ModelEntry& entry) {
+    return entry.file.filename() == file.filename();
+  });
+  if (found == entries->end()) {
+    return fail(fmt::format("{}: expected an entry with 'file: {}', found none", manifest.string(),
+                            file.filename().string()));
+  }
+  return *found;
+}
+
+}  // namespace
+
+Expected<std::string> read_bytes(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) {
+    return fail(fmt::format("{}: expected a file, found a folder", file.string()));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) {
+    return fail(
+        fmt::format("{}: cannot read: {}", file.string(), std::generic_category().message(errno)));
+  }
+  return bytes;
+}
+
+Expected<ModelEntry> find_model(const std::string& model, const std::filesystem::path& models_dir) {
+  if (model.ends_with(".onnx")) {
+    return find_by_path(model);
+  }
+  const std::filesystem::path manifest = models_dir / kManifest;
+  auto entries = load_manifest(manifest);
+  if (!entries) {
+    return tl::unexpected<Error>(std::move(entries).error());
+  }
+  std::vector<std::string> known;
+  for (ModelEntry& entry : *entries) {
+    if (entry.name == model) {
+      return std::move(entry);
+    }
+    known.push_back(entry.name);
+  }
+  known.insert(known.end(), {"gray", "input_layer", "the path of an .onnx"});
+  return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest.string(),
+                          fmt::join(known, ", "), model));
+}
+
+Expected<OnnxSession> open_model(const ModelEntry& entry) {
+  const std::string file = entry.file.string();
+  const auto bytes = read_bytes(entry.file);
+  if (!bytes) {
+    return tl::unexpected<Error>(bytes.error());
+  }
+  if (const std::string hash = sha256_hex(*bytes); hash != entry.sha256) {
+    return fail(fmt::format("{}: expected sha256 {} as in the manifest, found {}", file,
+                            entry.sha256, hash));
+  }
+  auto session = OnnxSession::create(file, *bytes);
+  if (!session) {
+    return session;
+  }
+  if (session->num_filters() != entry.num_filters) {
+    return fail(fmt::format("{}: expected {} filters as in the manifest, found {}", file,
+                            entry.num_filters, session->num_filters()));
+  }
+  if (Status status = check_window(file, *session, SamplingPlan(entry, entry.stride_px)); !status) {
+    return tl::unexpected<Error>(std::move(status).error());
+  }
+  return session;
+}
+
+}  // namespace stemvo::internal
+
+namespace stemvo {
+
+Status check_model(const ModelEntry& entry) {
+  const auto session = internal::open_model(entry);
+  return session ? Status() : tl::unexpected<Error>(session.error());
+}
+
+}  // namespace stemvo

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "stem/onnx_session.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/stem/manifest.hpp"
+
+namespace stemvo::internal {
+
+/// The whole of a file. Error: it cannot be read.
+[[nodiscard]] Expected<std::string> read_bytes(const std::filesystem::path& file);
+
+/// SHA-256 as 64 lower-case hexadecimal digits.
+[[nodiscard]] std::string sha256_hex(std::string_view bytes);
+
+/// The manifest's entry for `model`: a name in models_dir/manifest.yaml, or the path of an .onnx
+/// that a manifest.yaml beside it lists. Errors: no manifest, unknown name (lists the known ones),
+/// a file the manifest does not list.
+[[nodiscard]] Expected<ModelEntry> find_model(const std::string& model,
+                                              const std::filesystem::path& models_dir);
+
+/// Reads, hashes and loads the file, and holds the graph against the entry: hash, number of
+/// filters, kernel, stride and padding (window_check.hpp).
+[[nodiscard]] Expected<OnnxSession> open_model(const ModelEntry& entry);
+
+}  // namespace stemvo::internal

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/stem/channel.hpp"
+#include "stemvo/stem/manifest.hpp"
+
+namespace stemvo::internal {
+
+/// How one axis of a convolution of stride s is sampled every s' pixels, s' a divisor of s: s / s'
+/// passes over the frame shifted by 0, s', 2 s', .., whose outputs are interleaved. Output J looks
+/// at the k pixels from s' J - before on.
+///
+/// The passes read one buffer, each from its own start. Where the graph pads, a pass would see
+/// padding where the frame goes on, at another place in each pass; then the buffer holds a margin
+/// of repeated border pixels instead, and outputs that touch the graph's padding are left out.
+struct SamplingAxis {
+  int kernel = 1;
+  int stride = 1;
+  int sampling = 1;
+  int before = 0;  ///< padding of the graph
+  int after = 0;
+
+  [[nodiscard]] int num_shifts() const { return stride / sampling; }
+  [[nodiscard]] bool needs_margin() const { return num_shifts() > 1 && before + after > 0; }
+  /// Whole strides, so that a margin moves the outputs by whole positions.
+  [[nodiscard]] int margin_before() const {
+    return needs_margin() ? stride * ((before + stride - 1) / stride) : 0;
+  }
+  [[nodiscard]] int margin_after() const { return needs_margin() ? after : 0; }
+  [[nodiscard]] int buffer_size(int size) const { return margin_before() + size + margin_after(); }
+  /// Of the interleaved channel; 0 if the frame is smaller than the kernel.
+  [[nodiscard]] int channel_size(int size) const { return outputs(size, sampling); }
+  /// Of one pass over the buffer.
+  [[nodiscard]] int pass_size(int size) const { return outputs(buffer_size(size), stride); }
+  /// Outputs of each pass before the first that is kept.
+  [[nodiscard]] int first_output() const { return margin_before() / stride; }
+
+ private:
+  [[nodiscard]] int outputs(int size, int step) const {
+    const int room = size + before + after - kernel;
+    return room < 0 ? 0 : room / step + 1;
+  }
+};
+
+/// Both axes.
+struct SamplingPlan {
+  SamplingPlan(const ModelEntry& entry, int sampling_px);
+
+  SamplingAxis x;
+  SamplingAxis y;
+
+  [[nodiscard]] int num_passes() const { return x.num_shifts() * y.num_shifts(); }
+  /// Column and row where pass `index` starts in the buffer; row-major.
+  [[nodiscard]] cv::Point shift(int index) const {
+    return {x.sampling * (index % x.num_shifts()), y.sampling * (index / x.num_shifts())};
+  }
+  [[nodiscard]] bool needs_margin() const { return x.needs_margin() || y.needs_margin(); }
+  [[nodiscard]] cv::Size buffer_size(cv::Size frame) const {
+    return {x.buffer_size(frame.width), y.buffer_size(frame.height)};
+  }
+  [[nodiscard]] cv::Size pass_size(cv::Size frame) const {
+    return {x.pass_size(frame.width), y.pass_size(frame.height)};
+  }
+  [[nodiscard]] cv::Size channel_size(cv::Size frame) const {
+    return {x.channel_size(frame.width), y.channel_size(frame.height)};
+  }
+  /// Centre of the pixels that a channel pixel looks at.
+  [[nodiscard]] PixelMap map() const;
+  /// Writes the outputs of pass `index` to their places in the channel.
+  void interleave(int index, const cv::Mat1f& pass, cv::Mat1f& channel) const;
+};
+
+}  // namespace stemvo::internal

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/stem/stem.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "stem/filter_layer.hpp"
+#include "stem/model_file.hpp"
+#include "stemvo/check.hpp"
+
+namespace stemvo {
+
+struct Stem::Impl {
+  StemInfo info;
+  std::unique_ptr<internal::FilterLayer> layer;
+};
+
+namespace {
+
+using internal::FilterLayer;
+
+struct LoadedLayer {
+  StemInfo info;
+  int default_filter = 0;
+  std::unique_ptr<FilterLayer> layer;
+};
+
+/// 0 stands for the stride. Error: not a divisor.
+Expected<int> choose_sampling(int asked, int stride) {
+  if (asked == 0) {
+    return stride;
+  }
+  if (asked > 0 && stride % asked == 0) {
+    return asked;
+  }
+  std::vector<int> allowed;
+  for (int i = 1; i <= stride; ++i) {
+    if (stride % i == 0) {
+      allowed.push_back(i);
+    }
+  }
+  return fail(fmt::format("stem.sampling_px: expected {} (divisors of the stride {}), found {}",
+                          fmt::join(allowed, ", "), stride, asked));
+}
+
+Expected<LoadedLayer> load_network(const StemOptions& options,
+                                   const std::filesystem::path& models_dir) {
+  const auto entry = internal::find_model(options.model, models_dir);
+  if (!entry) {
+    return tl::unexpected<Error>(entry.error());
+  }
+  const auto sampling = choose_sampling(options.sampling_px, entry->stride_px);
+  if (!sampling) {
+    return tl::unexpected<Error>(sampling.error());
+  }
+  auto session = internal::open_model(*entry);
+  if (!session) {
+    return tl::unexpected<Error>(std::move(session).error());
+  }
+  const internal::SamplingPlan plan(*entry, *sampling);
+  if (plan.needs_margin() && !session->fixed_size().empty()) {
+    return fail(fmt::format(
+        "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
+        "found {}",
+        entry->stride_px, entry->file.string(), *sampling));
+  }
+  LoadedLayer loaded;
+  loaded.info = {.model = options.model,
+                 .layer = entry->layer,
+                 .sha256 = entry->sha256,
+                 .num_filters = entry->num_filters,
+                 .native_stride_px = entry->stride_px,
+                 .sampling_px = *sampling};
+  loaded.default_filter = entry->default_filter;
+  loaded.layer = internal::make_network_layer(entry->file.string(), *std::move(session), plan);
+  return loaded;
+}
+
+Expected<LoadedLayer> load_layer(const StemOptions& options,
+                                 const std::filesystem::path& models_dir) {
+  const bool is_gray = options.model == "gray";
+  if (!is_gray && options.model != "input_layer") {
+    return load_network(options, models_dir);
+  }
+  if (const auto sampling = choose_sampling(options.sampling_px, 1); !sampling) {
+    return tl::unexpected<Error>(sampling.error());
+  }
+  LoadedLayer loaded;
+  loaded.info.model = options.model;
+  loaded.info.num_filters = is_gray ? 1 : 3;
+  loaded.layer = is_gray ? internal::make_gray_layer() : internal::make_input_layer();
+  return loaded;
+}
+
+}  // namespace
+
+Stem::Stem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Stem::Stem(Stem&&) noexcept = default;
+Stem& Stem::operator=(Stem&&) noexcept = default;
+Stem::~Stem() = default;
+
+Expected<Stem> Stem::create(const StemOptions& options, const std::filesystem::path& models_dir) {
+  auto loaded = load_layer(options, models_dir);
+  if (!loaded) {
+    return tl::unexpected<Error>(std::move(loaded).error());
+  }
+  const int filter = options.filter == -1 ? loaded->default_filter : options.filter;
+  if (filter < 0 || filter >= loaded->info.num_filters) {
+    return fail(fmt::format("stem.filter: expected 0 to {} for {}, found {}",
+                            loaded->info.num_filters - 1, options.model, filter));
+  }
+  loaded->info.filter = filter;
+  auto impl = std::make_unique<Impl>();
+  impl->info = std::move(loaded->info);
+  impl->layer = std::move(loaded->layer);
+  return Stem(std::move(impl));
+}
+
+const StemInfo& Stem::info() const { return impl_->info; }
+
+Expected<Channel> Stem::apply(const cv::Mat& frame) const {
+  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
+  auto channels = impl_->layer->apply(frame, impl_->info.filter, impl_->info.filter + 1);
+  if (!channels) {
+    return tl::unexpected<Error>(std::move(channels).error());
+  }
+  return std::move(channels->front());
+}
+
+Expected<std::vector<Channel>> Stem::apply_all(const cv::Mat& frame) const {
+  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
+  return impl_->layer->apply(frame, 0, impl_->info.num_filters);
+}
+
+}  // namespace stemvo

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "stemvo/stem/stem.hpp"
+#include "support/temp_folder.hpp"
+#include "support/tiny_stem.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::TinyStem;
+
+Channel ramp(float low, float high) {
+  Channel channel;
+  channel.values.create(100, 200, CV_32F);
+  for (int i = 0; i < 20000; ++i) {
+    channel.values.at<float>(i / 200, i % 200) =
+        low + (high - low) * static_cast<float>(i) / 19999.0F;
+  }
+  return channel;
+}
+
+TEST(ChannelStretch, PercentilesBecomeBlackAndWhite) {
+  StemOptions options;
+  options.stretch_low_percent = 10.0;
+  options.stretch_high_percent = 60.0;
+  ChannelStretch stretch(options);
+  const ChannelImage image = stretch.apply(ramp(-3.0F, 7.0F));
+  ASSERT_EQ(image.pixels.type(), CV_8UC1);
+  const auto at_percent = [&](int percent) {
+    const int i = 20000 * percent / 100;
+    return static_cast<int>(image.pixels.at<unsigned char>(i / 200, i % 200));
+  };
+  EXPECT_EQ(at_percent(5), 0);
+  EXPECT_NEAR(at_percent(10), 0, 1);
+  EXPECT_NEAR(at_percent(35), 127.5, 1);
+  EXPECT_NEAR(at_percent(60), 255, 1);
+  EXPECT_EQ(at_percent(80), 255);
+}
+
+TEST(ChannelStretch, LimitsFollowSlowly) {
+  StemOptions options;
+  options.stretch_low_percent = 0.0;
+  options.stretch_high_percent = 100.0;
+  options.stretch_memory = 0.75;
+  ChannelStretch stretch(options);
+  (void)stretch.apply(ramp(0.0F, 100.0F));
+  // White moves from 100 to 0.75 * 100 + 0.25 * 200 = 125.
+  const ChannelImage second = stretch.apply(ramp(0.0F, 200.0F));
+  EXPECT_NEAR(second.pixels.at<unsigned char>(25, 0), 50.0 / 125.0 * 255.0, 1.0);
+  const ChannelImage third = stretch.apply(ramp(0.0F, 200.0F));
+  EXPECT_NEAR(third.pixels.at<unsigned char>(25, 0), 50.0 / 143.75 * 255.0, 1.0);
+}
+
+TEST(ChannelStretch, NoContrastIsOneGrayAndForgotten) {
+  ChannelStretch stretch{StemOptions{}};
+  Channel flat;
+  flat.values = cv::Mat1f(20, 30, 5.0F);
+  cv::Mat pixels = stretch.apply(flat).pixels;
+  EXPECT_EQ(cv::norm(pixels, cv::Mat1b(20, 30, 128), cv::NORM_INF), 0.0);
+  flat.values = cv::Mat1f(20, 30, 0.0F);
+  EXPECT_EQ(cv::norm(stretch.apply(flat).pixels, cv::Mat1b(20, 30, 128), cv::NORM_INF), 0.0);
+
+  const cv::Mat before = stretch.apply(ramp(0.0F, 10.0F)).pixels;
+  (void)stretch.apply(flat);
+  const cv::Mat after = stretch.apply(ramp(0.0F, 10.0F)).pixels;
+  EXPECT_EQ(cv::norm(before, after, cv::NORM_INF), 0.0);
+}
+
+TEST(ChannelStretch, NotANumberHarmsNobodyElse) {
+  StemOptions options;
+  ChannelStretch clean(options);
+  ChannelStretch dirty(options);
+  const cv::Mat expected = clean.apply(ramp(0.0F, 10.0F)).pixels;
+  Channel broken = ramp(0.0F, 10.0F);
+  broken.values.at<float>(50, 50) = std::numeric_limits<float>::quiet_NaN();
+  broken.values.at<float>(50, 51) = std::numeric_limits<float>::infinity();
+  const cv::Mat found = dirty.apply(broken).pixels;
+  cv::Mat1b differs = expected != found;
+  differs.at<unsigned char>(50, 50) = 0;
+  differs.at<unsigned char>(50, 51) = 0;
+  EXPECT_EQ(cv::countNonZero(differs), 0);
+  EXPECT_EQ(found.at<unsigned char>(50, 50), 0);
+
+  Channel nothing;
+  nothing.values = cv::Mat1f(10, 10, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_EQ(dirty.apply(nothing).pixels.size(), cv::Size(10, 10));
+}
+
+TEST(ChannelStretch, NativeKeepsTheSize) {
+  StemOptions options;
+  options.upsample = "native";
+  ChannelStretch stretch(options);
+  Channel channel = ramp(0.0F, 1.0F);
+  channel.map.scale = Eigen::Vector2d(2, 2);
+  channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
+  const ChannelImage image = stretch.apply(channel);
+  EXPECT_EQ(image.pixels.size(), channel.values.size());
+  EXPECT_EQ(image.map.scale, channel.map.scale);
+  EXPECT_EQ(image.map.offset_px, channel.map.offset_px);
+}
+
+/// Intensity-weighted centre of what is brighter than the middle.
+Eigen::Vector2d centre_of(const cv::Mat& pixels) {
+  cv::Mat1d weights;
+  pixels.convertTo(weights, CV_64F);
+  double darkest = 0.0;
+  double brightest = 0.0;
+  cv::minMaxLoc(weights, &darkest, &brightest);
+  weights = cv::max(weights - 0.3 * darkest - 0.7 * brightest, 0.0);
+  const cv::Moments moments = cv::moments(weights);
+  return {moments.m10 / moments.m00, moments.m01 / moments.m00};
+}
+
+struct Case {
+  const TinyStem* stem;
+  int sampling;
+  const char* upsample;
+};
+
+class BrightSpot : public ::testing::TestWithParam<Case> {};
+
+TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
+  const auto& [tiny, sampling, upsample] = GetParam();
+  const testing::TempFolder folder;
+  testing::write_models(folder, *tiny);
+  StemOptions options;
+  options.model = tiny->name;
+  options.filter = 0;  // a box: the only symmetric one
+  options.sampling_px = sampling;
+  options.upsample = upsample;
+  options.stretch_low_percent = 0.0;
+  options.stretch_high_percent = 100.0;
+  auto stem = Stem::create(options, folder.path());
+  ASSERT_TRUE(stem) << stem.error().message;
+  for (const Eigen::Vector2d& spot :
+       {Eigen::Vector2d(60.0, 45.0), Eigen::Vector2d(61.3, 43.8), Eigen::Vector2d(58.5, 47.25)}) {
+    cv::Mat1b frame(90, 121);
+    for (int y = 0; y < frame.rows; ++y) {
+      for (int x = 0; x < frame.cols; ++x) {
+        const double d2 = (Eigen::Vector2d(x, y) - spot).squaredNorm();
+        frame(y, x) = cv::saturate_cast<unsigned char>(20.0 + 220.0 * std::exp(-d2 / 200.0));
+      }
+    }
+    ChannelStretch stretch(options);
+    const auto channel = stem->apply(frame);
+    ASSERT_TRUE(channel);
+    const ChannelImage image = stretch.apply(*channel);
+    const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
+    EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
+    EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
+    if (std::string(upsample) == "bicubic") {
+      EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);
+      EXPECT_EQ(image.map.scale, Eigen::Vector2d(1, 1));
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         BrightSpot,
+                         ::testing::Values(Case{&testing::kPlain4, 4, "bicubic"},
+                                           Case{&testing::kPlain4, 2, "bicubic"},
+                                           Case{&testing::kPlain4, 2, "native"},
+                                           Case{&testing::kPlain4, 1, "bicubic"},
+                                           Case{&testing::kPadded3, 2, "bicubic"},
+                                           Case{&testing::kPadded3, 2, "native"},
+                                           Case{&testing::kPadded3, 1, "bicubic"},
+                                           Case{&testing::kSame3, 2, "bicubic"},
+                                           Case{&testing::kPadded7, 2, "bicubic"},
+                                           Case{&testing::kPadded7, 1, "bicubic"}),
+                         [](const auto& tested) {
+                           return tested.param.stem->name + "_at_" +
+                                  std::to_string(tested.param.sampling) + "_" +
+                                  tested.param.upsample;
+                         });
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/stem/stem.hpp"
+
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "support/temp_folder.hpp"
+#include "support/tiny_stem.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::TinyStem;
+
+/// Frame sizes with and without a remainder by 4.
+const std::vector<cv::Size> kSizes = {{96, 64}, {97, 66}, {94, 63}, {95, 61}};
+
+Stem make_stem(const testing::TempFolder& folder,
+               const TinyStem& tiny,
+               int sampling,
+               int filter = -1) {
+  StemOptions options;
+  options.model = tiny.name;
+  options.sampling_px = sampling;
+  options.filter = filter;
+  auto stem = Stem::create(options, folder.path());
+  EXPECT_TRUE(stem) << stem.error().message;
+  return *std::move(stem);
+}
+
+/// The part of a channel whose windows lie inside the frame.
+cv::Rect inside(const TinyStem& tiny, cv::Size frame, int sampling) {
+  const auto first = [&](int before) { return (before + sampling - 1) / sampling; };
+  const auto end = [&](int before, int size) {
+    return (size + before - tiny.kernel) / sampling + 1;
+  };
+  const int x = first(tiny.padding[1]);
+  const int y = first(tiny.padding[0]);
+  return {x, y, end(tiny.padding[1], frame.width) - x, end(tiny.padding[0], frame.height) - y};
+}
+
+/// Largest difference over the standard deviation.
+double relative_error(const cv::Mat& found, const cv::Mat1d& expected) {
+  cv::Mat1d values;
+  found.convertTo(values, CV_64F);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(expected, mean, deviation);
+  return cv::norm(values, expected, cv::NORM_INF) / deviation[0];
+}
+
+struct Case {
+  const TinyStem* stem;
+  int sampling;
+};
+
+class StemSampling : public ::testing::TestWithParam<Case> {};
+
+TEST_P(StemSampling, EqualsTheConvolutionWithTheSmallerStride) {
+  const auto& [tiny, sampling] = GetParam();
+  const testing::TempFolder folder;
+  testing::write_models(folder, *tiny);
+  const Stem stem = make_stem(folder, *tiny, sampling);
+  for (const int type : {CV_8UC1, CV_8UC3}) {
+    for (const cv::Size size : kSizes) {
+      const cv::Mat frame = testing::textured_frame(size, type);
+      const auto expected = testing::reference_channels(*tiny, frame, sampling);
+      const auto channels = stem.apply_all(frame);
+      ASSERT_TRUE(channels) << channels.error().message;
+      ASSERT_EQ(channels->size(), expected.size());
+      // At the stride itself the graph's own padding holds, everywhere.
+      const bool native = sampling == tiny->stride;
+      for (std::size_t i = 0; i < expected.size(); ++i) {
+        const cv::Mat& values = (*channels)[i].values;
+        ASSERT_EQ(values.size(), expected[i].size());
+        const cv::Rect part =
+            native ? cv::Rect({0, 0}, values.size()) : inside(*tiny, size, sampling);
+        EXPECT_LE(relative_error(values(part), expected[i](part)), 1e-5)
+            << size << " filter " << i << " type " << type;
+        EXPECT_TRUE(cv::checkRange(values));
+      }
+      const auto one = stem.apply(frame);  // the manifest's default filter is 1
+      ASSERT_TRUE(one);
+      EXPECT_EQ(cv::norm(one->values, (*channels)[1].values, cv::NORM_INF), 0.0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         StemSampling,
+                         ::testing::Values(Case{&testing::kPlain4, 4},
+                                           Case{&testing::kPlain4, 2},
+                                           Case{&testing::kPlain4, 1},
+                                           Case{&testing::kNorm4, 4},
+                                           Case{&testing::kNorm4, 2},
+                                           Case{&testing::kNorm4, 1},
+                                           Case{&testing::kPadded3, 2},
+                                           Case{&testing::kPadded3, 1},
+                                           Case{&testing::kSame3, 2},
+                                           Case{&testing::kSame3, 1},
+                                           Case{&testing::kPadded7, 2},
+                                           Case{&testing::kPadded7, 1}),
+                         [](const auto& tested) {
+                           return tested.param.stem->name + "_at_" +
+                                  std::to_string(tested.param.sampling);
+                         });
+
+TEST(Stem, ShiftedPassesSeeNoPaddingAndNoOtherSide) {
+  // On a plain frame every output is the same, the border's too.
+  for (const TinyStem& tiny :
+       {testing::kPlain4, testing::kPadded3, testing::kSame3, testing::kPadded7}) {
+    const testing::TempFolder folder;
+    testing::write_models(folder, tiny);
+    const Stem stem = make_stem(folder, tiny, 1, 0);
+    const auto channel = stem.apply(cv::Mat(61, 95, CV_8UC3, cv::Scalar(10, 200, 90)));
+    ASSERT_TRUE(channel) << channel.error().message;
+    const cv::Mat difference = channel->values - channel->values.at<float>(5, 5);
+    EXPECT_LE(cv::norm(difference, cv::NORM_INF), 1e-4) << tiny.name;
+  }
+}
+
+TEST(Stem, SameBytesForAnyNumberOfThreadsAndAnyHistory) {
+  const testing::TempFolder folder;
+  testing::write_models(folder, testing::kNorm4);
+  const Stem stem = make_stem(folder, testing::kNorm4, 1);
+  const cv::Mat frame = testing::textured_frame({131, 77}, CV_8UC3);
+  const cv::Mat other = testing::textured_frame({90, 50}, CV_8UC1);
+  const int threads_before = cv::getNumThreads();
+  cv::Mat first;
+  for (const int threads : {1, 2, 3, 8}) {
+    cv::setNumThreads(threads);
+    ASSERT_TRUE(stem.apply(other));  // another size in between
+    const auto channel = stem.apply(frame);
+    ASSERT_TRUE(channel);
+    if (first.empty()) {
+      first = channel->values;
+    }
+    ASSERT_EQ(channel->values.size(), first.size());
+    EXPECT_EQ(std::memcmp(channel->values.data, first.data, first.total() * sizeof(float)), 0);
+  }
+  cv::setNumThreads(threads_before);
+}
+
+TEST(Stem, InputLayerAndGray) {
+  StemOptions options;
+  options.model = "input_layer";
+  const auto colours = Stem::create(options, "/nowhere");
+  ASSERT_TRUE(colours) << colours.error().message;
+  EXPECT_EQ(colours->info().num_filters, 3);
+  EXPECT_EQ(colours->info().filter, 0);
+  cv::Mat frame(2, 3, CV_8UC3, cv::Scalar(10, 20, 40));
+  const auto channels = colours->apply_all(frame);
+  ASSERT_TRUE(channels);
+  ASSERT_EQ(channels->size(), 3U);
+  EXPECT_EQ((*channels)[0].values.at<float>(1, 2), 10.0F);
+  EXPECT_EQ((*channels)[1].values.at<float>(1, 2), 20.0F);
+  EXPECT_EQ((*channels)[2].values.at<float>(1, 2), 40.0F);
+  EXPECT_EQ((*channels)[2].map.scale, Eigen::Vector2d(1, 1));
+  EXPECT_EQ((*channels)[2].map.offset_px, Eigen::Vector2d(0, 0));
+  options.filter = 2;
+  EXPECT_EQ(Stem::create(options, "")->apply(frame)->values.at<float>(0, 0), 40.0F);
+  EXPECT_EQ(Stem::create(options, "")->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
+
+  options.model = "gray";
+  options.filter = -1;
+  const auto gray = Stem::create(options, "");
+  ASSERT_TRUE(gray) << gray.error().message;
+  EXPECT_NEAR(gray->apply(frame)->values.at<float>(1, 1), 2.99 + 11.74 + 4.56, 1e-4);
+  EXPECT_EQ(gray->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
+}
+
+TEST(Stem, InfoNamesTheModel) {
+  const testing::TempFolder folder;
+  testing::write_models(folder, testing::kNorm4);
+  const Stem stem = make_stem(folder, testing::kNorm4, 2);
+  EXPECT_EQ(stem.info().model, "norm_k4s4");
+  EXPECT_EQ(stem.info().layer, "stem");
+  EXPECT_EQ(stem.info().sha256.size(), 64U);
+  EXPECT_EQ(stem.info().filter, 1);
+  EXPECT_EQ(stem.info().num_filters, 6);
+  EXPECT_EQ(stem.info().native_stride_px, 4);
+  EXPECT_EQ(stem.info().sampling_px, 2);
+}
+
+class StemErrors : public ::testing::Test {
+ protected:
+  void SetUp() override { testing::write_models(folder, testing::kPlain4); }
+  std::string error_of(const std::string& model, int filter = -1, int sampling = 0) {
+    StemOptions options;
+    options.model = model;
+    options.filter = filter;
+    options.sampling_px = sampling;
+    const auto stem = Stem::create(options, folder.path());
+    return stem ? "no error" : stem.error().message;
+  }
+  testing::TempFolder folder;
+};
+
+TEST_F(StemErrors, NamesAndPaths) {
+  EXPECT_EQ(error_of("plain_k4s4"), "no error");
+  EXPECT_EQ(error_of((folder / "plain_k4s4.onnx").string()), "no error");
+  EXPECT_EQ(error_of("other"), (folder / "manifest.yaml").string() +
+                                   ": stem.model: expected one of plain_k4s4, gray, input_layer, "
+                                   "the path of an .onnx, found 'other'");
+  EXPECT_EQ(error_of("/no/such.onnx"), "/no/such.onnx: no such file");
+  std::filesystem::copy_file(folder / "plain_k4s4.onnx", folder / "unlisted.onnx");
+  EXPECT_EQ(error_of((folder / "unlisted.onnx").string()),
+            (folder / "manifest.yaml").string() +
+                ": expected an entry with 'file: unlisted.onnx', found none");
+  std::filesystem::remove(folder / "manifest.yaml");
+  EXPECT_THAT(error_of((folder / "plain_k4s4.onnx").string()),
+              HasSubstr("expected a manifest.yaml beside it"));
+  EXPECT_THAT(error_of("plain_k4s4"), HasSubstr("manifest.yaml: cannot read"));
+}
+
+TEST_F(StemErrors, ADamagedFileIsNotLoaded) {
+  std::string bytes = testing::read_all(folder / "plain_k4s4.onnx");
+  bytes.back() = static_cast<char>(bytes.back() ^ 1);
+  (void)folder.file("plain_k4s4.onnx", bytes);
+  EXPECT_THAT(error_of("plain_k4s4"), AllOf(HasSubstr("plain_k4s4.onnx: expected sha256 "),
+                                            HasSubstr(" as in the manifest, found ")));
+}
+
+TEST_F(StemErrors, FilterAndSamplingNameTheAllowedValues) {
+  EXPECT_EQ(error_of("plain_k4s4", 3), "stem.filter: expected 0 to 2 for plain_k4s4, found 3");
+  EXPECT_EQ(error_of("plain_k4s4", -2), "stem.filter: expected 0 to 2 for plain_k4s4, found -2");
+  EXPECT_EQ(error_of("gray", 1), "stem.filter: expected 0 to 0 for gray, found 1");
+  EXPECT_EQ(error_of("input_layer", 3), "stem.filter: expected 0 to 2 for input_layer, found 3");
+  const std::string divisors = "stem.sampling_px: expected 1, 2, 4 (divisors of the stride 4)";
+  for (const int sampling : {3, 8, -1}) {
+    EXPECT_EQ(error_of("plain_k4s4", 0, sampling),
+              divisors + ", found " + std::to_string(sampling));
+  }
+  EXPECT_EQ(error_of("gray", 0, 2),
+            "stem.sampling_px: expected 1 (divisors of the stride 1), found 2");
+}
+
+TEST_F(StemErrors, SmallFramesAndFixedSizes) {
+  const Stem stem = make_stem(folder, testing::kPlain4, 2);
+  EXPECT_EQ(stem.apply(cv::Mat1b(4, 4, 1))->values.size(), cv::Size(1, 1));
+  EXPECT_EQ(stem.apply(cv::Mat1b(5, 6, 1))->values.size(), cv::Size(2, 1));
+  EXPECT_THAT(stem.apply(cv::Mat1b(3, 9, 1)).error().message,
+              HasSubstr("expected frames of at least 4x4, found 9x3"));
+  const testing::TempFolder other;
+  testing::write_models(other, testing::kFixed4);
+  const Stem fixed = make_stem(other, testing::kFixed4, 2);
+  EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
+  EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
+              HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
+}
+
+}  // namespace
+}  // namespace stemvo
