@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "odometry/two_view_estimator.hpp"
+#include "support/synthetic_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::make_scene;
+using testing::Scene;
+using testing::SceneOptions;
+
+/// A car's scene: metres, points 5 to 40 m away.
+Scene drive_scene(const Rigid3& prev_from_cur,
+                  double noise_px,
+                  double outliers,
+                  std::uint64_t seed) {
+  SceneOptions options;
+  options.num_points = 600;
+  options.noise_px = noise_px;
+  options.outlier_ratio = outliers;
+  options.seed = seed;
+  options.min_depth = 5.0;
+  options.max_depth = 40.0;
+  options.cur_from_prev = prev_from_cur.inverse();
+  return make_scene(options);
+}
+
+MeasuredMotion measure(const Scene& scene, bool is_initializing = false) {
+  const TwoViewEstimator estimator({}, scene.camera);
+  return estimator.measure(scene.prev_uv, scene.cur_uv, is_initializing, 1);
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+TEST(TwoViewEstimator, ExactForwardDriveTurningRight) {
+  const Rigid3 prev_from_cur(so3_exp({0.0, 0.03, 0.0}), {0.05, 0.0, 1.0});  // yaw > 0: to the right
+  for (const bool is_initializing : {true, false}) {
+    const MeasuredMotion motion = measure(drive_scene(prev_from_cur, 0.0, 0.0, 3), is_initializing);
+    ASSERT_EQ(motion.state, FrameState::kTracking);
+    const Rigid3 estimate = motion.cur_from_prev.inverse();
+    EXPECT_LE(estimate.rotation.angularDistance(prev_from_cur.rotation), 1e-6);
+    EXPECT_LE((estimate.translation - prev_from_cur.translation.normalized()).norm(), 1e-5);
+    EXPECT_GT(estimate.translation.z(), 0.9);
+    EXPECT_GT(so3_log(estimate.rotation).y(), 0.02);
+  }
+}
+
+TEST(TwoViewEstimator, NoiseAndOutliersOver50Seeds) {
+  const Rigid3 prev_from_cur(so3_exp({0.002, 0.03, -0.001}), {0.05, 0.01, 1.0});
+  std::vector<double> rotation_errors_rad;
+  std::vector<double> direction_errors_rad;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const MeasuredMotion motion = measure(drive_scene(prev_from_cur, 0.3, 0.3, seed));
+    ASSERT_EQ(motion.state, FrameState::kTracking) << "seed " << seed;
+    const Rigid3 estimate = motion.cur_from_prev.inverse();
+    rotation_errors_rad.push_back(estimate.rotation.angularDistance(prev_from_cur.rotation));
+    direction_errors_rad.push_back(
+        (estimate.translation - prev_from_cur.translation.normalized()).norm());
+  }
+  EXPECT_LE(median(rotation_errors_rad), 5e-4);
+  EXPECT_LE(median(direction_errors_rad), 1e-2);
+}
+
+TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
+  SceneOptions options;
+  options.num_points = 500;
+  options.noise_px = 0.3;
+  options.cur_from_prev = Rigid3(so3_exp({0.0, 0.02, 0.0}), {0.8, 0.1, -0.6}).inverse();
+  options.planar = true;
+  const MeasuredMotion planar = measure(make_scene(options), /*is_initializing=*/true);
+  EXPECT_EQ(planar.model, TwoViewModel::kHomography);
+  EXPECT_GT(planar.homography_ratio, 0.40);
+  options.planar = false;
+  const MeasuredMotion general = measure(make_scene(options), /*is_initializing=*/true);
+  EXPECT_EQ(general.model, TwoViewModel::kEssential);
+  EXPECT_LT(general.homography_ratio, 0.40);
+}
+
+TEST(TwoViewEstimator, StandingRotatingAndCreepingAreStates) {
+  const MeasuredMotion standing = measure(drive_scene({}, 0.05, 0.05, 5));
+  EXPECT_EQ(standing.state, FrameState::kStanding);
+  EXPECT_EQ(standing.cur_from_prev.translation.norm(), 0.0);
+
+  const Rigid3 turn(so3_exp({0.0, 0.02, 0.0}), Eigen::Vector3d::Zero());
+  const MeasuredMotion rotating = measure(drive_scene(turn, 0.05, 0.05, 6));
+  EXPECT_EQ(rotating.state, FrameState::kRotating);
+  EXPECT_LE(rotating.cur_from_prev.inverse().rotation.angularDistance(turn.rotation), 2e-4);
+  EXPECT_EQ(rotating.cur_from_prev.translation.norm(), 0.0);
+
+  const Rigid3 creep(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.0, 0.02});
+  const MeasuredMotion creeping = measure(drive_scene(creep, 0.05, 0.05, 7));
+  EXPECT_EQ(creeping.state, FrameState::kCreeping);
+  EXPECT_LE(creeping.cur_from_prev.inverse().rotation.angularDistance(creep.rotation), 5e-4);
+}
+
+TEST(TwoViewEstimator, TooFewRandomOrNotFiniteMatchesAreLostNotWrong) {
+  const Scene scene = drive_scene({{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}, 0.2, 0.0, 8);
+  const TwoViewEstimator estimator({}, scene.camera);
+  const auto few = std::span(scene.prev_uv).first(5);
+  EXPECT_EQ(estimator.measure(few, std::span(scene.cur_uv).first(5), false, 1).state,
+            FrameState::kLost);
+  EXPECT_EQ(estimator.measure({}, {}, true, 1).state, FrameState::kLost);
+
+  const MeasuredMotion random = measure(drive_scene({}, 0.0, 1.0, 9));
+  EXPECT_TRUE(random.cur_from_prev.translation.allFinite());
+
+  const std::vector<Eigen::Vector2d> same(100, Eigen::Vector2d(10.0, 20.0));
+  const std::vector<Eigen::Vector2d> moved(100, Eigen::Vector2d(15.0, 20.0));
+  EXPECT_TRUE(estimator.measure(same, moved, true, 1).cur_from_prev.translation.allFinite());
+  const std::vector<Eigen::Vector2d> broken(
+      100, Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_EQ(estimator.measure(same, broken, false, 1).state, FrameState::kLost);
+}
+
+}  // namespace
+}  // namespace stemvo
