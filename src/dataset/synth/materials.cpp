@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+#include "dataset/synth/materials.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "dataset/synth/facade.hpp"
+#include "dataset/synth/hash.hpp"
+
+namespace stemvo::synth {
+namespace {
+
+/// Noise at `texel_m` metres per texel. `texel_m` * Ripmap::kSize should divide kTexturePeriod_m
+/// for the noise on roads to go on where u starts anew.
+float noise(const Ripmap& tile, const Footprint& at, float texel_m, float shift = 0.0F) {
+  const float s = 1.0F / texel_m;
+  return tile.sample((at.u + shift) * s, (at.v + shift) * s, at.width_u * s, at.width_v * s);
+}
+
+Rgb scaled(const Rgb& colour, float factor) {
+  return {colour[0] * factor, colour[1] * factor, colour[2] * factor};
+}
+
+Rgb blend(const Rgb& from, const Rgb& to, float share) {
+  return {from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1]),
+          from[2] + share * (to[2] - from[2])};
+}
+
+/// White paint: the dashed middle of the road and the line at the right edge.
+float lane_marking(const Footprint& at) {
+  constexpr float kDashPeriod_m = 12.288F;  // a fifth of the texture's period
+  const float middle = box_coverage(at.v, at.width_v, -1.82F, -1.69F) *
+                       bars_coverage(at.u, at.width_u, kDashPeriod_m, 4.1F);
+  const float edge = box_coverage(at.v, at.width_v, 2.02F, 2.14F);
+  return std::max(middle, edge);
+}
+
+/// Mended rectangles: one in three stretches of 7.68 m has one, a little darker or lighter.
+float patch_tone(const Style& style, const Footprint& at) {
+  constexpr float kStretch_m = 7.68F;
+  const float stretch = std::floor(at.u / kStretch_m);
+  Draw draw(style.seed, 'm', static_cast<int>(stretch) & 7);
+  if (draw.chance(0.65)) {
+    return 0.0F;
+  }
+  const auto begin_u = static_cast<float>(draw.in(0.2, 3.0));
+  const auto begin_v = static_cast<float>(draw.in(-5.0, 1.0));
+  const auto length = static_cast<float>(draw.in(1.0, 4.5));
+  const auto breadth = static_cast<float>(draw.in(0.6, 1.8));
+  const auto tone = static_cast<float>(draw.in(-0.09, 0.05));
+  const float u = at.u - kStretch_m * stretch;
+  return tone * box_coverage(u, at.width_u, begin_u, begin_u + length) *
+         box_coverage(at.v, at.width_v, begin_v, begin_v + breadth);
+}
+
+/// Deviations are calibrated to the real clip (docs/synthetic_drives.md).
+Rgb asphalt(const Style& style, const Footprint& at, const Textures& textures) {
+  constexpr float kGrain = 0.115F;
+  constexpr float kMottle = 0.05F;
+  const float grain = noise(textures.grain, at, 0.01F);
+  const float mottle = noise(textures.grain, at, 0.06F, 7.0F);
+  // Tyres polish two tracks 1.5 m apart in each lane.
+  const float track = 0.025F * std::cos(4.19F * (at.v - 0.75F));
+  const float tone = 1.0F + kGrain * grain + kMottle * mottle + track + patch_tone(style, at);
+  const float paint_share = lane_marking(at) * std::clamp(0.85F + 0.1F * grain, 0.0F, 1.0F);
+  return blend(scaled(style.albedo, tone), {0.70F, 0.70F, 0.68F}, paint_share);
+}
+
+/// Stones of `length` x `breadth` with joints; each stone has its own tone while it is larger than
+/// the footprint.
+Rgb paving(const Style& style,
+           const Footprint& at,
+           const Textures& textures,
+           float length,
+           float breadth) {
+  constexpr float kJoint_m = 0.012F;
+  const float row = std::floor(at.v / breadth);
+  const float u = at.u + (static_cast<int>(row) % 2 == 0 ? 0.0F : 0.5F * length);
+  const float joints = std::max(bars_coverage(u, at.width_u, length, kJoint_m),
+                                bars_coverage(at.v, at.width_v, breadth, kJoint_m));
+  const int period = static_cast<int>(std::lround(static_cast<float>(kTexturePeriod_m) / length));
+  const int column = static_cast<int>(std::floor(u / length)) % period;
+  const auto own = static_cast<float>(
+      unit(hash_of(style.seed, static_cast<int>(row), column < 0 ? column + period : column)) -
+      0.5);
+  const float sharp =
+      std::clamp(2.0F - 2.0F * std::max(at.width_u / length, at.width_v / breadth), 0.0F, 1.0F);
+  const float tone = 1.0F + 0.12F * sharp * own + 0.08F * noise(textures.grain, at, 0.01F, 3.0F) +
+                     0.07F * noise(textures.grain, at, 0.06F, 1.0F) - 0.3F * joints;
+  return scaled(style.albedo, tone);
+}
+
+Rgb leaves(const Style& style,
+           const Footprint& at,
+           const Textures& textures,
+           float texel_m,
+           float contrast) {
+  const auto shift = static_cast<float>(style.seed % 1024U) * 0.04F;
+  const float fine = noise(textures.leaf, at, texel_m, shift);
+  const float coarse = noise(textures.leaf, at, 4.0F * texel_m, shift);
+  const float tone = std::max(0.08F, 1.0F + contrast * (0.7F * fine + 0.5F * coarse));
+  Rgb colour = scaled(style.albedo, tone);
+  colour[0] += 0.04F * std::max(0.0F, coarse) * style.albedo[1];  // sunlit leaves are yellower
+  return colour;
+}
+
+Rgb kerb(const Style& style, const Footprint& at, const Textures& textures) {
+  const float joints = bars_coverage(at.u, at.width_u, 0.96F, 0.015F);
+  return scaled(style.albedo, 1.0F + 0.12F * noise(textures.grain, at, 0.01F, 5.0F) +
+                                  0.08F * noise(textures.grain, at, 0.06F, 2.0F) - 0.4F * joints);
+}
+
+Rgb roof(const Style& style, const Footprint& at, const Textures& textures) {
+  const float rows = bars_coverage(at.v, at.width_v, 0.33F, 0.06F);
+  const float columns = bars_coverage(at.u, at.width_u, 0.25F, 0.05F);
+  const auto shift = static_cast<float>(style.seed % 97U);
+  return scaled(style.albedo, 1.0F - 0.3F * rows - 0.18F * columns +
+                                  0.12F * noise(textures.grain, at, 0.03F, shift) +
+                                  0.08F * noise(textures.grain, at, 0.25F, shift));
+}
+
+Rgb fence(const Style& style, const Footprint& at, const Textures& textures) {
+  const float gaps = bars_coverage(at.u, at.width_u, 0.16F, 0.03F);
+  return scaled(style.albedo, 1.0F - 0.6F * gaps + 0.15F * noise(textures.grain, at, 0.02F));
+}
+
+}  // namespace
+
+float box_coverage(float x, float width, float begin, float end) {
+  const float w = std::max(width, 1e-6F);
+  const float inside = std::min(x + 0.5F * w, end) - std::max(x - 0.5F * w, begin);
+  return std::clamp(inside / w, 0.0F, 1.0F);
+}
+
+float bars_coverage(float x, float width, float period, float bar) {
+  const float w = std::max(width, 1e-6F);
+  const auto integral = [&](float t) {  // length of bar in [0, t)
+    const float k = std::floor(t / period);
+    return k * bar + std::min(t - k * period, bar);
+  };
+  // Counted from the cell of x, so that the difference of two long lengths loses nothing.
+  const float local = x - period * std::floor(x / period);
+  return std::clamp((integral(local + 0.5F * w) - integral(local - 0.5F * w)) / w, 0.0F, 1.0F);
+}
+
+Rgb paint(const Style& style, const Footprint& at, const Textures& textures) {
+  switch (style.material) {
+    case Material::kAsphalt:
+      return asphalt(style, at, textures);
+    case Material::kParking:
+      return paving(style, at, textures, 0.24F, 0.16F);
+    case Material::kSidewalk:
+      return paving(style, at, textures, 0.48F, 0.32F);
+    case Material::kKerb:
+      return kerb(style, at, textures);
+    case Material::kGrass:
+      return leaves(style, at, textures, 0.015F, 0.32F);
+    case Material::kFacade:
+      return facade(style, at, textures);
+    case Material::kPlainWall:
+      return plaster(style, at, textures);
+    case Material::kRoof:
+      return roof(style, at, textures);
+    case Material::kHedge:
+      return leaves(style, at, textures, 0.015F, 0.5F);
+    case Material::kFence:
+      return fence(style, at, textures);
+    case Material::kBark:
+      return leaves(style, at, textures, 0.01F, 0.3F);
+    case Material::kLeaves:
+      return leaves(style, at, textures, 0.02F, 0.55F);
+    case Material::kPaint:
+      break;
+  }
+  return style.albedo;
+}
+
+}  // namespace stemvo::synth

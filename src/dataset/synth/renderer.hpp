@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include <opencv2/core.hpp>
+
+#include "dataset/synth/drive.hpp"
+#include "dataset/synth/ripmap.hpp"
+#include "dataset/synth/sky.hpp"
+#include "stemvo/geometry/camera.hpp"
+
+namespace stemvo::synth {
+
+struct RenderedFrame {
+  cv::Mat bgr;      ///< CV_8UC3, ready to be written
+  cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
+};
+
+/// Draws frames of a drive. One frame needs nothing of the others, so any number of threads may
+/// call render() at once.
+class Renderer {
+ public:
+  Renderer(Drive drive, const Camera& camera, std::uint64_t seed);
+
+  [[nodiscard]] const Drive& drive() const { return drive_; }
+  [[nodiscard]] RenderedFrame render(std::size_t index) const;
+
+ private:
+  Drive drive_;
+  Camera camera_;
+  std::uint64_t seed_;
+  Textures textures_;
+  Sky sky_;
+  Eigen::Vector3d to_sun_;
+};
+
+}  // namespace stemvo::synth

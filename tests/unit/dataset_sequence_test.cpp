@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <unistd.h>
+
+#include "stemvo/dataset/sequence.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+constexpr int kNumFrames = 4;
+
+/// A sound sequence of 4 colour frames, 8x6 pixels, in a folder of its own; each test breaks it.
+class KittiSequenceTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", info->name(), ::getpid());
+    folder_ = root_ / "sequences" / "07";
+    fs::create_directories(folder_ / "image_2");
+    fs::create_directories(root_ / "poses");
+    for (int i = 0; i < kNumFrames; ++i) {
+      const cv::Mat bgr(6, 8, CV_8UC3, cv::Scalar(30, 20, 10 + i));
+      cv::imwrite(image(i).string(), bgr);
+    }
+    write(folder_ / "calib.txt",
+          "P0: 90 0 3 0 0 90 2 0 0 0 1 0\nP2: 100 0 4 5 0 101 3 0 0 0 1 0\n");
+    write(folder_ / "times.txt", "0\n0.1\n0.2\n0.3\n");
+    write(poses(), pose_lines(kNumFrames));
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  fs::path image(int index) const { return folder_ / "image_2" / fmt::format("{:06}.png", index); }
+  fs::path poses() const { return root_ / "poses" / "07.txt"; }
+  static std::string pose_lines(int count) {
+    std::string text;
+    for (int i = 0; i < count; ++i) {  // turned by 90 degrees about y, 2 m a frame along world x
+      text += fmt::format("0 0 1 {} 0 1 0 0 -1 0 0 3\n", 2 * i);
+    }
+    return text;
+  }
+  static void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
+  std::string open_error(const SequenceOptions& options = {}) const {
+    const auto sequence = KittiSequence::open(folder_, options);
+    return sequence ? "(opened)" : sequence.error().message;
+  }
+  static SequenceOptions frames(const std::string& text) {
+    return {.frames = parse_frame_range(text).value()};
+  }
+
+  fs::path root_;
+  fs::path folder_;
+};
+
+TEST_F(KittiSequenceTest, OpensASoundFolder) {
+  const auto sequence = KittiSequence::open(folder_);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 4U);
+  EXPECT_EQ(sequence->name(), "07");
+  EXPECT_EQ(sequence->camera().fx_px, 100.0);
+  EXPECT_EQ(sequence->camera().fy_px, 101.0);
+  EXPECT_EQ(sequence->camera().cx_px, 4.0);
+  EXPECT_EQ(sequence->camera().cy_px, 3.0);
+  EXPECT_EQ(sequence->camera().width_px, 8);
+  EXPECT_EQ(sequence->camera().height_px, 6);
+  const auto frame = sequence->read(1);
+  ASSERT_TRUE(frame) << frame.error().message;
+  ASSERT_EQ(frame->type(), CV_8UC3);
+  EXPECT_EQ(frame->at<cv::Vec3b>(0, 0), cv::Vec3b(11, 20, 30)) << "RGB order";
+}
+
+TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
+  const auto sequence = KittiSequence::open(folder_ / "", frames("1:3"));
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->name(), "07") << "a slash at the end changes nothing";
+  ASSERT_EQ(sequence->size(), 2U);
+  EXPECT_EQ(sequence->range().begin, 1U);
+  EXPECT_EQ(sequence->file(0).filename(), "000001.png");
+  EXPECT_EQ(sequence->timestamps_s().front(), 0.1);
+  ASSERT_TRUE(sequence->ground_truth());
+  const Trajectory& truth = *sequence->ground_truth();
+  ASSERT_EQ(truth.size(), 2U);
+  EXPECT_LT(truth[0].translation.norm() + truth[0].angle_rad(), 1e-12);
+  EXPECT_LT((truth[1].translation - Eigen::Vector3d(0, 0, 2)).norm(), 1e-12);
+}
+
+TEST_F(KittiSequenceTest, NoPoseFileMeansNoTruth) {
+  fs::remove(poses());
+  const auto sequence = KittiSequence::open(folder_);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_FALSE(sequence->ground_truth());
+}
+
+TEST_F(KittiSequenceTest, GivenPoseFileIsTakenInsteadAndMustExist) {
+  write(root_ / "other.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 9\n");
+  SequenceOptions options = frames(":2");
+  options.ground_truth = root_ / "other.txt";
+  const auto sequence = KittiSequence::open(folder_, options);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_NEAR(sequence->ground_truth()->back().translation.z(), 9.0, 1e-12);
+  options.ground_truth = root_ / "absent.txt";
+  EXPECT_THAT(open_error(options), HasSubstr("absent.txt"));
+}
+
+TEST_F(KittiSequenceTest, CameraIsChosenAndNeverReplaced) {
+  fs::create_directories(folder_ / "image_0");
+  cv::imwrite((folder_ / "image_0" / "000000.png").string(), cv::Mat(5, 7, CV_8UC1, cv::Scalar(9)));
+  const auto gray = KittiSequence::open(folder_, {.camera = "image_0"});
+  ASSERT_TRUE(gray) << gray.error().message;
+  EXPECT_EQ(gray->camera().fx_px, 90.0);
+  EXPECT_EQ(gray->read(0)->type(), CV_8UC1);
+  EXPECT_EQ(KittiSequence::open(folder_)->camera().fx_px, 100.0) << "auto takes image_2";
+  EXPECT_THAT(open_error({.camera = "image_3"}), HasSubstr("image_3"));
+  EXPECT_THAT(open_error({.camera = "left"}), HasSubstr("found 'left'"));
+}
+
+TEST_F(KittiSequenceTest, FolderProblems) {
+  fs::remove(image(1));
+  EXPECT_THAT(open_error(), HasSubstr("expected 000001.png next, found 000002.png"));
+  for (int i = 0; i < kNumFrames; ++i) {
+    fs::remove(image(i));
+  }
+  EXPECT_THAT(open_error(), HasSubstr("found none"));
+  fs::remove_all(folder_ / "image_2");
+  EXPECT_THAT(open_error(), HasSubstr("image_2 or image_0"));
+  fs::remove_all(folder_);
+  EXPECT_THAT(open_error(), HasSubstr("expected a sequence folder"));
+}
+
+TEST_F(KittiSequenceTest, CalibrationProblems) {
+  const fs::path file = folder_ / "calib.txt";
+  write(file, "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n");
+  EXPECT_THAT(open_error(), HasSubstr("expected a row 'P2:'"));
+  write(file, "\nP2: 100 0 nan 5 0 101 3 0 0 0 1 0\n");
+  EXPECT_THAT(open_error(), HasSubstr("calib.txt:2: expected a finite number, found 'nan'"));
+  write(file, "P2: 100 0 4 5 0 101 3 0 0 0 1\n");
+  EXPECT_THAT(open_error(), HasSubstr("calib.txt:1: expected P2: with 12 numbers, found 11"));
+  write(file, "P2: 0 0 4 5 0 101 3 0 0 0 1 0\n");
+  EXPECT_THAT(open_error(), HasSubstr("positive focal lengths"));
+  write(file, "P2: 100 7 4 5 0 101 3 0 0 0 1 0\n");
+  EXPECT_THAT(open_error(), HasSubstr("pinhole"));
+  write(file, "corner_dist: 1.0\r\nP_rect_02: 100 0 4 5 0 101 3 0 0 0 1 0\r\n");
+  EXPECT_EQ(open_error(), "(opened)") << "the raw data's name, lines ended by CR LF";
+  fs::remove(file);
+  EXPECT_THAT(open_error(), HasSubstr("calib.txt: expected a file, found nothing"));
+}
+
+TEST_F(KittiSequenceTest, TimesProblems) {
+  const fs::path file = folder_ / "times.txt";
+  write(file, "0\n0.1\n0.2\n");
+  EXPECT_THAT(open_error(), HasSubstr("each of 4 images, found 3"));
+  write(file, "0\n0.1\nx\n0.3\n");
+  EXPECT_THAT(open_error(), HasSubstr("times.txt:3: expected a finite number, found 'x'"));
+  write(file, "0\n0.1\n0.1\n0.3\n");
+  EXPECT_THAT(open_error(), HasSubstr("times.txt:3: expected a time after 0.1"));
+  fs::remove(file);
+  EXPECT_THAT(open_error(), HasSubstr("times.txt"));
+}
+
+TEST_F(KittiSequenceTest, PoseProblems) {
+  write(poses(), pose_lines(3));
+  EXPECT_THAT(open_error(), HasSubstr("found 3 poses"));
+  EXPECT_EQ(open_error(frames("0:3")), "(opened)");
+  write(poses(), "1 2 3\n");
+  EXPECT_THAT(open_error(), HasSubstr("07.txt:1"));
+}
+
+TEST_F(KittiSequenceTest, RangeOutsideTheFolder) {
+  EXPECT_THAT(open_error(frames("2:5")), HasSubstr("inside 0:4, found --frames 2:5"));
+  EXPECT_THAT(open_error(frames("4:")), HasSubstr("inside 0:4, found --frames 4:"));
+}
+
+/// Wherever a PNG is cut, it is an Error, never a partly gray picture; the others still read.
+TEST_F(KittiSequenceTest, TruncatedImageAnywhereIsAnErrorOfThatFrameOnly) {
+  const auto bytes = fs::file_size(image(2));
+  for (std::uintmax_t keep = 0; keep < bytes; ++keep) {
+    fs::resize_file(image(2), keep);
+    const auto sequence = KittiSequence::open(folder_);
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    const auto frame = sequence->read(2);
+    ASSERT_FALSE(frame) << keep << " of " << bytes << " bytes";
+    EXPECT_THAT(frame.error().message, HasSubstr("000002.png: expected"));
+    EXPECT_TRUE(sequence->read(3));
+    cv::imwrite(image(2).string(), cv::Mat(6, 8, CV_8UC3, cv::Scalar(30, 20, 12)));
+  }
+}
+
+TEST_F(KittiSequenceTest, DamagedImageIsAnError) {
+  std::fstream file(image(2), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(45);  // inside the compressed pixels
+  file.put('\x55');
+  file.close();
+  const auto sequence = KittiSequence::open(folder_);
+  ASSERT_TRUE(sequence);
+  const auto frame = sequence->read(2);
+  ASSERT_FALSE(frame);
+  EXPECT_THAT(frame.error().message, HasSubstr("000002.png"));
+}
+
+TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
+  write(image(0), "not a picture");
+  cv::imwrite(image(3).string(), cv::Mat(6, 9, CV_8UC3, cv::Scalar(0, 0, 0)));
+  const auto sequence = KittiSequence::open(folder_);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->camera().width_px, 8);
+  EXPECT_THAT(sequence->read(0).error().message, HasSubstr("another kind of file"));
+  EXPECT_THAT(sequence->read(3).error().message, HasSubstr("8x6 pixels, found 9x6"));
+  for (int i = 0; i < kNumFrames; ++i) {
+    write(image(i), "");
+  }
+  EXPECT_THAT(open_error(), HasSubstr("none of 4 images can be read"));
+}
+
+TEST(FrameRangeTest, AcceptsTheThreeForms) {
+  const auto both = parse_frame_range("3:10");
+  ASSERT_TRUE(both);
+  EXPECT_EQ(both->begin, 3U);
+  EXPECT_EQ(both->end, 10U);
+  EXPECT_EQ(parse_frame_range("7:")->end, std::nullopt);
+  EXPECT_EQ(parse_frame_range(":7")->begin, 0U);
+}
+
+TEST(FrameRangeTest, RefusesTheRest) {
+  for (const char* text : {"", ":", "5", "5:5", "6:5", "-1:5", "a:5", "1:b", "1:2:3", " 1:2",
+                           "1.5:3", ":0", "1:99999999999999999999999"}) {
+    const auto range = parse_frame_range(text);
+    ASSERT_FALSE(range) << text;
+    EXPECT_THAT(range.error().message, HasSubstr(fmt::format("found '{}'", text)));
+  }
+}
+
+}  // namespace
+}  // namespace stemvo
