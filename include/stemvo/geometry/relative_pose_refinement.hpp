@@ -24,8 +24,8 @@ struct RelativePoseRefinement {
 };
 
 /// Minimises the robust Sampson distance (px) of all given matches over R (3) and the direction of
-/// T (2) by Levenberg-Marquardt with analytic derivatives. Fewer than 5 matches: returned
-/// unchanged.
+/// T (2) by Levenberg-Marquardt with analytic derivatives. Matches that are not numbers are left
+/// out. Fewer than 5 matches, no translation or a motion that is not finite: returned unchanged.
 [[nodiscard]] RelativePoseRefinement refine_relative_pose(
     const Rigid3& cur_from_prev,
     std::span<const Eigen::Vector2d> prev_uv,
@@ -34,7 +34,7 @@ struct RelativePoseRefinement {
     const RelativePoseRefinementOptions& options = {});
 
 /// Rotation alone (standing still, pure rotation): robust angular residuals of x_cur ~ K R K^-1
-/// x_prev. The result has translation zero.
+/// x_prev. The result has translation zero; fewer than 2 matches leave the rotation unchanged.
 [[nodiscard]] RelativePoseRefinement refine_rotation(
     const Rigid3& cur_from_prev,
     std::span<const Eigen::Vector2d> prev_uv,

@@ -19,6 +19,7 @@ struct Rigid3 {
       : rotation(rotation_in.normalized()), translation(translation_in) {}
 
   /// From [R | t]; R is replaced by the nearest rotation (pose files are orthonormal to 1e-7 only).
+  /// An R that is not finite gives a rotation of NaN.
   [[nodiscard]] static Rigid3 from_matrix(const Matrix34d& matrix);
   [[nodiscard]] static Rigid3 from_matrix(const Eigen::Matrix3d& rotation,
                                           const Eigen::Vector3d& translation);

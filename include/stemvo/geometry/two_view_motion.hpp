@@ -22,12 +22,15 @@ struct PointTestOptions {
 };
 
 struct PointTestResult {
-  int num_good = 0;             ///< in front of both cameras and reprojected well
+  /// Reprojected well, and in front of both cameras or without the parallax to tell.
+  int num_good = 0;
   int num_with_parallax = 0;    ///< of those, the ones below max_cos_parallax
   double parallax_deg = 0.0;    ///< of the 51st largest (or the smallest, of fewer) good point
-  std::vector<char> good_mask;  ///< one per match
+  std::vector<char> good_mask;  ///< one per match: 1 where counted in num_good
 };
 
+/// Matches in pixels, spans of the same length. Points that are not numbers are bad; without
+/// translation every point is.
 [[nodiscard]] PointTestResult test_points(const Rigid3& cur_from_prev,
                                           std::span<const Eigen::Vector2d> prev_uv,
                                           std::span<const Eigen::Vector2d> cur_uv,
@@ -54,7 +57,7 @@ struct TwoViewMotion {
     const Camera& camera,
     const PointTestOptions& options = {});
 
-/// Best of the 4 hypotheses of E (normalised coordinates).
+/// Best of the 4 hypotheses of E (normalised coordinates); nullopt when no point passes.
 [[nodiscard]] std::optional<TwoViewMotion> motion_from_essential(
     const Eigen::Matrix3d& essential,
     std::span<const Eigen::Vector2d> prev_uv,

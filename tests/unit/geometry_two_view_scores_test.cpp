@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <gtest/gtest.h>
+
+#include "stemvo/geometry/decomposition.hpp"
+#include "stemvo/geometry/two_view_scores.hpp"
+#include "support/matchers.hpp"
+#include "support/synthetic_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::make_scene;
+using testing::Scene;
+
+using Points = std::vector<Eigen::Vector2d>;
+
+Eigen::Matrix3d shift(double x, double y) {
+  Eigen::Matrix3d h = Eigen::Matrix3d::Identity();
+  h(0, 2) = x;
+  h(1, 2) = y;
+  return h;
+}
+
+/// Pure sideways motion: epipolar lines are the rows of the picture.
+Eigen::Matrix3d row_fundamental() { return skew(Eigen::Vector3d(1.0, 0.0, 0.0)); }
+
+TEST(ScoreHomography, HandWorked) {
+  const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
+  // Shifted by (5, 0), then off by 0, 1, 2 and 3 px: the last is past sqrt(5.991) = 2.448.
+  const Points cur = {{5.0, 0.0}, {105.0, 51.0}, {203.0, 80.0}, {15.0, 23.0}};
+  const ModelScore score = score_homography(shift(5.0, 0.0), prev, cur, 1.0);
+  EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 4.0), 1e-9);
+  EXPECT_EQ(score.num_inliers, 3);
+  EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
+}
+
+TEST(ScoreHomography, BothDirectionsAreCounted) {
+  // Twice as large in cur: 3 px there are 1.5 px in prev, so one direction passes alone.
+  const Eigen::Matrix3d zoom = Eigen::Vector3d(2.0, 2.0, 1.0).asDiagonal();
+  const Points prev = {{10.0, 10.0}};
+  const Points cur = {{23.0, 20.0}};
+  const ModelScore score = score_homography(zoom, prev, cur, 1.0);
+  EXPECT_NEAR(score.score, 5.991 - 2.25, 1e-9);
+  EXPECT_EQ(score.num_inliers, 0);
+}
+
+TEST(ScoreHomography, SigmaScalesTheBound) {
+  const Points prev = {{0.0, 0.0}};
+  const Points cur = {{4.0, 0.0}};
+  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), prev, cur, 1.0).score, 0.0);
+  EXPECT_NEAR(score_homography(Eigen::Matrix3d::Identity(), prev, cur, 2.0).score,
+              2.0 * (5.991 - 4.0), 1e-9);
+}
+
+TEST(ScoreHomography, ScaleOfTheMatrixDoesNotMatter) {
+  const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = 3});
+  const Eigen::Matrix3d h = testing::true_homography(scene);
+  const double expected = score_homography(h, scene.prev_uv, scene.cur_uv, 1.0).score;
+  EXPECT_GT(expected, 0.0);
+  for (const double scale : {-1.0, 1e-9, 1e7}) {
+    const Eigen::Matrix3d scaled = scale * h;
+    EXPECT_NEAR(score_homography(scaled, scene.prev_uv, scene.cur_uv, 1.0).score, expected,
+                1e-6 * expected);
+  }
+}
+
+TEST(ScoreHomography, SingularOrBrokenScoresZero) {
+  const Scene scene = make_scene({.planar = true, .seed = 3});
+  const Eigen::Matrix3d h = testing::true_homography(scene);
+  Eigen::Matrix3d rank_two = h;
+  rank_two.col(2) = 2.0 * h.col(0) - 3.0 * h.col(1);
+  Eigen::Matrix3d with_nan = h;
+  with_nan(2, 2) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  const Eigen::Matrix3d ones = Eigen::Matrix3d::Ones();
+  for (const Eigen::Matrix3d& m : {rank_two, with_nan, zero, ones}) {
+    const ModelScore score = score_homography(m, scene.prev_uv, scene.cur_uv, 1.0);
+    EXPECT_EQ(score.score, 0.0);
+    EXPECT_EQ(score.num_inliers, 0);
+    EXPECT_EQ(score.inlier_mask.size(), scene.prev_uv.size());
+  }
+}
+
+TEST(ScoreFundamental, HandWorked) {
+  const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
+  // Rows differ by 0, 1, 1.9 and 2 px: the last is past sqrt(3.841) = 1.96.
+  const Points cur = {{50.0, 0.0}, {20.0, 51.0}, {203.0, 78.1}, {900.0, 22.0}};
+  const ModelScore score = score_fundamental(row_fundamental(), prev, cur, 1.0);
+  EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 3.61), 1e-9);
+  EXPECT_EQ(score.num_inliers, 3);
+  EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
+  EXPECT_NEAR(score_fundamental(row_fundamental(), prev, cur, 2.0).score,
+              2.0 * (4.0 * 5.991 - (0.0 + 1.0 + 3.61 + 4.0) / 4.0), 1e-9);
+}
+
+TEST(ScoreFundamental, BrokenScoresZero) {
+  const Scene scene = make_scene({.seed = 3});
+  Eigen::Matrix3d with_nan = row_fundamental();
+  with_nan(2, 2) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  for (const Eigen::Matrix3d& m : {with_nan, zero}) {
+    const ModelScore score = score_fundamental(m, scene.prev_uv, scene.cur_uv, 1.0);
+    EXPECT_EQ(score.score, 0.0);
+    EXPECT_EQ(score.num_inliers, 0);
+  }
+}
+
+TEST(Scores, BrokenPointsAreOutliersAndNoPointsScoreZero) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  const Points prev = {{1.0, 2.0}, {nan, 2.0}, {inf, 2.0}, {1.0, 2.0}};
+  const Points cur = {{1.0, 2.0}, {1.0, 2.0}, {1.0, 2.0}, {1.0, nan}};
+  const ModelScore h = score_homography(Eigen::Matrix3d::Identity(), prev, cur, 1.0);
+  const ModelScore f = score_fundamental(row_fundamental(), prev, cur, 1.0);
+  for (const ModelScore& score : {h, f}) {
+    EXPECT_TRUE(std::isfinite(score.score));
+    EXPECT_GE(score.inlier_mask[0], 1);
+    EXPECT_EQ(score.num_inliers, 1);
+  }
+  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), {}, {}, 1.0).score, 0.0);
+  EXPECT_EQ(score_fundamental(row_fundamental(), {}, {}, 1.0).score, 0.0);
+}
+
+TEST(Scores, MatchesThatDoNotPairAreOurMistake) {
+  const Points one = {{1.0, 2.0}};
+  EXPECT_THROW(static_cast<void>(score_homography(Eigen::Matrix3d::Identity(), one, {}, 1.0)),
+               std::logic_error);
+  EXPECT_THROW(static_cast<void>(score_fundamental(row_fundamental(), {}, one, 1.0)),
+               std::logic_error);
+}
+
+TEST(HomographyRatio, IsTheShareOfTheHomography) {
+  EXPECT_DOUBLE_EQ(homography_ratio(2.0, 3.0), 0.4);
+  EXPECT_EQ(homography_ratio(0.0, 0.0), 0.0);
+  EXPECT_EQ(homography_ratio(0.0, 5.0), 0.0);
+  EXPECT_EQ(homography_ratio(5.0, 0.0), 1.0);
+}
+
+// ---- the choice between the models -------------------------------------------------------------
+
+/// Mean to zero, mean distance to sqrt(2).
+Eigen::Matrix3d normalizer(const Points& points) {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const auto& p : points) {
+    mean += p / static_cast<double>(points.size());
+  }
+  double distance = 0.0;
+  for (const auto& p : points) {
+    distance += (p - mean).norm() / static_cast<double>(points.size());
+  }
+  const double s = std::sqrt(2.0) / distance;
+  Eigen::Matrix3d t;
+  t << s, 0.0, -s * mean.x(), 0.0, s, -s * mean.y(), 0.0, 0.0, 1.0;
+  return t;
+}
+
+struct Models {
+  Eigen::Matrix3d homography;
+  Eigen::Matrix3d fundamental;
+};
+
+/// Both models by the plain linear method from the true inliers.
+Models fit_models(const Scene& scene) {
+  Points prev;
+  Points cur;
+  for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
+    if (scene.is_outlier[i] == 0) {
+      prev.push_back(scene.prev_uv[i]);
+      cur.push_back(scene.cur_uv[i]);
+    }
+  }
+  const Eigen::Matrix3d t1 = normalizer(prev);
+  const Eigen::Matrix3d t2 = normalizer(cur);
+  const auto rows = static_cast<Eigen::Index>(prev.size());
+  Eigen::MatrixXd for_h = Eigen::MatrixXd::Zero(2 * rows, 9);
+  Eigen::MatrixXd for_f(rows, 9);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::RowVector3d a = (t1 * prev[k].homogeneous()).transpose();
+    const Eigen::RowVector3d b = (t2 * cur[k].homogeneous()).transpose();
+    for_h.row(2 * i) << a, Eigen::RowVector3d::Zero(), -b.x() * a;
+    for_h.row(2 * i + 1) << Eigen::RowVector3d::Zero(), a, -b.y() * a;
+    for_f.row(i) << b.x() * a, b.y() * a, a;
+  }
+  const auto solve = [](const Eigen::MatrixXd& m) {
+    const Eigen::BDCSVD<Eigen::MatrixXd> svd(m, Eigen::ComputeThinU | Eigen::ComputeFullV);
+    const Eigen::Matrix<double, 9, 1> x = svd.matrixV().col(8);
+    return Eigen::Matrix3d(x.reshaped(3, 3).transpose());
+  };
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(solve(for_f),
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d d(svd.singularValues()(0), svd.singularValues()(1), 0.0);
+  const Eigen::Matrix3d f = svd.matrixU() * d.asDiagonal() * svd.matrixV().transpose();
+  return {t2.inverse() * solve(for_h) * t1, t2.transpose() * f * t1};
+}
+
+double ratio(const Models& models, const Scene& scene) {
+  return homography_ratio(
+      score_homography(models.homography, scene.prev_uv, scene.cur_uv, 1.0).score,
+      score_fundamental(models.fundamental, scene.prev_uv, scene.cur_uv, 1.0).score);
+}
+
+TEST(ModelChoice, PlanarScenesChooseTheHomography) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const Scene scene =
+        make_scene({.noise_px = 0.5, .outlier_ratio = 0.2, .planar = true, .seed = seed});
+    const Models truth = {
+        testing::true_homography(scene),
+        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera)};
+    EXPECT_GT(ratio(truth, scene), 0.40) << "seed " << seed;
+    EXPECT_GT(ratio(fit_models(scene), scene), 0.40) << "seed " << seed;
+  }
+}
+
+TEST(ModelChoice, GeneralScenesChooseTheFundamentalMatrix) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    const Scene scene = make_scene({.noise_px = 0.5, .outlier_ratio = 0.2, .seed = seed});
+    const Models fitted = fit_models(scene);
+    const Models truth = {
+        fitted.homography,
+        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera)};
+    EXPECT_LT(ratio(truth, scene), 0.40) << "seed " << seed;
+    EXPECT_LT(ratio(fitted, scene), 0.40) << "seed " << seed;
+  }
+}
+
+TEST(ModelChoice, PureRotationChoosesTheHomography) {
+  const Rigid3 rotation(so3_exp({0.01, 0.05, -0.01}), Eigen::Vector3d::Zero());
+  const Scene scene = make_scene({.noise_px = 0.5, .seed = 8, .cur_from_prev = rotation});
+  EXPECT_GT(ratio(fit_models(scene), scene), 0.40);
+}
+
+TEST(Scores, TrueModelsFindTheTrueInliers) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Scene scene = make_scene({.noise_px = 0.3, .outlier_ratio = 0.3, .seed = seed});
+    const Eigen::Matrix3d f =
+        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera);
+    const ModelScore score = score_fundamental(f, scene.prev_uv, scene.cur_uv, 1.0);
+    int missed = 0;
+    int taken = 0;
+    for (std::size_t i = 0; i < scene.is_outlier.size(); ++i) {
+      missed += scene.is_outlier[i] == 0 && score.inlier_mask[i] == 0 ? 1 : 0;
+      taken += scene.is_outlier[i] != 0 && score.inlier_mask[i] != 0 ? 1 : 0;
+    }
+    EXPECT_EQ(missed, 0) << "seed " << seed;
+    // Outliers may lie on their epipolar line by chance.
+    EXPECT_LE(taken, 10) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace stemvo
