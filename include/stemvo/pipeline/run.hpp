@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
 #include <functional>
@@ -11,8 +12,8 @@
 #include "stemvo/config.hpp"
 #include "stemvo/dataset/sequence.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/evaluation/metrics.hpp"
 #include "stemvo/odometry/odometry.hpp"
+#include "stemvo/report/metrics_json.hpp"
 
 namespace stemvo {
 
@@ -26,17 +27,14 @@ struct RunRequest {
   std::optional<std::filesystem::path> ground_truth;
   int num_threads = 0;    ///< 0: all cores
   int picture_every = 0;  ///< 0: no per-frame pictures
+  /// Where `fps` counts from; the program sets the start of the process.
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
 
-/// What metrics.json holds (see docs/conventions.md and the README).
+/// What became of a run. Every file is written, also after an interrupt.
 struct RunSummary {
-  std::string sequence;
-  std::size_t num_frames = 0;
-  double fps = 0.0;
-  double tracked_fraction = 0.0;
-  std::string scale_source;
+  MetricsReport report;  ///< what metrics.json holds
   StemInfo stem;
-  std::optional<Metrics> metrics;     ///< absent without ground truth
   std::vector<std::string> warnings;  ///< broken frames and the like, one line each
   bool interrupted = false;           ///< stopped early; results hold what was computed
 };
@@ -46,7 +44,10 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, frames.csv, config.yaml, metrics.json,
-/// trajectory.png, trajectory.svg, pictures). Errors are found before work starts.
+/// trajectory.png, trajectory.svg, pictures/%06d.png). A wrong request (configuration, sequence,
+/// ground truth that scale.source needs, model, out_dir that cannot be written) is an error before
+/// work starts. A frame that cannot be read is a warning and gets a pose. When a result cannot be
+/// written the others still are, and the first failure is the error.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

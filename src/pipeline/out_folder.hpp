@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::pipeline {
+
+/// Creates the folder (and those above it) and proves that files can be written there. Error: the
+/// folder, what was expected, what the system says.
+[[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
+
+}  // namespace stemvo::pipeline

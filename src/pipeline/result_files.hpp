@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "stemvo/config.hpp"
+#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/evaluation/trajectory.hpp"
+#include "stemvo/pipeline/run.hpp"
+
+namespace stemvo::pipeline {
+
+/// trajectory_kitti.txt and trajectory_tum.txt. Poses of the first frames of the sequence.
+[[nodiscard]] Status write_trajectories(const std::filesystem::path& out_dir,
+                                        const KittiSequence& sequence,
+                                        std::span<const Rigid3> trajectory);
+
+/// config.yaml: the effective configuration under comments that say which program, frames and model
+/// made the results. `stemvo run --config` takes it as it is.
+[[nodiscard]] Status write_config(const std::filesystem::path& out_dir,
+                                  const Config& config,
+                                  const KittiSequence& sequence,
+                                  const StemInfo& stem);
+
+/// trajectory.png and .svg, against the ground truth where there is one.
+[[nodiscard]] Status write_map(const std::filesystem::path& out_dir,
+                               const KittiSequence& sequence,
+                               std::span<const Rigid3> trajectory,
+                               const MetricsReport& report);
+
+}  // namespace stemvo::pipeline

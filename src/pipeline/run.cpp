@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/pipeline/run.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
+
+#include "pipeline/frame_reader.hpp"
+#include "pipeline/out_folder.hpp"
+#include "pipeline/result_files.hpp"
+#include "stemvo/check.hpp"
+#include "stemvo/evaluation/metrics.hpp"
+#include "stemvo/evaluation/trajectory.hpp"
+#include "stemvo/report/frame_picture.hpp"
+#include "stemvo/report/frames_csv.hpp"
+#include "stemvo/version.hpp"
+
+namespace stemvo {
+namespace {
+
+/// OpenCV's number of threads belongs to the process: it is given back.
+class ThreadScope {
+ public:
+  explicit ThreadScope(int num_threads) : before_(cv::getNumThreads()) {
+    cv::setNumThreads(num_threads > 0 ? num_threads : cv::getNumberOfCPUs());
+  }
+  ~ThreadScope() { cv::setNumThreads(before_); }
+  ThreadScope(const ThreadScope&) = delete;
+  ThreadScope& operator=(const ThreadScope&) = delete;
+
+ private:
+  int before_;
+};
+
+/// The first thing that went wrong while writing; the rest is written all the same.
+void keep_first(Status& first, Status next) {
+  if (first && !next) {
+    first = std::move(next);
+  }
+}
+
+/// What the loop over the frames leaves behind.
+struct Drive {
+  Trajectory trajectory;  ///< one pose per frame done
+  std::size_t num_measured = 0;
+  std::vector<std::string> warnings;
+  bool interrupted = false;
+  Status written;  ///< of frames.csv and the pictures
+};
+
+Expected<KittiSequence> open_sequence(const RunRequest& request) {
+  Expected<KittiSequence> sequence = KittiSequence::open(
+      request.sequence_dir, {request.config.input.camera, request.frames, request.ground_truth});
+  if (sequence && request.config.scale.source == "ground_truth" && !sequence->ground_truth()) {
+    const auto file = request.sequence_dir / "../../poses" / (sequence->name() + ".txt");
+    return fail(fmt::format(
+        "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
+        file.lexically_normal().string()));
+  }
+  return sequence;
+}
+
+Status write_frame_picture(const RunRequest& request,
+                           const Odometry& odometry,
+                           const cv::Mat& frame,
+                           std::size_t number,
+                           const FrameResult& result) {
+  const std::string caption =
+      fmt::format("frame {}: {}, {} of {} matches", number, to_string(result.state),
+                  result.num_inliers, result.num_matches);
+  const cv::Mat picture = draw_frame_picture(frame, odometry.channel_image(), odometry.matches(),
+                                             odometry.inlier_mask(), caption);
+  return write_picture(request.out_dir / "pictures" / fmt::format("{:06}.png", number), picture);
+}
+
+Drive drive(const RunRequest& request,
+            const KittiSequence& sequence,
+            Odometry& odometry,
+            FramesCsv& csv,
+            const RunProgress& progress) {
+  Drive result;
+  pipeline::FrameReader reader(sequence);
+  for (std::size_t i = 0; i < sequence.size() && !result.interrupted; ++i) {
+    const std::size_t number = sequence.range().begin + i;
+    const Expected<cv::Mat> frame = reader.next();
+    if (!frame) {
+      result.warnings.push_back(frame.error().message);
+    }
+    const FrameResult pose = frame ? odometry.process(*frame) : odometry.process_missing();
+    result.trajectory.push_back(pose.world_from_camera);
+    result.num_measured += is_measured(pose.state) ? 1 : 0;
+    csv.write(number, sequence.timestamps_s()[i], pose);
+    if (request.picture_every > 0 && i % static_cast<std::size_t>(request.picture_every) == 0) {
+      keep_first(result.written,
+                 write_frame_picture(request, odometry, frame.value_or(cv::Mat()), number, pose));
+    }
+    result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
+  }
+  keep_first(result.written, csv.close());
+  return result;
+}
+
+/// The ground truth of the frames done; an interrupted run has fewer than the sequence.
+std::optional<std::span<const Rigid3>> truth_of(const KittiSequence& sequence,
+                                                std::size_t num_frames) {
+  if (!sequence.ground_truth()) {
+    return std::nullopt;
+  }
+  return std::span(*sequence.ground_truth()).first(num_frames);
+}
+
+MetricsReport make_report(const RunRequest& request,
+                          const KittiSequence& sequence,
+                          const StemInfo& stem,
+                          const Drive& done,
+                          double seconds) {
+  MetricsReport report;
+  const std::size_t num_frames = done.trajectory.size();
+  report.stemvo_version = version();
+  report.sequence = sequence.name();
+  report.first_frame = sequence.range().begin;
+  report.num_frames = num_frames;
+  report.model = request.config.stem.model;
+  report.filter = stem.filter;
+  report.fps = static_cast<double>(num_frames) / std::max(seconds, 1e-9);
+  report.scale_source = request.config.scale.source;
+  report.tracked_fraction =
+      static_cast<double>(done.num_measured) / static_cast<double>(num_frames);
+  if (const auto truth = truth_of(sequence, num_frames)) {
+    report.metrics = evaluate(done.trajectory, *truth, request.config.evaluation);
+  }
+  return report;
+}
+
+}  // namespace
+
+Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
+  if (const Status status = validate(request.config); !status) {
+    return tl::unexpected(status.error());
+  }
+  const ThreadScope threads(request.num_threads);
+  const Expected<KittiSequence> sequence = open_sequence(request);
+  if (!sequence) {
+    return tl::unexpected(sequence.error());
+  }
+  Expected<Odometry> odometry =
+      Odometry::create(request.config, sequence->camera(), request.models_dir);
+  if (!odometry) {
+    return tl::unexpected(odometry.error());
+  }
+  const bool has_pictures = request.picture_every > 0;
+  if (const Status status = pipeline::create_out_folder(has_pictures ? request.out_dir / "pictures"
+                                                                     : request.out_dir);
+      !status) {
+    return tl::unexpected(status.error());
+  }
+  Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
+  if (!csv) {
+    return tl::unexpected(csv.error());
+  }
+
+  Drive done = drive(request, *sequence, *odometry, *csv, progress);
+  if (request.config.scale.source == "ground_truth") {
+    done.trajectory = rescale_steps(done.trajectory, *truth_of(*sequence, done.trajectory.size()));
+  }
+  Status written = pipeline::write_trajectories(request.out_dir, *sequence, done.trajectory);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - request.started;
+
+  const MetricsReport report =
+      make_report(request, *sequence, odometry->stem_info(), done, elapsed.count());
+  keep_first(written, done.written);
+  keep_first(written, pipeline::write_config(request.out_dir, request.config, *sequence,
+                                             odometry->stem_info()));
+  keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
+  keep_first(written, pipeline::write_map(request.out_dir, *sequence, done.trajectory, report));
+  if (!written) {
+    return tl::unexpected(written.error());
+  }
+  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted};
+}
+
+}  // namespace stemvo

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <unistd.h>
+
+#include "stemvo/evaluation/trajectory.hpp"
+#include "stemvo/pipeline/channel_pictures.hpp"
+#include "stemvo/pipeline/run.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string read_file(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// A wall of blurred noise that the camera drives towards: a few small gray frames in KITTI's
+/// layout, as input of the gray channel.
+class PipelineRun : public ::testing::Test {
+ protected:
+  static constexpr int kNumFrames = 6;
+  static constexpr double kStep_m = 0.5;
+
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", ::getpid(), info->name());
+    const fs::path sequence = folder_ / "sequences/07";
+    fs::create_directories(sequence / "image_0");
+    fs::create_directories(folder_ / "poses");
+    std::ofstream(sequence / "calib.txt") << "P0: 200 0 159.5 0 0 200 79.5 0 0 0 1 0\n";
+    std::ofstream times(sequence / "times.txt");
+    std::ofstream poses(folder_ / "poses/07.txt");
+    cv::Mat wall(480, 960, CV_8UC1);
+    cv::theRNG().state = 1;
+    cv::randu(wall, 0, 256);
+    cv::GaussianBlur(wall, wall, {}, 2.0);
+    cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+    for (int i = 0; i < kNumFrames; ++i) {
+      times << 0.1 * i << "\n";
+      poses << fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", kStep_m * i);
+      // The left half of the wall stands at 12 m, the right half at 20 m: no plane, so that E
+      // exists.
+      cv::Mat frame(160, 320, CV_8UC1);
+      for (int half = 0; half < 2; ++half) {
+        const double scale =
+            (half == 0 ? 12.0 : 20.0) / 10.0 / ((half == 0 ? 12.0 : 20.0) - kStep_m * i) * 10.0;
+        const cv::Matx23d map(scale, 0, 159.5 - 479.5 * scale, 0, scale, 79.5 - 239.5 * scale);
+        cv::Mat view;
+        cv::warpAffine(wall, view, map, frame.size(), cv::INTER_LINEAR);
+        const cv::Rect side(half == 0 ? 0 : 160, 0, 160, 160);
+        view(side).copyTo(frame(side));
+      }
+      cv::imwrite((sequence / fmt::format("image_0/{:06}.png", i)).string(), frame);
+    }
+    request_.sequence_dir = sequence;
+    request_.out_dir = folder_ / "out";
+    request_.models_dir = STEMVO_SOURCE_DIR "/models";
+    request_.config.stem.model = "gray";
+    request_.num_threads = 1;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string error_of(const RunRequest& request) const {
+    const Expected<RunSummary> summary = run_sequence(request);
+    return summary ? "no error" : summary.error().message;
+  }
+
+  fs::path folder_;
+  RunRequest request_;
+};
+
+TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
+  request_.picture_every = 4;
+  const Expected<RunSummary> summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->report.num_frames, 6U);
+  EXPECT_EQ(summary->report.sequence, "07");
+  EXPECT_TRUE(summary->report.metrics.has_value());
+  EXPECT_FALSE(summary->interrupted);
+  EXPECT_TRUE(summary->warnings.empty());
+  const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  ASSERT_TRUE(poses) << poses.error().message;
+  EXPECT_EQ(poses->size(), 6U);
+  for (const char* name :
+       {"trajectory_tum.txt", "frames.csv", "config.yaml", "metrics.json", "trajectory.png",
+        "trajectory.svg", "pictures/000000.png", "pictures/000004.png"}) {
+    EXPECT_TRUE(fs::exists(request_.out_dir / name)) << name;
+  }
+}
+
+TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
+  ASSERT_TRUE(run_sequence(request_));
+  const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  request_.config.scale.source = "ground_truth";
+  ASSERT_TRUE(run_sequence(request_));
+  const auto rescaled = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  ASSERT_TRUE(constant && rescaled);
+  for (std::size_t i = 0; i < constant->size(); ++i) {
+    EXPECT_LT((*constant)[i].rotation.angularDistance((*rescaled)[i].rotation), 1e-9);
+    if (i > 0) {
+      const double step = ((*rescaled)[i].translation - (*rescaled)[i - 1].translation).norm();
+      const double before = ((*constant)[i].translation - (*constant)[i - 1].translation).norm();
+      EXPECT_TRUE(before == 0.0 || std::abs(step - kStep_m) < 1e-6) << i << ": " << step;
+    }
+  }
+}
+
+TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
+  request_.config.seed = 42;
+  ASSERT_TRUE(run_sequence(request_));
+  EXPECT_THAT(read_file(request_.out_dir / "config.yaml"), HasSubstr("# frames 0:6 of 07\n"));
+  const Expected<Config> config = load_config(request_.out_dir / "config.yaml");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->seed, 42U);
+  EXPECT_EQ(config->stem.filter, 0);       // what -1 stood for
+  EXPECT_EQ(config->stem.sampling_px, 1);  // what 0 stood for
+}
+
+TEST_F(PipelineRun, StoppedEarlyHoldsWhatWasComputed) {
+  request_.frames = FrameRangeRequest{1, 6};
+  const auto summary = run_sequence(request_, [](std::size_t done, std::size_t total) {
+    EXPECT_EQ(total, 5U);
+    return done < 3;
+  });
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_TRUE(summary->interrupted);
+  EXPECT_EQ(summary->report.num_frames, 3U);
+  EXPECT_EQ(summary->report.first_frame, 1U);
+  EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 3U);
+  EXPECT_NEAR(summary->report.metrics->path_length_m, 2 * kStep_m, 1e-6);
+}
+
+TEST_F(PipelineRun, StoppingAfterTheLastFrameIsNoInterrupt) {
+  const auto summary =
+      run_sequence(request_, [](std::size_t done, std::size_t total) { return done < total; });
+  ASSERT_TRUE(summary);
+  EXPECT_FALSE(summary->interrupted);
+}
+
+TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
+  fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
+  EXPECT_EQ(summary->report.num_frames, 6U);
+  EXPECT_LT(summary->report.tracked_fraction, 1.0);
+  EXPECT_THAT(read_file(request_.out_dir / "frames.csv"), HasSubstr(",broken,"));
+}
+
+TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
+  RunRequest request = request_;
+  request.config.scale.constant_m = 0.0;
+  EXPECT_THAT(error_of(request), HasSubstr("scale.constant_m"));
+  request = request_;
+  request.config.stem.model = "nothing";
+  EXPECT_THAT(error_of(request), HasSubstr("nothing"));
+  request = request_;
+  request.config.scale.source = "ground_truth";
+  fs::remove(folder_ / "poses/07.txt");
+  EXPECT_THAT(error_of(request), HasSubstr("poses/07.txt: expected a pose file"));
+  EXPECT_FALSE(fs::exists(request_.out_dir));
+  request = request_;
+  request.out_dir = request_.sequence_dir / "calib.txt";
+  EXPECT_THAT(error_of(request), HasSubstr("calib.txt: expected an output folder"));
+}
+
+TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
+  fs::create_directories(request_.out_dir / "trajectory_tum.txt");
+  fs::create_directories(request_.out_dir / "config.yaml");
+  EXPECT_THAT(error_of(request_), HasSubstr("trajectory_tum.txt"));
+  EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 6U);
+  EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "metrics.json"));
+  EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "trajectory.png"));
+}
+
+TEST_F(PipelineRun, ChannelPicturesOfTheInputLayer) {
+  ChannelPicturesRequest request;
+  request.sequence_dir = request_.sequence_dir;
+  request.out_dir = request_.out_dir;
+  request.models_dir = request_.models_dir;
+  request.config.stem.model = "input_layer";
+  request.frames = FrameRangeRequest{2, 4};
+  const auto written = write_channel_pictures(request);
+  ASSERT_TRUE(written) << written.error().message;
+  EXPECT_EQ(*written, 2U * (1 + 3 + 1));
+  EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
+  EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
+  request.filters = FrameRangeRequest{2, 4};
+  const auto outside = write_channel_pictures(request);
+  ASSERT_FALSE(outside);
+  EXPECT_THAT(outside.error().message,
+              HasSubstr("expected filters inside 0:3, found --filters 2:4"));
+}
+
+}  // namespace
+}  // namespace stemvo
