@@ -1,6 +1,93 @@
 // SPDX-License-Identifier: MIT
-#include <fmt/core.h>
+#include <exception>
+#include <string>
 
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "interrupt.hpp"
 #include "stemvo/config.hpp"
+#include "stemvo/version.hpp"
 
-int main() { fmt::print("{}", stemvo::dump_config({})); }
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter = R"(A first drive, without any data:
+  stemvo synth drive                                  render a street
+  stemvo run drive/sequences/00 --out result          reconstruct it, see result/trajectory.png
+With KITTI:
+  stemvo run kitti/sequences/00 --out result --set scale.source=ground_truth
+
+'stemvo COMMAND --help' explains a command. Every configuration key is explained by
+  stemvo --dump-config > my.yaml                      edit it, then: stemvo run ... --config my.yaml
+
+Exit codes: 0 done, 1 something is wrong with a file, model or key (one line says what), 2 wrong
+usage, 130 interrupted (what was computed is written).)";
+
+/// Wrong usage on one line, as every other error. --help and --version are no errors.
+int report_usage(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) {
+    app.exit(error, std::cout, std::cerr);
+    return kExitDone;
+  }
+  std::string command = "stemvo";
+  for (const CLI::App* sub : app.get_subcommands()) {
+    command += " " + sub->get_name();
+  }
+  print_error(std::string(error.what()) + " (see '" + command + " --help')");
+  return kExitUsage;
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App app("stemvo: camera frames in, a trajectory out, seen through one learned filter.",
+               "stemvo");
+  app.set_version_flag("--version", "stemvo " + std::string(version()));
+  app.footer(kFooter);
+  Action action;
+  app.add_flag_callback(
+      "--dump-config",
+      [&action] {
+        action = [] {
+          print(dump_config({}));
+          return kExitDone;
+        };
+      },
+      "Print the default configuration, every key explained");
+  for (const auto add : {add_run, add_evaluate, add_channel, add_synth, add_check, add_models}) {
+    CLI::App* command = add(app, action);
+    command->set_version_flag("--version", "stemvo " + std::string(version()));
+  }
+  app.require_subcommand(0, 1);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return report_usage(app, error);
+  }
+  if (!action) {
+    print_error(
+        "expected a command: run, evaluate, channel, synth, check or models (see 'stemvo "
+        "--help')");
+    return kExitUsage;
+  }
+  return action();
+}
+
+}  // namespace
+}  // namespace stemvo::apps
+
+int main(int argc, char** argv) {
+  stemvo::apps::process_start();
+  stemvo::apps::prepare_console();
+  stemvo::apps::catch_interrupts();
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell
+  try {
+    return stemvo::apps::finish_console(stemvo::apps::run_program(argc, argv));
+  } catch (const std::exception& error) {
+    stemvo::apps::print_error(std::string("internal: ") + error.what());
+  } catch (...) {
+    stemvo::apps::print_error("internal: unknown exception");
+  }
+  return stemvo::apps::kExitFailed;
+}

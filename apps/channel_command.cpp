@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "install_paths.hpp"
+#include "interrupt.hpp"
+#include "options.hpp"
+#include "progress.hpp"
+#include "stemvo/pipeline/channel_pictures.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(For each frame --out receives NNNNNN_input.png, NNNNNN_filter_KKK.png and NNNNNN_sheet.png, which
+shows them side by side.
+
+Examples:
+  stemvo channel kitti/sequences/03 --out pictures
+  stemvo channel kitti/sequences/03 --out pictures --frames 100:110 --filters 0:4
+  stemvo channel kitti/sequences/02 --out rgb --set stem.model=input_layer)";
+
+struct Arguments {
+  ChannelPicturesRequest request;
+  ConfigArguments config;
+};
+
+int draw(Arguments& arguments) {
+  const Expected<Config> config = read_config(arguments.config);
+  if (!config) {
+    print_error(config.error().message);
+    return kExitFailed;
+  }
+  arguments.request.config = *config;
+  arguments.request.models_dir = data_folder("models");
+  Progress progress("frames", /*is_quiet=*/false);
+  const Expected<std::size_t> written = write_channel_pictures(
+      arguments.request,
+      [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
+  if (!written) {
+    print_error(written.error().message);
+    return kExitFailed;
+  }
+  print(fmt::format("{} pictures in {}\n", *written, arguments.request.out_dir.string()));
+  return is_interrupted() ? kExitInterrupted : kExitDone;
+}
+
+}  // namespace
+
+CLI::App* add_channel(CLI::App& app, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("channel", "Draw what the filters make of the frames (paper, Figure 1)");
+  const auto arguments = std::make_shared<Arguments>();
+  arguments->request.frames = FrameRangeRequest{0, 1};
+  command->add_option("SEQUENCE_DIR", arguments->request.sequence_dir, "Sequence in KITTI's layout")
+      ->required()
+      ->type_name("");
+  command->add_option("--out", arguments->request.out_dir, "Folder for the pictures; created")
+      ->required()
+      ->type_name("DIR");
+  add_range_option(*command, "--frames", arguments->request.frames,
+                   "Frames A to B-1; default: the first one");
+  add_range_option(*command, "--filters", arguments->request.filters,
+                   "Filters A to B-1; default: all");
+  add_config_options(*command, arguments->config);
+  command->footer(kFooter);
+  command->callback([arguments, &action] { action = [arguments] { return draw(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "stemvo/report/check.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(THRESHOLDS.yaml holds one line per number of metrics.json that must stay inside its bounds:
+  t_rel_percent: {max: 1.0}
+  tracked_fraction: {min: 0.99}
+  ate_rmse_m.sim3: {max: 3}
+
+Exit code 1 when a bound is passed, so that it gates a script:
+  stemvo check result/metrics.json --against thresholds.yaml)";
+
+struct Arguments {
+  std::filesystem::path metrics;
+  std::filesystem::path thresholds;
+};
+
+int check(const Arguments& arguments) {
+  const Expected<std::vector<ThresholdResult>> results =
+      check_metrics(arguments.metrics, arguments.thresholds);
+  if (!results) {
+    print_error(results.error().message);
+    return kExitFailed;
+  }
+  print(format_check_table(*results));
+  return all_passed(*results) ? kExitDone : kExitFailed;
+}
+
+}  // namespace
+
+CLI::App* add_check(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("check", "Hold the numbers of a run against thresholds");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("METRICS.json", arguments->metrics, "metrics.json of a run")
+      ->required()
+      ->type_name("");
+  command->add_option("--against", arguments->thresholds, "Thresholds to hold it against")
+      ->required()
+      ->type_name("THRESHOLDS.yaml");
+  command->footer(kFooter);
+  command->callback([arguments, &action] { action = [arguments] { return check(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps

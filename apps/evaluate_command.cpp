@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <string>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "stemvo/report/evaluate_report.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Pose files are KITTI's (12 numbers a line) or TUM's (8 numbers a line). Both trajectories are moved to
+start at the identity; nothing else is fitted unless --align says so.
+
+Examples:
+  stemvo evaluate --gt kitti/poses/03.txt result/trajectory_kitti.txt
+  stemvo evaluate --gt kitti/poses/03.txt a.txt b.txt --align sim3 --json numbers.json)";
+
+struct Arguments {
+  EvaluationRequest request;
+  std::string alignment = "none";
+  std::string json;
+};
+
+int fail_with(const Error& error) {
+  print_error(error.message);
+  return kExitFailed;
+}
+
+int evaluate(Arguments& arguments) {
+  const Expected<Alignment> alignment = parse_alignment(arguments.alignment);
+  if (!alignment) {
+    return fail_with(alignment.error());
+  }
+  arguments.request.alignment = *alignment;
+  const Expected<EvaluationReport> report = evaluate_files(arguments.request);
+  if (!report) {
+    return fail_with(report.error());
+  }
+  print(format_evaluation_table(*report));
+  if (!arguments.json.empty()) {
+    if (const Status status = write_evaluation_json(arguments.json, *report); !status) {
+      return fail_with(status.error());
+    }
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+CLI::App* add_evaluate(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("evaluate", "Compare trajectories with the ground truth");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("--gt", arguments->request.ground_truth, "Ground truth: KITTI poses")
+      ->required()
+      ->type_name("POSES");
+  command->add_option("ESTIMATE", arguments->request.estimates, "Trajectories to judge")
+      ->required()
+      ->type_name("");
+  command->add_option("--align", arguments->alignment, "none (default), scale, se3 or sim3")
+      ->type_name("KIND")
+      ->check(CLI::IsMember({"none", "scale", "se3", "sim3"}));
+  command->add_option("--json", arguments->json, "Write the numbers to this file as well")
+      ->type_name("FILE");
+  command->footer(kFooter);
+  command->callback(
+      [arguments, &action] { action = [arguments] { return evaluate(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps

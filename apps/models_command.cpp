@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "install_paths.hpp"
+#include "stemvo/stem/manifest.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(A model is chosen by its name (--set stem.model=NAME) or by the path of an .onnx file with a
+manifest.yaml beside it. Two need no file: gray, and input_layer (filters 0, 1, 2 = R, G, B).)";
+
+std::string describe(const ModelEntry& entry, const Status& status) {
+  std::string text = fmt::format("{}: {}\n", entry.name, status ? "sound" : "NOT SOUND");
+  text += fmt::format("  network   {}, layer {}\n", entry.network, entry.layer);
+  text +=
+      fmt::format("  filters   {} of {}x{} pixels, stride {}, the best: {}\n", entry.num_filters,
+                  entry.kernel_px[1], entry.kernel_px[0], entry.stride_px, entry.default_filter);
+  text += fmt::format("  file      {}\n  licence   {}\n  made by   {}\n", entry.file.string(),
+                      entry.licence, entry.command);
+  return text;
+}
+
+int list_models() {
+  const auto manifest = data_folder("models") / "manifest.yaml";
+  const Expected<std::vector<ModelEntry>> entries = load_manifest(manifest);
+  if (!entries) {
+    print_error(entries.error().message);
+    return kExitFailed;
+  }
+  int exit_code = kExitDone;
+  for (const ModelEntry& entry : *entries) {
+    const Status status = check_model(entry);
+    print(describe(entry, status));
+    if (!status) {
+      print_error(status.error().message);
+      exit_code = kExitFailed;
+    }
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+CLI::App* add_models(CLI::App& app, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("models", "List the models and check that each file is sound");
+  command->footer(kFooter);
+  command->callback([&action] { action = list_models; });
+  return command;
+}
+
+}  // namespace stemvo::apps

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "options.hpp"
+
+#include <string_view>
+#include <system_error>
+
+#include "install_paths.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+std::filesystem::path find_config(const std::string& given) {
+  std::error_code code;
+  const std::filesystem::path file(given);
+  if (std::filesystem::exists(file, code) || file.has_parent_path()) {
+    return file;
+  }
+  for (const std::string& name : {given, given + ".yaml"}) {
+    const std::filesystem::path shipped = data_folder("config") / name;
+    if (std::filesystem::exists(shipped, code)) {
+      return shipped;
+    }
+  }
+  return file;  // load_config says what is wrong with it
+}
+
+}  // namespace
+
+CLI::Validator in_range(int min, int max) { return CLI::Range(min, max).description(""); }
+
+void add_config_options(CLI::App& command, ConfigArguments& arguments) {
+  command
+      .add_option("--config", arguments.file,
+                  "Configuration file, or the name of one that comes with stemvo: default, paper")
+      ->type_name("FILE");
+  command
+      .add_option("--set", arguments.overrides,
+                  "Set one configuration key, e.g. stem.filter=3; may be given many times")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->check([](const std::string& text) {
+        return text.find('=') == std::string::npos ? "expected KEY=VALUE, found '" + text + "'"
+                                                   : std::string();
+      });
+}
+
+Expected<Config> read_config(const ConfigArguments& arguments) {
+  Config config;
+  if (!arguments.file.empty()) {
+    const Expected<Config> loaded = load_config(find_config(arguments.file));
+    if (!loaded) {
+      return loaded;
+    }
+    config = *loaded;
+  }
+  for (const std::string& assignment : arguments.overrides) {
+    if (const Status status = apply_override(config, assignment); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
+  if (const Status status = validate(config); !status) {
+    return tl::unexpected(status.error());
+  }
+  return config;
+}
+
+CLI::Option* add_range_option(CLI::App& command,
+                              const std::string& name,
+                              std::optional<FrameRangeRequest>& range,
+                              const std::string& help) {
+  const auto parse = [&range](const std::string& text) {
+    const Expected<FrameRangeRequest> parsed = parse_frame_range(text);
+    if (!parsed) {
+      const std::string& message = parsed.error().message;
+      constexpr std::string_view kPrefix = "frames: ";  // CLI11 names the option itself
+      return message.starts_with(kPrefix) ? message.substr(kPrefix.size()) : message;
+    }
+    range = *parsed;
+    return std::string();
+  };
+  // The validator does the work, so that a malformed range is CLI11's wrong usage.
+  return command.add_option_function<std::string>(
+                    name, [](const std::string&) {}, help)
+      ->type_name("A:B")
+      ->check(parse);
+}
+
+}  // namespace stemvo::apps

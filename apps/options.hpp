@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "stemvo/config.hpp"
+#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo::apps {
+
+/// --config and --set, which several commands share.
+struct ConfigArguments {
+  std::string file;
+  std::vector<std::string> overrides;
+};
+void add_config_options(CLI::App& command, ConfigArguments& arguments);
+
+/// Defaults, then the file, then each --set, then the checks of the whole. A file that is not there
+/// as given and has no folder in its name is looked up among the configurations that come with the
+/// program, with or without ".yaml".
+[[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments);
+
+/// Whole numbers from min to max; leaves the help's line short.
+[[nodiscard]] CLI::Validator in_range(int min, int max);
+
+/// An option "A:B"; text of another form is wrong usage.
+CLI::Option* add_range_option(CLI::App& command,
+                              const std::string& name,
+                              std::optional<FrameRangeRequest>& range,
+                              const std::string& help);
+
+}  // namespace stemvo::apps

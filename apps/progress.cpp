@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: MIT
+#include "progress.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "interrupt.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr double kTerminalPeriod_s = 0.1;
+constexpr double kPlainPeriod_s = 5.0;
+
+std::string describe_time(double seconds) {
+  const auto whole = static_cast<long>(seconds + 0.5);
+  return whole < 60 ? fmt::format("{} s", whole)
+                    : fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::string unit, bool is_quiet)
+    : unit_(std::move(unit)),
+      is_quiet_(is_quiet),
+      is_terminal_(::isatty(STDERR_FILENO) == 1),
+      start_(Clock::now()),
+      last_(start_) {}
+
+bool Progress::is_due(Clock::time_point now, bool is_last) const {
+  const std::chrono::duration<double> since = now - last_;
+  return is_last || since.count() >= (is_terminal_ ? kTerminalPeriod_s : kPlainPeriod_s);
+}
+
+bool Progress::update(std::size_t done, std::size_t total) {
+  const bool go_on = !is_interrupted();
+  const Clock::time_point now = Clock::now();
+  const bool is_last = done == total || !go_on;
+  if (!is_quiet_ && is_due(now, is_last)) {
+    const double elapsed_s = std::max(std::chrono::duration<double>(now - start_).count(), 1e-9);
+    const double per_s = static_cast<double>(done) / elapsed_s;
+    const std::string rest =
+        is_last ? fmt::format("{} in all", describe_time(elapsed_s))
+                : describe_time(static_cast<double>(total - done) / per_s) + " left";
+    const std::string text =
+        fmt::format("{}/{} {}, {:.1f} {}/s, {}", done, total, unit_, per_s, unit_, rest);
+    // \r and "erase to the end" keep a terminal's cursor on one line until the last.
+    const std::string line =
+        is_terminal_ ? "\r" + text + "\x1b[K" + (is_last ? "\n" : "") : text + "\n";
+    std::fwrite(line.data(), 1, line.size(), stderr);
+    last_ = now;
+  }
+  return go_on;
+}
+
+}  // namespace stemvo::apps

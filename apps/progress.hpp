@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace stemvo::apps {
+
+/// Progress on standard error: one line that changes on a terminal, a plain line every few seconds
+/// otherwise, nothing when quiet.
+class Progress {
+ public:
+  /// `unit`: what is counted, e.g. "frames".
+  Progress(std::string unit, bool is_quiet);
+
+  /// After each unit of work. False once the user interrupted, so that it fits as a callback.
+  bool update(std::size_t done, std::size_t total);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  [[nodiscard]] bool is_due(Clock::time_point now, bool is_last) const;
+
+  std::string unit_;
+  bool is_quiet_;
+  bool is_terminal_;
+  Clock::time_point start_;
+  Clock::time_point last_;
+};
+
+}  // namespace stemvo::apps

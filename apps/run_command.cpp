@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "install_paths.hpp"
+#include "options.hpp"
+#include "progress.hpp"
+#include "stemvo/pipeline/run.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(SEQUENCE_DIR holds image_2/000000.png, .. (colour) or image_0 (gray), calib.txt and times.txt, as in
+KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
+
+--out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory.png and .svg (the
+map), metrics.json (the numbers), frames.csv (a row per frame), config.yaml (what was run).
+
+Examples:
+  stemvo run kitti/sequences/03 --out result
+  stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth   the paper's protocol
+  stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
+  stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn)";
+
+struct Arguments {
+  RunRequest request;
+  ConfigArguments config;
+  std::string ground_truth;
+  bool is_quiet = false;
+};
+
+void print_summary(const Arguments& arguments, const RunSummary& summary) {
+  if (arguments.is_quiet) {
+    return;
+  }
+  print(format_metrics_table(summary.report));
+  print(fmt::format("map: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+}
+
+int run(Arguments& arguments) {
+  const Expected<Config> config = read_config(arguments.config);
+  if (!config) {
+    print_error(config.error().message);
+    return kExitFailed;
+  }
+  RunRequest& request = arguments.request;
+  request.config = *config;
+  request.models_dir = data_folder("models");
+  request.started = process_start();
+  if (!arguments.ground_truth.empty()) {
+    request.ground_truth = arguments.ground_truth;
+  }
+  Progress progress("frames", arguments.is_quiet);
+  const Expected<RunSummary> summary = run_sequence(
+      request,
+      [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
+  if (!summary) {
+    print_error(summary.error().message);
+    return kExitFailed;
+  }
+  for (const std::string& warning : summary->warnings) {
+    print_warning(warning);
+  }
+  if (summary->interrupted) {
+    print_warning(fmt::format("interrupted; the results hold the first {} frames",
+                              summary->report.num_frames));
+  }
+  print_summary(arguments, *summary);
+  return summary->interrupted ? kExitInterrupted : kExitDone;
+}
+
+}  // namespace
+
+CLI::App* add_run(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a folder of frames");
+  const auto arguments = std::make_shared<Arguments>();
+  RunRequest& request = arguments->request;
+  command->add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
+      ->required()
+      ->type_name("");
+  command->add_option("--out", request.out_dir, "Folder for the results; created, files replaced")
+      ->required()
+      ->type_name("DIR");
+  add_config_options(*command, arguments->config);
+  add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
+  command->add_option("--gt", arguments->ground_truth, "Ground truth: a pose file of KITTI")
+      ->type_name("FILE");
+  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
+      ->type_name("N")
+      ->check(in_range(0, 1024));
+  command->add_option("--pictures", request.picture_every, "Draw the tracks of every Nth frame")
+      ->type_name("N")
+      ->check(in_range(1, 1000000));
+  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
+  command->footer(kFooter);
+  command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps

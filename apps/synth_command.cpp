@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "interrupt.hpp"
+#include "options.hpp"
+#include "progress.hpp"
+#include "stemvo/dataset/synthetic_drive.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Writes OUT_DIR/sequences/00 and OUT_DIR/poses/00.txt in KITTI's layout, with exact poses. The same
+options give the same files.
+
+Examples:
+  stemvo synth drive --frames 200
+  stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7)";
+
+struct Arguments {
+  std::filesystem::path out_dir;
+  std::filesystem::path trajectory;
+  SyntheticDriveOptions options;
+};
+
+int render(Arguments& arguments) {
+  if (!arguments.trajectory.empty()) {
+    arguments.options.trajectory = arguments.trajectory;
+  }
+  Progress progress("frames", /*is_quiet=*/false);
+  const Status status = render_synthetic_drive(
+      arguments.out_dir, arguments.options, [&progress](int done, int total) {
+        return progress.update(static_cast<std::size_t>(done), static_cast<std::size_t>(total));
+      });
+  if (is_interrupted()) {
+    return kExitInterrupted;
+  }
+  if (!status) {
+    print_error(status.error().message);
+    return kExitFailed;
+  }
+  print(fmt::format("sequence: {}\n", (arguments.out_dir / "sequences" / "00").string()));
+  return kExitDone;
+}
+
+}  // namespace
+
+CLI::App* add_synth(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("synth", "Render a drive along a street");
+  const auto arguments = std::make_shared<Arguments>();
+  SyntheticDriveOptions& options = arguments->options;
+  command->add_option("OUT_DIR", arguments->out_dir, "Folder for the drive; created")
+      ->required()
+      ->type_name("");
+  command
+      ->add_option("--trajectory", arguments->trajectory,
+                   "Drive along these KITTI poses; default: a curve of its own")
+      ->type_name("POSES");
+  command->add_option("--frames", options.num_frames, "Frames to render; default 100")
+      ->type_name("N")
+      ->check(in_range(1, 1000000));
+  command->add_option("--seed", options.seed, "Of textures, shading and noise; default 1")
+      ->type_name("S")
+      ->check([](const std::string& text) {
+        // CLI11 would wrap a negative number around.
+        return text.starts_with('-') ? "expected a whole number of at least 0, found " + text
+                                     : std::string();
+      });
+  command->add_option("--width", options.width_px, "Pixels; default 1241")
+      ->type_name("W")
+      ->check(in_range(16, 16384));
+  command->add_option("--height", options.height_px, "Pixels; default 376")
+      ->type_name("H")
+      ->check(in_range(16, 16384));
+  command->add_flag("--depth", options.write_depth,
+                    "Also depth/NNNNNN.npy: metres along the optical axis, float32");
+  command->footer(kFooter);
+  command->callback([arguments, &action] { action = [arguments] { return render(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps
