@@ -108,7 +108,7 @@ void add_building(const StreetContext& street, double side, int slot, double arc
   Style style;
   style.seed = draw.bits();
   style.albedo = kPlaster[draw.bits() % kPlaster.size()];
-  const float tone = static_cast<float>(draw.in(0.8, 1.1));
+  const float tone = static_cast<float>(draw.in(0.85, 1.2));
   for (float& value : style.albedo) {
     value *= tone;
   }

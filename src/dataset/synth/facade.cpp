@@ -93,7 +93,7 @@ Rgb plaster(const Style& style, const Footprint& at, const Textures& textures) {
     return textures.grain.sample((at.u + shift) * s, (at.v + shift) * s, at.width_u * s,
                                  at.width_v * s);
   };
-  const float tone = 1.0F + 0.035F * noise(0.015F) + 0.045F * noise(0.06F);
+  const float tone = 1.0F + 0.05F * noise(0.015F) + 0.06F * noise(0.06F);
   const float plinth = box_coverage(at.v, at.width_v, -10.0F, kPlinth_m);
   const float dirt = 0.12F * std::clamp(1.5F - 0.8F * at.v, 0.0F, 1.0F);
   const float factor = tone * (1.0F - dirt) * (1.0F - 0.35F * plinth);

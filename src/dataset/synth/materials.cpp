@@ -26,13 +26,11 @@ Rgb blend(const Rgb& from, const Rgb& to, float share) {
           from[2] + share * (to[2] - from[2])};
 }
 
-/// White paint: the dashed middle of the road and the line at the right edge.
+/// Worn white dashes in the middle of the road.
 float lane_marking(const Footprint& at) {
   constexpr float kDashPeriod_m = 12.288F;  // a fifth of the texture's period
-  const float middle = box_coverage(at.v, at.width_v, -1.82F, -1.69F) *
-                       bars_coverage(at.u, at.width_u, kDashPeriod_m, 4.1F);
-  const float edge = box_coverage(at.v, at.width_v, 2.02F, 2.14F);
-  return std::max(middle, edge);
+  return box_coverage(at.v, at.width_v, -1.82F, -1.71F) *
+         bars_coverage(at.u, at.width_u, kDashPeriod_m, 3.3F);
 }
 
 /// Mended rectangles: one in three stretches of 7.68 m has one, a little darker or lighter.
@@ -47,7 +45,7 @@ float patch_tone(const Style& style, const Footprint& at) {
   const auto begin_v = static_cast<float>(draw.in(-5.0, 1.0));
   const auto length = static_cast<float>(draw.in(1.0, 4.5));
   const auto breadth = static_cast<float>(draw.in(0.6, 1.8));
-  const auto tone = static_cast<float>(draw.in(-0.09, 0.05));
+  const auto tone = static_cast<float>(draw.in(-0.08, 0.04));
   const float u = at.u - kStretch_m * stretch;
   return tone * box_coverage(u, at.width_u, begin_u, begin_u + length) *
          box_coverage(at.v, at.width_v, begin_v, begin_v + breadth);
@@ -55,15 +53,15 @@ float patch_tone(const Style& style, const Footprint& at) {
 
 /// Deviations are calibrated to the real clip (docs/synthetic_drives.md).
 Rgb asphalt(const Style& style, const Footprint& at, const Textures& textures) {
-  constexpr float kGrain = 0.115F;
-  constexpr float kMottle = 0.05F;
+  constexpr float kGrain = 0.18F;
+  constexpr float kMottle = 0.03F;
   const float grain = noise(textures.grain, at, 0.01F);
   const float mottle = noise(textures.grain, at, 0.06F, 7.0F);
   // Tyres polish two tracks 1.5 m apart in each lane.
   const float track = 0.025F * std::cos(4.19F * (at.v - 0.75F));
   const float tone = 1.0F + kGrain * grain + kMottle * mottle + track + patch_tone(style, at);
-  const float paint_share = lane_marking(at) * std::clamp(0.85F + 0.1F * grain, 0.0F, 1.0F);
-  return blend(scaled(style.albedo, tone), {0.70F, 0.70F, 0.68F}, paint_share);
+  const float paint_share = lane_marking(at) * std::clamp(0.75F + 0.2F * grain, 0.0F, 1.0F);
+  return blend(scaled(style.albedo, tone), {0.62F, 0.62F, 0.60F}, paint_share);
 }
 
 /// Stones of `length` x `breadth` with joints; each stone has its own tone while it is larger than
@@ -98,7 +96,7 @@ Rgb leaves(const Style& style,
   const auto shift = static_cast<float>(style.seed % 1024U) * 0.04F;
   const float fine = noise(textures.leaf, at, texel_m, shift);
   const float coarse = noise(textures.leaf, at, 4.0F * texel_m, shift);
-  const float tone = std::max(0.08F, 1.0F + contrast * (0.7F * fine + 0.5F * coarse));
+  const float tone = std::max(0.08F, 1.0F + contrast * (0.8F * fine + 0.5F * coarse));
   Rgb colour = scaled(style.albedo, tone);
   colour[0] += 0.04F * std::max(0.0F, coarse) * style.albedo[1];  // sunlit leaves are yellower
   return colour;
@@ -154,7 +152,7 @@ Rgb paint(const Style& style, const Footprint& at, const Textures& textures) {
     case Material::kKerb:
       return kerb(style, at, textures);
     case Material::kGrass:
-      return leaves(style, at, textures, 0.015F, 0.32F);
+      return leaves(style, at, textures, 0.015F, 0.42F);
     case Material::kFacade:
       return facade(style, at, textures);
     case Material::kPlainWall:
@@ -162,13 +160,13 @@ Rgb paint(const Style& style, const Footprint& at, const Textures& textures) {
     case Material::kRoof:
       return roof(style, at, textures);
     case Material::kHedge:
-      return leaves(style, at, textures, 0.015F, 0.5F);
+      return leaves(style, at, textures, 0.015F, 0.75F);
     case Material::kFence:
       return fence(style, at, textures);
     case Material::kBark:
       return leaves(style, at, textures, 0.01F, 0.3F);
     case Material::kLeaves:
-      return leaves(style, at, textures, 0.02F, 0.55F);
+      return leaves(style, at, textures, 0.02F, 0.75F);
     case Material::kPaint:
       break;
   }

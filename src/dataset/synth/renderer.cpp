@@ -15,6 +15,8 @@ namespace {
 
 constexpr int kBandRows = 16;  // its samples stay in the processor's cache
 
+cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
+
 /// One frame while it is drawn.
 class FramePainter {
  public:
@@ -113,10 +115,11 @@ class FramePainter {
   [[nodiscard]] cv::Vec3f colour_of(int id, double x, double y) const {
     const Eigen::Vector2d ray = camera_.normalize({x, y});
     const Eigen::Vector3d direction(ray.x(), ray.y(), 1.0);
+    const auto backdrop = [&] {
+      return sky_.colour(world_from_camera_ * direction, 1.0 / camera_.fx_px, textures_);
+    };
     if (id == SampleBand::kNothing) {
-      const Rgb colour =
-          sky_.colour(world_from_camera_ * direction, 1.0 / camera_.fx_px, textures_);
-      return {colour[0], colour[1], colour[2]};
+      return to_vector(backdrop());
     }
     const ScreenFace& face = faces_[static_cast<std::size_t>(id)];
     const double z = 1.0 / face.inverse_z.at(x, y);
@@ -131,14 +134,12 @@ class FramePainter {
     texture(face.u_over_z, at.u, at.width_u);
     texture(face.v_over_z, at.v, at.width_v);
     const Rgb albedo = paint(*face.style, at, textures_);
-    const float haze = haze_share(static_cast<float>(z * direction.norm()));
-    cv::Vec3f colour;
-    for (int c = 0; c < 3; ++c) {
-      const auto k = static_cast<std::size_t>(c);
-      const float lit = std::max(0.0F, albedo[k]) * face.style->light;
-      colour[c] = lit + haze * (kHaze[k] - lit);
-    }
-    return colour;
+    const auto distance_m = static_cast<float>(z * direction.norm());
+    const float light = face.style->light;
+    const float haze = haze_share(distance_m);
+    const cv::Vec3f lit = to_vector(albedo) * (light * (1.0F - haze)) + to_vector(kHaze) * haze;
+    const float far = backdrop_share(distance_m);
+    return far > 0.0F ? lit * (1.0F - far) + to_vector(backdrop()) * far : lit;
   }
 
   /// At the pixel's centre on the plane of the face; if that point is far off the part of the face

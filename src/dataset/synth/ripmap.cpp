@@ -68,11 +68,11 @@ void add_value_noise(std::uint64_t seed, int cells, double amplitude, std::vecto
 }
 
 std::vector<float> grain_noise(std::uint64_t seed) {
-  return octave_noise(hash_of(seed, 'g'), {1.0, 1.3, 0.9, 0.6, 0.45, 0.4, 0.3, 0.2});
+  return octave_noise(hash_of(seed, 'g'), {1.2, 1.3, 0.7, 0.35, 0.22, 0.18, 0.15, 0.12});
 }
 
 std::vector<float> leaf_noise(std::uint64_t seed) {
-  auto values = octave_noise(hash_of(seed, 'l'), {0.3, 0.7, 1.0, 1.1, 1.0, 0.8, 0.5});
+  auto values = octave_noise(hash_of(seed, 'l'), {0.6, 1.0, 1.2, 1.1, 0.9, 0.7, 0.4});
   normalize(values);
   for (float& value : values) {  // gaps are darker than leaves are bright
     value = value < -0.6F ? -0.6F + 1.5F * (value + 0.6F) : value;

@@ -13,13 +13,12 @@ namespace {
 constexpr double kSeenBehind_m = 60.0;
 constexpr double kSeenAhead_m = 170.0;
 
-/// Last knot from `start` in direction `step` before the road comes back near the way between.
-int walk(const RoadCurve& road, int start, int step, double reach_m) {
+/// Last knot from `start` in direction `step` before the road comes back near the way from `from`,
+/// a knot on the other side of `start`.
+int walk(const RoadCurve& road, int from, int start, int step, double reach_m) {
   constexpr double kClear_m = 2.0 * kStreetHalfWidth_m;
   constexpr int kNeighbours = 45;  // knots: nearer ones are the same street
-  constexpr int kOtherSide = 30;   // the street on the camera's other side counts as well
   const int count = static_cast<int>(reach_m / kKnotSpacing_m);
-  const int from = std::clamp(start - step * kOtherSide, 0, road.num_knots() - 1);
   for (int k = 0; k < count; ++k) {
     const int i = start + step * (k + 1);
     if (i < 0 || i >= road.num_knots()) {
@@ -38,14 +37,16 @@ int walk(const RoadCurve& road, int start, int step, double reach_m) {
 
 RoadWindow visible_window(const RoadCurve& road, double arc_m) {
   const int here = std::clamp(static_cast<int>(arc_m / kKnotSpacing_m), 0, road.num_knots() - 1);
-  return {walk(road, here, -1, kSeenBehind_m), walk(road, here, 1, kSeenAhead_m) + 1};
+  constexpr int kBeside = 30;  // what is ahead must not stand in the street just behind the camera
+  const int last = walk(road, std::max(here - kBeside, 0), here, 1, kSeenAhead_m);
+  return {walk(road, last, here, -1, kSeenBehind_m), last + 1};
 }
 
 void Scene::add_polygon(std::span<const Eigen::Vector3d> corners,
                         std::span<const Eigen::Vector2d> texture,
                         const Style& style) {
-  constexpr double kAmbient = 0.40;
-  constexpr double kSun = 0.75;
+  constexpr double kAmbient = 0.36;
+  constexpr double kSun = 0.95;
   Face face;
   face.num_points = static_cast<int>(corners.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -134,6 +135,7 @@ Scene build_scene(const RoadCurve& road,
   add_borders(street, scene);
   add_buildings(street, scene);
   add_trees(street, scene);
+  add_bushes(street, scene);
   add_poles(street, scene);
   add_parked_cars(street, scene);
   return scene;

@@ -109,6 +109,7 @@ void add_ground(const StreetContext& street, Scene& scene);
 void add_borders(const StreetContext& street, Scene& scene);  // hedges, walls, fences
 void add_buildings(const StreetContext& street, Scene& scene);
 void add_trees(const StreetContext& street, Scene& scene);
+void add_bushes(const StreetContext& street, Scene& scene);
 void add_poles(const StreetContext& street, Scene& scene);
 void add_parked_cars(const StreetContext& street, Scene& scene);
 

@@ -69,15 +69,17 @@ Rgb Sky::colour(const Eigen::Vector3d& direction,
   const float s = static_cast<float>(kTexelsPerTurn / kTwoPi);
   const float woods = textures.leaf.sample(static_cast<float>(turn * kTexelsPerTurn), elevation * s,
                                            width * s, width * s);
-  const Rgb hill = blend({0.20F, 0.26F, 0.20F}, kHaze, 0.35F);
-  const float shade = 1.0F + 0.16F * woods;
+  const float shade = 1.0F + 0.2F * woods;
+  const Rgb hill = blend({0.20F * shade, 0.26F * shade, 0.19F * shade}, kHaze, 0.25F);
   const float share = std::clamp((ridge - elevation) / width + 0.5F, 0.0F, 1.0F);
-  colour = blend(colour, {hill[0] * shade, hill[1] * shade, hill[2] * shade}, share);
-  return blend(colour, kHaze, 1.0F - smooth_step(-0.006F, 0.003F, elevation));
+  colour = blend(colour, hill, share);
+  // Fields from just below the horizon on.
+  const Rgb field = {0.37F * shade, 0.39F * shade, 0.27F * shade};
+  return blend(colour, field, 1.0F - smooth_step(-0.03F, -0.005F, elevation));
 }
 
-float haze_share(float distance_m) {
-  return std::max(smooth_step(100.0F, 165.0F, distance_m), 1.0F - std::exp(-distance_m / 700.0F));
-}
+float haze_share(float distance_m) { return 1.0F - std::exp(-distance_m / 700.0F); }
+
+float backdrop_share(float distance_m) { return smooth_step(110.0F, 165.0F, distance_m); }
 
 }  // namespace stemvo::synth

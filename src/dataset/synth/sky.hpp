@@ -10,7 +10,7 @@
 
 namespace stemvo::synth {
 
-/// What is infinitely far: blue with thin clouds, wooded hills on the horizon, haze below it. It
+/// What is infinitely far: blue with thin clouds, wooded hills on the horizon, fields below it. It
 /// moves with the camera's rotation only.
 class Sky {
  public:
@@ -25,9 +25,11 @@ class Sky {
   std::vector<float> ridge_rad_;  ///< height of the hills around the horizon
 };
 
-/// Colour of the air; everything fades into it from 100 m on and is gone at 165 m, where the drawn
-/// part of a street ends.
+/// Colour of the air, and how much of it lies before a thing at that distance.
 inline constexpr Rgb kHaze = {0.60F, 0.63F, 0.66F};
 [[nodiscard]] float haze_share(float distance_m);
+/// Things dissolve into the backdrop from 110 m on and are gone at 165 m, before the drawn part of
+/// a street ends: nothing pops up.
+[[nodiscard]] float backdrop_share(float distance_m);
 
 }  // namespace stemvo::synth

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <numbers>
+#include <algorithm>
 
 #include <Eigen/Geometry>
 
@@ -10,86 +9,7 @@
 namespace stemvo::synth {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kRoomy = 0.75;  // things stand only where a tight turn leaves the street its width
-
-Eigen::Vector3d random_direction(Draw& draw) {
-  const double z = draw.in(-1.0, 1.0);
-  const double angle = draw.in(0.0, 2.0 * kPi);
-  const double r = std::sqrt(1.0 - z * z);
-  return {r * std::cos(angle), z, r * std::sin(angle)};
-}
-
-/// A closed ball of leaves, and loose bunches on it that make the outline ragged.
-void add_crown(
-    const Eigen::Vector3d& centre, double radius_m, double stretch, Draw draw, Scene& scene) {
-  Style style;
-  style.material = Material::kLeaves;
-  style.albedo = {0.13F, 0.20F, 0.06F};
-  const Eigen::Vector3d semi(radius_m, radius_m * stretch, radius_m);
-  constexpr int kRings = 6;
-  constexpr int kSectors = 9;
-  style.seed = draw.bits();
-  const auto on_ball = [&](int ring, int sector) -> Eigen::Vector3d {
-    const double polar = kPi * ring / kRings;
-    const double angle = 2.0 * kPi * sector / kSectors;
-    const Eigen::Vector3d direction(std::sin(polar) * std::cos(angle), -std::cos(polar),
-                                    std::sin(polar) * std::sin(angle));
-    return centre + 0.88 * semi.cwiseProduct(direction);
-  };
-  const auto texture = [&](int ring, int sector) {
-    return Eigen::Vector2d(2.0 * kPi * radius_m * sector / kSectors,
-                           kPi * radius_m * stretch * ring / kRings);
-  };
-  for (int ring = 0; ring < kRings; ++ring) {
-    for (int sector = 0; sector < kSectors; ++sector) {
-      scene.add_patch({on_ball(ring, sector), on_ball(ring, sector + 1),
-                       on_ball(ring + 1, sector + 1), on_ball(ring + 1, sector)},
-                      {texture(ring, sector), texture(ring, sector + 1),
-                       texture(ring + 1, sector + 1), texture(ring + 1, sector)},
-                      style);
-    }
-  }
-  const int bunches = static_cast<int>(26.0 * radius_m);
-  for (int i = 0; i < bunches; ++i) {
-    const Eigen::Vector3d outward = random_direction(draw);
-    const Eigen::Vector3d at = centre + draw.in(0.85, 1.05) * semi.cwiseProduct(outward);
-    const Eigen::Vector3d x = draw.in(0.2, 0.45) * random_direction(draw);
-    const Eigen::Vector3d y =
-        draw.in(0.2, 0.45) * (0.6 * outward + random_direction(draw)).cross(x).normalized();
-    style.seed = draw.bits();
-    style.light = static_cast<float>(draw.in(0.6, 1.35));
-    const double u = draw.in(0.0, 8.0);
-    scene.add_quad(
-        {at - x, at - 0.3 * x - y, at + x, at + 0.3 * x + y},
-        {Eigen::Vector2d(u - x.norm(), 0), Eigen::Vector2d(u - 0.3 * x.norm(), -y.norm()),
-         Eigen::Vector2d(u + x.norm(), 0)},
-        style);
-  }
-}
-
-void add_tree(const StreetContext& street,
-              double arc_m,
-              double lateral_m,
-              double size,
-              Draw draw,
-              Scene& scene) {
-  const RoadFrame place = street.road.at(arc_m);
-  if (place.squeeze(lateral_m) < kRoomy) {
-    return;
-  }
-  Style bark;
-  bark.material = Material::kBark;
-  bark.albedo = {0.20F, 0.16F, 0.12F};
-  bark.seed = draw.bits();
-  const Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
-  const Eigen::Vector3d foot = place.point(lateral_m, -0.1);
-  const double trunk_m = size * draw.in(1.8, 2.6);
-  const double radius_m = size * draw.in(1.0, 1.6);
-  const double stretch = draw.in(0.9, 1.5);
-  scene.add_prism(foot, up, size * draw.in(0.08, 0.16), trunk_m + 0.6 * radius_m, bark);
-  add_crown(foot + (trunk_m + 0.8 * radius_m * stretch) * up, radius_m, stretch, draw, scene);
-}
 
 void add_car(const RoadFrame& place, double lateral_m, Draw draw, Scene& scene) {
   Style paint;
@@ -128,24 +48,6 @@ void add_car(const RoadFrame& place, double lateral_m, Draw draw, Scene& scene) 
 }
 
 }  // namespace
-
-void add_trees(const StreetContext& street, Scene& scene) {
-  for (const double side : {-1.0, 1.0}) {
-    for_each_slot(street, 11.0, [&](int slot, double arc_m) {  // along the sidewalk
-      Draw draw(street.seed, 'T', side > 0.0, slot);
-      if (draw.chance(0.38)) {
-        add_tree(street, arc_m + draw.in(1.0, 10.0), side * draw.in(6.9, 7.3), 1.0, draw, scene);
-      }
-    });
-    for_each_slot(street, 7.0, [&](int slot, double arc_m) {  // in the gardens
-      Draw draw(street.seed, 'D', side > 0.0, slot);
-      if (draw.chance(0.55)) {
-        add_tree(street, arc_m + draw.in(0.5, 6.5), side * draw.in(11.0, 14.0), draw.in(1.1, 2.2),
-                 draw, scene);
-      }
-    });
-  }
-}
 
 void add_poles(const StreetContext& street, Scene& scene) {
   for_each_slot(street, 14.0, [&](int slot, double arc_m) {

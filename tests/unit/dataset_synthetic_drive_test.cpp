@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <opencv2/core/utility.hpp>
+#include <unistd.h>
+
+#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/synthetic_drive.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class SyntheticDriveTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    root_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", info->name(), ::getpid());
+    fs::create_directories(root_);
+  }
+  void TearDown() override {
+    cv::setNumThreads(-1);
+    fs::remove_all(root_);
+  }
+  static SyntheticDriveOptions small(int num_frames) {
+    SyntheticDriveOptions options;
+    options.num_frames = num_frames;
+    options.width_px = 160;
+    options.height_px = 48;
+    return options;
+  }
+  fs::path write_poses(const Trajectory& poses) const {
+    const fs::path file = root_ / "given.txt";
+    EXPECT_TRUE(write_kitti_trajectory(file, poses));
+    return file;
+  }
+  static std::string bytes_of(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::string all_bytes(const std::string& name, int num_frames) const {
+    std::string bytes = bytes_of(root_ / name / "poses" / "00.txt");
+    for (int i = 0; i < num_frames; ++i) {
+      bytes +=
+          bytes_of(root_ / name / "sequences" / "00" / "image_2" / fmt::format("{:06}.png", i));
+    }
+    return bytes;
+  }
+
+  fs::path root_;
+};
+
+TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), 3U);
+  EXPECT_EQ(sequence->camera().width_px, 160);
+  EXPECT_NEAR(sequence->camera().fx_px, 718.856 * 160 / 1241, 1e-9);
+  EXPECT_EQ(sequence->camera().fx_px, sequence->camera().fy_px);
+  EXPECT_DOUBLE_EQ(sequence->timestamps_s()[2], 0.2);
+  ASSERT_TRUE(sequence->ground_truth());
+  const Rigid3 step = sequence->ground_truth()->at(1);
+  EXPECT_GT(step.translation.z(), 0.75) << "8 m/s at least, forward";
+  EXPECT_LT(step.translation.norm(), 1.25) << "12 m/s at most";
+  EXPECT_EQ(sequence->read(2)->type(), CV_8UC3);
+  std::ifstream poses(root_ / "out" / "poses" / "00.txt");
+  std::string first;
+  std::string word;
+  std::getline(poses, first);
+  EXPECT_THAT(first, ::testing::StartsWith("1.0000000000000000e+00 0.0"));
+  poses >> word;
+  EXPECT_GE(word.find('e') - word.find('.'), 13U) << "12 digits or more: " << word;
+}
+
+TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
+  SyntheticDriveOptions options = small(3);
+  cv::setNumThreads(1);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
+  cv::setNumThreads(2);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
+  EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3));
+  options.seed = 2;
+  ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
+  EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3));
+}
+
+TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
+  cv::setNumThreads(1);
+  const auto stop_after_two = [](int done, int total) {
+    EXPECT_EQ(total, 6);
+    return done < 2;
+  };
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(6), stop_after_two));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 2U);
+  EXPECT_EQ(sequence->ground_truth()->size(), 2U);
+}
+
+TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 2U);
+}
+
+/// Standing, turning on the spot, a cut to another place, and a ring driven twice over itself.
+TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
+  Trajectory poses;
+  const auto add = [&](double heading_rad, double x, double z) {
+    poses.emplace_back(Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitY())),
+                       Eigen::Vector3d(x, 0.0, z));
+  };
+  add(0.0, 0.0, 0.0);
+  add(0.0, 0.0, 0.0);
+  add(0.5, 0.0, 0.0);
+  add(0.0, 0.0, 1.0);
+  add(1.0, 300.0, -70.0);
+  for (int i = 0; i < 40; ++i) {
+    const double angle = 4.0 * std::numbers::pi * i / 40;
+    add(angle, 500.0 + 12.0 * (1.0 - std::cos(angle)), 12.0 * std::sin(angle));
+  }
+  SyntheticDriveOptions options = small(1000);
+  options.write_depth = true;
+  options.trajectory = write_poses(poses);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Rigid3 error = sequence->ground_truth()->at(i).inverse() * poses[i];
+    EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
+    // The last numbers of the file: the road before the car, which nothing may stand on.
+    const std::string depth =
+        bytes_of(root_ / "out" / "sequences" / "00" / "depth" / fmt::format("{:06}.npy", i));
+    ASSERT_EQ(depth.size(), 128U + 4U * 160U * 48U);
+    float z = 0.0F;
+    std::memcpy(&z, depth.data() + depth.size() - 4U * 80U, sizeof(z));
+    const double expected = 1.65 * 718.856 * 160 / 1241 / (47.0 - 185.2157 * 48 / 376);
+    EXPECT_NEAR(static_cast<double>(z), expected, 0.12 * expected) << "frame " << i;
+  }
+}
+
+TEST_F(SyntheticDriveTest, BadInputIsOneLine) {
+  const auto message = [&](const SyntheticDriveOptions& options, const fs::path& out) {
+    const Status status = render_synthetic_drive(out, options);
+    return status ? std::string("(done)") : status.error().message;
+  };
+  SyntheticDriveOptions options = small(1);
+  options.width_px = 0;
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("width from 16 to 8192, found 0"));
+  options = small(1);
+  options.height_px = -4;
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("height"));
+  EXPECT_THAT(message(small(0), root_ / "out"), HasSubstr("frames from 1"));
+  options = small(1);
+  options.trajectory = root_ / "absent.txt";
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("absent.txt"));
+  std::ofstream(root_ / "broken.txt") << "1 0 0 0 0 1 0 0 0 0 1\n";
+  options.trajectory = root_ / "broken.txt";
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("broken.txt:1"));
+  EXPECT_FALSE(fs::exists(root_ / "out")) << "nothing is written before the input is sound";
+  std::ofstream(root_ / "file") << "x";
+  EXPECT_THAT(message(small(1), root_ / "file"), HasSubstr((root_ / "file").string()));
+}
+
+}  // namespace
+}  // namespace stemvo
