@@ -89,6 +89,19 @@ TEST(Evaluate, ConstantYawErrorIsItsRotationPerHundredMetres) {
   EXPECT_GT(metrics.t_rel_percent.value(), 0.5);
 }
 
+// The devkit's error is estimate^-1 * truth: where the camera got right, looking elsewhere costs
+// rotation only. The other order would charge 10 deg of a 100 m arm.
+TEST(Evaluate, LookingElsewhereAtTheRightPlaceCostsNoTranslation) {
+  Trajectory estimate = straight(106, 1.0);
+  for (std::size_t i = 1; i < estimate.size(); ++i) {
+    estimate[i].rotation = so3_exp({0.0, 10.0 * kRadPerDeg, 0.0});
+  }
+  const Metrics metrics = evaluate(estimate, straight(106, 1.0));
+  EXPECT_EQ(metrics.num_segments, 1);
+  EXPECT_NEAR(metrics.t_rel_percent.value(), 0.0, 1e-9);
+  EXPECT_NEAR(metrics.r_rel_deg_per_100m.value(), 10.0, 1e-9);
+}
+
 TEST(Evaluate, PathsUnderHundredMetresTakeShortSegments) {
   const Metrics metrics = evaluate(straight(61, 0.98), straight(61, 1.0));
   EXPECT_THAT(metrics.segment_lengths_m, ::testing::ElementsAre(10, 20, 30, 40, 50));
