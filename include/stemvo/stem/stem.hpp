@@ -65,7 +65,8 @@ class Stem {
 /// Float channel -> 8-bit picture: percentile limits that follow the drive slowly, so that a patch
 /// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
 /// brings it to the input's size (PixelMap is adjusted; no resampling between pixels).
-/// A channel without contrast becomes one gray and leaves the limits as they were; NaN becomes 0.
+/// A channel without contrast becomes one gray and leaves the limits as they were; NaN becomes 0
+/// (upsampled: its surroundings too).
 class ChannelStretch {
  public:
   explicit ChannelStretch(const StemOptions& options);
@@ -76,6 +77,7 @@ class ChannelStretch {
   bool has_limits_ = false;
   double low_ = 0.0;
   double high_ = 1.0;
+  cv::Mat upsampled_;  ///< buffer
 };
 
 }  // namespace stemvo
