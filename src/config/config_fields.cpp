@@ -55,7 +55,8 @@ std::vector<Field> stem_fields(StemOptions& o) {
       {"stem", "filter", &o.filter, at_least(-1),
        "the one filter whose response is the picture; -1: the default_filter of the manifest"},
       {"stem", "sampling_px", &o.sampling_px, at_least(0),
-       "input pixels per channel pixel, a divisor of the network's stride; 0: the stride itself"},
+       "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
+       "divides the stride, else 1"},
       {"stem", "upsample", &o.upsample, one_of({"bicubic", "native"}),
        "size of the picture to track on: bicubic (the input's) or native (the channel's)"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),

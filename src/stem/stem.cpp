@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "stemvo/stem/stem.hpp"
 
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -27,10 +28,11 @@ struct LoadedLayer {
   std::unique_ptr<FilterLayer> layer;
 };
 
-/// 0 stands for the stride. Error: not a divisor.
+/// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
+/// worth too many pixels. Error: not a divisor.
 Expected<int> choose_sampling(int asked, int stride) {
   if (asked == 0) {
-    return stride;
+    return std::gcd(stride, 2);
   }
   if (asked > 0 && stride % asked == 0) {
     return asked;

@@ -16,8 +16,8 @@ struct StemOptions {
   /// Name in models/manifest.yaml, path of an .onnx (with a manifest.yaml beside it), `gray`, or
   /// `input_layer` (filters 0, 1, 2 = R, G, B).
   std::string model = "default";
-  int filter = -1;                   ///< -1: the manifest's default_filter (gray, input_layer: 0)
-  int sampling_px = 0;               ///< divisor of the native stride; 0: the native stride itself
+  int filter = -1;      ///< -1: the manifest's default_filter (gray, input_layer: 0)
+  int sampling_px = 0;  ///< divisor of the native stride; 0: 2 if it divides it, else 1
   std::string upsample = "bicubic";  ///< `bicubic` (to the input's size) or `native`
   double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
   double stretch_high_percent = 99.5;
