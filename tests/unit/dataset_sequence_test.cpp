@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
-#include <unistd.h>
 
 #include "stemvo/dataset/sequence.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
@@ -22,8 +22,6 @@ constexpr int kNumFrames = 4;
 class KittiSequenceTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    root_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", info->name(), ::getpid());
     folder_ = root_ / "sequences" / "07";
     fs::create_directories(folder_ / "image_2");
     fs::create_directories(root_ / "poses");
@@ -36,7 +34,6 @@ class KittiSequenceTest : public ::testing::Test {
     write(folder_ / "times.txt", "0\n0.1\n0.2\n0.3\n");
     write(poses(), pose_lines(kNumFrames));
   }
-  void TearDown() override { fs::remove_all(root_); }
 
   fs::path image(int index) const { return folder_ / "image_2" / fmt::format("{:06}.png", index); }
   fs::path poses() const { return root_ / "poses" / "07.txt"; }
@@ -56,7 +53,8 @@ class KittiSequenceTest : public ::testing::Test {
     return {.frames = parse_frame_range(text).value()};
   }
 
-  fs::path root_;
+  testing::TempFolder temp_;
+  const fs::path root_ = temp_.path();
   fs::path folder_;
 };
 

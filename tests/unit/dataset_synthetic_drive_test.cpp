@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <opencv2/core/utility.hpp>
-#include <unistd.h>
 
 #include "stemvo/dataset/sequence.hpp"
 #include "stemvo/dataset/synthetic_drive.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
@@ -24,15 +24,7 @@ using ::testing::HasSubstr;
 
 class SyntheticDriveTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    root_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", info->name(), ::getpid());
-    fs::create_directories(root_);
-  }
-  void TearDown() override {
-    cv::setNumThreads(-1);
-    fs::remove_all(root_);
-  }
+  void TearDown() override { cv::setNumThreads(-1); }
   static SyntheticDriveOptions small(int num_frames) {
     SyntheticDriveOptions options;
     options.num_frames = num_frames;
@@ -58,7 +50,8 @@ class SyntheticDriveTest : public ::testing::Test {
     return bytes;
   }
 
-  fs::path root_;
+  testing::TempFolder folder_;
+  const fs::path root_ = folder_.path();
 };
 
 TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {

@@ -12,7 +12,7 @@ namespace stemvo::synth {
 namespace {
 
 constexpr float kCornerLoss = 0.12F;
-constexpr float kReadNoise = 1.0F;     // gray levels
+constexpr float kReadNoise = 1.3F;     // gray levels
 constexpr float kPhotonNoise = 0.06F;  // times the square root of the level
 
 /// Roughly normal, deviation 1: the sum of four uniform numbers of 16 bits each.
