@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""tools/learn_stem.py on a planted drive: a textured wall that the camera approaches."""
+
+import contextlib
+import io
+import pathlib
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
+import _environment  # noqa: E402,F401
+
+import matplotlib.image  # noqa: E402
+import numpy as np  # noqa: E402
+import onnxruntime  # noqa: E402
+import yaml  # noqa: E402
+
+import learn_stem  # noqa: E402
+from stems import discriminant, drive  # noqa: E402
+
+SIZE = (96, 128)
+FOCAL_PX = 100.0
+WALL_M = 10.0
+
+
+def wall_gray(x, y):
+    """Texture of the wall at metres x, y: waves of many lengths, weaker when shorter."""
+    rng = np.random.default_rng(5)
+    gray = np.full(x.shape, 120.0)
+    for _ in range(60):
+        length = 0.3 * 2.0 ** rng.uniform(0, 4)
+        angle, phase = rng.uniform(0, 2 * np.pi, 2)
+        gray += 12 * length**0.5 * np.sin(2 * np.pi * (np.cos(angle) * x + np.sin(angle) * y) / length + phase)
+    return np.clip(gray, 0, 255)
+
+
+def write_drive(folder, frames=4, *, step_m=0.4):
+    sequence = folder / "sequences" / "00"
+    for name in ("image_2", "depth"):
+        (sequence / name).mkdir(parents=True)
+    (folder / "poses").mkdir()
+    centre = (np.array(SIZE[::-1]) - 1) / 2
+    (sequence / "calib.txt").write_text(f"P2: {FOCAL_PX} 0 {centre[0]} 0 0 {FOCAL_PX} {centre[1]} 0 0 0 1 0\n")
+    poses = []
+    y, x = np.mgrid[:SIZE[0], :SIZE[1]].astype(np.float64)
+    for index in range(frames):
+        position = np.array([0.11, -0.07, 1.0]) * step_m * index
+        depth = WALL_M - position[2]
+        gray = wall_gray((x - centre[0]) / FOCAL_PX * depth + position[0], (y - centre[1]) / FOCAL_PX * depth + position[1])
+        picture = np.repeat(np.rint(gray).astype(np.uint8)[:, :, None], 3, axis=2)
+        matplotlib.image.imsave(sequence / "image_2" / f"{index:06d}.png", picture)
+        np.save(sequence / "depth" / f"{index:06d}.npy", np.full(SIZE, depth, np.float32))
+        poses.append(np.column_stack([np.eye(3), position]).ravel())
+    np.savetxt(folder / "poses" / "00.txt", poses)
+
+
+class PlantedDrive(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        write_drive(self.folder / "drive")
+
+    def learn(self, out, *options):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+            code = learn_stem.main([str(self.folder / "drive"), "--out", str(self.folder / out), "--pairs", "3000", *options])
+        return code, printed.getvalue()
+
+    def channels(self, out, gray):
+        session = onnxruntime.InferenceSession(str(self.folder / out / "default.onnx"))
+        image = np.repeat(gray[None, None].astype(np.float32), 3, axis=1)
+        return session.run(["channels"], {"image": image})[0][0]
+
+
+class Correspondences(PlantedDrive):
+    def test_corners_are_where_the_wall_says(self):
+        frames = drive.Drive(self.folder / "drive")
+        before, after = drive.corresponding_corners(frames, 0, 2, 4, 1, 3000, np.random.default_rng(0))
+        self.assertGreater(len(before), 1000)
+        centre = (np.array(SIZE[::-1]) - 1) / 2
+        wall = (before + 1.5 - centre) / FOCAL_PX * WALL_M
+        expected = (wall - 0.8 * np.array([0.11, -0.07])) / (WALL_M - 0.8) * FOCAL_PX + centre - 1.5
+        self.assertTrue(np.abs(after - expected).max() <= 0.5 + 1e-9)
+        self.assertGreater(np.abs(after - before).max(), 2)
+
+    def test_patches_look_alike(self):
+        frames = drive.Drive(self.folder / "drive")
+        before, after = drive.corresponding_corners(frames, 0, 1, 4, 1, 3000, np.random.default_rng(0))
+        first = drive.patches(frames.gray(0), before, 4)
+        difference = drive.patches(frames.gray(1), after, 4) - first
+        self.assertTrue(difference.std() < 0.35 * first.std(), (difference.std(), first.std()))
+
+    def test_hidden_points_are_left_out(self):
+        depth = self.folder / "drive" / "sequences" / "00" / "depth" / "000001.npy"
+        np.save(depth, np.full(SIZE, 3.0, np.float32))
+        frames = drive.Drive(self.folder / "drive")
+        before, _ = drive.corresponding_corners(frames, 0, 1, 4, 1, 3000, np.random.default_rng(0))
+        self.assertEqual(len(before), 0)
+
+
+class Learning(PlantedDrive):
+    def test_same_drive_same_bytes(self):
+        self.assertEqual(self.learn("a")[0], 0)
+        self.assertEqual(self.learn("b")[0], 0)
+        first, second = ((self.folder / out / "default.onnx").read_bytes() for out in ("a", "b"))
+        self.assertEqual(first, second)
+        entry = yaml.safe_load((self.folder / "a" / "manifest.yaml").read_text())["models"][0]
+        self.assertEqual((entry["filters"], entry["kernel"], entry["stride"]), (16, [4, 4], 4))
+
+    def test_the_layer_norm_is_the_one_of_the_page(self):
+        """channel k = z_k / sqrt(mean z^2 + floor^2): z_k unspoiled by the mean over channels."""
+        self.learn("out", "--floor", "3")
+        frames = drive.Drive(self.folder / "drive")
+        options = learn_stem.parse_arguments([str(self.folder / "drive"), "--out", "x", "--pairs", "3000"])
+        stem, ratios = learn_stem.learn(learn_stem.collect(frames, options), discriminant.Nuisance(), 3.0)
+        self.assertTrue(np.all(np.diff(ratios) < 0))
+        gray = frames.gray(1)
+        windows = np.lib.stride_tricks.sliding_window_view(gray, (4, 4))[::4, ::4]
+        z = np.einsum("cyx,hwyx->chw", stem.weights.sum(axis=1), windows) + stem.bias[:, None, None]
+        want = z / np.sqrt((z**2).mean(axis=0) + 9.0)
+        got = self.channels("out", gray)
+        self.assertTrue(np.abs(got - want).max() < 1e-3, np.abs(got - want).max())
+        self.assertTrue(np.all(got.std(axis=(1, 2)) > 0.01), "a filter is dead on gray")
+
+    def test_first_filter_rises_with_gray(self):
+        self.learn("out")
+        dark, bright = (self.channels("out", np.full((8, 8), level)) for level in (60.0, 180.0))
+        self.assertTrue(np.all(bright[0] > dark[0] + 0.5))
+
+    def test_errors_are_one_line(self):
+        sequence = self.folder / "drive" / "sequences" / "00"
+        cases = (
+            (sequence / "depth" / "000001.npy", b"broken", "000001.npy"),
+            (sequence / "calib.txt", b"P0: 1", "P2:"),
+            (self.folder / "drive" / "poses" / "00.txt", b"1 2 3", "expected 4 rows of 12 numbers"),
+            (sequence / "image_2" / "000002.png", b"broken", "000002.png"),
+        )
+        for file, content, words in cases:
+            with self.subTest(file=file.name):
+                whole = file.read_bytes()
+                file.write_bytes(content)
+                code, printed = self.learn("out")
+                file.write_bytes(whole)
+                self.assertEqual(code, 1)
+                self.assertEqual(printed.count("\n"), 1, printed)
+                self.assertIn(words, printed)
+
+
+class Discriminant(unittest.TestCase):
+    def test_planted_directions(self):
+        signal, noise = np.diag([4.0, 9.0, 1.0, 1.0]), np.diag([1.0, 9.0, 0.1, 1.0])
+        filters, ratios = discriminant.generalised_eigenvectors(signal, noise, 3)
+        np.testing.assert_allclose(ratios, [10.0, 4.0, 1.0])
+        np.testing.assert_allclose(np.abs(filters[0]), [0, 0, 10**0.5, 0], atol=1e-12)
+        np.testing.assert_allclose(np.einsum("ki,ij,lj->kl", filters, noise, filters), np.eye(3), atol=1e-12)
+
+
+if __name__ == "__main__":
+    unittest.main()

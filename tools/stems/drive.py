@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""A rendered drive (`stemvo synth --depth`): pictures, depth, poses, and patches that show the same
+point of the world in two frames."""
+
+import pathlib
+
+import matplotlib.image
+import numpy as np
+
+# Depth may differ by this share inside a patch, and between the two frames' views of a point: more is
+# an edge of an object, or a point that something else hides.
+_DEPTH_TOLERANCE = 0.03
+# Where nothing was drawn (the sky) the depth is not finite or not positive: a point this far away.
+_SKY_M = 1e6
+
+# Share of R, G and B in gray: Rec. 601, as in OpenCV.
+LUMA = np.array([0.299, 0.587, 0.114])
+
+
+class DriveError(Exception):
+    """One line for the user."""
+
+
+class Drive:
+    """Frames of DIR/sequences/00 with DIR/poses/00.txt."""
+
+    def __init__(self, folder):
+        folder = pathlib.Path(folder)
+        self._sequence = folder / "sequences" / "00"
+        self._images = sorted((self._sequence / "image_2").glob("*.png"))
+        if len(self._images) < 2:
+            raise DriveError(f"{self._sequence / 'image_2'}: expected at least 2 pictures, found {len(self._images)}")
+        self.camera = _camera(self._sequence / "calib.txt")
+        self.world_from_camera = _poses(folder / "poses" / "00.txt", len(self._images))
+
+    def __len__(self):
+        return len(self._images)
+
+    def gray(self, index):
+        """H x W, gray levels 0..255."""
+        try:
+            picture = matplotlib.image.imread(self._images[index])
+        except (OSError, SyntaxError, ValueError) as error:
+            raise DriveError(f"{self._images[index]}: expected a PNG, found: {error}") from error
+        if picture.ndim != 3 or picture.dtype != np.float32:
+            raise DriveError(f"{self._images[index]}: expected a colour picture, found shape {picture.shape}")
+        return picture[:, :, :3].astype(np.float64) @ (255.0 * LUMA)
+
+    def depth(self, index):
+        """H x W, metres along z; the sky very far away."""
+        file = self._sequence / "depth" / f"{self._images[index].stem}.npy"
+        try:
+            depth = np.load(file, allow_pickle=False).astype(np.float64)
+        except (OSError, ValueError, EOFError) as error:
+            raise DriveError(f"{file}: expected depth (stemvo synth --depth), found: {error}") from error
+        return np.where(np.isfinite(depth) & (depth > 0), depth, _SKY_M)
+
+
+def _camera(file):
+    rows = _lines(file)
+    for row in rows:
+        numbers = row[1:]
+        if row[:1] == ["P2:"] and len(numbers) == 12:
+            return np.array(numbers, np.float64).reshape(3, 4)[:, :3]
+    raise DriveError(f"{file}: expected a row P2: with 12 numbers, found {len(rows)} other rows")
+
+
+def _poses(file, count):
+    rows = _lines(file)
+    if len(rows) != count or any(len(row) != 12 for row in rows):
+        raise DriveError(f"{file}: expected {count} rows of 12 numbers, found {len(rows)} rows")
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3] = np.array(rows, np.float64).reshape(count, 3, 4)
+    return poses
+
+
+def _lines(file):
+    try:
+        return [line.split() for line in file.read_text(encoding="ascii").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise DriveError(f"{file}: expected a text file, found: {error}") from error
+
+
+def windows(values, size):
+    """View of all size x size windows: y, x, window y, window x."""
+    return np.lib.stride_tricks.sliding_window_view(values, (size, size))
+
+
+def _project(camera, after_from_before, centre, depth):
+    """centre: N x 2 (x, y) with its depth -> where it is in the other frame, and its depth there."""
+    rays = np.column_stack([centre, np.ones(len(centre))]) @ np.linalg.inv(camera).T
+    points = (rays * depth[:, None]) @ after_from_before[:3, :3].T + after_from_before[:3, 3]
+    in_front = np.maximum(points[:, 2], 1e-6)
+    return (points @ camera.T)[:, :2] / in_front[:, None], points[:, 2]
+
+
+def corresponding_corners(drive, before, after, size, sampling_px, count, rng):
+    """Top left corners (x, y) of patches that show the same surface in two frames: N x 2, N x 2, N <= count.
+
+    In the frame `after`, the patch is the nearest one whose corner is a multiple of sampling_px:
+    a channel sampled every sampling_px pixels has no closer one, so what is left of the motion, up
+    to half of that on each axis, belongs to the differences that a filter should not see.
+    """
+    depth_before, depth_after = drive.depth(before), drive.depth(after)
+    height, width = depth_before.shape
+    corner = np.column_stack([rng.integers(0, width - size + 1, count), rng.integers(0, height - size + 1, count)])
+    patch_depth = windows(depth_before, size)[corner[:, 1], corner[:, 0]].reshape(count, -1)
+    flat = patch_depth.max(axis=1) < patch_depth.min(axis=1) * (1 + _DEPTH_TOLERANCE)
+
+    after_from_before = np.linalg.inv(drive.world_from_camera[after]) @ drive.world_from_camera[before]
+    half = (size - 1) / 2
+    centre, depth = _project(drive.camera, after_from_before, corner + half, patch_depth.mean(axis=1))
+    other = sampling_px * np.rint((centre - half) / sampling_px).astype(np.int64)
+    inside = np.all((other >= 0) & (other <= np.array([width, height]) - size), axis=1) & (depth > 0)
+    other = np.where(inside[:, None], other, 0)
+    seen = windows(depth_after, size)[other[:, 1], other[:, 0]].reshape(count, -1)
+    visible = np.all(np.abs(seen - depth[:, None]) < 2 * _DEPTH_TOLERANCE * depth[:, None], axis=1)
+    keep = flat & inside & visible
+    return corner[keep], other[keep]
+
+
+def patches(image, corners, size):
+    """N x (size * size): y, x."""
+    return windows(image, size)[corners[:, 1], corners[:, 0]].reshape(len(corners), -1)
