@@ -13,6 +13,9 @@
 namespace stemvo {
 namespace {
 
+/// Rounding of the mean leaves a variance of this share of its square where all points are equal.
+constexpr double kRounding = 1e-24;
+
 Eigen::Vector3d mean(std::span<const Eigen::Vector3d> points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : points) {
@@ -67,8 +70,6 @@ Similarity3 umeyama(std::span<const Eigen::Vector3d> source,
   if (!covariance.allFinite()) {
     return result;
   }
-  // Rounding of the means leaves a variance where all points are equal.
-  constexpr double kRounding = 1e-24;
   const double count = static_cast<double>(source.size());
   const bool spread = source_variance > kRounding * count * source_mean.squaredNorm() &&
                       target_variance > kRounding * count * target_mean.squaredNorm();

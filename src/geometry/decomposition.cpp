@@ -12,6 +12,11 @@ namespace {
 
 using Svd3 = Eigen::JacobiSVD<Eigen::Matrix3d>;
 
+/// ORB-SLAM2's bound: closer singular values leave the direction of the translation open.
+constexpr double kMinRatio = 1.00001;
+/// Beyond, d2 is rounding and the matrix has rank 1.
+constexpr double kMaxRatio = 1e9;
+
 /// What the 8 hypotheses share: A = K^-1 H K = U diag(d1, d2, d3) V^T.
 struct FaugerasTerms {
   Eigen::Matrix3d u;
@@ -60,8 +65,6 @@ std::vector<PlanarMotion> decompose_homography(const Eigen::Matrix3d& homography
   }
   const Svd3 svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d d = svd.singularValues();
-  constexpr double kMinRatio = 1.00001;
-  constexpr double kMaxRatio = 1e9;  // beyond, d2 is rounding and the matrix has rank 1
   // Negated, so that 0/0 is refused as well.
   if (!(d(0) / d(1) >= kMinRatio && d(0) / d(1) <= kMaxRatio && d(1) / d(2) >= kMinRatio)) {
     return {};

@@ -177,6 +177,24 @@ TEST(AlignPositions, StraightLineTakesTheSmallestTurn) {
                                Points(right.begin(), right.begin() + 2), Alignment::kSim3));
 }
 
+TEST(AlignPositions, ObliqueLineTakesTheSmallestTurn) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SceneRandom random(seed);
+    const Eigen::Vector3d from = random.direction();
+    const Eigen::Vector3d to = random.direction();
+    Points source;
+    Points target;
+    for (int i = 0; i < 20; ++i) {
+      source.emplace_back(i * from);
+      target.emplace_back(i * to);
+    }
+    const Similarity3 found = align_positions(source, target, Alignment::kSim3);
+    EXPECT_NEAR(squared_error(found, source, target), 0.0, 1e-18);
+    const double turn_rad = Rigid3::from_matrix(found.rotation, found.translation).angle_rad();
+    EXPECT_NEAR(turn_rad, testing::direction_error_rad(from, to), 1e-7);
+  }
+}
+
 TEST(AlignPositions, EqualPointsOnlyMove) {
   const Eigen::Vector3d from(0.1, 0.2, 0.3);
   const Eigen::Vector3d to(5.0, -7.1, 100.3);

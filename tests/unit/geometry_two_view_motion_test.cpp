@@ -166,6 +166,24 @@ TEST(MotionFromEssential, NoiseAndOutliersDoNotChangeTheChoice) {
   }
 }
 
+TEST(MotionFrom, RunnerUpIsTheSecondBestInWhateverOrderTheyCome) {
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = seed});
+    std::vector<int> counts;
+    for (const PlanarMotion& hypothesis :
+         decompose_homography(testing::true_homography(scene), scene.camera)) {
+      counts.push_back(
+          test_points(hypothesis.cur_from_prev, scene.prev_uv, scene.cur_uv, scene.camera)
+              .num_good);
+    }
+    std::sort(counts.rbegin(), counts.rend());
+    const auto motion = homography_motion(scene);
+    ASSERT_TRUE(motion.has_value());
+    EXPECT_EQ(motion->num_good, counts[0]);
+    EXPECT_DOUBLE_EQ(motion->runner_up_ratio, static_cast<double>(counts[1]) / counts[0]);
+  }
+}
+
 TEST(MotionFromHomography, AllPointsPassAndTheTrueMotionIsOneOfTheBest) {
   int num_true = 0;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {

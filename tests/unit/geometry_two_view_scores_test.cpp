@@ -143,8 +143,6 @@ TEST(HomographyRatio, IsTheShareOfTheHomography) {
   EXPECT_EQ(homography_ratio(5.0, 0.0), 1.0);
 }
 
-// ---- the choice between the models -------------------------------------------------------------
-
 /// Mean to zero, mean distance to sqrt(2).
 Eigen::Matrix3d normalizer(const Points& points) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
