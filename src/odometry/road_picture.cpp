@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace stemvo {
+
+namespace {
+
+/// The camera in the pixels of a picture that is `map` away from the camera's own pixels.
+Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size) {
+  const Eigen::Vector2d centre = map.from_input({camera.cx_px, camera.cy_px});
+  return {camera.fx_px / map.scale.x(),
+          camera.fy_px / map.scale.y(),
+          centre.x(),
+          centre.y(),
+          size.width,
+          size.height};
+}
+
+RoadPicture::Level make_level(const cv::Mat& pixels, const Camera& camera, int contrast_px) {
+  RoadPicture::Level level;
+  level.camera = camera;
+  const int margin = 2 * contrast_px;
+  level.first_row = std::clamp(static_cast<int>(camera.cy_px) - margin, 0, pixels.rows);
+  if (pixels.rows - level.first_row < 2 * margin) {
+    return level;
+  }
+  cv::Mat values;
+  pixels.rowRange(level.first_row, pixels.rows).convertTo(values, CV_32F);
+  cv::GaussianBlur(values, values, {5, 5}, 1.0, 1.0, cv::BORDER_REFLECT_101);
+  cv::Mat mean;
+  const cv::Size window(2 * contrast_px + 1, 2 * contrast_px + 1);
+  cv::blur(values, mean, window);
+  values -= mean;
+  cv::Mat contrast;
+  cv::blur(values.mul(values), contrast, window);
+  cv::sqrt(contrast, contrast);
+  // Half a gray value: the noise of a plain surface is not blown up to the size of texture.
+  values /= contrast + 0.5;
+  cv::Mat du;
+  cv::Mat dv;
+  cv::Sobel(values, du, CV_32F, 1, 0, 3, 0.125);
+  cv::Sobel(values, dv, CV_32F, 0, 1, 3, 0.125);
+  cv::merge(std::vector<cv::Mat>{values, du, dv, contrast}, level.values);
+  return level;
+}
+
+}  // namespace
+
+RoadPicture make_road_picture(const ChannelImage& image, const Camera& camera) {
+  RoadPicture picture;
+  picture.pixels = image.pixels;
+  picture.camera = camera_in(camera, image.map, image.pixels.size());
+  picture.levels.push_back(make_level(image.pixels, picture.camera, 8));
+  cv::Mat half;
+  cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  // The centre of a pixel of the half picture lies between two of the full one.
+  const PixelMap map{{2.0, 2.0}, {0.5, 0.5}};
+  picture.levels.push_back(make_level(half, camera_in(picture.camera, map, half.size()), 8));
+  return picture;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road_region.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stemvo {
+
+namespace {
+constexpr double kMaxAngle_rad = 1.0;  ///< beyond it nobody knows how the turn goes on
+}  // namespace
+
+RoadRegion::RoadRegion(const Rigid3& cur_from_prev,
+                       const RoadPrior& prior,
+                       const RoadOptions& options)
+    : plane_(road_plane(0.0, prior.slope_rad, prior.roll_rad, options.camera_height_m)),
+      half_width_m_(options.half_width_m),
+      far_m_(options.far_m) {
+  const Eigen::Vector3d& t = cur_from_prev.translation;
+  const double step_m = t.norm() * std::exp(prior.log_scale);
+  // Turning right is a positive rotation about y (down) of the current camera against the previous.
+  const double yaw_rad = -so3_log(cur_from_prev.rotation).y();
+  if (step_m > 0.1 && t.z() < 0.0) {
+    curvature_ = std::clamp(yaw_rad / step_m, -0.15, 0.15);
+    heading_ = std::clamp(t.x() / t.z() + 0.5 * yaw_rad, -0.3, 0.3);
+  }
+}
+
+Eigen::Vector2d RoadRegion::on_ground(const Eigen::Vector2d& xy) const {
+  const double inverse_z = plane_.dot(xy.homogeneous());
+  if (!(inverse_z > 1e-3)) {
+    return {0.0, -1.0};
+  }
+  const double z = 1.0 / inverse_z;
+  // Lateral distance from the arc that starts here, and the length driven on it until there.
+  const double x = xy.x() * z - heading_ * z;
+  if (std::abs(curvature_) < 1e-4) {
+    return {x, z};
+  }
+  const double radius = 1.0 / curvature_;
+  const double angle = std::atan2(z, std::abs(radius) - std::copysign(x, x * radius));
+  if (angle > kMaxAngle_rad) {
+    return {0.0, -1.0};
+  }
+  return {radius - std::copysign(std::hypot(radius - x, z), radius), std::abs(radius) * angle};
+}
+
+std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
+                                                    int first_row,
+                                                    int step) const {
+  std::vector<Sample> result;
+  const int last_row = camera.height_px - 4;
+  const double far_row = camera.cy_px + camera.fy_px * (1.0 / far_m_ - plane_.z()) / plane_.y();
+  const int row0 = std::max(first_row + 4, static_cast<int>(far_row));
+  const int tile_rows = kTiles / kTileColumns;
+  for (int v = row0; v < last_row; v += step) {
+    const int tile_row = tile_rows * (v - row0) / std::max(1, last_row - row0);
+    for (int u = 4; u < camera.width_px - 4; u += step) {
+      const Eigen::Vector2d ground = on_ground(camera.normalize({u, v}));
+      if (!contains(ground)) {
+        continue;
+      }
+      const double across = (ground.x() + half_width_m_) / (2.0 * half_width_m_);
+      const int tile_column =
+          std::clamp(static_cast<int>(across * kTileColumns), 0, kTileColumns - 1);
+      result.push_back({u, v, tile_row * kTileColumns + tile_column});
+    }
+  }
+  return result;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "odometry/road_dense.hpp"
+#include "support/road_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::RoadScene;
+
+/// Two pictures of a scene; the camera drove `step_m` along the road, and turned.
+struct Pair {
+  RoadPicture prev;
+  RoadPicture cur;
+  Rigid3 cur_from_prev;  ///< metres
+};
+
+Pair render_pair(const RoadScene& scene, double step_m, double yaw_rad = 0.0) {
+  const Eigen::Vector3d forward =
+      Eigen::Vector3d(-0.5 * yaw_rad, scene.slope_rad, 1.0).normalized() * step_m;
+  Pair pair;
+  pair.cur_from_prev = {so3_exp({0.0, -yaw_rad, 0.0}), -forward};
+  const Rigid3 prev_from_cur = pair.cur_from_prev.inverse();
+  pair.prev = make_road_picture({testing::render_road(scene, prev_from_cur, 1), {}}, scene.camera);
+  pair.cur = make_road_picture({testing::render_road(scene, Rigid3{}, 2), {}}, scene.camera);
+  return pair;
+}
+
+/// The motion in units that are 1 / metres_per_unit long.
+Rigid3 in_units(Rigid3 motion, double metres_per_unit) {
+  motion.translation /= metres_per_unit;
+  return motion;
+}
+
+RoadPrior near(double metres_per_unit) {
+  RoadPrior prior;
+  prior.log_scale = std::log(metres_per_unit);
+  prior.log_scale_sigma = 0.03;
+  return prior;
+}
+
+struct PlaneCase {
+  double height_m;
+  double slope_rad;
+  double roll_rad;
+  double step_m;
+  double yaw_rad;
+};
+class RoadDensePlane : public ::testing::TestWithParam<PlaneCase> {};
+
+TEST_P(RoadDensePlane, FindsThePlantedPlane) {
+  const PlaneCase c = GetParam();
+  RoadScene scene;
+  scene.height_m = c.height_m;
+  scene.slope_rad = c.slope_rad;
+  scene.roll_rad = c.roll_rad;
+  scene.noise_gray = 1.0;
+  const Pair pair = render_pair(scene, c.step_m, c.yaw_rad);
+  RoadOptions options;
+  options.camera_height_m = c.height_m;
+  RoadPrior prior = near(2.0 * 1.02);  // 2 % off
+  const RoadMeasurement road =
+      RoadDense(options).measure(pair.prev, pair.cur, in_units(pair.cur_from_prev, 2.0), prior);
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, std::log(2.0), 0.015);
+  EXPECT_LT(std::abs(road.log_scale - std::log(2.0)), 4.0 * road.sigma);
+  EXPECT_LT(road.sigma, 0.03);
+  EXPECT_NEAR(road.slope_rad, c.slope_rad, 0.003);
+  EXPECT_NEAR(road.roll_rad, c.roll_rad, 0.004);
+}
+
+INSTANTIATE_TEST_SUITE_P(Planes,
+                         RoadDensePlane,
+                         ::testing::Values(PlaneCase{1.65, 0.0, 0.0, 0.8, 0.0},
+                                           PlaneCase{1.65, 0.015, 0.0, 0.8, 0.0},
+                                           PlaneCase{1.65, -0.02, 0.02, 0.8, 0.0},
+                                           PlaneCase{1.65, 0.0, -0.03, 1.4, 0.0},
+                                           PlaneCase{1.2, 0.01, 0.01, 0.5, 0.0},
+                                           PlaneCase{1.65, 0.0, 0.0, 0.8, 0.04},
+                                           PlaneCase{1.65, 0.0, 0.0, 0.8, -0.04}));
+
+TEST(RoadDense, FindsAnUnknownScale) {
+  const RoadScene scene;
+  const Pair pair = render_pair(scene, 1.1);
+  RoadPrior prior;
+  prior.log_scale = std::log(0.8);
+  prior.log_scale_sigma = 1.0;
+  const RoadMeasurement road =
+      RoadDense(RoadOptions{})
+          .measure(pair.prev, pair.cur, in_units(pair.cur_from_prev, 1.1), prior);
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, std::log(1.1), 0.01);
+}
+
+TEST(RoadDense, SmallErrorsOfTheGivenRotationAreTakenUp) {
+  const RoadScene scene;
+  const Pair pair = render_pair(scene, 0.8);
+  Rigid3 motion = pair.cur_from_prev;
+  motion.rotation = so3_exp({2e-4, -2e-4, 1e-4}) * motion.rotation;
+  RoadOptions options;
+  options.rotation_sigma_rad = 3e-4;
+  const RoadMeasurement free = RoadDense(options).measure(pair.prev, pair.cur, motion, near(1.0));
+  options.rotation_sigma_rad = 1e-7;
+  const RoadMeasurement fixed = RoadDense(options).measure(pair.prev, pair.cur, motion, near(1.0));
+  ASSERT_TRUE(free.is_valid) << free.reason;
+  ASSERT_TRUE(fixed.is_valid) << fixed.reason;
+  EXPECT_NEAR(free.log_scale, 0.0, 0.012);
+  EXPECT_GT(free.sigma, fixed.sigma);
+}
+
+TEST(RoadDense, ACarAheadThatCoversHalfOfTheStripIsLeftOut) {
+  RoadScene scene;
+  scene.is_covered = [](int u, int v) { return u > 320 && u < 480 && v > 110 && v < 230; };
+  const Pair pair = render_pair(scene, 0.8);
+  const RoadMeasurement road =
+      RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.015);
+}
+
+TEST(RoadDense, AKerbAtTheSideCostsLittle) {
+  RoadScene scene;
+  scene.bump = [](double x, double /*z*/) { return x > 1.1 ? 0.12 : 0.0; };
+  const Pair pair = render_pair(scene, 0.8);
+  const RoadMeasurement road =
+      RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.025);
+}
+
+TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
+  const RoadDense dense{RoadOptions{}};
+  RoadScene blank;
+  blank.has_road = false;
+  const Pair plain = render_pair(blank, 0.8);
+  const RoadMeasurement no_texture =
+      dense.measure(plain.prev, plain.cur, plain.cur_from_prev, near(1.0));
+  EXPECT_FALSE(no_texture.is_valid);
+  EXPECT_EQ(no_texture.reason, "nothing moves like a road");
+
+  blank.noise_gray = 20.0;  // two pictures that have nothing to do with each other
+  const Pair noise = render_pair(blank, 0.8);
+  EXPECT_FALSE(dense.measure(noise.prev, noise.cur, noise.cur_from_prev, near(1.0)).is_valid);
+
+  const Pair road = render_pair(RoadScene{}, 0.8);
+  EXPECT_EQ(dense.measure(road.prev, road.cur, Rigid3{}, near(1.0)).reason, "no motion");
+  Rigid3 bad = road.cur_from_prev;
+  bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(dense.measure(road.prev, road.cur, bad, near(1.0)).reason, "no motion");
+  RoadPrior wild = near(1.0);
+  wild.slope_rad = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(dense.measure(road.prev, road.cur, road.cur_from_prev, wild).is_valid);
+
+  // A picture that ends at the horizon.
+  const cv::Mat sky(130, 660, CV_8U, cv::Scalar(200));
+  const RoadPicture above = make_road_picture({sky, {}}, RoadScene{}.camera);
+  EXPECT_EQ(dense.measure(above, above, road.cur_from_prev, near(1.0)).reason,
+            "the picture ends above the road");
+}
+
+TEST(RoadDense, APictureOfHalfTheSizeGivesTheSameScale) {
+  const RoadScene scene;
+  Pair pair = render_pair(scene, 0.8);
+  const auto halve = [&](const RoadPicture& full) {
+    ChannelImage image;
+    cv::resize(full.pixels, image.pixels, {}, 0.5, 0.5, cv::INTER_AREA);
+    image.map = {{2.0, 2.0}, {0.5, 0.5}};
+    return make_road_picture(image, scene.camera);
+  };
+  const RoadMeasurement road =
+      RoadDense(RoadOptions{})
+          .measure(halve(pair.prev), halve(pair.cur), pair.cur_from_prev, near(1.0));
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.02);
+}
+
+TEST(RoadDense, SameBytesForAnyNumberOfThreads) {
+  const int threads = cv::getNumThreads();
+  std::vector<RoadMeasurement> results;
+  for (const int n : {1, 4}) {
+    cv::setNumThreads(n);
+    const Pair pair = render_pair(RoadScene{}, 0.8);
+    results.push_back(
+        RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.02)));
+  }
+  cv::setNumThreads(threads);
+  EXPECT_EQ(results[0].log_scale, results[1].log_scale);
+  EXPECT_EQ(results[0].sigma, results[1].sigma);
+}
+
+}  // namespace
+}  // namespace stemvo
