@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <numbers>
 
 #include <Eigen/LU>
@@ -77,33 +78,50 @@ double robust_parallax_deg(std::vector<double>& cosines) {
   return std::acos(std::clamp(*nth, -1.0, 1.0)) * 180.0 / std::numbers::pi;
 }
 
-/// Keeps the hypothesis with the most good points (the first of equals).
+/// A plane leaves two motions that (nearly) all its points accept. Between two frames of a drive
+/// the smaller turn is the likelier one.
+constexpr double kPlanarTieShare = 0.9;
+
+struct TestedHypothesis {
+  Rigid3 cur_from_prev;
+  PointTestResult test;
+};
+
+/// The hypothesis with the most good points; among those with at least `tie_share` of its points,
+/// the one that turns least. The first of equals.
 std::optional<TwoViewMotion> best_motion(TwoViewModel model,
                                          std::span<const Rigid3> hypotheses,
-                                         std::span<const Eigen::Vector2d> prev_uv,
-                                         std::span<const Eigen::Vector2d> cur_uv,
-                                         const Camera& camera,
-                                         const PointTestOptions& options) {
-  TwoViewMotion best;
-  int runner_up = 0;
+                                         const std::function<PointTestResult(const Rigid3&)>& test,
+                                         double tie_share) {
+  std::vector<TestedHypothesis> tested;
+  int most_good = 0;
   for (const Rigid3& hypothesis : hypotheses) {
-    PointTestResult test = test_points(hypothesis, prev_uv, cur_uv, camera, options);
-    if (test.num_good <= best.num_good) {
-      runner_up = std::max(runner_up, test.num_good);
-      continue;
-    }
-    runner_up = best.num_good;
-    best.model = model;
-    best.cur_from_prev = hypothesis;
-    best.num_good = test.num_good;
-    best.parallax_deg = test.parallax_deg;
-    best.good_mask = std::move(test.good_mask);
+    tested.push_back({hypothesis, test(hypothesis)});
+    most_good = std::max(most_good, tested.back().test.num_good);
   }
-  if (best.num_good == 0) {
+  if (most_good == 0) {
     return std::nullopt;
   }
-  best.runner_up_ratio = static_cast<double>(runner_up) / best.num_good;
-  return best;
+  std::size_t best = tested.size();
+  for (std::size_t i = 0; i < tested.size(); ++i) {
+    const bool is_candidate = tested[i].test.num_good >= tie_share * most_good;
+    if (is_candidate && (best == tested.size() || tested[i].cur_from_prev.angle_rad() <
+                                                      tested[best].cur_from_prev.angle_rad())) {
+      best = i;
+    }
+  }
+  int runner_up = 0;
+  for (std::size_t i = 0; i < tested.size(); ++i) {
+    runner_up = i == best ? runner_up : std::max(runner_up, tested[i].test.num_good);
+  }
+  TwoViewMotion motion;
+  motion.model = model;
+  motion.cur_from_prev = tested[best].cur_from_prev;
+  motion.num_good = tested[best].test.num_good;
+  motion.parallax_deg = tested[best].test.parallax_deg;
+  motion.good_mask = std::move(tested[best].test.good_mask);
+  motion.runner_up_ratio = static_cast<double>(runner_up) / motion.num_good;
+  return motion;
 }
 
 }  // namespace
@@ -143,7 +161,10 @@ std::optional<TwoViewMotion> motion_from_homography(const Eigen::Matrix3d& homog
   for (const PlanarMotion& motion : decompose_homography(homography, camera)) {
     hypotheses.push_back(motion.cur_from_prev);
   }
-  return best_motion(TwoViewModel::kHomography, hypotheses, prev_uv, cur_uv, camera, options);
+  const auto test = [&](const Rigid3& hypothesis) {
+    return test_points(hypothesis, prev_uv, cur_uv, camera, options);
+  };
+  return best_motion(TwoViewModel::kHomography, hypotheses, test, kPlanarTieShare);
 }
 
 std::optional<TwoViewMotion> motion_from_essential(const Eigen::Matrix3d& essential,
@@ -151,8 +172,10 @@ std::optional<TwoViewMotion> motion_from_essential(const Eigen::Matrix3d& essent
                                                    std::span<const Eigen::Vector2d> cur_uv,
                                                    const Camera& camera,
                                                    const PointTestOptions& options) {
-  return best_motion(TwoViewModel::kEssential, decompose_essential(essential), prev_uv, cur_uv,
-                     camera, options);
+  const auto test = [&](const Rigid3& hypothesis) {
+    return test_points(hypothesis, prev_uv, cur_uv, camera, options);
+  };
+  return best_motion(TwoViewModel::kEssential, decompose_essential(essential), test, 1.0);
 }
 
 bool is_decisive(const TwoViewMotion& motion, int num_matches, const AcceptanceOptions& options) {

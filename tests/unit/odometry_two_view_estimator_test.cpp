@@ -75,9 +75,16 @@ TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
   options.noise_px = 0.3;
   options.cur_from_prev = Rigid3(so3_exp({0.0, 0.02, 0.0}), {0.8, 0.1, -0.6}).inverse();
   options.planar = true;
-  const MeasuredMotion planar = measure(make_scene(options), /*is_initializing=*/true);
-  EXPECT_EQ(planar.model, TwoViewModel::kHomography);
-  EXPECT_GT(planar.homography_ratio, 0.40);
+  int num_right = 0;
+  for (options.seed = 1; options.seed <= 20; ++options.seed) {
+    const MeasuredMotion planar = measure(make_scene(options), /*is_initializing=*/true);
+    EXPECT_GT(planar.homography_ratio, 0.40) << "seed " << options.seed;
+    EXPECT_EQ(planar.model, TwoViewModel::kHomography) << "seed " << options.seed;
+    const double error_rad =
+        planar.cur_from_prev.rotation.angularDistance(options.cur_from_prev->rotation);
+    num_right += error_rad < 0.01 ? 1 : 0;
+  }
+  EXPECT_GE(num_right, 15);  // a plane leaves two motions; the smaller turn is mostly the true one
   options.planar = false;
   const MeasuredMotion general = measure(make_scene(options), /*is_initializing=*/true);
   EXPECT_EQ(general.model, TwoViewModel::kEssential);

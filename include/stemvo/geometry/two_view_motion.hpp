@@ -48,8 +48,9 @@ struct TwoViewMotion {
   std::vector<char> good_mask;  ///< one per match
 };
 
-/// Best of the 8 hypotheses of H (pixels, cur_from_prev); nullopt when H does not decompose or no
-/// point passes. Thresholds are the caller's: see is_decisive().
+/// Best of the 8 hypotheses of H (pixels, cur_from_prev); of those nearly as good, the one that
+/// turns least, since a plane leaves two that all its points accept; nullopt when H does not
+/// decompose or no point passes. Thresholds are the caller's: see is_decisive().
 [[nodiscard]] std::optional<TwoViewMotion> motion_from_homography(
     const Eigen::Matrix3d& homography,
     std::span<const Eigen::Vector2d> prev_uv,
