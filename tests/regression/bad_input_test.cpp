@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using test::read_file;
+using test::run_stemvo;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+void write_file(const fs::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+/// Line `number` (from 1) of a file replaced.
+void replace_line(const fs::path& file, int number, const std::string& text) {
+  std::istringstream in(read_file(file));
+  std::string result;
+  std::string line;
+  for (int i = 1; std::getline(in, line); ++i) {
+    result += (i == number ? text : line) + "\n";
+  }
+  write_file(file, result);
+}
+
+/// One line, with the words given, and the exit code; nothing on standard output.
+void expect_error(const ProgramResult& result,
+                  int exit_code,
+                  const std::vector<std::string>& words) {
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_THAT(result.out, IsEmpty());
+  EXPECT_THAT(result.err, StartsWith("error: "));
+  EXPECT_THAT(result.err, Not(HasSubstr("internal")));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  for (const std::string& word : words) {
+    EXPECT_THAT(result.err, HasSubstr(word));
+  }
+}
+
+/// A copy of ten rendered frames that each test breaks in its own way.
+class BadInput : public ::testing::Test {
+ protected:
+  ProgramResult run(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"run", sequence_.string(), "--out", out_});
+    return run_stemvo(more);
+  }
+  /// The configuration as a file, line 1 first.
+  ProgramResult run_with_config(const std::string& text) const {
+    write_file(folder_ / "my.yaml", text);
+    return run({"--config", folder_ / "my.yaml"});
+  }
+
+  test::TemporaryFolder folder_;
+  fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  std::string out_ = folder_ / "out";
+};
+
+TEST_F(BadInput, WhatIsBrokenRunsUnbroken) { EXPECT_EQ(run().exit_code, 0); }
+
+TEST_F(BadInput, MissingSequence) {
+  const std::string none = folder_ / "none";
+  expect_error(run_stemvo({"run", none, "--out", out_}), 1, {none, "expected", "found none"});
+  EXPECT_FALSE(fs::exists(out_));
+}
+
+TEST_F(BadInput, NoImages) {
+  fs::remove_all(sequence_ / "image_2");
+  expect_error(run(), 1, {sequence_.string(), "image_2"});
+  fs::create_directories(sequence_ / "image_2");
+  expect_error(run(), 1, {"image_2", "000000.png", "found none"});
+}
+
+TEST_F(BadInput, GapInTheNumbering) {
+  fs::remove(sequence_ / "image_2/000004.png");
+  expect_error(run(), 1, {"image_2", "expected 000004.png", "found 000005.png"});
+}
+
+TEST_F(BadInput, EveryImageBroken) {
+  for (const auto& entry : fs::directory_iterator(sequence_ / "image_2")) {
+    fs::resize_file(entry.path(), 50);
+  }
+  expect_error(run(), 1, {"000000.png"});
+}
+
+TEST_F(BadInput, CameraThatIsNotThere) {
+  expect_error(run({"--set", "input.camera=image_0"}), 1, {"image_0"});
+  expect_error(run({"--set", "input.camera=left"}), 1, {"input.camera", "image_0", "'left'"});
+}
+
+TEST_F(BadInput, Calibration) {
+  const fs::path calib = sequence_ / "calib.txt";
+  const std::string good = read_file(calib);
+  write_file(calib, "P0: 1 0 0 0 0 1 0 0 0 0 1 0\n");
+  expect_error(run(), 1, {"calib.txt", "P2"});
+  write_file(calib, "P2: 7e2 0 600 0 0 nan 180 0 0 0 1 0\n");
+  expect_error(run(), 1, {"calib.txt:1:"});
+  write_file(calib, "P2: 7e2 0 600 0 0 7e2 180 0 0 0 1\n");
+  expect_error(run(), 1, {"calib.txt:1:", "12", "11"});
+  fs::remove(calib);
+  expect_error(run(), 1, {"calib.txt"});
+}
+
+TEST_F(BadInput, Times) {
+  write_file(sequence_ / "times.txt", "0.0\n0.1\n");
+  expect_error(run(), 1, {"times.txt", "2"});
+  fs::remove(sequence_ / "times.txt");
+  expect_error(run(), 1, {"times.txt"});
+}
+
+TEST_F(BadInput, Poses) {
+  const fs::path poses = folder_.path() / "poses/00.txt";
+  replace_line(poses, 4, "1 0 0 0 0 1 0 0 0 0 1");
+  expect_error(run(), 1, {"00.txt:4:", "12", "11"});
+  replace_line(poses, 4, "1 0 0 x 0 1 0 0 0 0 1 0");
+  expect_error(run(), 1, {"00.txt:4:", "x"});
+  write_file(poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
+  expect_error(run(), 1, {"00.txt", "9", "2"});
+  expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
+  fs::remove(poses);
+  expect_error(run({"--set", "scale.source=ground_truth"}), 1,
+               {"poses/00.txt", "scale.source=ground_truth", "found none"});
+  EXPECT_FALSE(fs::exists(out_ + "/trajectory_kitti.txt"));
+}
+
+TEST_F(BadInput, OutputFolderThatCannotBeWritten) {
+  write_file(folder_ / "file", "");
+  out_ = folder_ / "file";
+  expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+  out_ = "/proc/stemvo/out";
+  expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+}
+
+TEST_F(BadInput, Model) {
+  expect_error(run({"--set", "stem.model=resnet"}), 1, {"resnet", "default"});
+  expect_error(run({"--set", "stem.model=" + (folder_ / "no.onnx")}), 1, {"no.onnx"});
+  expect_error(run({"--set", "stem.filter=500"}), 1, {"stem.filter", "500"});
+  expect_error(run({"--set", "stem.sampling_px=3"}), 1, {"stem.sampling_px", "3", "1, 2, 4"});
+  write_file(folder_ / "text.onnx", "this is not a model\n");
+  expect_error(run({"--set", "stem.model=" + (folder_ / "text.onnx")}), 1, {"text.onnx"});
+}
+
+TEST_F(BadInput, ModelOtherThanTheManifestSays) {
+  const fs::path models = fs::path(STEMVO_SOURCE_DIR) / "models";
+  fs::copy(models / "manifest.yaml", folder_.path() / "manifest.yaml");
+  fs::copy(models / "default.onnx", folder_.path() / "default.onnx");
+  fs::resize_file(folder_.path() / "default.onnx", 1000);
+  expect_error(run({"--set", "stem.model=" + (folder_ / "default.onnx")}), 1,
+               {"default.onnx", "expected", "found"});
+}
+
+TEST_F(BadInput, Configuration) {
+  expect_error(run_with_config("stem:\n  filtre: 3\n"), 1,
+               {"my.yaml:2: stem.filtre: unknown key; known keys of stem: model, filter"});
+  expect_error(run_with_config("stem:\n  filter: 3\n  filter: 4\n"), 1,
+               {"my.yaml:3: stem.filter: duplicated key", "line 2"});
+  expect_error(run_with_config("stem:\n  filter: three\n"), 1,
+               {"my.yaml:2: stem.filter: expected a whole number, found 'three'"});
+  expect_error(run_with_config("stem: [\n"), 1, {"my.yaml:2: not YAML"});
+  expect_error(run({"--config", folder_ / "none.yaml"}), 1, {"none.yaml"});
+  expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
+  expect_error(run({"--set", "stem.filtre=3"}), 1, {"--set stem.filtre: unknown key"});
+  expect_error(run({"--set", "scale.source=gps"}), 1, {"constant, ground_truth, found 'gps'"});
+  expect_error(run({"--set", "scale.constant_m=nan"}), 1, {"scale.constant_m", "nan"});
+}
+
+TEST_F(BadInput, FramesOutsideTheSequence) {
+  expect_error(run({"--frames", "0:11"}), 1, {"image_2", "0:10", "0:11"});
+  expect_error(run({"--frames", "10:"}), 1, {"image_2", "0:10", "10:"});
+}
+
+TEST_F(BadInput, Evaluate) {
+  const std::string poses = folder_ / "poses/00.txt";
+  const std::string bad = folder_ / "bad.txt";
+  const auto evaluate = [&](const std::string& truth, const std::string& estimate) {
+    return run_stemvo({"evaluate", "--gt", truth, estimate});
+  };
+  EXPECT_EQ(evaluate(poses, poses).exit_code, 0);
+  expect_error(evaluate(poses, bad), 1, {"bad.txt"});
+  write_file(bad, "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  expect_error(evaluate(poses, bad), 1, {"bad.txt", "1"});
+  write_file(bad, "1 2 3\n");
+  expect_error(evaluate(poses, bad), 1, {"bad.txt:1:"});
+  expect_error(evaluate(folder_ / "none.txt", poses), 1, {"none.txt"});
+}
+
+TEST_F(BadInput, Channel) {
+  const auto channel = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"channel", sequence_.string(), "--out", out_});
+    return run_stemvo(more);
+  };
+  expect_error(channel({"--filters", "0:500"}), 1, {"default", "--filters 0:500"});
+  expect_error(channel({"--frames", "3:99"}), 1, {"0:10"});
+  const ProgramResult good = channel({"--frames", "2:4", "--filters", "1:3"});
+  EXPECT_EQ(good.exit_code, 0) << good.err;
+  for (const char* name :
+       {"000002_input", "000003_filter_001", "000003_filter_002", "000002_sheet"}) {
+    EXPECT_TRUE(fs::exists(out_ + "/" + name + ".png")) << name;
+  }
+  EXPECT_FALSE(fs::exists(out_ + "/000003_filter_003.png"));
+}
+
+TEST_F(BadInput, Synth) {
+  write_file(folder_ / "file", "");
+  expect_error(run_stemvo({"synth", folder_ / "file", "--frames", "2"}), 1, {"file"});
+  expect_error(run_stemvo({"synth", folder_ / "o", "--trajectory", folder_ / "none.txt"}), 1,
+               {"none.txt"});
+}
+
+TEST_F(BadInput, Check) {
+  const std::string metrics = folder_ / "metrics.json";
+  const std::string limits = folder_ / "limits.yaml";
+  const auto check = [&] { return run_stemvo({"check", metrics, "--against", limits}); };
+  write_file(metrics, R"({"t_rel_percent": 0.9, "segments": null})");
+  write_file(limits, "t_rel_percent: {max: 1.0}\n");
+  EXPECT_EQ(check().exit_code, 0);
+  write_file(limits, "t_rel_percent: {max: 0.8}\n");
+  const ProgramResult passed = check();
+  EXPECT_EQ(passed.exit_code, 1);
+  EXPECT_THAT(passed.out, HasSubstr("t_rel_percent"));
+  EXPECT_THAT(passed.err, IsEmpty());
+  write_file(limits, "segments: {min: 1}\n");
+  EXPECT_EQ(check().exit_code, 1) << "a number that is null holds no bound";
+  write_file(limits, "t_rel: {max: 0.8}\n");
+  expect_error(check(), 1, {"limits.yaml:1", "t_rel"});
+  write_file(metrics, "{");
+  expect_error(check(), 1, {"metrics.json"});
+  fs::remove(metrics);
+  expect_error(check(), 1, {"metrics.json"});
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stemvo/config.hpp"
+#include "stemvo/version.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+using test::ProgramResult;
+using test::run_stemvo;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+const std::vector<std::string> kCommands = {"run",   "evaluate", "channel",
+                                            "synth", "check",    "models"};
+
+TEST(CommandLine, HelpOfTheProgramNamesEveryCommand) {
+  const ProgramResult result = run_stemvo({"--help"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, IsEmpty());
+  for (const std::string& command : kCommands) {
+    EXPECT_THAT(result.out, HasSubstr("\n  " + command + " "));
+  }
+  EXPECT_THAT(result.out, HasSubstr("stemvo run drive/sequences/00 --out result"));
+}
+
+TEST(CommandLine, EveryCommandHasHelpAndVersion) {
+  for (const std::string& command : kCommands) {
+    const ProgramResult help = run_stemvo({command, "--help"});
+    EXPECT_EQ(help.exit_code, 0) << command;
+    EXPECT_THAT(help.out, HasSubstr("Usage: stemvo " + command)) << command;
+    EXPECT_THAT(help.err, IsEmpty()) << command;
+    const ProgramResult version = run_stemvo({command, "--version"});
+    EXPECT_EQ(version.exit_code, 0) << command;
+    EXPECT_THAT(version.out, StartsWith("stemvo 0.")) << command;
+  }
+}
+
+TEST(CommandLine, VersionIsOneLine) {
+  const ProgramResult result = run_stemvo({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, "stemvo " + std::string(version()) + "\n");
+}
+
+TEST(CommandLine, DumpConfigIsTheDefaultConfiguration) {
+  const ProgramResult result = run_stemvo({"--dump-config"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, dump_config({}));
+}
+
+struct Misuse {
+  std::vector<std::string> arguments;
+  std::string says;
+};
+
+TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
+  const std::vector<Misuse> cases = {
+      {{}, "expected a command"},
+      {{"drive"}, "drive"},
+      {{"run"}, "SEQUENCE_DIR"},
+      {{"run", "x"}, "--out"},
+      {{"run", "x", "--out"}, "--out"},
+      {{"run", "x", "y", "--out", "o"}, "y"},
+      {{"run", "x", "--out", "o", "--bogus"}, "--bogus"},
+      {{"run", "x", "--out", "o", "--frames", "7"}, "expected A:B"},
+      {{"run", "x", "--out", "o", "--frames", "7:3"}, "A < B"},
+      {{"run", "x", "--out", "o", "--set", "stem.filter"}, "expected KEY=VALUE"},
+      {{"run", "x", "--out", "o", "--threads", "-1"}, "--threads"},
+      {{"run", "x", "--out", "o", "--pictures", "0"}, "--pictures"},
+      {{"evaluate", "--gt", "a"}, "ESTIMATE"},
+      {{"evaluate", "--gt", "a", "b", "--align", "icp"}, "--align"},
+      {{"channel", "x", "--out", "o", "--filters", "4:4"}, "A < B"},
+      {{"synth", "x", "--frames", "0"}, "--frames"},
+      {{"synth", "x", "--seed", "-3"}, "--seed"},
+      {{"check", "metrics.json"}, "--against"},
+      {{"models", "x"}, "x"},
+  };
+  for (const Misuse& misuse : cases) {
+    const ProgramResult result = run_stemvo(misuse.arguments);
+    EXPECT_EQ(result.exit_code, 2) << misuse.says;
+    EXPECT_THAT(result.out, IsEmpty());
+    EXPECT_THAT(result.err, AllOf(StartsWith("error: "), HasSubstr(misuse.says)));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
+TEST(CommandLine, ModelsListsTheManifest) {
+  const ProgramResult result = run_stemvo({"models"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("default: sound"));
+}
+
+// Standard output that cannot be written is an error; one that nobody reads any more is not; one
+// that is closed must not send the results into another file.
+TEST(CommandLine, OutputThatCannotBeWrittenIsAnError) {
+  const std::string program = STEMVO_PROGRAM;
+  const auto shell = [](const std::string& command) {
+    return test::run_program("/bin/sh", {"-c", command});
+  };
+  const ProgramResult full = shell(program + " --dump-config > /dev/full");
+  EXPECT_EQ(full.exit_code, 1);
+  EXPECT_THAT(full.err, HasSubstr("standard output"));
+  EXPECT_EQ(shell("{ " + program + " --dump-config; echo $? >&2; } | head -n 1").err, "0\n");
+  EXPECT_EQ(shell(program + " --dump-config >&- 2>&-").exit_code, 0);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+using test::ProgramResult;
+using test::run_stemvo;
+
+/// The real clips, held against tests/regression/thresholds/kitti_NN.yaml.
+class Kitti : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Kitti, StaysInsideTheThresholds) {
+  const auto data = test::shared_data();
+  if (!data) {
+    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+  }
+  const test::TemporaryFolder folder;
+  const std::string out = folder / "result";
+  const ProgramResult run = run_stemvo({"run", (*data / "kitti/sequences" / GetParam()).string(),
+                                        "--out", out, "--set", "scale.source=ground_truth"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const ProgramResult check =
+      run_stemvo({"check", out + "/metrics.json", "--against",
+                  STEMVO_SOURCE_DIR "/tests/regression/thresholds/kitti_" + GetParam() + ".yaml"});
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  std::cout << run.out << check.out;
+}
+
+// The promise is 25 frames a second of the clock on two free cores, which a machine that runs tests
+// side by side has not: held here is the time of the cores, and 25 frames take two of them 80 ms
+// each.
+TEST(KittiSpeed, TwoCoresCanKeepTwentyFiveFramesPerSecond) {
+  const auto data = test::shared_data();
+  if (!data) {
+    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+  }
+  const test::TemporaryFolder folder;
+  const ProgramResult run = run_stemvo({"run", (*data / "kitti/sequences/03").string(), "--out",
+                                        folder / "result", "--frames", "0:150", "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_LE(1000.0 * run.cpu_s / 150, 80.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Clips,
+                         Kitti,
+                         ::testing::Values("00", "02", "03", "06"),
+                         [](const auto& clip) { return clip.param; });
+
+}  // namespace
+}  // namespace stemvo

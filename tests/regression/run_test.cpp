@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using test::read_file;
+using test::rendered_drive;
+using test::run_stemvo;
+using test::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr const char* kTrueScale = "scale.source=ground_truth";
+
+ProgramResult run_drive(const fs::path& sequence,
+                        const std::string& out,
+                        const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments = {"run", sequence.string(), "--out", out};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_stemvo(arguments);
+}
+
+nlohmann::json metrics_of(const std::string& out) {
+  return nlohmann::json::parse(read_file(out + "/metrics.json"));
+}
+
+std::ptrdiff_t count_lines(const std::string& text) {
+  return std::count(text.begin(), text.end(), '\n');
+}
+
+class Run : public ::testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  fs::path sequence_ = rendered_drive() / "sequences/00";
+  std::string out_ = folder_ / "result";
+};
+
+TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
+  const ProgramResult result =
+      run_drive(sequence_, out_, {"--set", kTrueScale, "--pictures", "20"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 60);
+  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_tum.txt")), 60);
+  EXPECT_EQ(count_lines(read_file(out_ + "/frames.csv")), 61);
+  EXPECT_GT(fs::file_size(out_ + "/trajectory.png"), 10000U);
+  EXPECT_THAT(read_file(out_ + "/trajectory.svg"), HasSubstr("<svg"));
+  EXPECT_THAT(read_file(out_ + "/config.yaml"),
+              AllOf(HasSubstr("# stemvo 0."), HasSubstr("sha256"), HasSubstr("frames 0:60 of 00"),
+                    HasSubstr("source: ground_truth")));
+  for (const char* name : {"000000", "000020", "000040"}) {
+    EXPECT_TRUE(fs::exists(out_ + "/pictures/" + name + ".png")) << name;
+  }
+  EXPECT_FALSE(fs::exists(out_ + "/pictures/000001.png"));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("t_rel"), HasSubstr("trajectory.png")));
+  EXPECT_THAT(result.err, HasSubstr("60/60 frames"));
+}
+
+TEST_F(Run, MetricsHaveEveryKeyOfTheContract) {
+  ASSERT_EQ(run_drive(sequence_, out_, {"--set", kTrueScale}).exit_code, 0);
+  const nlohmann::json metrics = metrics_of(out_);
+  for (const char* key :
+       {"frames", "fps", "path_length_m", "scale_source", "average_offset_m", "null_offset_m",
+        "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments", "ate_rmse_m",
+        "rpe_rotation_deg", "tracked_fraction"}) {
+    EXPECT_TRUE(metrics.contains(key)) << key;
+  }
+  for (const char* key : {"none", "scale", "se3", "sim3"}) {
+    EXPECT_TRUE(metrics["ate_rmse_m"].contains(key)) << key;
+  }
+  EXPECT_EQ(metrics["frames"], 60);
+  EXPECT_EQ(metrics["scale_source"], "ground_truth");
+  EXPECT_GT(metrics["fps"].get<double>(), 0.0);
+  EXPECT_GE(metrics["tracked_fraction"].get<double>(), 0.95);
+  EXPECT_LT(metrics["average_offset_m"].get<double>(),
+            0.2 * metrics["null_offset_m"].get<double>());
+}
+
+TEST_F(Run, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
+  const std::vector<std::vector<std::string>> variants = {
+      {"--threads", "1"}, {"--threads", "1"}, {"--threads", "2"}, {}};
+  std::string first;
+  for (std::size_t i = 0; i < variants.size(); ++i) {
+    const std::string out = out_ + std::to_string(i);
+    ASSERT_EQ(run_drive(sequence_, out, variants[i]).exit_code, 0);
+    const std::string bytes =
+        read_file(out + "/trajectory_kitti.txt") + read_file(out + "/trajectory_tum.txt");
+    first = i == 0 ? bytes : first;
+    EXPECT_FALSE(bytes.empty());
+    EXPECT_TRUE(bytes == first) << "variant " << i;
+  }
+}
+
+TEST_F(Run, WithoutGroundTruthNoByteOfTheTrajectoryChanges) {
+  const fs::path copy = test::copy_drive(folder_.path(), 12);
+  ASSERT_EQ(run_drive(copy, out_ + "1").exit_code, 0);
+  EXPECT_FALSE(metrics_of(out_ + "1")["t_rel_percent"].is_null() &&
+               metrics_of(out_ + "1")["path_length_m"].is_null());
+  fs::remove(folder_.path() / "poses/00.txt");
+  const ProgramResult result = run_drive(copy, out_ + "2");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(read_file(out_ + "1/trajectory_kitti.txt") ==
+              read_file(out_ + "2/trajectory_kitti.txt"));
+  const nlohmann::json metrics = metrics_of(out_ + "2");
+  for (const char* key : {"path_length_m", "average_offset_m", "t_rel_percent", "ate_rmse_m"}) {
+    EXPECT_TRUE(metrics.contains(key)) << key;
+  }
+  EXPECT_TRUE(metrics["path_length_m"].is_null());
+  EXPECT_TRUE(metrics["t_rel_percent"].is_null());
+  EXPECT_EQ(metrics["frames"], 12);
+}
+
+TEST_F(Run, ItsConfigRunsAgain) {
+  ASSERT_EQ(run_drive(sequence_, out_ + "1",
+                      {"--frames", "0:10", "--set", "stem.model=gray", "--set", "seed=5"})
+                .exit_code,
+            0);
+  const ProgramResult result =
+      run_drive(sequence_, out_ + "2", {"--frames", "0:10", "--config", out_ + "1/config.yaml"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(read_file(out_ + "1/trajectory_kitti.txt") ==
+              read_file(out_ + "2/trajectory_kitti.txt"));
+  EXPECT_TRUE(read_file(out_ + "1/config.yaml") == read_file(out_ + "2/config.yaml"));
+}
+
+TEST_F(Run, AnyChannelAndFrontEndRuns) {
+  for (const std::string model : {"gray", "input_layer", "default"}) {
+    for (const std::string method : {"klt", "orb", "sift"}) {
+      const std::string out = out_ + model + method;
+      const ProgramResult result = run_drive(sequence_, out,
+                                             {"--frames", "0:6", "--set", "stem.model=" + model,
+                                              "--set", "features.method=" + method, "--quiet"});
+      EXPECT_EQ(result.exit_code, 0) << model << " " << method << ": " << result.err;
+      EXPECT_THAT(result.out + result.err, IsEmpty());
+      EXPECT_EQ(count_lines(read_file(out + "/trajectory_kitti.txt")), 6);
+    }
+  }
+  EXPECT_EQ(run_drive(sequence_, out_, {"--frames", "0:6", "--config", "paper"}).exit_code, 0);
+}
+
+TEST_F(Run, FramesInTheMiddleStartAtTheIdentity) {
+  ASSERT_EQ(run_drive(sequence_, out_, {"--frames", "30:45", "--set", kTrueScale}).exit_code, 0);
+  const std::string poses = read_file(out_ + "/trajectory_kitti.txt");
+  EXPECT_EQ(count_lines(poses), 15);
+  EXPECT_THAT(read_file(out_ + "/frames.csv"), HasSubstr("\n30,"));
+  EXPECT_THAT(read_file(out_ + "/frames.csv"), Not(HasSubstr("\n45,")));
+  const nlohmann::json metrics = metrics_of(out_);
+  EXPECT_LT(metrics["average_offset_m"].get<double>(),
+            0.2 * metrics["null_offset_m"].get<double>());
+}
+
+TEST_F(Run, BrokenFramesGetAStateAndTheRunGoesOn) {
+  const fs::path copy = test::copy_drive(folder_.path(), 20);
+  fs::resize_file(copy / "image_2/000008.png", 900);
+  fs::copy_file(rendered_drive({3, 320, 96}) / "sequences/00/image_2/000001.png",
+                copy / "image_2/000014.png", fs::copy_options::overwrite_existing);
+  const ProgramResult result = run_drive(copy, out_, {"--set", kTrueScale, "--pictures", "1"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("warning: "));
+  EXPECT_THAT(result.err, HasSubstr("000008.png"));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("000014.png"), HasSubstr("320x96")));
+  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 20);
+  const std::string frames = read_file(out_ + "/frames.csv");
+  EXPECT_EQ(count_lines(frames), 21);
+  std::size_t num_broken = 0;
+  for (std::size_t at = frames.find(",broken,"); at != std::string::npos;
+       at = frames.find(",broken,", at + 1)) {
+    ++num_broken;
+  }
+  EXPECT_EQ(num_broken, 2U);
+  EXPECT_LT(metrics_of(out_)["tracked_fraction"].get<double>(), 0.95);
+}
+
+TEST_F(Run, BrokenFirstFrameIsNoEnd) {
+  const fs::path copy = test::copy_drive(folder_.path(), 10);
+  fs::resize_file(copy / "image_2/000000.png", 100);
+  const ProgramResult result = run_drive(copy, out_);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 10);
+}
+
+TEST_F(Run, InterruptWritesWhatWasComputed) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    // The same few frames many times over last long enough to be interrupted.
+    const fs::path copy = test::copy_drive(folder_.path() / std::to_string(signal), 2);
+    for (int i = 2; i < 4000; ++i) {
+      char name[32];
+      std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+      fs::create_symlink(copy / (i % 2 == 0 ? "image_2/000000.png" : "image_2/000001.png"),
+                         copy / name);
+    }
+    fs::remove(copy / "../../poses/00.txt");
+    std::ofstream times(copy / "times.txt");
+    for (int i = 0; i < 4000; ++i) {
+      times << 0.1 * i << "\n";
+    }
+    times.close();
+    const std::string out = out_ + std::to_string(signal);
+    test::RunningProgram program(STEMVO_PROGRAM, {"run", copy.string(), "--out", out});
+    for (int i = 0; i < 600 && !fs::exists(out + "/frames.csv"); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    program.send(signal);
+    const ProgramResult result = program.wait();
+    EXPECT_EQ(result.exit_code, 130) << result.err;
+    const auto num_poses = count_lines(read_file(out + "/trajectory_kitti.txt"));
+    EXPECT_GT(num_poses, 0);
+    EXPECT_LT(num_poses, 4000);
+    EXPECT_EQ(metrics_of(out)["frames"], num_poses);
+    EXPECT_EQ(count_lines(read_file(out + "/frames.csv")), num_poses + 1);
+    EXPECT_TRUE(fs::exists(out + "/trajectory.png"));
+  }
+}
+
+TEST(RunFullSize, HundredRenderedFramesStayUnderTheLimit) {
+  const TemporaryFolder folder;
+  const fs::path drive = rendered_drive({100, 1241, 376});
+  const std::string out = folder / "result";
+  const ProgramResult result = run_drive(drive / "sequences/00", out, {"--set", kTrueScale});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult check =
+      run_stemvo({"check", out + "/metrics.json", "--against",
+                  STEMVO_SOURCE_DIR "/tests/regression/thresholds/rendered.yaml"});
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+}
+
+}  // namespace
+}  // namespace stemvo

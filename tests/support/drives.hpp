@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "support/run_program.hpp"
+
+namespace stemvo::test {
+
+/// A rendered drive, made once per build of the program and shared by all tests, which are
+/// processes of their own and may run at the same time.
+struct DriveSize {
+  int frames = 60;
+  int width_px = 620;
+  int height_px = 188;
+};
+
+/// Holds a lock file while it lives.
+class FileLock {
+ public:
+  explicit FileLock(const std::filesystem::path& file)
+      : descriptor_(::open(file.c_str(), O_CREAT | O_RDWR, 0600)) {
+    ::flock(descriptor_, LOCK_EX);
+  }
+  ~FileLock() { ::close(descriptor_); }
+  FileLock(const FileLock&) = delete;
+  FileLock& operator=(const FileLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
+/// Folder with sequences/00 and poses/00.txt. Read it only; copy what is to be broken.
+inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
+  namespace fs = std::filesystem;
+  const fs::path base = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
+  fs::create_directories(base);
+  const FileLock lock(base / "lock");
+  const std::string built =
+      std::to_string(fs::last_write_time(STEMVO_PROGRAM).time_since_epoch().count());
+  if (read_file(base / "program") != built) {  // drives of an older program
+    for (const auto& entry : fs::directory_iterator(base)) {
+      if (entry.is_directory()) {
+        fs::remove_all(entry.path());
+      }
+    }
+    std::ofstream(base / "program") << built;
+  }
+  const std::string name = std::to_string(size.frames) + "x" + std::to_string(size.width_px) + "x" +
+                           std::to_string(size.height_px);
+  const fs::path drive = base / name;
+  if (!fs::exists(drive)) {
+    const fs::path unfinished = base / (name + ".unfinished");
+    fs::remove_all(unfinished);
+    const ProgramResult result = run_stemvo(
+        {"synth", unfinished.string(), "--frames", std::to_string(size.frames), "--width",
+         std::to_string(size.width_px), "--height", std::to_string(size.height_px)});
+    if (result.exit_code != 0) {
+      throw std::runtime_error("stemvo synth failed: " + result.err);
+    }
+    fs::rename(unfinished, drive);
+  }
+  return drive;
+}
+
+/// The first frames of the rendered drive, copied, to be broken.
+inline std::filesystem::path copy_drive(const std::filesystem::path& to, int num_frames) {
+  namespace fs = std::filesystem;
+  const fs::path from = rendered_drive();
+  const fs::path sequence = to / "sequences" / "00";
+  fs::create_directories(sequence / "image_2");
+  fs::create_directories(to / "poses");
+  fs::copy_file(from / "poses/00.txt", to / "poses/00.txt");
+  for (const char* name : {"calib.txt", "times.txt"}) {
+    fs::copy_file(from / "sequences/00" / name, sequence / name);
+  }
+  for (int i = 0; i < num_frames; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    fs::copy_file(from / "sequences/00" / name, sequence / name);
+  }
+  return sequence;
+}
+
+/// The folder with real clips, where the machine has it.
+inline std::optional<std::filesystem::path> shared_data() {
+  const char* folder = std::getenv("STEMVO_SHARED_DATA");
+  return folder != nullptr && *folder != '\0' ? std::optional<std::filesystem::path>(folder)
+                                              : std::nullopt;
+}
+
+}  // namespace stemvo::test

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace stemvo::test {
+
+/// The whole file; empty where there is none.
+inline std::string read_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+struct ProgramResult {
+  int exit_code = -1;  ///< 128 + signal when the program was killed
+  double cpu_s = 0.0;  ///< of all its threads; unlike the clock's it hardly knows of other programs
+  std::string out;
+  std::string err;
+};
+
+/// A program as a child process, its output caught in files.
+class RunningProgram {
+ public:
+  RunningProgram(const std::string& program, const std::vector<std::string>& arguments)
+      : out_(capture_file("out")), err_(capture_file("err")) {
+    std::vector<char*> argv = {const_cast<char*>(program.c_str())};
+    for (const std::string& argument : arguments) {
+      argv.push_back(const_cast<char*>(argument.c_str()));
+    }
+    argv.push_back(nullptr);
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      redirect("/dev/null", STDIN_FILENO, O_RDONLY);
+      redirect(out_, STDOUT_FILENO, O_WRONLY | O_CREAT | O_TRUNC);
+      redirect(err_, STDERR_FILENO, O_WRONLY | O_CREAT | O_TRUNC);
+      ::execv(program.c_str(), argv.data());
+      ::_exit(127);
+    }
+  }
+
+  void send(int signal) const { ::kill(pid_, signal); }
+
+  ProgramResult wait() {
+    int status = 0;
+    struct rusage usage = {};
+    ::wait4(pid_, &status, 0, &usage);
+    ProgramResult result;
+    result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    result.out = read_file(out_);
+    result.err = read_file(err_);
+    std::filesystem::remove(out_);
+    std::filesystem::remove(err_);
+    return result;
+  }
+
+ private:
+  static double seconds(const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  }
+  static std::filesystem::path capture_file(const std::string& name) {
+    static int count = 0;
+    return std::filesystem::temp_directory_path() /
+           ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++) + "." + name);
+  }
+  static void redirect(const std::filesystem::path& file, int descriptor, int flags) {
+    const int opened = ::open(file.c_str(), flags, 0600);
+    ::dup2(opened, descriptor);
+    ::close(opened);
+  }
+
+  std::filesystem::path out_;
+  std::filesystem::path err_;
+  pid_t pid_ = -1;
+};
+
+inline ProgramResult run_program(const std::string& program,
+                                 const std::vector<std::string>& arguments) {
+  return RunningProgram(program, arguments).wait();
+}
+
+/// The stemvo program that this build made.
+inline ProgramResult run_stemvo(const std::vector<std::string>& arguments) {
+  return run_program(STEMVO_PROGRAM, arguments);
+}
+
+/// A folder of this test's own, removed with it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    static int count = 0;
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::temp_directory_path() /
+            ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++) + "_" +
+             (info != nullptr ? info->test_suite_name() : "suite"));
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::string operator/(const std::string& name) const {
+    return (path_ / name).string();
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace stemvo::test
