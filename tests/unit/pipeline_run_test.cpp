@@ -113,6 +113,7 @@ TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
     if (i > 0) {
       const double step = ((*rescaled)[i].translation - (*rescaled)[i - 1].translation).norm();
       const double before = ((*constant)[i].translation - (*constant)[i - 1].translation).norm();
+      EXPECT_TRUE(before == 0.0 || std::abs(before - 1.0) < 1e-6) << i << ": " << before;
       EXPECT_TRUE(before == 0.0 || std::abs(step - kStep_m) < 1e-6) << i << ": " << step;
     }
   }
