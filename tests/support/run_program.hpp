@@ -8,8 +8,6 @@
 #include <vector>
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -100,10 +98,8 @@ class TemporaryFolder {
  public:
   TemporaryFolder() {
     static int count = 0;
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
     path_ = std::filesystem::temp_directory_path() /
-            ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++) + "_" +
-             (info != nullptr ? info->test_suite_name() : "suite"));
+            ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++));
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {
