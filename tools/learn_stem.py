@@ -30,13 +30,13 @@ def parse_arguments(arguments):
     parser.add_argument("drive", metavar="DRIVE", type=pathlib.Path)
     parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True, help="created where missing")
     parser.add_argument("--name", default="default")
-    parser.add_argument("--default-filter", type=int, default=0, help="for the manifest (default: 0)")
+    parser.add_argument("--default-filter", type=int, default=2, help="for the manifest (default: %(default)s)")
     parser.add_argument("--sampling", type=int, default=2, metavar="PX",
                         help="pixels between samples of the channel that it is meant for (default: 2)")
     parser.add_argument("--gain", type=float, default=defaults.gain, help="standard deviation (default: %(default)s)")
     parser.add_argument("--offset", type=float, default=defaults.offset, help="gray levels (default: %(default)s)")
     parser.add_argument("--noise", type=float, default=defaults.noise, help="gray levels (default: %(default)s)")
-    parser.add_argument("--floor", type=float, default=8.0,
+    parser.add_argument("--floor", type=float, default=3.0,
                         help="of the layer norm, in nuisance standard deviations (default: %(default)s)")
     parser.add_argument("--pairs", type=int, default=20000, help="patches tried per frame (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1)
@@ -46,7 +46,7 @@ def parse_arguments(arguments):
 def collect(frames, options):
     """Pairs of patches of every frame and the next."""
     rng = np.random.default_rng(options.seed)
-    scatter = discriminant.Scatter(KERNEL * KERNEL)
+    scatter = discriminant.Scatter(KERNEL)
     gray = frames.gray(0)
     for before in range(len(frames) - 1):
         next_gray = frames.gray(before + 1)

@@ -156,6 +156,16 @@ class Discriminant(unittest.TestCase):
         np.testing.assert_allclose(np.abs(filters[0]), [0, 0, 10**0.5, 0], atol=1e-12)
         np.testing.assert_allclose(np.einsum("ki,ij,lj->kl", filters, noise, filters), np.eye(3), atol=1e-12)
 
+    def test_filters_are_even_or_odd_in_x(self):
+        rng = np.random.default_rng(2)
+        scatter = discriminant.Scatter(4)
+        before = rng.normal(size=(400, 16)) @ rng.normal(size=(16, 16))
+        scatter.add(before, before + rng.normal(size=before.shape))
+        filters, _ = discriminant.generalised_eigenvectors(scatter.signal(), scatter.noise(discriminant.Nuisance()), 16)
+        for values in filters.reshape(-1, 4, 4):
+            sign = np.sign((values * values[:, ::-1]).sum())
+            np.testing.assert_allclose(values[:, ::-1], sign * values, atol=1e-8)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -28,13 +28,15 @@ class Nuisance:
 
 
 class Scatter:
-    """Sums over pairs of corresponding patches (N x pixels, gray levels)."""
+    """Sums over pairs of corresponding patches (N x pixels of square patches, gray levels). A street seen in
+    a mirror is as good a street, so every pair counts mirrored too: filters come out even or odd in x."""
 
-    def __init__(self, pixels):
+    def __init__(self, size):
+        self._size = size
         self.count = 0
-        self._sum = np.zeros(pixels)
-        self._moment = np.zeros((pixels, pixels))
-        self._difference = np.zeros((pixels, pixels))
+        self._sum = np.zeros(size * size)
+        self._moment = np.zeros((size * size, size * size))
+        self._difference = np.zeros((size * size, size * size))
 
     def add(self, before, after):
         self.count += len(before)
@@ -42,16 +44,21 @@ class Scatter:
         self._moment += before.T @ before
         self._difference += (after - before).T @ (after - before)
 
+    def _mean_with_mirrored(self, sums):
+        mirror = np.arange(self._size**2).reshape(self._size, self._size)[:, ::-1].ravel()
+        mirrored = sums[mirror] if sums.ndim == 1 else sums[np.ix_(mirror, mirror)]
+        return (sums + mirrored) / (2 * self.count)
+
     def mean(self):
-        return self._sum / self.count
+        return self._mean_with_mirrored(self._sum)
 
     def signal(self):
         """S."""
-        return self._moment / self.count - np.outer(self.mean(), self.mean())
+        return self._mean_with_mirrored(self._moment) - np.outer(self.mean(), self.mean())
 
     def noise(self, nuisance):
         """N."""
-        return self._difference / self.count + nuisance.covariance(self._moment / self.count)
+        return self._mean_with_mirrored(self._difference) + nuisance.covariance(self._mean_with_mirrored(self._moment))
 
 
 def generalised_eigenvectors(signal, noise, count):
