@@ -11,6 +11,8 @@
 namespace stemvo {
 namespace {
 
+constexpr int kBackLevels = 2;
+
 Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
   return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
 }
@@ -84,8 +86,10 @@ Matches KltFrontEnd::track(const ChannelImage& image, const std::vector<cv::Mat>
   std::vector<unsigned char> found_back;
   cv::calcOpticalFlowPyrLK(pyramid_, pyramid, prev_uv, cur_uv, found, cv::noArray(), window,
                            options_.klt_levels - 1, criteria);
+  // The way back starts where the way there started: two levels are enough to leave a wrong place.
+  const int back_levels = std::min(options_.klt_levels, kBackLevels);
   cv::calcOpticalFlowPyrLK(pyramid, pyramid_, cur_uv, back_uv, found_back, cv::noArray(), window,
-                           options_.klt_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
+                           back_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
 
   std::vector<Point> followed;
   followed.reserve(points_.size());

@@ -15,7 +15,7 @@ namespace stemvo {
 /// Keys `features.*` of the configuration.
 struct FeatureOptions {
   std::string method = "klt";  ///< `klt`, `orb` or `sift`
-  int max_features = 1500;     ///< keypoints aimed at per frame
+  int max_features = 1000;     ///< keypoints aimed at per frame
   int grid_columns = 16;       ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
   double corner_quality = 0.005;         ///< klt: least corner response over the strongest
