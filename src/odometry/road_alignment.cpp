@@ -25,8 +25,11 @@ void for_each_match(const RoadPicture::Level& prev,
                     const RoadWarp& warp,
                     const Visit& visit) {
   const Camera& camera = cur.camera;
-  const Eigen::Matrix3d homography = warp.rotation + warp.translation * warp.plane.transpose();
-  const Eigen::Matrix3f h = homography.cast<float>();
+  const Eigen::Matrix3f rotation = warp.rotation().cast<float>();
+  const Eigen::Vector3f translation = warp.translation.cast<float>();
+  const Eigen::Vector3f plane = warp.plane.cast<float>();
+  // RoadWarp::inverse_depth(), written out.
+  const auto bend = static_cast<float>(4.0 * warp.drop * warp.plane.squaredNorm());
   const auto fx = static_cast<float>(camera.fx_px);
   const auto fy = static_cast<float>(camera.fy_px);
   const auto cx = static_cast<float>(camera.cx_px);
@@ -38,7 +41,13 @@ void for_each_match(const RoadPicture::Level& prev,
   for (const RoadRegion::Sample& sample : samples) {
     const Eigen::Vector3f ray((static_cast<float>(sample.u) - cx) / fx,
                               (static_cast<float>(sample.v) - cy) / fy, 1.0F);
-    const Eigen::Vector3f p = h * ray;
+    const float flat = plane.dot(ray);
+    const float root = 1.0F - bend / (flat * flat);
+    if (!(flat > 0.0F && root > static_cast<float>(kMinRoadRoot))) {
+      continue;  // behind a crest
+    }
+    const Eigen::Vector3f p =
+        rotation * ray + (0.5F * flat * (1.0F + std::sqrt(root))) * translation;
     const float u = fx * p.x() / p.z() + cx;
     const float v = fy * p.y() / p.z() + cy - first_row;
     if (!(p.z() > 1e-3F && u >= 1.0F && v >= 1.0F && u < last_u && v < last_v)) {
@@ -76,6 +85,8 @@ RoadTiles align_road(const RoadPicture::Level& prev,
                      const RoadWarp& warp) {
   RoadTiles tiles;
   const Eigen::Vector3f t = warp.translation.cast<float>();
+  const Eigen::Vector3f plane = warp.plane.cast<float>();
+  const auto bend_unit = static_cast<float>(warp.plane.squaredNorm());
   const auto fx = static_cast<float>(cur.camera.fx_px);
   const auto fy = static_cast<float>(cur.camera.fy_px);
   for_each_match(prev, cur, samples, warp,
@@ -90,15 +101,15 @@ RoadTiles align_road(const RoadPicture::Level& prev,
                    const float gx = value[1] * fx / p.z();
                    const float gy = value[2] * fy / p.z();
                    const Eigen::Vector3f g(gx, gy, -(gx * p.x() + gy * p.y()) / p.z());
-                   Eigen::Matrix<float, 6, 1> j;
-                   j.head<3>() = g.dot(t) * ray;
-                   j.tail<3>() = p.cross(g);  // of exp(w) p
-                   const float residual = value[0] - cur_value;
-                   const float size = std::abs(residual);
+                   const float along = g.dot(t);
+                   Eigen::Matrix<float, 8, 1> a;
+                   a.head<3>() = along * ray;
+                   a[3] = -along * bend_unit / plane.dot(ray);
+                   a.segment<3>(4) = p.cross(g);  // of exp(w) p
+                   a[7] = value[0] - cur_value;
+                   const float size = std::abs(a[7]);
                    const float weight = size <= kHuber ? 1.0F : kHuber / size;
-                   const Vector6d jd = j.cast<double>();
-                   tile.information.noalias() += (weight * jd) * jd.transpose();
-                   tile.gradient += (weight * residual) * jd;
+                   tile.sums.noalias() += (weight * a) * a.transpose();
                  });
   return tiles;
 }

@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
-#include <vector>
-
-#include "odometry/road_alignment.hpp"
 #include "odometry/road_picture.hpp"
-#include "odometry/road_region.hpp"
 #include "odometry/road_types.hpp"
 
 namespace stemvo {
@@ -25,13 +20,6 @@ class RoadDense {
                                         const RoadPrior& prior) const;
 
  private:
-  [[nodiscard]] RoadMeasurement refine(
-      const RoadPicture& prev,
-      const RoadPicture& cur,
-      const std::array<std::vector<RoadRegion::Sample>, 2>& samples,
-      const RoadPrior& prior,
-      RoadWarp warp) const;
-
   RoadOptions options_;
 };
 

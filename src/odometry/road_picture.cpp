@@ -21,12 +21,31 @@ Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size
           size.height};
 }
 
+/// Values, their gradient (central differences) and the contrast, pixel by pixel.
+cv::Mat interleave(const cv::Mat& values, const cv::Mat& contrast) {
+  cv::Mat result(values.size(), CV_32FC4);
+  for (int v = 0; v < values.rows; ++v) {
+    const auto* here = values.ptr<float>(v);
+    const auto* above = values.ptr<float>(std::max(v - 1, 0));
+    const auto* below = values.ptr<float>(std::min(v + 1, values.rows - 1));
+    const auto* strength = contrast.ptr<float>(v);
+    auto* out = result.ptr<cv::Vec4f>(v);
+    for (int u = 1; u + 1 < values.cols; ++u) {
+      out[u] = {here[u], 0.5F * (here[u + 1] - here[u - 1]), 0.5F * (below[u] - above[u]),
+                strength[u]};
+    }
+    out[0] = {here[0], 0.0F, 0.0F, strength[0]};
+    const int last = values.cols - 1;
+    out[last] = {here[last], 0.0F, 0.0F, strength[last]};
+  }
+  return result;
+}
+
 RoadPicture::Level make_level(const cv::Mat& pixels, const Camera& camera, int contrast_px) {
   RoadPicture::Level level;
   level.camera = camera;
-  const int margin = 2 * contrast_px;
-  level.first_row = std::clamp(static_cast<int>(camera.cy_px) - margin, 0, pixels.rows);
-  if (pixels.rows - level.first_row < 2 * margin) {
+  level.first_row = std::clamp(static_cast<int>(camera.cy_px), 0, pixels.rows);
+  if (pixels.rows - level.first_row < 4 * contrast_px || pixels.cols < 4 * contrast_px) {
     return level;
   }
   cv::Mat values;
@@ -41,11 +60,7 @@ RoadPicture::Level make_level(const cv::Mat& pixels, const Camera& camera, int c
   cv::sqrt(contrast, contrast);
   // Half a gray value: the noise of a plain surface is not blown up to the size of texture.
   values /= contrast + 0.5;
-  cv::Mat du;
-  cv::Mat dv;
-  cv::Sobel(values, du, CV_32F, 1, 0, 3, 0.125);
-  cv::Sobel(values, dv, CV_32F, 0, 1, 3, 0.125);
-  cv::merge(std::vector<cv::Mat>{values, du, dv, contrast}, level.values);
+  level.values = interleave(values, contrast);
   return level;
 }
 

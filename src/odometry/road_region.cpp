@@ -8,6 +8,8 @@ namespace stemvo {
 
 namespace {
 constexpr double kMaxAngle_rad = 1.0;  ///< beyond it nobody knows how the turn goes on
+constexpr int kBorder_px = 4;
+constexpr int kCoarse = 8;  ///< the ends of a row are looked for at every 8th sample
 }  // namespace
 
 RoadRegion::RoadRegion(const Rigid3& cur_from_prev,
@@ -49,14 +51,28 @@ std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
                                                     int first_row,
                                                     int step) const {
   std::vector<Sample> result;
-  const int last_row = camera.height_px - 4;
+  const int last_row = camera.height_px - kBorder_px;
   const double far_row = camera.cy_px + camera.fy_px * (1.0 / far_m_ - plane_.z()) / plane_.y();
-  const int row0 = std::max(first_row + 4, static_cast<int>(far_row));
+  if (!(far_row > -1e6 && far_row < last_row)) {
+    return result;
+  }
+  const int row0 = std::max(first_row + kBorder_px, static_cast<int>(far_row));
   const int tile_rows = kTiles / kTileColumns;
   for (int v = row0; v < last_row; v += step) {
     const int tile_row = tile_rows * (v - row0) / std::max(1, last_row - row0);
-    for (int u = 4; u < camera.width_px - 4; u += step) {
-      const Eigen::Vector2d ground = on_ground(camera.normalize({u, v}));
+    const auto ground_at = [&](int u) { return on_ground(camera.normalize({u, v})); };
+    int first = camera.width_px;
+    int last = -1;
+    for (int u = kBorder_px; u < camera.width_px - kBorder_px; u += kCoarse * step) {
+      if (contains(ground_at(u))) {
+        first = std::min(first, u);
+        last = u;
+      }
+    }
+    first = std::max(kBorder_px, first - kCoarse * step);
+    last = std::min(camera.width_px - kBorder_px, last + kCoarse * step);
+    for (int u = first; u < last; u += step) {
+      const Eigen::Vector2d ground = ground_at(u);
       if (!contains(ground)) {
         continue;
       }

@@ -19,10 +19,16 @@ constexpr double kStandingShare = 0.25;
 }  // namespace
 
 RoadScale::RoadScale(const RoadOptions& options, const Camera& camera)
-    : options_(options), camera_(camera), dense_(options), filter_(options) {}
+    : options_(options),
+      camera_(camera),
+      dense_(options),
+      points_(options),
+      filter_(options),
+      path_(options) {}
 
 void RoadScale::rescale(double factor) {
   filter_.shift(-std::log(factor));
+  path_.rescale(factor);
   for (Past& past : past_) {
     past.now_from_past.translation *= factor;
   }
@@ -31,6 +37,7 @@ void RoadScale::rescale(double factor) {
 void RoadScale::restart() {
   filter_.restart();
   past_.clear();
+  path_.restart();
   frames_unmeasured_ = 0;
 }
 
@@ -57,22 +64,16 @@ const RoadScale::Past* RoadScale::pick_past() const {
 
 RoadPrior RoadScale::make_prior(const Rigid3& motion) const {
   RoadPrior prior;
-  const double length = motion.translation.norm();
+  prior.roll_sigma = options_.roll_sigma_rad;
   prior.log_scale = filter_.log_scale();
   prior.log_scale_sigma = std::max(kMinPriorSigma, filter_.sigma());
   if (!filter_.is_initialized()) {
-    prior.log_scale = std::log(kTypicalStep_m / length);
+    prior.log_scale = std::log(kTypicalStep_m / motion.translation.norm());
     prior.log_scale_sigma = RoadFilter::kUnknownSigma;
   } else if (frames_unmeasured_ >= kFramesUntilSearch) {
     prior.log_scale_sigma = std::max(prior.log_scale_sigma, kSearchSigma);
   }
-  // A car drives along the road, whatever the pitch of its camera: the plane's horizon goes through
-  // the point it drives to, but for its bouncing and the road's curvature.
-  const Eigen::Vector3d& t = motion.translation;
-  if (t.z() < -0.5 * length) {
-    prior.slope_rad = t.y() / t.z();
-    prior.slope_sigma = options_.slope_sigma;
-  }
+  path_.predict(std::exp(prior.log_scale), prior);
   return prior;
 }
 
@@ -83,17 +84,43 @@ void RoadScale::remember(RoadPicture picture) {
   }
 }
 
-RoadScaleEstimate RoadScale::estimate() const {
-  RoadScaleEstimate result;
-  result.is_initialized = filter_.is_initialized();
-  result.metres_per_unit = std::exp(filter_.log_scale());
-  result.sigma = filter_.sigma();
-  return result;
+bool RoadScale::measure(const Past& past, const RoadPicture& picture, RoadScaleEstimate& result) {
+  const Rigid3& motion = past.now_from_past;
+  RoadPrior prior = make_prior(motion);
+  if (options_.use_dense) {
+    result.dense = dense_.measure(past.picture, picture, motion, prior);
+  }
+  if (options_.use_points) {
+    if (result.dense.is_valid) {
+      prior.log_scale = result.dense.log_scale;  // where to look, not what to find
+    }
+    result.points = points_.measure(past.picture, picture, motion, prior);
+  }
+  // What they share (the same road, not quite as the model) is the filter's flatness_sigma.
+  double weight = 0.0;
+  double sum = 0.0;
+  for (const RoadMeasurement* road : {&result.dense, &result.points}) {
+    if (road->is_valid) {
+      weight += 1.0 / (road->sigma * road->sigma);
+      sum += road->log_scale / (road->sigma * road->sigma);
+    }
+  }
+  if (!(weight > 0.0)) {
+    result.reason = options_.use_dense ? result.dense.reason : result.points.reason;
+    return false;
+  }
+  if (!filter_.update(sum / weight, 1.0 / std::sqrt(weight))) {
+    result.reason = "differs from the frames before";
+    return false;
+  }
+  return true;
 }
 
 RoadScaleEstimate RoadScale::update(const ChannelImage& image, const Rigid3& cur_from_prev) {
   if (!cur_from_prev.matrix().allFinite()) {
     restart();
+  } else if (!past_.empty()) {
+    path_.move(cur_from_prev);
   }
   RoadPicture picture = make_road_picture(image, camera_);
   for (Past& past : past_) {
@@ -101,27 +128,20 @@ RoadScaleEstimate RoadScale::update(const ChannelImage& image, const Rigid3& cur
   }
   RoadScaleEstimate result;
   const Past* past = pick_past();
-  if (past == nullptr) {
-    const bool is_first = past_.empty();
-    result = estimate();
-    result.reason = is_first ? "first frame" : "standing still";
-    if (is_first) {
-      remember(std::move(picture));
-    }
-    return result;
+  if (past != nullptr) {
+    filter_.predict();
+    result.is_measured = measure(*past, picture, result);
+    frames_unmeasured_ = result.is_measured ? 0 : frames_unmeasured_ + 1;
+    remember(std::move(picture));
+  } else if (past_.empty()) {
+    result.reason = "first frame";
+    remember(std::move(picture));
+  } else {
+    result.reason = "standing still";
   }
-  filter_.predict();
-  const Rigid3& motion = past->now_from_past;
-  const RoadMeasurement dense = dense_.measure(past->picture, picture, motion, make_prior(motion));
-  const bool is_measured = dense.is_valid && filter_.update(dense.log_scale, dense.sigma);
-  frames_unmeasured_ = is_measured ? 0 : frames_unmeasured_ + 1;
-  remember(std::move(picture));
-  result = estimate();
-  result.is_measured = is_measured;
-  result.dense = dense;
-  if (!is_measured) {
-    result.reason = dense.is_valid ? "differs from the frames before" : dense.reason;
-  }
+  result.is_initialized = filter_.is_initialized();
+  result.metres_per_unit = std::exp(filter_.log_scale());
+  result.sigma = filter_.sigma();
   return result;
 }
 

@@ -6,7 +6,9 @@
 
 #include "odometry/road_dense.hpp"
 #include "odometry/road_filter.hpp"
+#include "odometry/road_path.hpp"
 #include "odometry/road_picture.hpp"
+#include "odometry/road_points.hpp"
 #include "odometry/road_types.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
@@ -20,7 +22,8 @@ struct RoadScaleEstimate {
   double sigma = 0.0;            ///< of log(metres_per_unit)
   bool is_initialized = false;   ///< a road was seen since the start (or since restart())
   bool is_measured = false;      ///< this frame's road was measured and believed
-  RoadMeasurement dense;
+  RoadMeasurement dense;         ///< by direct alignment
+  RoadMeasurement points;        ///< by tracked corners
   std::string_view reason = "";  ///< where is_measured is false
 };
 
@@ -46,12 +49,15 @@ class RoadScale {
   [[nodiscard]] const Past* pick_past() const;
   [[nodiscard]] RoadPrior make_prior(const Rigid3& motion) const;
   void remember(RoadPicture picture);
-  [[nodiscard]] RoadScaleEstimate estimate() const;
+  /// Both estimators, joined and given to the filter.
+  bool measure(const Past& past, const RoadPicture& picture, RoadScaleEstimate& result);
 
   RoadOptions options_;
   Camera camera_;
   RoadDense dense_;
+  RoadPoints points_;
   RoadFilter filter_;
+  RoadPath path_;
   std::deque<Past> past_;  ///< newest first
   int frames_unmeasured_ = 0;
 };

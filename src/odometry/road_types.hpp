@@ -16,22 +16,42 @@ struct RoadOptions {
   double half_width_m = 1.6;         ///< of the strip of road that is looked at
   double far_m = 22.0;               ///< its far end; the near end is the picture's
   double rotation_sigma_rad = 2e-4;  ///< of the given motion's rotation, per axis
-  double convergence = 1e-3;         ///< relative change of the plane that ends the refinement
-  double slope_sigma = 0.003;        ///< of the road against the direction of travel
-  double flatness_sigma = 0.03;      ///< error of log_scale that neighbouring frames share
-  double drift_sigma = 0.002;        ///< of log(metres per unit), per frame
-  double min_baseline_m = 0.4;       ///< pairs of frames are taken this far apart
+
+  // The road's profile, from the path that was driven (RoadPath).
+  double heave_sigma_m = 0.03;         ///< of the camera's height above the road
+  double bend_sigma_per_m = 1e-3;      ///< of half the road's vertical curvature
+  double path_m = 15.0;                ///< as far back as the path is used
+  double free_slope_sigma_rad = 0.03;  ///< of the camera's pitch against an unknown road
+  double roll_sigma_rad = 0.03;
+
+  // Which pairs of frames, which estimators.
+  double min_baseline_m = 0.4;  ///< of a pair of frames, if any in memory is that far away
   int max_frames_apart = 4;
+  bool use_dense = true;
+  bool use_points = true;
+
+  // Joining over time.
+  double flatness_sigma = 0.03;  ///< error of log_scale that both estimators and neighbours share
+  double drift_sigma = 0.002;    ///< of log(metres per unit), per frame
+
+  // The estimators.
+  double convergence = 3e-3;       ///< relative change of the plane that ends the refinement
+  int max_points = 100;            ///< corners tracked on the road
+  double corner_quality = 0.0005;  ///< of the best corner: asphalt is faint
+  double corner_distance_px = 8.0;
+  double max_loop_px = 0.3;      ///< forward and back again
+  double max_off_line_px = 0.7;  ///< from the epipolar line of the given motion
 };
 
-/// What is believed of the road before a pair of frames is looked at. The plane is that of the
-/// *current* camera: points X with (-roll, 1, -slope) . X = height (both small),
-/// that is y = height + slope * z + roll * x.
+/// What is believed of the road before a pair of frames is looked at, in the *current* camera:
+/// y = height + slope * z + roll * x + drop * z^2 / height, metres.
 struct RoadPrior {
   double log_scale = 0.0;        ///< see RoadMeasurement
-  double log_scale_sigma = 0.5;  ///< above ~0.05 the estimators search first
+  double log_scale_sigma = 0.5;  ///< above 0.05 the scale is searched first
   double slope_rad = 0.0;        ///< > 0: the ground falls away from the optical axis
-  double slope_sigma = 0.03;
+  double drop = 0.0;             ///< height * half the vertical curvature; > 0: over a crest
+  /// Inverse covariance of (slope_rad, drop).
+  Eigen::Matrix2d profile_information = Eigen::Vector2d(1e3, 1e8).asDiagonal();
   double roll_rad = 0.0;
   double roll_sigma = 0.03;
 };
@@ -40,13 +60,18 @@ struct RoadPrior {
 struct RoadMeasurement {
   bool is_valid = false;
   double log_scale = 0.0;  ///< log(metres / unit of the given translation)
-  double sigma = 0.0;      ///< of log_scale
+  double sigma = 0.0;      ///< of log_scale, for a road as smooth as the model
   double slope_rad = 0.0;
   double roll_rad = 0.0;
+  double drop = 0.0;
   int num_points = 0;            ///< tracks or tiles that agreed
   double quality = 0.0;          ///< correlation (dense) or share of inliers (points), 0..1
   std::string_view reason = "";  ///< why it is not valid
 };
+
+/// A ray only touches the road where 1 - 4 drop |m|^2 / (m . ray)^2 is 0; nearer to it than this,
+/// it is as good as behind the crest.
+inline constexpr double kMinRoadRoot = 0.1;
 
 /// The plane as m = n / d: m . X = 1 for its points X in the camera, in units of the translation.
 [[nodiscard]] inline Eigen::Vector3d road_plane(double log_scale,

@@ -10,6 +10,8 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "odometry/road_picture.hpp"
+#include "odometry/road_types.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
 #include "stemvo/stem/channel.hpp"
@@ -107,6 +109,38 @@ inline cv::Mat render_road(const RoadScene& scene,
     }
   }
   return picture;
+}
+
+/// Two pictures of a scene; the camera drove `step_m` along the road, and turned.
+struct RoadPair {
+  RoadPicture prev;
+  RoadPicture cur;
+  Rigid3 cur_from_prev;  ///< metres
+};
+
+inline RoadPair render_pair(const RoadScene& scene, double step_m, double yaw_rad = 0.0) {
+  const Eigen::Vector3d forward =
+      Eigen::Vector3d(-0.5 * yaw_rad, scene.slope_rad, 1.0).normalized() * step_m;
+  RoadPair pair;
+  pair.cur_from_prev = {so3_exp({0.0, -yaw_rad, 0.0}), -forward};
+  const Rigid3 prev_from_cur = pair.cur_from_prev.inverse();
+  pair.prev = make_road_picture({render_road(scene, prev_from_cur, 1), {}}, scene.camera);
+  pair.cur = make_road_picture({render_road(scene, Rigid3{}, 2), {}}, scene.camera);
+  return pair;
+}
+
+/// The motion in units that are 1 / metres_per_unit long.
+inline Rigid3 in_units(Rigid3 motion, double metres_per_unit) {
+  motion.translation /= metres_per_unit;
+  return motion;
+}
+
+/// Belief that the unit is that long, to 3 %; nothing about the road.
+inline RoadPrior near(double metres_per_unit) {
+  RoadPrior prior;
+  prior.log_scale = std::log(metres_per_unit);
+  prior.log_scale_sigma = 0.03;
+  return prior;
 }
 
 }  // namespace stemvo::testing

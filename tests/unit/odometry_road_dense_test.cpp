@@ -12,38 +12,11 @@
 namespace stemvo {
 namespace {
 
+using testing::in_units;
+using testing::near;
+using testing::render_pair;
+using testing::RoadPair;
 using testing::RoadScene;
-
-/// Two pictures of a scene; the camera drove `step_m` along the road, and turned.
-struct Pair {
-  RoadPicture prev;
-  RoadPicture cur;
-  Rigid3 cur_from_prev;  ///< metres
-};
-
-Pair render_pair(const RoadScene& scene, double step_m, double yaw_rad = 0.0) {
-  const Eigen::Vector3d forward =
-      Eigen::Vector3d(-0.5 * yaw_rad, scene.slope_rad, 1.0).normalized() * step_m;
-  Pair pair;
-  pair.cur_from_prev = {so3_exp({0.0, -yaw_rad, 0.0}), -forward};
-  const Rigid3 prev_from_cur = pair.cur_from_prev.inverse();
-  pair.prev = make_road_picture({testing::render_road(scene, prev_from_cur, 1), {}}, scene.camera);
-  pair.cur = make_road_picture({testing::render_road(scene, Rigid3{}, 2), {}}, scene.camera);
-  return pair;
-}
-
-/// The motion in units that are 1 / metres_per_unit long.
-Rigid3 in_units(Rigid3 motion, double metres_per_unit) {
-  motion.translation /= metres_per_unit;
-  return motion;
-}
-
-RoadPrior near(double metres_per_unit) {
-  RoadPrior prior;
-  prior.log_scale = std::log(metres_per_unit);
-  prior.log_scale_sigma = 0.03;
-  return prior;
-}
 
 struct PlaneCase {
   double height_m;
@@ -61,7 +34,7 @@ TEST_P(RoadDensePlane, FindsThePlantedPlane) {
   scene.slope_rad = c.slope_rad;
   scene.roll_rad = c.roll_rad;
   scene.noise_gray = 1.0;
-  const Pair pair = render_pair(scene, c.step_m, c.yaw_rad);
+  const RoadPair pair = render_pair(scene, c.step_m, c.yaw_rad);
   RoadOptions options;
   options.camera_height_m = c.height_m;
   RoadPrior prior = near(2.0 * 1.02);  // 2 % off
@@ -87,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(Planes,
 
 TEST(RoadDense, FindsAnUnknownScale) {
   const RoadScene scene;
-  const Pair pair = render_pair(scene, 1.1);
+  const RoadPair pair = render_pair(scene, 1.1);
   RoadPrior prior;
   prior.log_scale = std::log(0.8);
   prior.log_scale_sigma = 1.0;
@@ -100,7 +73,7 @@ TEST(RoadDense, FindsAnUnknownScale) {
 
 TEST(RoadDense, SmallErrorsOfTheGivenRotationAreTakenUp) {
   const RoadScene scene;
-  const Pair pair = render_pair(scene, 0.8);
+  const RoadPair pair = render_pair(scene, 0.8);
   Rigid3 motion = pair.cur_from_prev;
   motion.rotation = so3_exp({2e-4, -2e-4, 1e-4}) * motion.rotation;
   RoadOptions options;
@@ -117,7 +90,7 @@ TEST(RoadDense, SmallErrorsOfTheGivenRotationAreTakenUp) {
 TEST(RoadDense, ACarAheadThatCoversHalfOfTheStripIsLeftOut) {
   RoadScene scene;
   scene.is_covered = [](int u, int v) { return u > 320 && u < 480 && v > 110 && v < 230; };
-  const Pair pair = render_pair(scene, 0.8);
+  const RoadPair pair = render_pair(scene, 0.8);
   const RoadMeasurement road =
       RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
   ASSERT_TRUE(road.is_valid) << road.reason;
@@ -127,7 +100,7 @@ TEST(RoadDense, ACarAheadThatCoversHalfOfTheStripIsLeftOut) {
 TEST(RoadDense, AKerbAtTheSideCostsLittle) {
   RoadScene scene;
   scene.bump = [](double x, double /*z*/) { return x > 1.1 ? 0.12 : 0.0; };
-  const Pair pair = render_pair(scene, 0.8);
+  const RoadPair pair = render_pair(scene, 0.8);
   const RoadMeasurement road =
       RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
   ASSERT_TRUE(road.is_valid) << road.reason;
@@ -138,17 +111,17 @@ TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
   const RoadDense dense{RoadOptions{}};
   RoadScene blank;
   blank.has_road = false;
-  const Pair plain = render_pair(blank, 0.8);
+  const RoadPair plain = render_pair(blank, 0.8);
   const RoadMeasurement no_texture =
       dense.measure(plain.prev, plain.cur, plain.cur_from_prev, near(1.0));
   EXPECT_FALSE(no_texture.is_valid);
   EXPECT_EQ(no_texture.reason, "nothing moves like a road");
 
   blank.noise_gray = 20.0;  // two pictures that have nothing to do with each other
-  const Pair noise = render_pair(blank, 0.8);
+  const RoadPair noise = render_pair(blank, 0.8);
   EXPECT_FALSE(dense.measure(noise.prev, noise.cur, noise.cur_from_prev, near(1.0)).is_valid);
 
-  const Pair road = render_pair(RoadScene{}, 0.8);
+  const RoadPair road = render_pair(RoadScene{}, 0.8);
   EXPECT_EQ(dense.measure(road.prev, road.cur, Rigid3{}, near(1.0)).reason, "no motion");
   Rigid3 bad = road.cur_from_prev;
   bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
@@ -166,7 +139,7 @@ TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
 
 TEST(RoadDense, APictureOfHalfTheSizeGivesTheSameScale) {
   const RoadScene scene;
-  Pair pair = render_pair(scene, 0.8);
+  RoadPair pair = render_pair(scene, 0.8);
   const auto halve = [&](const RoadPicture& full) {
     ChannelImage image;
     cv::resize(full.pixels, image.pixels, {}, 0.5, 0.5, cv::INTER_AREA);
@@ -185,7 +158,7 @@ TEST(RoadDense, SameBytesForAnyNumberOfThreads) {
   std::vector<RoadMeasurement> results;
   for (const int n : {1, 4}) {
     cv::setNumThreads(n);
-    const Pair pair = render_pair(RoadScene{}, 0.8);
+    const RoadPair pair = render_pair(RoadScene{}, 0.8);
     results.push_back(
         RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.02)));
   }

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "odometry/road_filter.hpp"
+#include "odometry/road_path.hpp"
 #include "odometry/road_region.hpp"
 #include "odometry/road_scale.hpp"
 #include "support/road_scene.hpp"
@@ -73,6 +74,38 @@ TEST(RoadRegion, FollowsTheTurn) {
   EXPECT_GT(at(4.0, 10.0).x(), 1.0);
   EXPECT_FALSE(region.contains(at(0.0, 14.0)));
   EXPECT_FALSE(region.contains(region.on_ground({0.0, -0.1})));
+}
+
+TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
+  RoadOptions options;
+  options.heave_sigma_m = 0.01;
+  const double units_per_m = 0.25;
+  const double pitch_rad = 0.02;  // of the camera, looking up
+  const double bend_per_m = 4e-4;
+  // Along y = bend z^2 (over a crest), in steps of 0.8 m.
+  const auto place = [&](double z) {
+    return Rigid3(so3_exp({pitch_rad - 2.0 * bend_per_m * z, 0.0, 0.0}),
+                  Eigen::Vector3d(0.0, bend_per_m * z * z, z) * units_per_m);
+  };
+  RoadPath path(options);
+  for (double z = -40.0; z < -0.4; z += 0.8) {
+    path.move(place(z + 0.8).inverse() * place(z));
+  }
+  RoadPrior prior;
+  path.predict(1.0 / units_per_m, prior);
+  EXPECT_NEAR(prior.slope_rad, pitch_rad, 1e-3);
+  EXPECT_NEAR(prior.drop, bend_per_m * options.camera_height_m, 1e-4);
+  EXPECT_GT(prior.profile_information(0, 0), 1e4);
+
+  RoadPath fresh(options);
+  fresh.predict(1.0, prior);
+  EXPECT_EQ(prior.slope_rad, 0.0);
+  EXPECT_EQ(prior.drop, 0.0);
+  EXPECT_LT(prior.profile_information(0, 0), 1e4);
+  path.rescale(2.0);
+  RoadPrior rescaled;
+  path.predict(0.5 / units_per_m, rescaled);
+  EXPECT_NEAR(rescaled.slope_rad, pitch_rad, 1e-3);
 }
 
 /// Drives straight ahead over asphalt, 0.7 m a frame; the map's unit is 1 / kMetresPerUnit long.
@@ -147,6 +180,37 @@ TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
   EXPECT_GT(lost.sigma, seen.sigma);
   drive.next(scale);
   EXPECT_TRUE(drive.next(scale).is_measured);
+}
+
+/// Error of log(metres per unit) after a drive over a crest, y = bend z^2, that ends at its top.
+double error_on_a_crest(const RoadOptions& options) {
+  constexpr double kBend_per_m = 8e-4;
+  constexpr int kFrames = 15;
+  constexpr double kCrestStep_m = 1.1;
+  RoadScene scene;
+  scene.bump = [](double /*x*/, double z) { return -kBend_per_m * z * z; };
+  const auto first_from_camera = [](int frame) {
+    const double z = kCrestStep_m * (frame - kFrames);
+    return Rigid3(so3_exp({-2.0 * kBend_per_m * z, 0.0, 0.0}), {0.0, kBend_per_m * z * z, z});
+  };
+  RoadScale scale(options, scene.camera);
+  RoadScaleEstimate estimate;
+  for (int frame = 0; frame <= kFrames; ++frame) {
+    const Rigid3 camera_from_first = first_from_camera(frame).inverse();
+    const cv::Mat picture =
+        testing::render_road(scene, camera_from_first, static_cast<std::uint64_t>(frame));
+    estimate = scale.update({picture, {}}, camera_from_first * first_from_camera(frame - 1));
+  }
+  EXPECT_TRUE(estimate.is_measured) << estimate.reason;
+  return std::log(estimate.metres_per_unit);
+}
+
+TEST(RoadScale, ACrestIsNoBiasBecauseThePathTellsTheBend) {
+  EXPECT_NEAR(error_on_a_crest(RoadOptions{}), 0.0, 0.012);
+  RoadOptions flat;  // a plane, as if roads did not bend
+  flat.path_m = 0.0;
+  flat.bend_sigma_per_m = 1e-7;
+  EXPECT_GT(std::abs(error_on_a_crest(flat)), 0.03);
 }
 
 TEST(RoadScale, ANonsenseMotionOrARestartForgetsTheUnit) {

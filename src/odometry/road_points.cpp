@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road_points.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "odometry/road_normal.hpp"
+#include "odometry/road_region.hpp"
+
+namespace stemvo {
+
+namespace {
+
+constexpr int kMinPoints = 12;
+constexpr int kFitIterations = 8;
+constexpr double kTukey = 4.0;         ///< standard deviations
+constexpr double kMinNoise_px = 0.05;  ///< no track is better than this
+/// Wide and flat: texture on the road is stretched across the picture.
+const cv::Size kWindow(31, 15);
+constexpr int kPyramidLevel = 0;  ///< the predicted plane has taken most of the motion away
+constexpr double kMinEigenvalue = 1e-5;
+constexpr double kMinInlierShare = 0.3;
+constexpr double kMaxSigma = 0.2;
+constexpr int kBorder_px = 24;  ///< room for the tracker's window around the strip
+
+/// Where the strip of road is in the current picture, and the corners in it.
+struct Strip {
+  cv::Rect box;
+  std::vector<cv::Point2f> corners;  ///< in the box
+};
+
+Strip find_strip(const RoadPicture& cur, const RoadRegion& region, const RoadOptions& options) {
+  Strip strip;
+  const std::vector<RoadRegion::Sample> samples =
+      region.samples(cur.camera, cur.levels[0].first_row, 4);
+  cv::Mat mask = cv::Mat::zeros(cur.pixels.size(), CV_8U);
+  cv::Point low(cur.pixels.cols, cur.pixels.rows);
+  cv::Point high(0, 0);
+  for (const RoadRegion::Sample& sample : samples) {
+    mask(cv::Rect(sample.u, sample.v, 4, 4) & cv::Rect({}, mask.size())).setTo(255);
+    low = {std::min(low.x, sample.u), std::min(low.y, sample.v)};
+    high = {std::max(high.x, sample.u), std::max(high.y, sample.v)};
+  }
+  strip.box =
+      cv::Rect(low - cv::Point(kBorder_px, kBorder_px), high + cv::Point(kBorder_px, kBorder_px)) &
+      cv::Rect({}, cur.pixels.size());
+  if (samples.empty() || strip.box.area() == 0) {
+    return {};
+  }
+  cv::goodFeaturesToTrack(cur.pixels(strip.box), strip.corners, options.max_points,
+                          options.corner_quality, options.corner_distance_px, mask(strip.box));
+  return strip;
+}
+
+/// A corner of the current picture, found again in the previous one.
+struct Track {
+  Eigen::Vector3d ray;  ///< in the current camera, z = 1
+  Eigen::Vector2d prev_uv;
+};
+
+/// How far a track is from where the warp puts it, along its epipolar line and across.
+struct Residual {
+  double along_px = 0.0;
+  double across_px = 0.0;
+  RoadVector jacobian = RoadVector::Zero();  ///< of along_px
+  bool is_valid = false;
+};
+
+Residual residual_of(const Track& track, const RoadWarp& warp, const Camera& camera) {
+  Residual result;
+  const double q = warp.inverse_depth(track.ray);
+  const Eigen::Vector3d p = warp.rotation() * track.ray + q * warp.translation;
+  if (!(q > 0.0 && p.z() > 1e-6)) {
+    return result;
+  }
+  Eigen::Matrix<double, 2, 3> project;
+  project << camera.fx_px, 0.0, -camera.fx_px * p.x() / p.z(), 0.0, camera.fy_px,
+      -camera.fy_px * p.y() / p.z();
+  project /= p.z();
+  const Eigen::Vector2d line = (project * warp.translation).normalized();
+  const Eigen::Vector2d error = camera.project(p) - track.prev_uv;
+  result.along_px = line.dot(error);
+  result.across_px = line.x() * error.y() - line.y() * error.x();
+  const Eigen::RowVector3d g = line.transpose() * project;
+  const double by_q = g.dot(warp.translation);
+  result.jacobian.head<3>() = by_q * track.ray;
+  result.jacobian[3] = -by_q * warp.plane.squaredNorm() / warp.plane.dot(track.ray);
+  result.jacobian.tail<3>() = p.cross(g.transpose());  // of exp(w) p
+  result.is_valid = std::isfinite(result.along_px);
+  return result;
+}
+
+/// The homography of the predicted plane, from the strip's pixels to the previous picture's.
+cv::Matx33d strip_homography(const Camera& camera, const Strip& strip, const RoadWarp& warp) {
+  const Eigen::Matrix3d k = camera.matrix();
+  const Eigen::Matrix3d h =
+      k * (warp.rotation() + warp.translation * warp.plane.transpose()) * k.inverse();
+  cv::Matx33d map;
+  for (int i = 0; i < 9; ++i) {
+    map(i / 3, i % 3) = h(i / 3, i % 3);
+  }
+  return map * cv::Matx33d(1, 0, strip.box.x, 0, 1, strip.box.y, 0, 0, 1);
+}
+
+/// Tracks from the current picture into the previous one, seen through the predicted plane.
+std::vector<Track> track_corners(const RoadPicture& prev,
+                                 const RoadPicture& cur,
+                                 const Strip& strip,
+                                 const RoadWarp& warp,
+                                 const RoadOptions& options) {
+  const cv::Matx33d map = strip_homography(cur.camera, strip, warp);
+  cv::Mat warped;
+  cv::warpPerspective(prev.pixels, warped, map, strip.box.size(),
+                      cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  const cv::Mat picture = cur.pixels(strip.box).clone();
+  std::vector<cv::Point2f> there = strip.corners;
+  std::vector<cv::Point2f> back = strip.corners;
+  std::vector<std::uint8_t> found;
+  std::vector<std::uint8_t> found_back;
+  const auto follow = [](const cv::Mat& from, const cv::Mat& to, const auto& points, auto& ends,
+                         auto& ok) {
+    const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.01);
+    cv::calcOpticalFlowPyrLK(from, to, points, ends, ok, cv::noArray(), kWindow, kPyramidLevel,
+                             stop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  };
+  follow(picture, warped, strip.corners, there, found);
+  follow(warped, picture, there, back, found_back);
+  std::vector<Track> tracks;
+  for (std::size_t i = 0; i < strip.corners.size(); ++i) {
+    const cv::Point2f corner = strip.corners[i];
+    const cv::Point2f loop = back[i] - corner;
+    const cv::Vec3d in_prev = map * cv::Vec3d(there[i].x, there[i].y, 1.0);
+    if (found[i] == 0 || found_back[i] == 0 || !(in_prev[2] > 1e-6) ||
+        !(std::hypot(loop.x, loop.y) <= options.max_loop_px)) {
+      continue;
+    }
+    const Track track{
+        cur.camera.normalize({corner.x + strip.box.x, corner.y + strip.box.y}).homogeneous(),
+        {in_prev[0] / in_prev[2], in_prev[1] / in_prev[2]}};
+    const Residual residual = residual_of(track, warp, cur.camera);
+    if (residual.is_valid && std::abs(residual.across_px) <= options.max_off_line_px) {
+      tracks.push_back(track);
+    }
+  }
+  return tracks;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Fit {
+  RoadMatrix covariance = RoadMatrix::Zero();
+  int num_inliers = 0;
+  bool is_valid = false;
+};
+
+/// Reweighted Gauss-Newton from the predicted plane: Tukey's weights, their width from the median
+/// residual (it shrinks as the fit improves).
+Fit fit_road(const std::vector<Track>& tracks,
+             const Camera& camera,
+             const RoadPrior& prior,
+             const RoadOptions& options,
+             RoadWarp& warp) {
+  Fit fit;
+  std::vector<Residual> residuals(tracks.size());
+  std::vector<double> sizes(tracks.size());
+  for (int iteration = 0; iteration < kFitIterations; ++iteration) {
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      residuals[i] = residual_of(tracks[i], warp, camera);
+      sizes[i] = residuals[i].is_valid ? std::abs(residuals[i].along_px) : 1e6;
+    }
+    const double noise_px = std::max(kMinNoise_px, 1.4826 * median(sizes));
+    RoadNormal normal;
+    fit.num_inliers = 0;
+    for (std::size_t i = 0; i < tracks.size(); ++i) {
+      const double share = sizes[i] / (kTukey * noise_px);
+      if (!(share < 1.0)) {
+        continue;
+      }
+      ++fit.num_inliers;
+      const double root = (1.0 - share * share) / noise_px;
+      const RoadVector& j = residuals[i].jacobian;
+      normal.information += root * root * j * j.transpose();
+      normal.gradient += root * root * residuals[i].along_px * j;
+    }
+    normal.add_prior(warp, prior, options.rotation_sigma_rad);
+    if (!normal.step(warp)) {
+      return fit;
+    }
+    fit.covariance = normal.covariance;
+  }
+  fit.is_valid = true;
+  return fit;
+}
+
+}  // namespace
+
+RoadMeasurement RoadPoints::measure(const RoadPicture& prev,
+                                    const RoadPicture& cur,
+                                    const Rigid3& cur_from_prev,
+                                    const RoadPrior& prior) const {
+  if (!is_motion(cur_from_prev)) {
+    return no_road("no motion");
+  }
+  if (cur.levels.empty() || cur.levels[0].values.empty() ||
+      prev.pixels.size() != cur.pixels.size()) {
+    return no_road("the picture ends above the road");
+  }
+  const RoadRegion region(cur_from_prev, prior, options_);
+  const Strip strip = find_strip(cur, region, options_);
+  if (static_cast<int>(strip.corners.size()) < kMinPoints) {
+    return no_road("no corners on the road");
+  }
+  RoadWarp warp(cur_from_prev, prior, options_.camera_height_m);
+  const std::vector<Track> tracks = track_corners(prev, cur, strip, warp, options_);
+  if (static_cast<int>(tracks.size()) < kMinPoints) {
+    return no_road("no tracks on the road");
+  }
+  const Fit fit = fit_road(tracks, cur.camera, prior, options_, warp);
+  if (!fit.is_valid) {
+    return no_road("no plane through the points");
+  }
+  RoadMeasurement result = read_road(warp, fit.covariance, options_.camera_height_m);
+  result.num_points = fit.num_inliers;
+  result.quality = static_cast<double>(fit.num_inliers) / static_cast<double>(tracks.size());
+  result.is_valid = fit.num_inliers >= kMinPoints && result.quality >= kMinInlierShare &&
+                    result.sigma < kMaxSigma;
+  result.reason = result.is_valid ? "" : "the points are on no common plane";
+  return result;
+}
+
+}  // namespace stemvo
