@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/landmarks.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "stemvo/geometry/triangulation.hpp"
+
+namespace stemvo {
+namespace {
+
+struct View {
+  const Keyframe* keyframe;
+  const MapObservation* observation;
+};
+
+std::vector<View> views_of(const LocalMap& map, int track_id) {
+  std::vector<View> views;
+  for (const Keyframe& keyframe : map.keyframes) {
+    if (const MapObservation* observation = find_observation(keyframe, track_id)) {
+      views.push_back({&keyframe, observation});
+    }
+  }
+  return views;
+}
+
+bool is_seen_well(const Eigen::Vector3d& point_in_world,
+                  const View& view,
+                  const Camera& camera,
+                  double bound_px) {
+  const Eigen::Vector3d point = view.keyframe->world_from_camera.inverse() * point_in_world;
+  return point.z() > 0.0 && (camera.project(point) - view.observation->uv).norm() <= bound_px;
+}
+
+std::optional<Eigen::Vector3d> triangulate_views(const std::vector<View>& views,
+                                                 const Camera& camera,
+                                                 const LocalMapOptions& options) {
+  const View& first = views.front();
+  const View& last = views.back();
+  const Rigid3 last_from_first =
+      last.keyframe->world_from_camera.inverse() * first.keyframe->world_from_camera;
+  const TriangulatedPoint point =
+      triangulate(last_from_first, camera.normalize(first.observation->uv),
+                  camera.normalize(last.observation->uv));
+  const double max_cos = std::cos(options.min_parallax_deg * std::numbers::pi / 180.0);
+  if (!point.finite || !(point.cos_parallax < max_cos)) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d in_world = first.keyframe->world_from_camera * point.in_prev;
+  for (const View& view : views) {
+    if (!is_seen_well(in_world, view, camera, options.max_reprojection_error_px)) {
+      return std::nullopt;
+    }
+  }
+  return in_world;
+}
+
+}  // namespace
+
+void triangulate_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options) {
+  if (map.keyframes.size() < 2) {
+    return;
+  }
+  for (const MapObservation& observation : map.keyframes.back().observations) {
+    if (map.landmarks.contains(observation.track_id)) {
+      continue;
+    }
+    const std::vector<View> views = views_of(map, observation.track_id);
+    if (views.size() < 2) {
+      continue;
+    }
+    if (const auto point = triangulate_views(views, camera, options)) {
+      map.landmarks.emplace(observation.track_id, *point);
+    }
+  }
+}
+
+void cull_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options) {
+  std::erase_if(map.landmarks, [&](const auto& landmark) {
+    const auto& [track_id, point_in_world] = landmark;
+    for (const View& view : views_of(map, track_id)) {
+      if (!is_seen_well(point_in_world, view, camera, options.max_reprojection_error_px)) {
+        return true;
+      }
+    }
+    return false;
+  });
+}
+
+}  // namespace stemvo

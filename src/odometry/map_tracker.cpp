@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/map_tracker.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "odometry/landmarks.hpp"
+
+namespace stemvo {
+
+MapTracker::MapTracker(const Camera& camera, const MapTrackerOptions& options)
+    : camera_(camera), options_(options), last_step_(options.first_step) {}
+
+void MapTracker::add(const Matches& matches, const MeasuredMotion& motion) {
+  ++frame_;
+  if (map_.keyframes.empty()) {
+    // The frame before this one opens the map: it saw the same tracks.
+    Keyframe first{frame_ - 1, world_from_camera_, {}};
+    for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
+      if (motion.inlier_mask[i] != 0) {
+        first.observations.push_back({matches.track_ids[i], matches.prev_uv[i]});
+      }
+    }
+    add_keyframe(map_, std::move(first), options_.map);
+  }
+  const Rigid3 world_from_prev = world_from_camera_;
+  world_from_camera_ = place(matches, motion);
+  last_prev_from_cur_ = world_from_prev.inverse() * world_from_camera_;
+  if (last_prev_from_cur_.translation.norm() > 0.0) {
+    last_step_ = last_prev_from_cur_.translation.norm();
+  }
+  if (is_new_keyframe()) {
+    extend_map(matches, motion.inlier_mask);
+  }
+}
+
+Rigid3 MapTracker::place(const Matches& matches, const MeasuredMotion& motion) {
+  const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
+  const Rigid3 guess =
+      world_from_camera_ * Rigid3(prev_from_cur.rotation, last_step_ * prev_from_cur.translation);
+  if (!(prev_from_cur.translation.norm() > 0.0)) {
+    return guess;
+  }
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> uv;
+  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+    const auto landmark = map_.landmarks.find(matches.track_ids[i]);
+    if (motion.inlier_mask[i] != 0 && landmark != map_.landmarks.end()) {
+      points.push_back(landmark->second);
+      uv.push_back(matches.cur_uv[i]);
+    }
+  }
+  if (static_cast<int>(points.size()) < options_.min_landmarks) {
+    return guess;
+  }
+  const AbsolutePose pose =
+      refine_absolute_pose(guess.inverse(), points, uv, camera_, options_.pose);
+  return pose.num_inliers >= options_.min_landmarks ? pose.camera_from_world.inverse() : guess;
+}
+
+bool MapTracker::is_new_keyframe() const {
+  const Rigid3& last = map_.keyframes.back().world_from_camera;
+  return (world_from_camera_.translation - last.translation).norm() > 0.0;
+}
+
+void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_inlier) {
+  Keyframe keyframe{frame_, world_from_camera_, {}};
+  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+    if (is_inlier[i] != 0) {
+      keyframe.observations.push_back({matches.track_ids[i], matches.cur_uv[i]});
+    }
+  }
+  add_keyframe(map_, std::move(keyframe), options_.map);
+  triangulate_landmarks(map_, camera_, options_.map);
+  ++keyframes_since_refinement_;
+  if (options_.refine_every > 0 && keyframes_since_refinement_ >= options_.refine_every) {
+    keyframes_since_refinement_ = 0;
+    refine_window(map_, camera_, options_.refinement);
+    world_from_camera_ = map_.keyframes.back().world_from_camera;
+  }
+  cull_landmarks(map_, camera_, options_.map);
+}
+
+void MapTracker::rescale(double factor) {
+  const Eigen::Vector3d center = world_from_camera_.translation;
+  const auto scaled = [&](const Eigen::Vector3d& point) -> Eigen::Vector3d {
+    return center + factor * (point - center);
+  };
+  for (Keyframe& keyframe : map_.keyframes) {
+    keyframe.world_from_camera.translation = scaled(keyframe.world_from_camera.translation);
+  }
+  for (auto& [track_id, point] : map_.landmarks) {
+    point = scaled(point);
+  }
+  last_prev_from_cur_.translation *= factor;
+  last_step_ *= factor;
+}
+
+}  // namespace stemvo

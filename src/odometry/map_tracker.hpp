@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "odometry/bundle_adjustment.hpp"
+#include "odometry/local_map.hpp"
+#include "odometry/two_view_estimator.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/geometry/absolute_pose.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+struct MapTrackerOptions {
+  LocalMapOptions map;
+  BundleAdjustmentOptions refinement;
+  AbsolutePoseOptions pose;
+  int refine_every = 1;     ///< keyframes between refinements, the paper's m; 0: never
+  int min_landmarks = 30;   ///< fewer in view: the two-frame motion is taken as it is
+  double first_step = 1.0;  ///< length of the first step, map units
+};
+
+/// Poses from a local map: each frame is placed against the landmarks, becomes a keyframe when it
+/// has moved, and the window is refined. Lengths are in map units.
+class MapTracker {
+ public:
+  MapTracker(const Camera& camera, const MapTrackerOptions& options);
+
+  /// A frame whose matches start at the last frame given. The two-frame motion brings inliers and
+  /// a first guess.
+  void add(const Matches& matches, const MeasuredMotion& motion);
+
+  [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
+  [[nodiscard]] const LocalMap& map() const { return map_; }
+  /// Multiplies every length around the last camera, which stays where it is.
+  void rescale(double factor);
+
+ private:
+  [[nodiscard]] Rigid3 place(const Matches& matches, const MeasuredMotion& motion);
+  [[nodiscard]] bool is_new_keyframe() const;
+  void extend_map(const Matches& matches, const std::vector<char>& is_inlier);
+
+  Camera camera_;
+  MapTrackerOptions options_;
+  LocalMap map_;
+  Rigid3 world_from_camera_;
+  Rigid3 last_prev_from_cur_;
+  double last_step_;
+  int frame_ = 0;
+  int keyframes_since_refinement_ = 0;
+};
+
+}  // namespace stemvo
