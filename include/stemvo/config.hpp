@@ -31,6 +31,7 @@ struct TwoViewOptions {
 
 /// Keys `odometry.*`.
 struct OdometryOptions {
+  std::string mode = "two_frame";     ///< `two_frame` chains pairs; `map` adds a local map
   std::string composition = "right";  ///< `right`: R_c R; `paper`: R R_c
   std::string gate = "translation";   ///< `translation`, `paper` (drops the rotation too), `off`
   int min_inliers = 20;               ///< fewer: the frame is lost
@@ -38,11 +39,19 @@ struct OdometryOptions {
   double min_parallax_px = 0.6;       ///< median rotation-free flow below it: creeping
 };
 
+/// Keys `refine.*`: bundle adjustment of the local map (odometry.mode: map).
+struct RefineOptions {
+  int every = 1;    ///< keyframes between refinements, the paper's m; 0: never
+  int window = 10;  ///< keyframes refined together
+  int max_iterations = 6;
+  double loss_px = 0.5;  ///< Cauchy scale on the reprojection error
+};
+
 /// Keys `scale.*`.
 struct ScaleOptions {
-  std::string source = "constant";  ///< `constant` or `ground_truth`
+  std::string source = "constant";  ///< `constant`, `camera_height` (mode map) or `ground_truth`
   double constant_m = 1.0;          ///< per frame
-  double camera_height_m = 1.65;    ///< recorded for later use by the metric scale
+  double camera_height_m = 1.65;    ///< above the road, for `camera_height`
 };
 
 /// The whole configuration. Defaults stand here, once; config/default.yaml is generated from them.
@@ -52,6 +61,7 @@ struct Config {
   FeatureOptions features;
   TwoViewOptions two_view;
   OdometryOptions odometry;
+  RefineOptions refine;
   ScaleOptions scale;
   EvaluationOptions evaluation;
   std::uint64_t seed = 1;

@@ -114,6 +114,9 @@ std::vector<Field> two_view_fields(TwoViewOptions& o) {
 
 std::vector<Field> odometry_fields(OdometryOptions& o) {
   return {
+      {"odometry", "mode", &o.mode, one_of({"two_frame", "map"}),
+       "two_frame: motions of pairs of frames are chained; map: each frame is placed against "
+       "landmarks of the last keyframes, which are refined together (needs features.method klt)"},
       {"odometry", "composition", &o.composition, one_of({"right", "paper"}),
        "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)"},
       {"odometry", "gate", &o.gate, one_of({"translation", "paper", "off"}),
@@ -126,12 +129,26 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
   };
 }
 
+std::vector<Field> refine_fields(RefineOptions& o) {
+  return {
+      {"refine", "every", &o.every, at_least(0),
+       "keyframes between refinements of the map, the paper's m; 0: never"},
+      {"refine", "window", &o.window, between(3, 100), "keyframes refined together"},
+      {"refine", "max_iterations", &o.max_iterations, between(1, 1000), "of one refinement"},
+      {"refine", "loss_px", &o.loss_px, above(0),
+       "reprojection error from which an observation is mistrusted, input pixels"},
+  };
+}
+
 std::vector<Field> scale_fields(ScaleOptions& o) {
   return {
-      {"scale", "source", &o.source, one_of({"constant", "ground_truth"}),
-       "length of a step: constant, or ground_truth (the paper's protocol; needs the pose file)"},
+      {"scale", "source", &o.source, one_of({"constant", "camera_height", "ground_truth"}),
+       "length of a step: constant (mode map: of the first one); camera_height, from the road "
+       "(mode "
+       "map); ground_truth, each output step rescaled (the paper's protocol; needs the pose file)"},
       {"scale", "constant_m", &o.constant_m, above(0), "metres per frame when constant"},
-      {"scale", "camera_height_m", &o.camera_height_m, above(0), "above the road; only recorded"},
+      {"scale", "camera_height_m", &o.camera_height_m, above(0),
+       "above the road, for camera_height"},
   };
 }
 
@@ -193,6 +210,7 @@ std::vector<Field> fields_of(Config& config) {
   append(feature_fields(config.features));
   append(two_view_fields(config.two_view));
   append(odometry_fields(config.odometry));
+  append(refine_fields(config.refine));
   append(scale_fields(config.scale));
   append(evaluation_fields(config.evaluation));
   append({{"", "seed", &config.seed, any(), "of every random number"}});

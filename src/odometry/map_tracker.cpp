@@ -11,27 +11,37 @@ namespace stemvo {
 MapTracker::MapTracker(const Camera& camera, const MapTrackerOptions& options)
     : camera_(camera), options_(options), last_step_(options.first_step) {}
 
-void MapTracker::add(const Matches& matches, const MeasuredMotion& motion) {
+void MapTracker::add(const Rigid3& world_from_prev,
+                     const Matches& matches,
+                     const MeasuredMotion& motion) {
   ++frame_;
+  const bool is_where_we_left =
+      world_from_camera_.translation == world_from_prev.translation &&
+      world_from_camera_.rotation.coeffs() == world_from_prev.rotation.coeffs();
+  if (!is_where_we_left) {
+    map_.clear();
+    world_from_camera_ = world_from_prev;
+  }
   if (map_.keyframes.empty()) {
-    // The frame before this one opens the map: it saw the same tracks.
-    Keyframe first{frame_ - 1, world_from_camera_, {}};
-    for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
-      if (motion.inlier_mask[i] != 0) {
-        first.observations.push_back({matches.track_ids[i], matches.prev_uv[i]});
-      }
-    }
-    add_keyframe(map_, std::move(first), options_.map);
+    open_map(matches, motion.inlier_mask);
   }
-  const Rigid3 world_from_prev = world_from_camera_;
   world_from_camera_ = place(matches, motion);
-  last_prev_from_cur_ = world_from_prev.inverse() * world_from_camera_;
-  if (last_prev_from_cur_.translation.norm() > 0.0) {
-    last_step_ = last_prev_from_cur_.translation.norm();
-  }
-  if (is_new_keyframe()) {
+  const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
+  last_step_ = step > 0.0 ? step : last_step_;
+  if (is_new_keyframe(motion)) {
     extend_map(matches, motion.inlier_mask);
   }
+}
+
+/// The frame before the first one given saw the same tracks.
+void MapTracker::open_map(const Matches& matches, const std::vector<char>& is_inlier) {
+  Keyframe first{frame_ - 1, world_from_camera_, {}};
+  for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
+    if (is_inlier[i] != 0) {
+      first.observations.push_back({matches.track_ids[i], matches.prev_uv[i]});
+    }
+  }
+  add_keyframe(map_, std::move(first), options_.map);
 }
 
 Rigid3 MapTracker::place(const Matches& matches, const MeasuredMotion& motion) {
@@ -58,9 +68,9 @@ Rigid3 MapTracker::place(const Matches& matches, const MeasuredMotion& motion) {
   return pose.num_inliers >= options_.min_landmarks ? pose.camera_from_world.inverse() : guess;
 }
 
-bool MapTracker::is_new_keyframe() const {
-  const Rigid3& last = map_.keyframes.back().world_from_camera;
-  return (world_from_camera_.translation - last.translation).norm() > 0.0;
+/// Frames without parallax to the one before tell nothing of depth.
+bool MapTracker::is_new_keyframe(const MeasuredMotion& motion) const {
+  return motion.state == FrameState::kTracking;
 }
 
 void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_inlier) {
@@ -81,8 +91,7 @@ void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_
   cull_landmarks(map_, camera_, options_.map);
 }
 
-void MapTracker::rescale(double factor) {
-  const Eigen::Vector3d center = world_from_camera_.translation;
+void MapTracker::rescale(double factor, const Eigen::Vector3d& center) {
   const auto scaled = [&](const Eigen::Vector3d& point) -> Eigen::Vector3d {
     return center + factor * (point - center);
   };
@@ -92,7 +101,7 @@ void MapTracker::rescale(double factor) {
   for (auto& [track_id, point] : map_.landmarks) {
     point = scaled(point);
   }
-  last_prev_from_cur_.translation *= factor;
+  world_from_camera_.translation = scaled(world_from_camera_.translation);
   last_step_ *= factor;
 }
 

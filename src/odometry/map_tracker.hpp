@@ -30,25 +30,28 @@ class MapTracker {
  public:
   MapTracker(const Camera& camera, const MapTrackerOptions& options);
 
-  /// A frame whose matches start at the last frame given. The two-frame motion brings inliers and
-  /// a first guess.
-  void add(const Matches& matches, const MeasuredMotion& motion);
+  /// A frame whose matches start at the frame of pose `world_from_prev`. The two-frame motion
+  /// brings inliers and a first guess. Where the pose is not the one left here (the frames between
+  /// were lost, or the caller moved it) the map starts anew from it.
+  void add(const Rigid3& world_from_prev, const Matches& matches, const MeasuredMotion& motion);
+  /// Nothing connects the next frame with the ones before.
+  void restart() { map_.clear(); }
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
   [[nodiscard]] const LocalMap& map() const { return map_; }
-  /// Multiplies every length around the last camera, which stays where it is.
-  void rescale(double factor);
+  /// Multiplies every length; `center` (in the world) stays where it is.
+  void rescale(double factor, const Eigen::Vector3d& center);
 
  private:
   [[nodiscard]] Rigid3 place(const Matches& matches, const MeasuredMotion& motion);
-  [[nodiscard]] bool is_new_keyframe() const;
+  void open_map(const Matches& matches, const std::vector<char>& is_inlier);
+  [[nodiscard]] bool is_new_keyframe(const MeasuredMotion& motion) const;
   void extend_map(const Matches& matches, const std::vector<char>& is_inlier);
 
   Camera camera_;
   MapTrackerOptions options_;
   LocalMap map_;
   Rigid3 world_from_camera_;
-  Rigid3 last_prev_from_cur_;
   double last_step_;
   int frame_ = 0;
   int keyframes_since_refinement_ = 0;

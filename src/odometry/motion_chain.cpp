@@ -45,7 +45,8 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
   const Eigen::Vector3d direction = prev_from_cur.translation;
   const int num_frames = frames_since_picture_ + 1;
-  const double full_step_m = scale_.constant_m * num_frames;
+  const bool is_step_known = motion.step > 0.0;
+  const double full_step_m = is_step_known ? motion.step : scale_.constant_m * num_frames;
   FrameState state = motion.state;
   if (state == FrameState::kTracking) {
     if (!passes_gate(direction, motion)) {
@@ -62,6 +63,10 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
       apply(prev_from_cur, full_step_m);
       break;
     case FrameState::kCreeping:
+      if (is_step_known) {  // placed against landmarks: the direction is measured too
+        apply(prev_from_cur, full_step_m);
+        break;
+      }
       // The flow is proportional to the step: a creeping frame moves by its share of a full one.
       apply({prev_from_cur.rotation, last_direction_},
             full_step_m * motion.parallax_px / options_.min_parallax_px);

@@ -25,6 +25,8 @@ class MotionChain {
   void extrapolate(bool has_picture);
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
+  /// Pose of the last picture: where the next motion starts.
+  [[nodiscard]] const Rigid3& world_from_picture() const { return world_from_picture_; }
   /// True until a first motion was measured with a direction of its own.
   [[nodiscard]] bool is_initializing() const { return is_initializing_; }
   [[nodiscard]] bool has_picture() const { return has_picture_; }

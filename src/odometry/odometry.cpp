@@ -2,8 +2,10 @@
 #include "stemvo/odometry/odometry.hpp"
 
 #include <chrono>
+#include <optional>
 #include <utility>
 
+#include "odometry/map_odometry.hpp"
 #include "odometry/motion_chain.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/check.hpp"
@@ -38,7 +40,11 @@ struct Odometry::Impl {
         stretch(config.stem),
         front_end(std::move(front_end_in)),
         estimator(config, camera_in),
-        chain(config.odometry, config.scale) {}
+        chain(config.odometry, config.scale) {
+    if (config.odometry.mode == "map") {
+      map.emplace(config, camera_in);
+    }
+  }
 
   Camera camera;
   std::uint64_t seed;
@@ -47,6 +53,7 @@ struct Odometry::Impl {
   std::unique_ptr<FrontEnd> front_end;
   TwoViewEstimator estimator;
   MotionChain chain;
+  std::optional<MapOdometry> map;
 
   ChannelImage image;
   Matches matches;
@@ -92,12 +99,19 @@ FrameResult Odometry::process(const cv::Mat& frame) {
 
   if (!self.chain.has_picture()) {
     self.chain.start();
+    if (self.map.has_value()) {
+      self.map->restart(self.image);
+    }
     result.world_from_camera = self.chain.world_from_camera();
     return result;
   }
   self.motion = self.estimator.measure(self.matches.prev_uv, self.matches.cur_uv,
                                        self.chain.is_initializing(), self.seed);
   self.front_end->keep(self.motion.inlier_mask);
+  if (self.map.has_value()) {
+    self.motion = self.map->refine(self.image, self.matches, self.chain.world_from_picture(),
+                                   std::move(self.motion));
+  }
   result.state = self.chain.add(self.motion);
   result.times.pose_ms = watch.lap_ms();
 

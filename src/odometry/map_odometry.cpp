@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/map_odometry.hpp"
+
+namespace stemvo {
+namespace {
+
+MapTrackerOptions tracker_options(const Config& config) {
+  MapTrackerOptions options;
+  options.map.num_keyframes = config.refine.window;
+  options.refine_every = config.refine.every;
+  options.refinement.loss_scale_px = config.refine.loss_px;
+  options.refinement.max_iterations = config.refine.max_iterations;
+  options.pose.loss_scale_px = config.refine.loss_px;
+  options.first_step = config.scale.constant_m;
+  return options;
+}
+
+}  // namespace
+
+MapOdometry::MapOdometry(const Config& config, const Camera& camera)
+    : tracker_(camera, tracker_options(config)) {
+  if (config.scale.source == "camera_height") {
+    RoadOptions options;
+    options.camera_height_m = config.scale.camera_height_m;
+    road_.emplace(options, camera);
+  }
+}
+
+void MapOdometry::restart(const ChannelImage& image) {
+  tracker_.restart();
+  if (road_.has_value()) {
+    road_->restart();
+    scale_sigma_ = road_->update(image, {}).sigma;
+  }
+}
+
+MeasuredMotion MapOdometry::refine(const ChannelImage& image,
+                                   const Matches& matches,
+                                   const Rigid3& world_from_prev,
+                                   MeasuredMotion motion) {
+  if (motion.state == FrameState::kLost) {
+    restart(image);
+    return motion;
+  }
+  tracker_.add(world_from_prev, matches, motion);
+  const Rigid3 cur_from_prev = tracker_.world_from_camera().inverse() * world_from_prev;
+  if (road_.has_value()) {
+    make_metric(image, cur_from_prev, world_from_prev.translation);
+  }
+  const Rigid3 metric = tracker_.world_from_camera().inverse() * world_from_prev;
+  motion.step = metric.translation.norm();
+  if (motion.step > 0.0) {
+    motion.cur_from_prev = Rigid3(metric.rotation, metric.translation / motion.step);
+  }
+  return motion;
+}
+
+void MapOdometry::make_metric(const ChannelImage& image,
+                              const Rigid3& cur_from_prev,
+                              const Eigen::Vector3d& center) {
+  const RoadScaleEstimate estimate = road_->update(image, cur_from_prev);
+  scale_sigma_ = estimate.sigma;
+  if (estimate.is_initialized) {
+    tracker_.rescale(estimate.metres_per_unit, center);
+    road_->rescale(estimate.metres_per_unit);
+  }
+}
+
+}  // namespace stemvo

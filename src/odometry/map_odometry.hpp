@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include "odometry/map_tracker.hpp"
+#include "odometry/road_scale.hpp"
+#include "odometry/two_view_estimator.hpp"
+#include "stemvo/config.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/stem/channel.hpp"
+
+namespace stemvo {
+
+/// The map behind the two-frame motions: places each frame against landmarks, refines the window,
+/// and, with `scale.source: camera_height`, keeps the map in metres by what the road tells.
+class MapOdometry {
+ public:
+  MapOdometry(const Config& config, const Camera& camera);
+
+  /// The first picture, or one whose motion was not measured: nothing connects it with the past.
+  void restart(const ChannelImage& image);
+  /// A frame with matches from the frame of pose `world_from_prev`. Returns the motion with what
+  /// the map and the road add: R and direction of T refined, and the length of the step.
+  [[nodiscard]] MeasuredMotion refine(const ChannelImage& image,
+                                      const Matches& matches,
+                                      const Rigid3& world_from_prev,
+                                      MeasuredMotion motion);
+  /// Of log(metres per map unit), after the last frame; nullopt where the road is not asked.
+  [[nodiscard]] std::optional<double> scale_sigma() const { return scale_sigma_; }
+
+ private:
+  /// Multiplies the map so that one unit is a metre; `center` stays.
+  void make_metric(const ChannelImage& image,
+                   const Rigid3& cur_from_prev,
+                   const Eigen::Vector3d& center);
+
+  MapTracker tracker_;
+  std::optional<RoadScale> road_;
+  std::optional<double> scale_sigma_;
+};
+
+}  // namespace stemvo
