@@ -45,10 +45,7 @@ int join(const RoadTiles& tiles, RoadNormal& normal) {
     normal.gradient += gradient;
     spread += gradient.head<3>().cwiseAbs2();
   }
-  const Eigen::Vector3d expected = normal.information.diagonal().head<3>().cwiseMax(1e-12);
-  const double excess = std::max(1.0, spread.cwiseQuotient(expected).mean());
-  normal.information /= excess;
-  normal.gradient /= excess;
+  normal.discount(spread);
   return num_tiles;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/road_normal.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -21,6 +22,13 @@ double RoadWarp::inverse_depth(const Eigen::Vector3d& ray) const {
   const double flat = plane.dot(ray);
   const double root = 1.0 - 4.0 * drop * plane.squaredNorm() / (flat * flat);
   return flat > 0.0 && root > kMinRoadRoot ? 0.5 * flat * (1.0 + std::sqrt(root)) : 0.0;
+}
+
+void RoadNormal::discount(const Eigen::Vector3d& spread) {
+  const Eigen::Vector3d expected = information.diagonal().head<3>().cwiseMax(1e-12);
+  const double excess = std::max(1.0, spread.cwiseQuotient(expected).mean());
+  information /= excess;
+  gradient /= excess;
 }
 
 void RoadNormal::add_prior(const RoadWarp& warp,

@@ -32,6 +32,10 @@ struct RoadNormal {
   RoadMatrix information = RoadMatrix::Zero();
   RoadVector gradient = RoadVector::Zero();
 
+  /// Groups of data (tiles, cells) that are not independent within: `spread` is the sum over the
+  /// groups of the squares of their gradient by the plane. Where it exceeds what independent data
+  /// would give, everything so far is worth less by that factor.
+  void discount(const Eigen::Vector3d& spread);
   void add_prior(const RoadWarp& warp, const RoadPrior& prior, double rotation_sigma_rad);
   /// Moves the warp; false where there is no finite step or the plane tips over.
   [[nodiscard]] bool step(RoadWarp& warp);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <vector>
 
 #include <Eigen/Core>
@@ -22,6 +23,8 @@ constexpr double kTukey = 4.0;         ///< standard deviations
 constexpr double kMinNoise_px = 0.05;  ///< no track is better than this
 /// Wide and flat: texture on the road is stretched across the picture.
 const cv::Size kWindow(31, 15);
+const cv::Size kCell(48, 24);
+constexpr int kCellsAcross = 1000;
 constexpr int kPyramidLevel = 0;  ///< the predicted plane has taken most of the motion away
 constexpr double kMinEigenvalue = 1e-5;
 constexpr double kMinInlierShare = 0.3;
@@ -61,6 +64,7 @@ Strip find_strip(const RoadPicture& cur, const RoadRegion& region, const RoadOpt
 struct Track {
   Eigen::Vector3d ray;  ///< in the current camera, z = 1
   Eigen::Vector2d prev_uv;
+  int cell = 0;  ///< corners of one cell share most of their windows
 };
 
 /// How far a track is from where the warp puts it, along its epipolar line and across.
@@ -141,7 +145,9 @@ std::vector<Track> track_corners(const RoadPicture& prev,
     }
     const Track track{
         cur.camera.normalize({corner.x + strip.box.x, corner.y + strip.box.y}).homogeneous(),
-        {in_prev[0] / in_prev[2], in_prev[1] / in_prev[2]}};
+        {in_prev[0] / in_prev[2], in_prev[1] / in_prev[2]},
+        static_cast<int>(corner.y) / kCell.height * kCellsAcross +
+            static_cast<int>(corner.x) / kCell.width};
     const Residual residual = residual_of(track, warp, cur.camera);
     if (residual.is_valid && std::abs(residual.across_px) <= options.max_off_line_px) {
       tracks.push_back(track);
@@ -154,6 +160,14 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+void discount(const std::map<int, Eigen::Vector3d>& cells, RoadNormal& normal) {
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  for (const auto& [cell, gradient] : cells) {
+    spread += gradient.cwiseAbs2();
+  }
+  normal.discount(spread);
 }
 
 struct Fit {
@@ -179,6 +193,7 @@ Fit fit_road(const std::vector<Track>& tracks,
     }
     const double noise_px = std::max(kMinNoise_px, 1.4826 * median(sizes));
     RoadNormal normal;
+    std::map<int, Eigen::Vector3d> cells;
     fit.num_inliers = 0;
     for (std::size_t i = 0; i < tracks.size(); ++i) {
       const double share = sizes[i] / (kTukey * noise_px);
@@ -189,8 +204,12 @@ Fit fit_road(const std::vector<Track>& tracks,
       const double root = (1.0 - share * share) / noise_px;
       const RoadVector& j = residuals[i].jacobian;
       normal.information += root * root * j * j.transpose();
-      normal.gradient += root * root * residuals[i].along_px * j;
+      const RoadVector gradient = root * root * residuals[i].along_px * j;
+      normal.gradient += gradient;
+      cells.try_emplace(tracks[i].cell, Eigen::Vector3d::Zero()).first->second +=
+          gradient.head<3>();
     }
+    discount(cells, normal);
     normal.add_prior(warp, prior, options.rotation_sigma_rad);
     if (!normal.step(warp)) {
       return fit;

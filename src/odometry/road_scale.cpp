@@ -87,7 +87,7 @@ void RoadScale::remember(RoadPicture picture) {
 bool RoadScale::measure(const Past& past, const RoadPicture& picture, RoadScaleEstimate& result) {
   const Rigid3& motion = past.now_from_past;
   RoadPrior prior = make_prior(motion);
-  if (options_.use_dense) {
+  if (options_.use_dense || !filter_.is_initialized()) {  // the corners cannot search for a scale
     result.dense = dense_.measure(past.picture, picture, motion, prior);
   }
   if (options_.use_points) {
