@@ -16,22 +16,26 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+GRAY = ["--set", "stem.model=gray"]
 GROUND_TRUTH_STEPS = ["--set", "scale.source=ground_truth"]
 
 
 def configurations(efficientnet):
     """(heading, options of `stemvo run`) of every row."""
+    paper = ["--config", str(ROOT / "config/paper.yaml")]
     rows = [
         ("learned channel (the defaults)", []),
-        ("gray image, same back end", ["--set", "stem.model=gray"]),
-        ("learned channel, SIFT", ["--set", "features.method=sift"]),
-        ("learned channel, ORB", ["--set", "features.method=orb"]),
-        ("the paper's recipe, stand-in stem", ["--config", str(ROOT / "config/paper.yaml")]),
+        ("learned channel, local map (`odometry.mode=map`)", ["--set", "odometry.mode=map"]),
+        ("gray image, same back end", GRAY),
+        ("learned channel, SIFT (brute force)", ["--set", "features.method=sift"]),
+        ("learned channel, ORB (brute force)", ["--set", "features.method=orb"]),
+        ("the paper's recipe, stand-in stem", paper),
+        ("the paper's recipe on the gray image", [*paper, *GRAY, "--set", "stem.filter=-1", "--set", "stem.sampling_px=0"]),
     ]
     if efficientnet:
         model, _, channel = efficientnet.rpartition(":")
         options = ["--set", f"stem.model={model}", "--set", f"stem.filter={channel}"]
-        rows.insert(2, (f"EfficientNetV2-B0, filter {channel}", options))
+        rows.insert(3, (f"EfficientNetV2-B0, filter {channel}", options))
     return rows
 
 
