@@ -74,10 +74,10 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
       });
   command->add_option("--width", options.width_px, "Pixels; default 1241")
       ->type_name("W")
-      ->check(in_range(16, 16384));
+      ->check(in_range(16, 8192));
   command->add_option("--height", options.height_px, "Pixels; default 376")
       ->type_name("H")
-      ->check(in_range(16, 16384));
+      ->check(in_range(16, 8192));
   command->add_flag("--depth", options.write_depth,
                     "Also depth/NNNNNN.npy: metres along the optical axis, float32");
   command->footer(kFooter);

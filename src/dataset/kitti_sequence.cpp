@@ -103,20 +103,31 @@ Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& reque
   return range;
 }
 
-/// Size of the first image that can be read: a broken one at the start is not the end of a run.
+/// So many readable frames vote on the size of all: one odd frame must not throw the rest away.
+constexpr int kNumSizeVotes = 5;
+
+/// The size most of the first readable frames have; of equals the one seen first.
 Expected<cv::Size> find_image_size(const std::vector<fs::path>& files, bool is_color) {
   std::string first_message;
+  std::vector<cv::Size> sizes;
   for (const fs::path& file : files) {
     const auto image = dataset::read_png(file, is_color);
     if (image) {
-      return image->size();
-    }
-    if (first_message.empty()) {
+      sizes.push_back(image->size());
+    } else if (first_message.empty()) {
       first_message = image.error().message;
     }
+    if (static_cast<int>(sizes.size()) == kNumSizeVotes) {
+      break;
+    }
   }
-  return fail(
-      fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
+  if (sizes.empty()) {
+    return fail(
+        fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
+  }
+  return *std::max_element(sizes.begin(), sizes.end(), [&](const auto& a, const auto& b) {
+    return std::count(sizes.begin(), sizes.end(), a) < std::count(sizes.begin(), sizes.end(), b);
+  });
 }
 
 /// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.

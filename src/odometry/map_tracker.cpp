@@ -7,6 +7,12 @@
 #include "odometry/landmarks.hpp"
 
 namespace stemvo {
+namespace {
+
+/// Of the step (and in rad): far above rounding, far below any measurement.
+constexpr double kSamePose = 1e-5;
+
+}  // namespace
 
 MapTracker::MapTracker(const Camera& camera, const MapTrackerOptions& options)
     : camera_(camera), options_(options), last_step_(options.first_step) {}
@@ -15,9 +21,10 @@ void MapTracker::add(const Rigid3& world_from_prev,
                      const Matches& matches,
                      const MeasuredMotion& motion) {
   ++frame_;
+  // The caller chains relative motions: the same pose but for rounding.
+  const Rigid3 moved = world_from_camera_.inverse() * world_from_prev;
   const bool is_where_we_left =
-      world_from_camera_.translation == world_from_prev.translation &&
-      world_from_camera_.rotation.coeffs() == world_from_prev.rotation.coeffs();
+      moved.translation.norm() < kSamePose * last_step_ && moved.angle_rad() < kSamePose;
   if (!is_where_we_left) {
     map_.clear();
     world_from_camera_ = world_from_prev;

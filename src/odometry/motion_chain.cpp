@@ -58,7 +58,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
   switch (state) {
     case FrameState::kTracking:
     case FrameState::kInitializing:
-      is_initializing_ = false;
+      is_initializing_ = is_initializing_ && !motion.is_decisive;
       last_direction_ = direction.normalized();
       apply(prev_from_cur, full_step_m);
       break;

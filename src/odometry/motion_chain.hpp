@@ -27,7 +27,7 @@ class MotionChain {
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
   /// Pose of the last picture: where the next motion starts.
   [[nodiscard]] const Rigid3& world_from_picture() const { return world_from_picture_; }
-  /// True until a first motion was measured with a direction of its own.
+  /// True until a first motion was accepted: decisive by the point test.
   [[nodiscard]] bool is_initializing() const { return is_initializing_; }
   [[nodiscard]] bool has_picture() const { return has_picture_; }
 

@@ -67,6 +67,11 @@ Expected<Odometry> Odometry::create(const Config& config,
   if (!stem.has_value()) {
     return tl::unexpected<Error>(stem.error());
   }
+  // A model that cannot take this camera's frames is found before work starts.
+  const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
+  if (const Expected<Channel> channel = stem->apply(blank); !channel.has_value()) {
+    return tl::unexpected<Error>(channel.error());
+  }
   Expected<std::unique_ptr<FrontEnd>> front_end = create_front_end(config.features);
   if (!front_end.has_value()) {
     return tl::unexpected<Error>(front_end.error());
@@ -89,7 +94,9 @@ FrameResult Odometry::process(const cv::Mat& frame) {
 
   const Expected<Channel> channel = self.stem.apply(frame);
   if (!channel.has_value()) {
-    return process_missing();
+    result = process_missing();
+    result.problem = channel.error().message;
+    return result;
   }
   self.image = self.stretch.apply(channel.value());
   result.times.stem_ms = watch.lap_ms();

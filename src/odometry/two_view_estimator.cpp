@@ -16,6 +16,9 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
+/// ORB-SLAM2's acceptance, but the share is of all matches here, outliers included.
+constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5};
+
 double median(std::vector<double> values) {
   if (values.empty()) {
     return 0.0;
@@ -111,6 +114,7 @@ MeasuredMotion TwoViewEstimator::measure(std::span<const Eigen::Vector2d> prev_u
   result.model = motion->model;
   result.cur_from_prev = motion->cur_from_prev;
   result.runner_up_ratio = motion->runner_up_ratio;
+  result.is_decisive = is_decisive(*motion, static_cast<int>(prev_uv.size()), kAcceptance);
   result.inlier_mask = motion->good_mask;
   refine(prev_uv, cur_uv, result);
   return result;

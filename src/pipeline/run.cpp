@@ -91,6 +91,9 @@ Drive drive(const RunRequest& request,
       result.warnings.push_back(frame.error().message);
     }
     const FrameResult pose = frame ? odometry.process(*frame) : odometry.process_missing();
+    if (!pose.problem.empty()) {
+      result.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
+    }
     result.trajectory.push_back(pose.world_from_camera);
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     csv.write(number, sequence.timestamps_s()[i], pose);

@@ -152,6 +152,7 @@ cv::Mat draw_frame_picture(const cv::Mat& frame,
 Status write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
   cv::Mat bgr = picture;
   if (picture.channels() == 3) {
+    bgr = cv::Mat();  // else the caller's pixels would be converted in place
     cv::cvtColor(picture, bgr, cv::COLOR_RGB2BGR);
   }
   std::vector<uchar> bytes;

@@ -33,10 +33,9 @@ TEST_P(Kitti, StaysInsideTheThresholds) {
   std::cout << run.out << check.out;
 }
 
-// The promise is 25 frames a second of the clock on two free cores, which a machine that runs tests
-// side by side has not: held here is the time of the cores, and 25 frames take two of them 80 ms
-// each.
-TEST(KittiSpeed, TwoCoresCanKeepTwentyFiveFramesPerSecond) {
+// 25 frames a second on two cores is measured by hand on an idle machine (README); held here, where
+// other tests run beside it, is the time of the cores: 36 ms a frame when this was written.
+TEST(KittiSpeed, ProcessorTimePerFrameIsBounded) {
   const auto data = test::shared_data();
   if (!data) {
     GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
@@ -45,7 +44,7 @@ TEST(KittiSpeed, TwoCoresCanKeepTwentyFiveFramesPerSecond) {
   const ProgramResult run = run_stemvo({"run", (*data / "kitti/sequences/03").string(), "--out",
                                         folder / "result", "--frames", "0:150", "--quiet"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_LE(1000.0 * run.cpu_s / 150, 80.0);
+  EXPECT_LE(1000.0 * run.cpu_s / 150, 55.0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Clips,

@@ -217,6 +217,15 @@ TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
   EXPECT_THAT(open_error(), HasSubstr("none of 4 images can be read"));
 }
 
+TEST_F(KittiSequenceTest, AnOddFirstImageDoesNotSetTheSize) {
+  cv::imwrite(image(0).string(), cv::Mat(6, 9, CV_8UC3, cv::Scalar(0, 0, 0)));
+  const auto sequence = KittiSequence::open(folder_);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->camera().width_px, 8);
+  EXPECT_THAT(sequence->read(0).error().message, HasSubstr("8x6 pixels, found 9x6"));
+  EXPECT_TRUE(sequence->read(1));
+}
+
 TEST(FrameRangeTest, AcceptsTheThreeForms) {
   const auto both = parse_frame_range("3:10");
   ASSERT_TRUE(both);

@@ -19,6 +19,7 @@ MeasuredMotion driven(const Eigen::Vector3d& direction,
   motion.cur_from_prev = Rigid3(so3_exp({0.0, yaw_deg * kDeg, 0.0}), direction).inverse();
   motion.parallax_px = 5.0;
   motion.runner_up_ratio = 0.1;
+  motion.is_decisive = true;
   return motion;
 }
 
@@ -35,6 +36,17 @@ TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
+}
+
+TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
+  MotionChain chain = make_chain();
+  MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);
+  doubtful.is_decisive = false;
+  EXPECT_EQ(chain.add(doubtful), FrameState::kInitializing);
+  EXPECT_TRUE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_FALSE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
 }
 
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {

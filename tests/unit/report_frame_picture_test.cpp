@@ -51,6 +51,15 @@ cv::Rect colored_box(const cv::Mat& rgb) {
   return box;
 }
 
+TEST(FramePicture, WritingLeavesThePictureAloneAndKeepsItsColours) {
+  const cv::Mat rgb(20, 30, CV_8UC3, cv::Scalar(200, 100, 50));
+  const TempFolder folder;
+  ASSERT_TRUE(write_picture(folder.path() / "rgb.png", rgb).has_value());
+  EXPECT_EQ(rgb.at<cv::Vec3b>(3, 4), cv::Vec3b(200, 100, 50));
+  const cv::Mat read = cv::imread((folder.path() / "rgb.png").string());
+  EXPECT_EQ(read.at<cv::Vec3b>(3, 4), cv::Vec3b(50, 100, 200));  // OpenCV reads B, G, R
+}
+
 TEST(FramePicture, ShowsInputAboveChannelAtTheSameWidth) {
   const cv::Mat picture = draw_frame_picture(gray_frame(), coarse_channel(), {}, {}, "frame 7");
   ASSERT_EQ(picture.type(), CV_8UC3);

@@ -54,12 +54,14 @@ struct FrameResult {
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
   StageTimes times;
+  std::string problem;  ///< why the stem gave no channel (the frame counts as broken), else empty
 };
 
 /// The facade: frames in, poses out, one at a time, no look-ahead.
 class Odometry {
  public:
-  /// Loads the model. Errors: those of Stem::create and create_front_end.
+  /// Loads the model. Errors: those of Stem::create and create_front_end, and a model that does
+  /// not take frames of the camera's size.
   [[nodiscard]] static Expected<Odometry> create(const Config& config,
                                                  const Camera& camera,
                                                  const std::filesystem::path& models_dir);
