@@ -14,7 +14,7 @@ namespace stemvo {
 struct SyntheticDriveOptions {
   /// KITTI poses to drive along; else own curve.
   std::optional<std::filesystem::path> trajectory = std::nullopt;
-  int num_frames = 100;                             ///< with a trajectory: at most its length
+  int num_frames = 100;  ///< with a trajectory: at most its length
   std::uint64_t seed = 1;
   int width_px = 1241;
   int height_px = 376;
