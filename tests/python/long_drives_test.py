@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: MIT
+"""tools/long_drives.py: what is rendered is kept, what changed is rendered anew, runs are watched."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from drives import rendered, watched_run
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = os.environ["STEMVO_PROGRAM"]
+STEP_M = 0.8
+
+
+def write_poses(file, count):
+    """A drive straight ahead."""
+    lines = [f"1 0 0 0 0 1 0 0 0 0 1 {STEP_M * i:.6f}" for i in range(count)]
+    file.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def long_drives(*arguments):
+    command = [sys.executable, str(ROOT / "tools/long_drives.py"), "--program", PROGRAM, *map(str, arguments)]
+    return subprocess.run(command, check=False, capture_output=True, text=True)
+
+
+class RenderedDrives(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        write_poses(self.folder / "31.txt", 9)
+        self.drive = rendered.Drive(self.folder / "31.txt", 96, 48)
+
+    def render(self, drive):
+        return rendered.render(PROGRAM, self.folder / "cache", drive)
+
+    def test_is_rendered_once(self):
+        folder = self.render(self.drive)
+        frames = sorted((folder / "sequences/00/image_2").iterdir())
+        self.assertEqual(len(frames), 9)
+        self.assertEqual(len((folder / "poses/00.txt").read_text().splitlines()), 9)
+        before = frames[3].stat().st_mtime_ns
+        self.assertEqual(self.render(self.drive), folder)
+        self.assertEqual(frames[3].stat().st_mtime_ns, before)
+
+    def test_other_poses_are_rendered_anew(self):
+        folder = self.render(self.drive)
+        write_poses(self.folder / "31.txt", 7)
+        self.assertEqual(self.render(self.drive), folder)
+        self.assertEqual(len(list((folder / "sequences/00/image_2").iterdir())), 7)
+
+    def test_half_a_rendering_is_not_kept(self):
+        folder = self.render(self.drive)
+        (folder / rendered.RENDERED).unlink()  # as an interrupt leaves it
+        (folder / "sequences/00/image_2/000004.png").unlink()
+        self.render(self.drive)
+        self.assertTrue((folder / "sequences/00/image_2/000004.png").exists())
+
+    def test_sizes_lengths_and_seeds_have_folders_of_their_own(self):
+        drives = [self.drive, rendered.Drive(self.drive.poses, 64, 48), rendered.Drive(self.drive.poses, 96, 48, 5),
+                  rendered.Drive(self.drive.poses, 96, 48, 0, 2)]
+        self.assertEqual(len({rendered.folder_of(self.folder, drive) for drive in drives}), 4)
+        self.assertEqual(drives[2].num_frames(), 5)
+
+    def test_no_pose_file_is_one_line(self):
+        with self.assertRaisesRegex(rendered.DriveError, "99.txt: expected a KITTI pose file"):
+            self.render(rendered.Drive(self.folder / "99.txt"))
+
+
+class WatchedRuns(unittest.TestCase):
+    def test_a_growing_process_shows_in_the_second_half(self):
+        script = ("import sys, time\n"
+                  "out = open(sys.argv[1], 'w')\n"
+                  "print('frame', file=out, flush=True)\n"
+                  "kept = []\n"
+                  "for i in range(40):\n"
+                  "    kept.append(bytearray(2_000_000))\n"
+                  "    print(i, file=out, flush=True)\n"
+                  "    time.sleep(0.05)\n")
+        with tempfile.TemporaryDirectory() as folder:
+            frames = pathlib.Path(folder) / "frames.csv"
+            process = subprocess.Popen([sys.executable, "-c", script, str(frames)])
+            first, second = watched_run.watch(process, frames, 40)
+        self.assertGreater(second - first, 20.0)  # of 40 MB
+
+    def test_lengths_by_quarter(self):
+        with tempfile.TemporaryDirectory() as folder:
+            truth, estimate = pathlib.Path(folder) / "a.txt", pathlib.Path(folder) / "b.txt"
+            write_poses(truth, 9)
+            steps = [1.0, 1.0, 2.0, 2.0, 1.0, 1.0, 0.0, 0.0]
+            z = [sum(steps[:i]) for i in range(9)]
+            estimate.write_text("\n".join(f"1 0 0 0 0 1 0 0 0 0 1 {STEP_M * value}" for value in z), encoding="ascii")
+            found = watched_run.lengths_ratio(estimate, truth)
+        for ratio, expected in zip(found, (1.0, 2.0, 1.0, 0.0)):
+            self.assertAlmostEqual(ratio, expected, places=5)
+
+
+class Command(unittest.TestCase):
+    def test_prints_a_row_per_drive_and_goes_on_after_a_failure(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            write_poses(folder / "31.txt", 40)
+            done = long_drives(folder / "cache", "--poses", folder, "--sequences", "77,31", "--size", "310x94",
+                               "--out", folder / "out")
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("77: ", done.stderr)
+            rows = done.stdout.splitlines()
+            self.assertEqual(len(rows), 3, done.stdout)
+            cells = [cell.strip() for cell in rows[2].strip("|").split("|")]
+            self.assertEqual(cells[:2], ["31", "40"])
+            first, second = map(float, cells[6].split("/"))
+            self.assertGreater(first, 5.0)
+            self.assertGreater(second, 5.0)
+            self.assertTrue(all(float(value) > 0.0 for value in cells[8].split()))
+            metrics = json.loads((folder / "out/31/metrics.json").read_text())
+            self.assertEqual(cells[3], f"{metrics['r_rel_deg_per_100m']:.3f}")
+
+    def test_the_programs_message_is_told(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            write_poses(folder / "31.txt", 5)
+            done = long_drives(folder / "cache", "--poses", folder, "--sequences", "31", "--size", "96x48",
+                               "--set", "stem.filter=999")
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("filter", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
