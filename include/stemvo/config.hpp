@@ -49,7 +49,8 @@ struct RefineOptions {
 
 /// Keys `scale.*`.
 struct ScaleOptions {
-  std::string source = "constant";  ///< `constant`, `camera_height` (mode map) or `ground_truth`
+  /// `none` (up to scale), `constant`, `camera_height` (mode map) or `ground_truth`
+  std::string source = "constant";
   double constant_m = 1.0;          ///< per frame
   double camera_height_m = 1.65;    ///< above the road, for `camera_height`
 };

@@ -162,6 +162,23 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   return metrics;
 }
 
+Metrics evaluate_aligned(std::span<const Rigid3> estimate,
+                         std::span<const Rigid3> ground_truth,
+                         Alignment alignment,
+                         const EvaluationOptions& options) {
+  const Metrics as_it_comes = evaluate(estimate, ground_truth, options);
+  if (alignment == Alignment::kNone) {
+    return as_it_comes;
+  }
+  const Trajectory aligned = align_trajectory(estimate, ground_truth, alignment);
+  Metrics metrics = evaluate(aligned, ground_truth, options);
+  metrics.alignment = alignment;
+  // evaluate() moves its input back to the origin; the offset is meant where the fit has put it.
+  metrics.average_offset_m = average_offset_m(aligned, relative_to_first(ground_truth));
+  metrics.ate_rmse = as_it_comes.ate_rmse;
+  return metrics;
+}
+
 Trajectory align_trajectory(std::span<const Rigid3> estimate,
                             std::span<const Rigid3> ground_truth,
                             Alignment alignment) {

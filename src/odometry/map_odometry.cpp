@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/map_odometry.hpp"
 
+#include "odometry/motion_chain.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -11,7 +13,7 @@ MapTrackerOptions tracker_options(const Config& config) {
   options.refinement.loss_scale_px = config.refine.loss_px;
   options.refinement.max_iterations = config.refine.max_iterations;
   options.pose.loss_scale_px = config.refine.loss_px;
-  options.first_step = config.scale.constant_m;
+  options.first_step = assumed_step(config.scale);
   return options;
 }
 

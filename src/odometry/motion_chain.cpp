@@ -46,7 +46,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
   const Eigen::Vector3d direction = prev_from_cur.translation;
   const int num_frames = frames_since_picture_ + 1;
   const bool is_step_known = motion.step > 0.0;
-  const double full_step_m = is_step_known ? motion.step : scale_.constant_m * num_frames;
+  const double full_step_m = is_step_known ? motion.step : assumed_step_ * num_frames;
   FrameState state = motion.state;
   if (state == FrameState::kTracking) {
     if (!passes_gate(direction, motion)) {

@@ -10,11 +10,16 @@
 
 namespace stemvo {
 
+/// Length of a step that nothing measures: one unit where no scale is asked for.
+[[nodiscard]] inline double assumed_step(const ScaleOptions& scale) {
+  return scale.source == "none" ? 1.0 : scale.constant_m;
+}
+
 /// Chains two-frame motions into poses: gate, step length, composition (paper eq. (11) and (12)).
 class MotionChain {
  public:
   MotionChain(const OdometryOptions& odometry, const ScaleOptions& scale)
-      : options_(odometry), scale_(scale) {}
+      : options_(odometry), assumed_step_(assumed_step(scale)) {}
 
   /// The frame of the first picture: the pose stays where it is.
   void start() { has_picture_ = true; }
@@ -37,7 +42,7 @@ class MotionChain {
   void apply(const Rigid3& prev_from_cur, double step_m);
 
   OdometryOptions options_;
-  ScaleOptions scale_;
+  double assumed_step_;  ///< metres or units, per frame
   Rigid3 world_from_picture_;  ///< pose of the last picture the matches start from
   Rigid3 world_from_camera_;   ///< pose of the last frame
   Rigid3 last_prev_from_cur_;  ///< last motion of one frame, metres; for extrapolation

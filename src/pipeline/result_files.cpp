@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "stemvo/report/evaluate_report.hpp"
 #include "stemvo/report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 
@@ -30,8 +31,11 @@ std::string describe_frames(const KittiSequence& sequence, std::size_t num_frame
 std::string describe_numbers(const MetricsReport& report) {
   std::string text = fmt::format("scale: {}", report.scale_source);
   if (report.metrics) {
-    text += fmt::format("   path {:.0f} m   average offset {:.2f} m", report.metrics->path_length_m,
-                        report.metrics->average_offset_m);
+    const Alignment alignment = report.metrics->alignment;
+    text += fmt::format("   path {:.0f} m   ", report.metrics->path_length_m);
+    text += alignment == Alignment::kNone ? "no alignment:"
+                                          : fmt::format("fitted by {}:", to_string(alignment));
+    text += fmt::format(" average offset {:.2f} m", report.metrics->average_offset_m);
     if (report.metrics->t_rel_percent) {
       text += fmt::format("   t_rel {:.2f} %", *report.metrics->t_rel_percent);
     }
@@ -79,9 +83,15 @@ Status write_map(const std::filesystem::path& out_dir,
   plot.title = one_line(describe_frames(sequence, trajectory.size()));
   plot.subtitle = describe_numbers(report);
   plot.estimate.assign(trajectory.begin(), trajectory.end());
+  const Alignment alignment = report.metrics ? report.metrics->alignment : Alignment::kNone;
   if (const std::optional<Trajectory>& truth = sequence.ground_truth()) {
     const auto end = truth->begin() + static_cast<std::ptrdiff_t>(trajectory.size());
     plot.ground_truth = Trajectory(truth->begin(), end);
+    if (alignment != Alignment::kNone) {
+      plot.estimate = align_trajectory(trajectory, *plot.ground_truth, alignment);
+    }
+  } else if (report.scale_source == "none") {
+    plot.unit = "units";
   }
   const Status png = write_trajectory_png(out_dir / "trajectory.png", plot);
   const Status svg = write_trajectory_svg(out_dir / "trajectory.svg", plot);

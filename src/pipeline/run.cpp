@@ -116,6 +116,11 @@ std::optional<std::span<const Rigid3>> truth_of(const KittiSequence& sequence,
   return std::span(*sequence.ground_truth()).first(num_frames);
 }
 
+/// A trajectory without a scale has no error in metres until one is fitted.
+Alignment alignment_of(const ScaleOptions& scale) {
+  return scale.source == "none" ? Alignment::kSim3 : Alignment::kNone;
+}
+
 MetricsReport make_report(const RunRequest& request,
                           const KittiSequence& sequence,
                           const StemInfo& stem,
@@ -134,7 +139,8 @@ MetricsReport make_report(const RunRequest& request,
   report.tracked_fraction =
       static_cast<double>(done.num_measured) / static_cast<double>(num_frames);
   if (const auto truth = truth_of(sequence, num_frames)) {
-    report.metrics = evaluate(done.trajectory, *truth, request.config.evaluation);
+    report.metrics = evaluate_aligned(done.trajectory, *truth, alignment_of(request.config.scale),
+                                      request.config.evaluation);
   }
   return report;
 }

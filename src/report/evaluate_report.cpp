@@ -58,22 +58,6 @@ double ate_of(const Metrics& metrics, Alignment alignment) {
   return metrics.ate_rmse.none_m;
 }
 
-/// The four kinds of ATE are those of the estimate as it comes; all else is taken after alignment.
-Metrics evaluate_aligned(const Trajectory& estimate,
-                         const Trajectory& ground_truth,
-                         const EvaluationRequest& request) {
-  const Metrics as_it_comes = evaluate(estimate, ground_truth, request.options);
-  if (request.alignment == Alignment::kNone) {
-    return as_it_comes;
-  }
-  const Trajectory aligned = align_trajectory(estimate, ground_truth, request.alignment);
-  Metrics metrics = evaluate(aligned, ground_truth, request.options);
-  // evaluate() moves its input back to the origin; the offset is meant where the fit has put it.
-  metrics.average_offset_m = average_offset_m(aligned, relative_to_first(ground_truth));
-  metrics.ate_rmse = as_it_comes.ate_rmse;
-  return metrics;
-}
-
 std::string number_or_dash(const std::optional<double>& value, int decimals) {
   return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
 }
@@ -114,7 +98,7 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
                       "line, KITTI or TUM; nothing is matched by time)",
                       file.string(), truth->size(), report.ground_truth, estimate->size()));
     }
-    report.rows.push_back({file.string(), evaluate_aligned(*estimate, *truth, request)});
+    report.rows.push_back({file.string(), evaluate_aligned(*estimate, *truth, request.alignment, request.options)});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
   report.never_moves = {"(never moves)",

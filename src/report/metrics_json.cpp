@@ -10,6 +10,7 @@
 #include "evaluation/text_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "report/text_table.hpp"
+#include "stemvo/report/evaluate_report.hpp"
 
 namespace stemvo {
 
@@ -29,6 +30,9 @@ std::string scale_explained(const std::string& source) {
   }
   if (source == "constant") {
     return "constant (every step the same length: not metric)";
+  }
+  if (source == "none") {
+    return "none (up to scale: units, not metres)";
   }
   return source;
 }
@@ -53,13 +57,14 @@ std::string error_table(const Metrics& m) {
   const std::string segments = m.num_segments == 0 ? "no segment fits into the drive"
                                                    : fmt::format("mean over {} segments of {}",
                                                                  m.num_segments, length_range(m));
+  const std::string fitted(to_string(m.alignment));
   TextTable table("lrlll");
   table.add({"error", "value", "unit", "alignment", ""});
   table.rule();
-  table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", "none", segments});
-  table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", "none",
+  table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
+  table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
              "the same segments"});
-  table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", "none",
+  table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
              "mean of |dx| + |dz|"});
   table.add({"  if it never moved", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
              "the same for a camera that stays at the start"});
@@ -75,7 +80,7 @@ std::string error_table(const Metrics& m) {
     table.add({"position ATE", fmt::format("{:.2f}", rmse_m), "m", std::string(alignment),
                std::string(note)});
   }
-  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", "none",
+  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
              "mean over steps of one frame (RPE)"});
   return table.str();
 }
@@ -124,6 +129,8 @@ Status write_metrics_json(const std::filesystem::path& file, const MetricsReport
   json["fps"] = report.fps;
   json["scale_source"] = report.scale_source;
   json["tracked_fraction"] = report.tracked_fraction;
+  json["alignment"] = report.metrics ? nlohmann::ordered_json(to_string(report.metrics->alignment))
+                                     : nlohmann::ordered_json();
   add_metrics(json, report.metrics ? &*report.metrics : nullptr);
   return write_text_file(file, to_text(json));
 }

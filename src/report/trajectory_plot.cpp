@@ -39,7 +39,7 @@ constexpr double kSubtitle_px = 25.0;
 constexpr double kLabel_px = 27.0;
 constexpr double kTick_px = 24.0;
 
-void draw_grid(const CairoCanvas& canvas, const PlotLayout& layout) {
+void draw_grid(const CairoCanvas& canvas, const PlotLayout& layout, const std::string& unit) {
   const double right = layout.left_px + layout.plot_width_px;
   const double bottom = layout.top_px + layout.plot_height_px;
   canvas.set_font(kTick_px);
@@ -59,9 +59,10 @@ void draw_grid(const CairoCanvas& canvas, const PlotLayout& layout) {
                 TextAnchor::kRight);
   }
   canvas.set_font(kLabel_px);
-  canvas.text(0.5 * (layout.left_px + right), bottom + 92.0, "x, to the right [m]",
-              TextAnchor::kCenter);
-  canvas.vertical_text(44.0, layout.top_px + 0.5 * layout.plot_height_px, "z, forward [m]");
+  canvas.text(0.5 * (layout.left_px + right), bottom + 92.0,
+              fmt::format("x, to the right [{}]", unit), TextAnchor::kCenter);
+  canvas.vertical_text(44.0, layout.top_px + 0.5 * layout.plot_height_px,
+                       fmt::format("z, forward [{}]", unit));
   canvas.set_color(kFrame);
   cairo_rectangle(canvas.context(), layout.left_px, layout.top_px, layout.plot_width_px,
                   layout.plot_height_px);
@@ -171,7 +172,7 @@ Status draw(cairo_surface_t* surface, const PlotLayout& layout, const Trajectory
   canvas.fill_background(kWhite);
   draw_titles(canvas, layout, plot);
   draw_legend(canvas, layout, plot.ground_truth.has_value());
-  draw_grid(canvas, layout);
+  draw_grid(canvas, layout, plot.unit);
   if (plot.ground_truth) {
     draw_path(canvas, layout, *plot.ground_truth, kTruth, kTruthWidth_px);
   }

@@ -177,7 +177,7 @@ TEST_F(BadInput, Configuration) {
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
   expect_error(run({"--set", "stem.filtre=3"}), 1, {"--set stem.filtre: unknown key"});
   expect_error(run({"--set", "scale.source=gps"}), 1,
-               {"constant, camera_height, ground_truth, found 'gps'"});
+               {"none, constant, camera_height, ground_truth, found 'gps'"});
   expect_error(run({"--set", "scale.constant_m=nan"}), 1, {"scale.constant_m", "nan"});
 }
 

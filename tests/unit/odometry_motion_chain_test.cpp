@@ -38,6 +38,17 @@ TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
 }
 
+TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
+  ScaleOptions scale;
+  scale.source = "none";
+  scale.constant_m = 0.7;
+  MotionChain chain({}, scale);
+  chain.start();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
+}
+
 TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
   MotionChain chain = make_chain();
   MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);

@@ -119,6 +119,25 @@ TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
   }
 }
 
+TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
+  request_.config.odometry.mode = "two_frame";
+  request_.config.scale.source = "none";
+  request_.config.scale.constant_m = 0.25;
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  ASSERT_TRUE(poses);
+  for (std::size_t i = 1; i < poses->size(); ++i) {
+    EXPECT_NEAR(((*poses)[i].translation - (*poses)[i - 1].translation).norm(), 1.0, 1e-6) << i;
+  }
+  const Metrics& metrics = summary->report.metrics.value();
+  EXPECT_EQ(metrics.alignment, Alignment::kSim3);
+  EXPECT_LE(metrics.average_offset_m, 0.2 * metrics.null_offset_m);
+  EXPECT_GE(metrics.ate_rmse.none_m, metrics.null_offset_m * 0.5) << "two times too long";
+  EXPECT_THAT(read_file(request_.out_dir / "metrics.json"), HasSubstr("\"alignment\": \"sim3\""));
+  EXPECT_THAT(read_file(request_.out_dir / "trajectory.svg"), HasSubstr("<svg"));
+}
+
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
   request_.config.seed = 42;
   ASSERT_TRUE(run_sequence(request_));

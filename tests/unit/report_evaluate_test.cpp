@@ -61,6 +61,7 @@ TEST(EvaluateFiles, AppliesTheAlignment) {
     const auto report = evaluate_files({files.truth, {files.kitti}, alignment, {}});
     ASSERT_TRUE(report) << report.error().message;
     const Metrics& metrics = report->rows[0].metrics;
+    EXPECT_EQ(metrics.alignment, alignment);
     EXPECT_LE(metrics.t_rel_percent.value(), 1e-6);
     EXPECT_LE(metrics.average_offset_m, 1e-6);
     EXPECT_GT(metrics.ate_rmse.none_m, 0.5) << "stays that of the file as it is";

@@ -72,7 +72,8 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["ate_rmse_m"]["se3"], 2.0);
   EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
-  EXPECT_EQ(json.size(), 18U);
+  EXPECT_EQ(json["alignment"], "none");
+  EXPECT_EQ(json.size(), 19U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
@@ -80,7 +81,7 @@ TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   report.metrics.reset();
   const nlohmann::json json = written(report);
   for (const char* key :
-       {"path_length_m", "average_offset_m", "null_offset_m", "t_rel_percent", "r_rel_deg_per_100m",
+       {"alignment", "path_length_m", "average_offset_m", "null_offset_m", "t_rel_percent", "r_rel_deg_per_100m",
         "segment_lengths_m", "segments", "ate_rmse_m", "rpe_rotation_deg"}) {
     ASSERT_TRUE(json.contains(key)) << key;
     EXPECT_TRUE(json[key].is_null()) << key;
@@ -122,6 +123,19 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   EXPECT_THAT(table, HasSubstr("each step rescaled to its true length"));
   EXPECT_THAT(table, HasSubstr("200 frames (20:220)"));
   EXPECT_EQ(table.find(" \n"), std::string::npos) << "blanks at the end of a line";
+}
+
+TEST(MetricsTable, NamesTheFitOfATrajectoryWithoutScale) {
+  MetricsReport report = example();
+  report.scale_source = "none";
+  report.metrics->alignment = Alignment::kSim3;
+  EXPECT_EQ(written(report)["alignment"], "sim3");
+  const std::string table = format_metrics_table(report);
+  EXPECT_THAT(table, ContainsRegex("scale +none \\(up to scale: units, not metres"));
+  EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +sim3"));
+  EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +sim3"));
+  EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +sim3"));
+  EXPECT_THAT(table, ContainsRegex("never moved +79\\.25  m +none"));
 }
 
 TEST(MetricsTable, SaysWhatIsMissing) {

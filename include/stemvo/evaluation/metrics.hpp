@@ -26,8 +26,10 @@ struct AbsoluteTrajectoryError {
 
 /// Everything that needs ground truth. Both trajectories are first moved to start at the identity.
 struct Metrics {
+  /// What was fitted before the offset, t_rel, r_rel and the RPE were taken.
+  Alignment alignment = Alignment::kNone;
   double path_length_m = 0.0;           ///< of the ground truth
-  double average_offset_m = 0.0;        ///< paper: mean of |dx| + |dz|, no alignment
+  double average_offset_m = 0.0;        ///< paper: mean of |dx| + |dz|
   double null_offset_m = 0.0;           ///< the same for a trajectory that never moves
   std::optional<double> t_rel_percent;  ///< nullopt: no segment fits
   std::optional<double> r_rel_deg_per_100m;
@@ -42,6 +44,13 @@ struct Metrics {
 [[nodiscard]] Metrics evaluate(std::span<const Rigid3> estimate,
                                std::span<const Rigid3> ground_truth,
                                const EvaluationOptions& options = {});
+
+/// The same after the estimate was fitted to the ground truth, for trajectories without a scale.
+/// The four kinds of ATE and the null offset are those of the estimate as it comes.
+[[nodiscard]] Metrics evaluate_aligned(std::span<const Rigid3> estimate,
+                                       std::span<const Rigid3> ground_truth,
+                                       Alignment alignment,
+                                       const EvaluationOptions& options = {});
 
 /// The paper's offset, (E_x + E_y) / N_f: mean of |dx| + |dz| between the poses as they are
 /// (KITTI's ground plane is x-z). Same length, at least one pose (checked).

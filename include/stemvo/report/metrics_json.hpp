@@ -26,7 +26,8 @@ struct MetricsReport {
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
+/// alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3
+/// where the trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
 /// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg. Numbers round-trip; a number that is
 /// not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
