@@ -31,4 +31,18 @@ bool is_measured(FrameState state) {
   return state != FrameState::kGated && state != FrameState::kLost && state != FrameState::kBroken;
 }
 
+std::string_view to_string(RoadState state) {
+  switch (state) {
+    case RoadState::kNotAsked:
+      return "-";
+    case RoadState::kNone:
+      return "none";
+    case RoadState::kHeld:
+      return "held";
+    case RoadState::kMeasured:
+      return "measured";
+  }
+  return "unknown";
+}
+
 }  // namespace stemvo

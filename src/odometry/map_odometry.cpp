@@ -32,7 +32,7 @@ void MapOdometry::restart(const ChannelImage& image) {
   tracker_.restart();
   if (road_.has_value()) {
     road_->restart();
-    scale_sigma_ = road_->update(image, {}).sigma;
+    ask_road(image, {});
   }
 }
 
@@ -57,11 +57,20 @@ MeasuredMotion MapOdometry::refine(const ChannelImage& image,
   return motion;
 }
 
+RoadScaleEstimate MapOdometry::ask_road(const ChannelImage& image, const Rigid3& cur_from_prev) {
+  const RoadScaleEstimate estimate = road_->update(image, cur_from_prev);
+  scale_sigma_ = estimate.sigma;
+  road_state_ = estimate.is_measured      ? RoadState::kMeasured
+                : estimate.is_initialized ? RoadState::kHeld
+                                          : RoadState::kNone;
+  road_reason_ = estimate.is_measured ? std::string_view() : estimate.reason;
+  return estimate;
+}
+
 void MapOdometry::make_metric(const ChannelImage& image,
                               const Rigid3& cur_from_prev,
                               const Eigen::Vector3d& center) {
-  const RoadScaleEstimate estimate = road_->update(image, cur_from_prev);
-  scale_sigma_ = estimate.sigma;
+  const RoadScaleEstimate estimate = ask_road(image, cur_from_prev);
   if (estimate.is_initialized) {
     tracker_.rescale(estimate.metres_per_unit, center);
     road_->rescale(estimate.metres_per_unit);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 
 #include "odometry/map_tracker.hpp"
 #include "odometry/road_scale.hpp"
@@ -9,6 +10,7 @@
 #include "stemvo/config.hpp"
 #include "stemvo/features/front_end.hpp"
 #include "stemvo/geometry/camera.hpp"
+#include "stemvo/odometry/odometry.hpp"
 #include "stemvo/stem/channel.hpp"
 
 namespace stemvo {
@@ -29,8 +31,13 @@ class MapOdometry {
                                       MeasuredMotion motion);
   /// Of log(metres per map unit), after the last frame; nullopt where the road is not asked.
   [[nodiscard]] std::optional<double> scale_sigma() const { return scale_sigma_; }
+  /// What the road told of the last frame given.
+  [[nodiscard]] RoadState road_state() const { return road_state_; }
+  [[nodiscard]] std::string_view road_reason() const { return road_reason_; }
 
  private:
+  /// Asks the road, and keeps what it says of the frame.
+  RoadScaleEstimate ask_road(const ChannelImage& image, const Rigid3& cur_from_prev);
   /// Multiplies the map so that one unit is a metre; `center` stays.
   void make_metric(const ChannelImage& image,
                    const Rigid3& cur_from_prev,
@@ -39,6 +46,8 @@ class MapOdometry {
   MapTracker tracker_;
   std::optional<RoadScale> road_;
   std::optional<double> scale_sigma_;
+  RoadState road_state_ = RoadState::kNotAsked;
+  std::string_view road_reason_;
 };
 
 }  // namespace stemvo

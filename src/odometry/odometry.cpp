@@ -55,6 +55,14 @@ struct Odometry::Impl {
   MotionChain chain;
   std::optional<MapOdometry> map;
 
+  void add_road(FrameResult& result) const {
+    if (map.has_value()) {
+      result.road = map->road_state();
+      result.road_reason = map->road_reason();
+      result.scale_sigma = map->scale_sigma();
+    }
+  }
+
   ChannelImage image;
   Matches matches;
   MeasuredMotion motion;
@@ -109,6 +117,7 @@ FrameResult Odometry::process(const cv::Mat& frame) {
     if (self.map.has_value()) {
       self.map->restart(self.image);
     }
+    self.add_road(result);
     result.world_from_camera = self.chain.world_from_camera();
     return result;
   }
@@ -129,6 +138,7 @@ FrameResult Odometry::process(const cv::Mat& frame) {
   result.fundamental_score = self.motion.fundamental_score;
   result.homography_ratio = self.motion.homography_ratio;
   result.model = self.motion.model;
+  self.add_road(result);
   return result;
 }
 
@@ -139,6 +149,13 @@ FrameResult Odometry::process_missing() {
   FrameResult result;
   result.state = FrameState::kBroken;
   result.world_from_camera = impl_->chain.world_from_camera();
+  impl_->add_road(result);
+  if (result.road == RoadState::kMeasured) {
+    result.road = RoadState::kHeld;
+  }
+  if (result.road != RoadState::kNotAsked) {
+    result.road_reason = "no picture";
+  }
   return result;
 }
 

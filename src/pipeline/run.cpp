@@ -47,6 +47,7 @@ void keep_first(Status& first, Status next) {
 struct Drive {
   Trajectory trajectory;  ///< one pose per frame done
   std::size_t num_measured = 0;
+  std::size_t num_road_measured = 0;
   std::vector<std::string> warnings;
   bool interrupted = false;
   Status written;  ///< of frames.csv and the pictures
@@ -96,6 +97,7 @@ Drive drive(const RunRequest& request,
     }
     result.trajectory.push_back(pose.world_from_camera);
     result.num_measured += is_measured(pose.state) ? 1 : 0;
+    result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     csv.write(number, sequence.timestamps_s()[i], pose);
     if (request.picture_every > 0 && i % static_cast<std::size_t>(request.picture_every) == 0) {
       keep_first(result.written,
@@ -138,6 +140,10 @@ MetricsReport make_report(const RunRequest& request,
   report.scale_source = request.config.scale.source;
   report.tracked_fraction =
       static_cast<double>(done.num_measured) / static_cast<double>(num_frames);
+  if (request.config.scale.source == "camera_height") {
+    report.road_measured_fraction =
+        static_cast<double>(done.num_road_measured) / static_cast<double>(num_frames);
+  }
   if (const auto truth = truth_of(sequence, num_frames)) {
     report.metrics = evaluate_aligned(done.trajectory, *truth, alignment_of(request.config.scale),
                                       request.config.evaluation);

@@ -15,7 +15,8 @@ namespace stemvo {
 namespace {
 
 constexpr std::string_view kHeader =
-    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms\n";
+    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
+    "scale_sigma,road\n";
 
 std::string_view model_name(TwoViewModel model) {
   switch (model) {
@@ -72,11 +73,12 @@ Expected<FramesCsv> FramesCsv::create(const std::filesystem::path& file) {
 }
 
 void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
-  impl_->put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f}\n", frame,
+  const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
+  impl_->put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n", frame,
                          timestamp_s, to_string(r.state), r.num_matches, r.num_inliers,
                          r.homography_score, r.fundamental_score, r.homography_ratio,
                          model_name(r.model), r.times.stem_ms, r.times.features_ms,
-                         r.times.pose_ms));
+                         r.times.pose_ms, sigma, to_string(r.road)));
 }
 
 Status FramesCsv::close() {

@@ -47,6 +47,10 @@ std::string head(const MetricsReport& report) {
   table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
   table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
                                     100.0 * report.tracked_fraction)});
+  if (report.road_measured_fraction) {
+    table.add({"road", fmt::format("measured on {:.1f} % of the frames",
+                                   100.0 * *report.road_measured_fraction)});
+  }
   if (report.metrics) {
     table.add({"path", fmt::format("{:.1f} m (ground truth)", report.metrics->path_length_m)});
   }
@@ -129,6 +133,7 @@ Status write_metrics_json(const std::filesystem::path& file, const MetricsReport
   json["fps"] = report.fps;
   json["scale_source"] = report.scale_source;
   json["tracked_fraction"] = report.tracked_fraction;
+  json["road_measured_fraction"] = number_or_null(report.road_measured_fraction);
   json["alignment"] = report.metrics ? nlohmann::ordered_json(to_string(report.metrics->alignment))
                                      : nlohmann::ordered_json();
   add_metrics(json, report.metrics ? &*report.metrics : nullptr);

@@ -17,7 +17,8 @@ using ::stemvo::testing::TempFolder;
 using ::testing::HasSubstr;
 
 constexpr char kHeader[] =
-    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms\n";
+    "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
+    "scale_sigma,road\n";
 
 FrameResult tracked() {
   FrameResult result;
@@ -28,6 +29,8 @@ FrameResult tracked() {
   result.fundamental_score = 4321.0;
   result.homography_ratio = 0.22221;
   result.model = TwoViewModel::kEssential;
+  result.road = RoadState::kHeld;
+  result.scale_sigma = 0.01234;
   result.times = {1.25, 12.5, 3.0004};
   return result;
 }
@@ -41,9 +44,9 @@ TEST(FramesCsv, HoldsOneRowPerFrame) {
   ASSERT_TRUE(csv->close());
   EXPECT_EQ(read_all(folder / "frames.csv"),
             std::string(kHeader) +
-                "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000\n"
+                "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,-\n"
                 "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
-                "1.250,12.500,3.000\n");
+                "1.250,12.500,3.000,0.0123,held\n");
 }
 
 TEST(FramesCsv, KeepsTheRowsOfARunThatNeverEnds) {

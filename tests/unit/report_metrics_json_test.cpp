@@ -37,6 +37,7 @@ MetricsReport example() {
           .fps = 31.5,
           .scale_source = "ground_truth",
           .tracked_fraction = 0.995,
+          .road_measured_fraction = 0.75,
           .metrics = metrics};
 }
 
@@ -73,7 +74,8 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["alignment"], "none");
-  EXPECT_EQ(json.size(), 19U);
+  EXPECT_EQ(json["road_measured_fraction"], 0.75);
+  EXPECT_EQ(json.size(), 20U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
@@ -98,6 +100,8 @@ TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
   EXPECT_TRUE(json["t_rel_percent"].is_null());
   EXPECT_TRUE(json["average_offset_m"].is_null());
   EXPECT_TRUE(json["fps"].is_null());
+  report.road_measured_fraction.reset();
+  EXPECT_TRUE(written(report)["road_measured_fraction"].is_null());
 }
 
 TEST(MetricsJson, SurvivesNamesThatAreNotUtf8AndFoldersThatAreNotThere) {
@@ -121,6 +125,7 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   EXPECT_THAT(table, ContainsRegex("ATE +1\\.00  m +sim3"));
   EXPECT_THAT(table, HasSubstr("mean over 5 segments of 100..200 m"));
   EXPECT_THAT(table, HasSubstr("each step rescaled to its true length"));
+  EXPECT_THAT(table, HasSubstr("measured on 75.0 % of the frames"));
   EXPECT_THAT(table, HasSubstr("200 frames (20:220)"));
   EXPECT_EQ(table.find(" \n"), std::string::npos) << "blanks at the end of a line";
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -36,6 +37,16 @@ enum class FrameState {
 /// First, initialising, tracking, standing, creeping and rotating frames count as measured.
 [[nodiscard]] bool is_measured(FrameState state);
 
+/// What the road told of a frame's scale (`scale.source: camera_height`).
+enum class RoadState {
+  kNotAsked,  ///< the scale comes from elsewhere
+  kNone,      ///< no road was measured since the map started: the scale is a guess
+  kHeld,      ///< measured before, not on this frame: the last scale is kept, its sigma grows
+  kMeasured,  ///< measured on this frame and believed
+};
+/// `-`, `none`, `held`, `measured`.
+[[nodiscard]] std::string_view to_string(RoadState state);
+
 /// Milliseconds per stage of one frame.
 struct StageTimes {
   double stem_ms = 0.0;
@@ -53,6 +64,9 @@ struct FrameResult {
   double fundamental_score = 0.0;  ///< S_F
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
+  RoadState road = RoadState::kNotAsked;
+  std::string_view road_reason;       ///< why the road was not measured, else empty
+  std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;
   std::string problem;  ///< why the stem gave no channel (the frame counts as broken), else empty
 };

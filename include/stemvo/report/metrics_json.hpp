@@ -22,11 +22,12 @@ struct MetricsReport {
   double fps = 0.0;  ///< frames over wall time, process start to trajectory written
   std::string scale_source;
   double tracked_fraction = 0.0;  ///< frames whose pose was measured, over all
+  std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3
+/// road_measured_fraction (of all frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3
 /// where the trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
 /// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg. Numbers round-trip; a number that is
 /// not finite becomes null. Error: the file cannot be written.
