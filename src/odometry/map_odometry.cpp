@@ -28,23 +28,24 @@ MapOdometry::MapOdometry(const Config& config, const Camera& camera)
   }
 }
 
-void MapOdometry::restart(const ChannelImage& image) {
-  tracker_.restart();
+void MapOdometry::restart(int frame, const ChannelImage& image) {
+  tracker_.restart(frame);
   if (road_.has_value()) {
     road_->restart();
     ask_road(image, {});
   }
 }
 
-MeasuredMotion MapOdometry::refine(const ChannelImage& image,
+MeasuredMotion MapOdometry::refine(int frame,
+                                   const ChannelImage& image,
                                    const Matches& matches,
                                    const Rigid3& world_from_prev,
                                    MeasuredMotion motion) {
   if (motion.state == FrameState::kLost) {
-    restart(image);
+    restart(frame, image);
     return motion;
   }
-  tracker_.add(world_from_prev, matches, motion);
+  tracker_.add(frame, world_from_prev, matches, motion);
   const Rigid3 cur_from_prev = tracker_.world_from_camera().inverse() * world_from_prev;
   if (road_.has_value()) {
     make_metric(image, cur_from_prev, world_from_prev.translation);

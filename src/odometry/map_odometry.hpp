@@ -22,13 +22,16 @@ class MapOdometry {
   MapOdometry(const Config& config, const Camera& camera);
 
   /// The first picture, or one whose motion was not measured: nothing connects it with the past.
-  void restart(const ChannelImage& image);
-  /// A frame with matches from the frame of pose `world_from_prev`. Returns the motion with what
+  void restart(int frame, const ChannelImage& image);
+  /// A frame with matches from the last one given here, of pose `world_from_prev`. Returns the motion with what
   /// the map and the road add: R and direction of T refined, and the length of the step.
-  [[nodiscard]] MeasuredMotion refine(const ChannelImage& image,
+  [[nodiscard]] MeasuredMotion refine(int frame,
+                                      const ChannelImage& image,
                                       const Matches& matches,
                                       const Rigid3& world_from_prev,
                                       MeasuredMotion motion);
+  /// Keyframe motions and landmarks as they were last refined.
+  [[nodiscard]] MapHistory history() const { return tracker_.history(); }
   /// Of log(metres per map unit), after the last frame; nullopt where the road is not asked.
   [[nodiscard]] std::optional<double> scale_sigma() const { return scale_sigma_; }
   /// What the road told of the last frame given.

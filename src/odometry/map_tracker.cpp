@@ -17,21 +17,41 @@ constexpr double kSamePose = 1e-5;
 MapTracker::MapTracker(const Camera& camera, const MapTrackerOptions& options)
     : camera_(camera), options_(options), last_step_(options.first_step) {}
 
-void MapTracker::add(const Rigid3& world_from_prev,
+void MapTracker::restart(int frame) {
+  start_anew(/*is_last_pose_kept=*/true);
+  frame_ = frame;
+}
+
+void MapTracker::start_anew(bool is_last_pose_kept) {
+  if (!is_last_pose_kept && !map_.keyframes.empty() && map_.keyframes.back().frame == frame_) {
+    map_.keyframes.pop_back();
+  }
+  history_.close(map_);
+  map_.clear();
+}
+
+MapHistory MapTracker::history() const {
+  MapHistory history = history_;
+  history.close(map_);
+  return history;
+}
+
+void MapTracker::add(int frame,
+                     const Rigid3& world_from_prev,
                      const Matches& matches,
                      const MeasuredMotion& motion) {
-  ++frame_;
   // The caller chains relative motions: the same pose but for rounding.
   const Rigid3 moved = world_from_camera_.inverse() * world_from_prev;
   const bool is_where_we_left =
       moved.translation.norm() < kSamePose * last_step_ && moved.angle_rad() < kSamePose;
   if (!is_where_we_left) {
-    map_.clear();
+    start_anew(/*is_last_pose_kept=*/false);
     world_from_camera_ = world_from_prev;
   }
   if (map_.keyframes.empty()) {
     open_map(matches, motion.inlier_mask);
   }
+  frame_ = frame;
   world_from_camera_ = place(matches, motion);
   const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
   last_step_ = step > 0.0 ? step : last_step_;
@@ -40,15 +60,22 @@ void MapTracker::add(const Rigid3& world_from_prev,
   }
 }
 
+void MapTracker::add_to_window(Keyframe keyframe) {
+  if (static_cast<int>(map_.keyframes.size()) >= options_.map.num_keyframes) {
+    history_.leave(map_);
+  }
+  add_keyframe(map_, std::move(keyframe), options_.map);
+}
+
 /// The frame before the first one given saw the same tracks.
 void MapTracker::open_map(const Matches& matches, const std::vector<char>& is_inlier) {
-  Keyframe first{frame_ - 1, world_from_camera_, {}};
+  Keyframe first{frame_, world_from_camera_, {}};
   for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
     if (is_inlier[i] != 0) {
       first.observations.push_back({matches.track_ids[i], matches.prev_uv[i]});
     }
   }
-  add_keyframe(map_, std::move(first), options_.map);
+  add_to_window(std::move(first));
 }
 
 Rigid3 MapTracker::place(const Matches& matches, const MeasuredMotion& motion) {
@@ -87,7 +114,7 @@ void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_
       keyframe.observations.push_back({matches.track_ids[i], matches.cur_uv[i]});
     }
   }
-  add_keyframe(map_, std::move(keyframe), options_.map);
+  add_to_window(std::move(keyframe));
   triangulate_landmarks(map_, camera_, options_.map);
   ++keyframes_since_refinement_;
   if (options_.refine_every > 0 && keyframes_since_refinement_ >= options_.refine_every) {

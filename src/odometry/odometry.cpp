@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "odometry/map_history.hpp"
 #include "odometry/map_odometry.hpp"
 #include "odometry/motion_chain.hpp"
 #include "odometry/two_view_estimator.hpp"
@@ -63,9 +64,13 @@ struct Odometry::Impl {
     }
   }
 
+  /// Of the frame being processed.
+  [[nodiscard]] int frame_number() const { return static_cast<int>(poses.size()); }
+
   ChannelImage image;
   Matches matches;
   MeasuredMotion motion;
+  std::vector<Rigid3> poses;  ///< of all frames, as they came
 };
 
 Expected<Odometry> Odometry::create(const Config& config,
@@ -94,6 +99,12 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 FrameResult Odometry::process(const cv::Mat& frame) {
+  FrameResult result = process_picture(frame);
+  impl_->poses.push_back(result.world_from_camera);
+  return result;
+}
+
+FrameResult Odometry::process_picture(const cv::Mat& frame) {
   STEMVO_CHECK(frame.cols == impl_->camera.width_px && frame.rows == impl_->camera.height_px,
                "the frame has the camera's size");
   Impl& self = *impl_;
@@ -102,7 +113,7 @@ FrameResult Odometry::process(const cv::Mat& frame) {
 
   const Expected<Channel> channel = self.stem.apply(frame);
   if (!channel.has_value()) {
-    result = process_missing();
+    result = skip_frame();
     result.problem = channel.error().message;
     return result;
   }
@@ -115,7 +126,7 @@ FrameResult Odometry::process(const cv::Mat& frame) {
   if (!self.chain.has_picture()) {
     self.chain.start();
     if (self.map.has_value()) {
-      self.map->restart(self.image);
+      self.map->restart(self.frame_number(), self.image);
     }
     self.add_road(result);
     result.world_from_camera = self.chain.world_from_camera();
@@ -125,8 +136,8 @@ FrameResult Odometry::process(const cv::Mat& frame) {
                                        self.chain.is_initializing(), self.seed);
   self.front_end->keep(self.motion.inlier_mask);
   if (self.map.has_value()) {
-    self.motion = self.map->refine(self.image, self.matches, self.chain.world_from_picture(),
-                                   std::move(self.motion));
+    self.motion = self.map->refine(self.frame_number(), self.image, self.matches,
+                                   self.chain.world_from_picture(), std::move(self.motion));
   }
   result.state = self.chain.add(self.motion);
   result.times.pose_ms = watch.lap_ms();
@@ -143,6 +154,12 @@ FrameResult Odometry::process(const cv::Mat& frame) {
 }
 
 FrameResult Odometry::process_missing() {
+  FrameResult result = skip_frame();
+  impl_->poses.push_back(result.world_from_camera);
+  return result;
+}
+
+FrameResult Odometry::skip_frame() {
   impl_->chain.extrapolate(/*has_picture=*/false);
   impl_->matches = {};
   impl_->motion = {};
@@ -157,6 +174,11 @@ FrameResult Odometry::process_missing() {
     result.road_reason = "no picture";
   }
   return result;
+}
+
+std::vector<Rigid3> Odometry::refined_trajectory() const {
+  return impl_->map.has_value() ? refined_poses(impl_->poses, impl_->map->history().motions())
+                                : impl_->poses;
 }
 
 const ChannelImage& Odometry::channel_image() const { return impl_->image; }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -52,6 +53,21 @@ Status write_trajectories(const std::filesystem::path& out_dir,
   const Status kitti = write_kitti_trajectory(out_dir / "trajectory_kitti.txt", trajectory);
   const Status tum = write_tum_trajectory(out_dir / "trajectory_tum.txt", times_s, trajectory);
   return kitti ? tum : kitti;
+}
+
+Status write_refined_trajectory(const std::filesystem::path& out_dir,
+                                const std::optional<Trajectory>& refined) {
+  const std::filesystem::path file = out_dir / "trajectory_refined_kitti.txt";
+  if (refined) {
+    return write_kitti_trajectory(file, *refined);
+  }
+  std::error_code code;
+  std::filesystem::remove(file, code);
+  if (code) {
+    return fail(fmt::format("{}: an earlier run's file cannot be removed ({})", file.string(),
+                            code.message()));
+  }
+  return {};
 }
 
 Status write_config(const std::filesystem::path& out_dir,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 
 #include "stemvo/config.hpp"
@@ -16,6 +17,10 @@ namespace stemvo::pipeline {
 [[nodiscard]] Status write_trajectories(const std::filesystem::path& out_dir,
                                         const KittiSequence& sequence,
                                         std::span<const Rigid3> trajectory);
+
+/// trajectory_refined_kitti.txt; without one, what an earlier run left there is removed.
+[[nodiscard]] Status write_refined_trajectory(const std::filesystem::path& out_dir,
+                                              const std::optional<Trajectory>& refined);
 
 /// config.yaml: the effective configuration under comments that say which program, frames and model
 /// made the results. `stemvo run --config` takes it as it is.

@@ -45,7 +45,8 @@ void keep_first(Status& first, Status next) {
 
 /// What the loop over the frames leaves behind.
 struct Drive {
-  Trajectory trajectory;  ///< one pose per frame done
+  Trajectory trajectory;              ///< one pose per frame done
+  std::optional<Trajectory> refined;  ///< the same with look-ahead; mode map only
   std::size_t num_measured = 0;
   std::size_t num_road_measured = 0;
   std::vector<std::string> warnings;
@@ -123,6 +124,15 @@ Alignment alignment_of(const ScaleOptions& scale) {
   return scale.source == "none" ? Alignment::kSim3 : Alignment::kNone;
 }
 
+Trajectory refined_trajectory(const RunRequest& request,
+                              const KittiSequence& sequence,
+                              const Odometry& odometry) {
+  Trajectory refined = odometry.refined_trajectory();
+  return request.config.scale.source == "ground_truth"
+             ? rescale_steps(refined, *truth_of(sequence, refined.size()))
+             : refined;
+}
+
 MetricsReport make_report(const RunRequest& request,
                           const KittiSequence& sequence,
                           const StemInfo& stem,
@@ -145,8 +155,13 @@ MetricsReport make_report(const RunRequest& request,
         static_cast<double>(done.num_road_measured) / static_cast<double>(num_frames);
   }
   if (const auto truth = truth_of(sequence, num_frames)) {
-    report.metrics = evaluate_aligned(done.trajectory, *truth, alignment_of(request.config.scale),
-                                      request.config.evaluation);
+    const Alignment alignment = alignment_of(request.config.scale);
+    report.metrics =
+        evaluate_aligned(done.trajectory, *truth, alignment, request.config.evaluation);
+    if (done.refined) {
+      report.refined =
+          evaluate_aligned(*done.refined, *truth, alignment, request.config.evaluation);
+    }
   }
   return report;
 }
@@ -183,6 +198,10 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     done.trajectory = rescale_steps(done.trajectory, *truth_of(*sequence, done.trajectory.size()));
   }
   Status written = pipeline::write_trajectories(request.out_dir, *sequence, done.trajectory);
+  if (request.config.odometry.mode == "map") {
+    done.refined = refined_trajectory(request, *sequence, *odometry);
+  }
+  keep_first(written, pipeline::write_refined_trajectory(request.out_dir, done.refined));
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - request.started;
 
   const MetricsReport report =

@@ -37,6 +37,15 @@ std::string scale_explained(const std::string& source) {
   return source;
 }
 
+nlohmann::ordered_json refined_json(const Metrics& metrics) {
+  nlohmann::ordered_json json;
+  json["average_offset_m"] = metrics.average_offset_m;
+  json["t_rel_percent"] = number_or_null(metrics.t_rel_percent);
+  json["r_rel_deg_per_100m"] = number_or_null(metrics.r_rel_deg_per_100m);
+  json["rpe_rotation_deg"] = metrics.rpe_rotation_deg;
+  return json;
+}
+
 std::string head(const MetricsReport& report) {
   TextTable table("ll");
   const std::size_t end = report.first_frame + report.num_frames;
@@ -57,7 +66,8 @@ std::string head(const MetricsReport& report) {
   return table.str();
 }
 
-std::string error_table(const Metrics& m) {
+std::string error_table(const MetricsReport& report) {
+  const Metrics& m = *report.metrics;
   const std::string segments = m.num_segments == 0 ? "no segment fits into the drive"
                                                    : fmt::format("mean over {} segments of {}",
                                                                  m.num_segments, length_range(m));
@@ -66,6 +76,10 @@ std::string error_table(const Metrics& m) {
   table.add({"error", "value", "unit", "alignment", ""});
   table.rule();
   table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
+  if (report.refined) {
+    table.add({"  with look-ahead", number_or_dash(report.refined->t_rel_percent, 2), "%",
+               std::string(to_string(report.refined->alignment)), "trajectory_refined_kitti.txt"});
+  }
   table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
              "the same segments"});
   table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
@@ -137,6 +151,7 @@ Status write_metrics_json(const std::filesystem::path& file, const MetricsReport
   json["alignment"] = report.metrics ? nlohmann::ordered_json(to_string(report.metrics->alignment))
                                      : nlohmann::ordered_json();
   add_metrics(json, report.metrics ? &*report.metrics : nullptr);
+  json["refined"] = report.refined ? refined_json(*report.refined) : nlohmann::ordered_json();
   return write_text_file(file, to_text(json));
 }
 
@@ -144,7 +159,7 @@ std::string format_metrics_table(const MetricsReport& report) {
   if (!report.metrics) {
     return head(report) + "\nNo ground truth: the errors are not known.\n";
   }
-  return head(report) + '\n' + error_table(*report.metrics);
+  return head(report) + '\n' + error_table(report);
 }
 
 }  // namespace stemvo

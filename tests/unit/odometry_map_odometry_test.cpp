@@ -62,7 +62,7 @@ TEST(MapOdometry, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
   const Config config = metric_config();
   const TwoViewEstimator estimator(config, drive.scene.camera);
   MapOdometry map(config, drive.scene.camera);
-  map.restart(drive.picture(0));
+  map.restart(0, drive.picture(0));
   EXPECT_EQ(map.road_state(), RoadState::kNone);
   EXPECT_EQ(map.road_reason(), "first frame");
   const double unknown = map.scale_sigma().value();
@@ -74,7 +74,7 @@ TEST(MapOdometry, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
     drive.scene.has_road = i < num_seen;
     const Matches matches = drive.matches(i);
     const MeasuredMotion motion =
-        map.refine(drive.picture(i), matches, pose,
+        map.refine(i, drive.picture(i), matches, pose,
                    estimator.measure(matches.prev_uv, matches.cur_uv, i == 1, 1));
     const Rigid3 step = motion.cur_from_prev.inverse();
     pose = pose * Rigid3(step.rotation, motion.step * step.translation);
@@ -97,7 +97,7 @@ TEST(MapOdometry, ARoadThatIsNotAskedHasNoState) {
   Config config = metric_config();
   config.scale.source = "constant";
   MapOdometry map(config, drive.scene.camera);
-  map.restart(drive.picture(0));
+  map.restart(0, drive.picture(0));
   EXPECT_EQ(map.road_state(), RoadState::kNotAsked);
   EXPECT_FALSE(map.scale_sigma().has_value());
 }

@@ -28,6 +28,8 @@ MetricsReport example() {
   metrics.num_segments = 5;
   metrics.ate_rmse = {4.0, 3.0, 2.0, 1.0};
   metrics.rpe_rotation_deg = 0.0456;
+  Metrics refined = metrics;
+  refined.average_offset_m = 0.25;
   return {.stemvo_version = "0.1.0",
           .sequence = "00",
           .first_frame = 20,
@@ -38,7 +40,8 @@ MetricsReport example() {
           .scale_source = "ground_truth",
           .tracked_fraction = 0.995,
           .road_measured_fraction = 0.75,
-          .metrics = metrics};
+          .metrics = metrics,
+          .refined = refined};
 }
 
 nlohmann::json written(const MetricsReport& report) {
@@ -74,17 +77,22 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["alignment"], "none");
+  EXPECT_EQ(json["refined"]["t_rel_percent"], 0.97);
+  EXPECT_EQ(json["refined"]["r_rel_deg_per_100m"], 1.72);
+  EXPECT_EQ(json["refined"]["average_offset_m"], 0.25);
+  EXPECT_EQ(json["refined"]["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
-  EXPECT_EQ(json.size(), 20U);
+  EXPECT_EQ(json.size(), 21U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   MetricsReport report = example();
   report.metrics.reset();
+  report.refined.reset();
   const nlohmann::json json = written(report);
   for (const char* key :
        {"alignment", "path_length_m", "average_offset_m", "null_offset_m", "t_rel_percent", "r_rel_deg_per_100m",
-        "segment_lengths_m", "segments", "ate_rmse_m", "rpe_rotation_deg"}) {
+        "segment_lengths_m", "segments", "ate_rmse_m", "rpe_rotation_deg", "refined"}) {
     ASSERT_TRUE(json.contains(key)) << key;
     EXPECT_TRUE(json[key].is_null()) << key;
   }
@@ -117,6 +125,7 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   const std::string table = format_metrics_table(example());
   EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +none"));
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +none"));
+  EXPECT_THAT(table, ContainsRegex("with look-ahead +0\\.97  % +none +trajectory_refined_kitti.txt"));
   EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +none"));
   EXPECT_THAT(table, ContainsRegex("never moved +79\\.25  m +none"));
   EXPECT_THAT(table, ContainsRegex("ATE +4\\.00  m +none"));

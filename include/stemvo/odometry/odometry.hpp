@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -88,6 +89,10 @@ class Odometry {
   /// A frame that could not be read: keeps the clock running.
   [[nodiscard]] FrameResult process_missing();
 
+  /// One pose per frame so far, as the local map last knew them: with the look-ahead of its window.
+  /// Mode two_frame refines nothing: the poses as they came.
+  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
+
   /// Of the last frame processed, for pictures.
   [[nodiscard]] const ChannelImage& channel_image() const;
   [[nodiscard]] const Matches& matches() const;
@@ -97,6 +102,8 @@ class Odometry {
  private:
   struct Impl;
   explicit Odometry(std::unique_ptr<Impl> impl);
+  FrameResult process_picture(const cv::Mat& frame);
+  FrameResult skip_frame();
   std::unique_ptr<Impl> impl_;
 };
 

@@ -43,7 +43,8 @@ struct RunSummary {
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
-/// (trajectory_kitti.txt, trajectory_tum.txt, frames.csv, config.yaml, metrics.json,
+/// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
+/// else an old one is removed, frames.csv, config.yaml, metrics.json,
 /// trajectory.png, trajectory.svg, pictures/%06d.png). A wrong request (configuration, sequence,
 /// ground truth that scale.source needs, model, out_dir that cannot be written) is an error before
 /// work starts. A frame that cannot be read is a warning and gets a pose. When a result cannot be
