@@ -28,6 +28,8 @@ constexpr int kCellsAcross = 1000;
 constexpr int kPyramidLevel = 0;  ///< the predicted plane has taken most of the motion away
 constexpr double kMinEigenvalue = 1e-5;
 constexpr double kMinInlierShare = 0.3;
+/// Of the corners. One in eight finds its way back on nothing but the sensor's noise.
+constexpr double kMinTrackedShare = 0.25;
 constexpr double kMaxSigma = 0.2;
 constexpr int kBorder_px = 24;  ///< room for the tracker's window around the strip
 
@@ -240,7 +242,9 @@ RoadMeasurement RoadPoints::measure(const RoadPicture& prev,
   }
   RoadWarp warp(cur_from_prev, prior, options_.camera_height_m);
   const std::vector<Track> tracks = track_corners(prev, cur, strip, warp, options_);
-  if (static_cast<int>(tracks.size()) < kMinPoints) {
+  if (static_cast<int>(tracks.size()) < kMinPoints ||
+      static_cast<double>(tracks.size()) <
+          kMinTrackedShare * static_cast<double>(strip.corners.size())) {
     return no_road("no tracks on the road");
   }
   const Fit fit = fit_road(tracks, cur.camera, prior, options_, warp);
