@@ -51,8 +51,8 @@ struct RefineOptions {
 struct ScaleOptions {
   /// `none` (up to scale), `constant`, `camera_height` (mode map) or `ground_truth`
   std::string source = "constant";
-  double constant_m = 1.0;          ///< per frame
-  double camera_height_m = 1.65;    ///< above the road, for `camera_height`
+  double constant_m = 1.0;        ///< per frame
+  double camera_height_m = 1.65;  ///< above the road, for `camera_height`
 };
 
 /// The whole configuration. Defaults stand here, once; config/default.yaml is generated from them.

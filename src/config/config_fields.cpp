@@ -144,7 +144,8 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
   return {
       {"scale", "source", &o.source, one_of({"none", "constant", "camera_height", "ground_truth"}),
        "length of a step: none, up to scale (1 unit; mode map: the first one); constant, the same "
-       "in metres; camera_height, from the road (mode map); ground_truth, each output step rescaled "
+       "in metres; camera_height, from the road (mode map); ground_truth, each output step "
+       "rescaled "
        "(the paper's protocol; needs the pose file)"},
       {"scale", "constant_m", &o.constant_m, above(0), "metres per frame when constant"},
       {"scale", "camera_height_m", &o.camera_height_m, above(0),

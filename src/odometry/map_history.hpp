@@ -31,9 +31,9 @@ class MapHistory {
   std::vector<KeyframeMotion> motions_;
 };
 
-/// Poses of all frames, with look-ahead: a keyframe follows its predecessor by their refined motion,
-/// any other frame the one before it as it did when it came. `motions` are ordered by `cur`; frame
-/// numbers count `world_from_camera`, the poses as they came.
+/// Poses of all frames, with look-ahead: a keyframe follows its predecessor by their refined
+/// motion, any other frame the one before it as it did when it came. `motions` are ordered by
+/// `cur`; frame numbers count `world_from_camera`, the poses as they came.
 [[nodiscard]] std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
                                                 std::span<const KeyframeMotion> motions);
 

@@ -23,8 +23,9 @@ class MapOdometry {
 
   /// The first picture, or one whose motion was not measured: nothing connects it with the past.
   void restart(int frame, const ChannelImage& image);
-  /// A frame with matches from the last one given here, of pose `world_from_prev`. Returns the motion with what
-  /// the map and the road add: R and direction of T refined, and the length of the step.
+  /// A frame with matches from the last one given here, of pose `world_from_prev`. Returns the
+  /// motion with what the map and the road add: R and direction of T refined, and the length of the
+  /// step.
   [[nodiscard]] MeasuredMotion refine(int frame,
                                       const ChannelImage& image,
                                       const Matches& matches,

@@ -32,8 +32,9 @@ class MapTracker {
   MapTracker(const Camera& camera, const MapTrackerOptions& options);
 
   /// A frame whose matches start at the last one given (here or to restart), of pose
-  /// `world_from_prev`. Numbers of frames grow. The two-frame motion brings inliers and a first guess. Where the pose is not the one left here (the frames between
-  /// were lost, or the caller moved it) the map starts anew from it.
+  /// `world_from_prev`. Numbers of frames grow. The two-frame motion brings inliers and a first
+  /// guess. Where the pose is not the one left here (the frames between were lost, or the caller
+  /// moved it) the map starts anew from it.
   void add(int frame,
            const Rigid3& world_from_prev,
            const Matches& matches,

@@ -42,7 +42,7 @@ class MotionChain {
   void apply(const Rigid3& prev_from_cur, double step_m);
 
   OdometryOptions options_;
-  double assumed_step_;  ///< metres or units, per frame
+  double assumed_step_;        ///< metres or units, per frame
   Rigid3 world_from_picture_;  ///< pose of the last picture the matches start from
   Rigid3 world_from_camera_;   ///< pose of the last frame
   Rigid3 last_prev_from_cur_;  ///< last motion of one frame, metres; for extrapolation

@@ -98,7 +98,8 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
                       "line, KITTI or TUM; nothing is matched by time)",
                       file.string(), truth->size(), report.ground_truth, estimate->size()));
     }
-    report.rows.push_back({file.string(), evaluate_aligned(*estimate, *truth, request.alignment, request.options)});
+    report.rows.push_back(
+        {file.string(), evaluate_aligned(*estimate, *truth, request.alignment, request.options)});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
   report.never_moves = {"(never moves)",

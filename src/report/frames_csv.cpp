@@ -74,11 +74,11 @@ Expected<FramesCsv> FramesCsv::create(const std::filesystem::path& file) {
 
 void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
   const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
-  impl_->put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n", frame,
-                         timestamp_s, to_string(r.state), r.num_matches, r.num_inliers,
+  impl_->put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n",
+                         frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers,
                          r.homography_score, r.fundamental_score, r.homography_ratio,
-                         model_name(r.model), r.times.stem_ms, r.times.features_ms,
-                         r.times.pose_ms, sigma, to_string(r.road)));
+                         model_name(r.model), r.times.stem_ms, r.times.features_ms, r.times.pose_ms,
+                         sigma, to_string(r.road)));
 }
 
 Status FramesCsv::close() {

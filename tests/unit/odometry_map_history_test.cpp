@@ -24,9 +24,8 @@ TEST(RefinedPoses, KeyframesFollowTheirMotionsAndTheOthersTheirKeyframe) {
     online.push_back(online.back() * step(1.0));
   }
   // Frame 2 was no keyframe, frame 5 is after the last one.
-  const std::vector<Rigid3> refined =
-      refined_poses(online, std::vector<KeyframeMotion>{
-                                {0, 1, step(1.1)}, {1, 3, step(2.5)}, {3, 4, step(0.9)}});
+  const std::vector<Rigid3> refined = refined_poses(
+      online, std::vector<KeyframeMotion>{{0, 1, step(1.1)}, {1, 3, step(2.5)}, {3, 4, step(0.9)}});
   ASSERT_EQ(refined.size(), online.size());
   EXPECT_LT(distance(refined[1], step(1.1)), 1e-12);
   EXPECT_LT(distance(refined[2], step(1.1) * step(1.0)), 1e-12);
@@ -44,11 +43,8 @@ TEST(RefinedPoses, WithoutAMapThePosesStay) {
 }
 
 /// Drives a tracker over frames [from, to); returns the poses as they came.
-void drive_on(MapTracker& tracker,
-              const DriveTracks& drive,
-              int from,
-              int to,
-              std::vector<Rigid3>& online) {
+void drive_on(
+    MapTracker& tracker, const DriveTracks& drive, int from, int to, std::vector<Rigid3>& online) {
   const TwoViewEstimator estimator({}, drive.camera);
   for (int i = from; i < to; ++i) {
     const Matches matches = drive.matches(i);

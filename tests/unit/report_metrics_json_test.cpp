@@ -90,9 +90,9 @@ TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   report.metrics.reset();
   report.refined.reset();
   const nlohmann::json json = written(report);
-  for (const char* key :
-       {"alignment", "path_length_m", "average_offset_m", "null_offset_m", "t_rel_percent", "r_rel_deg_per_100m",
-        "segment_lengths_m", "segments", "ate_rmse_m", "rpe_rotation_deg", "refined"}) {
+  for (const char* key : {"alignment", "path_length_m", "average_offset_m", "null_offset_m",
+                          "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments",
+                          "ate_rmse_m", "rpe_rotation_deg", "refined"}) {
     ASSERT_TRUE(json.contains(key)) << key;
     EXPECT_TRUE(json[key].is_null()) << key;
   }
@@ -125,7 +125,8 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   const std::string table = format_metrics_table(example());
   EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +none"));
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +none"));
-  EXPECT_THAT(table, ContainsRegex("with look-ahead +0\\.97  % +none +trajectory_refined_kitti.txt"));
+  EXPECT_THAT(table,
+              ContainsRegex("with look-ahead +0\\.97  % +none +trajectory_refined_kitti.txt"));
   EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +none"));
   EXPECT_THAT(table, ContainsRegex("never moved +79\\.25  m +none"));
   EXPECT_THAT(table, ContainsRegex("ATE +4\\.00  m +none"));

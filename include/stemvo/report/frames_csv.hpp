@@ -12,8 +12,8 @@ namespace stemvo {
 
 /// Writes frames.csv row by row, so that a run that is killed keeps the rows it had. Columns:
 /// frame, timestamp_s, state, matches, inliers, s_h, s_f, r_h, model, stem_ms, features_ms,
-/// pose_ms, scale_sigma (of log(metres per unit); empty where no road is asked), road (-, none, held,
-/// measured: RoadState).
+/// pose_ms, scale_sigma (of log(metres per unit); empty where no road is asked), road (-, none,
+/// held, measured: RoadState).
 class FramesCsv {
  public:
   /// Replaces the file and writes the header. Error: it cannot be written.

@@ -21,19 +21,20 @@ struct MetricsReport {
   int filter = 0;
   double fps = 0.0;  ///< frames over wall time, process start to trajectory written
   std::string scale_source;
-  double tracked_fraction = 0.0;  ///< frames whose pose was measured, over all
+  double tracked_fraction = 0.0;                 ///< frames whose pose was measured, over all
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;
   std::optional<Metrics> refined;  ///< of trajectory_refined_kitti.txt
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// road_measured_fraction (of all frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3
-/// where the trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
-/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
-/// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no refined
-/// trajectory is written). Numbers round-trip; a number that is
-/// not finite becomes null. Error: the file cannot be written.
+/// road_measured_fraction (of all frames; null where the road is not asked) alignment (of
+/// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
+/// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
+/// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
+/// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
+/// refined trajectory is written). Numbers round-trip; a number that is not finite becomes null.
+/// Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
 
