@@ -18,12 +18,14 @@ constexpr const char* kFooter =
     R"(SEQUENCE_DIR holds image_2/000000.png, .. (colour) or image_0 (gray), calib.txt and times.txt, as in
 KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
 
---out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory.png and .svg (the
-map), metrics.json (the numbers), frames.csv (a row per frame), config.yaml (what was run).
+--out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory_refined_kitti.txt
+(odometry.mode map: the same with look-ahead), trajectory.png and .svg (the path drawn), metrics.json
+(the numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
   stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth   the paper's protocol
+  stemvo run kitti/sequences/03 --out result --map --set odometry.mode=map     with a point cloud
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
   stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn)";
 
@@ -39,7 +41,10 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
     return;
   }
   print(format_metrics_table(summary.report));
-  print(fmt::format("map: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+  print(fmt::format("picture: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+  if (arguments.request.write_map) {
+    print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
+  }
 }
 
 int run(Arguments& arguments) {
@@ -96,6 +101,8 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   command->add_option("--pictures", request.picture_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
+  command->add_flag("--map", request.write_map,
+                    "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
   command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
   command->footer(kFooter);
   command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });

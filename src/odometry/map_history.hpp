@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "odometry/local_map.hpp"
 #include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/odometry/odometry.hpp"
 
 namespace stemvo {
 
@@ -17,18 +23,37 @@ struct KeyframeMotion {
 };
 
 /// What the window leaves behind. Motions between neighbours are kept, not poses: the window is
-/// rescaled and moved as a whole later on, and what has left must not be torn from it.
+/// rescaled and moved as a whole later on, and what has left must not be torn from it. For the same
+/// reason a landmark is kept in the camera of the last keyframe that saw it.
 class MapHistory {
  public:
-  /// The oldest keyframe is about to leave the window.
-  void leave(const LocalMap& map);
+  /// From now on landmarks are kept too.
+  void keep_landmarks() { keeps_landmarks_ = true; }
+  /// The newest keyframe of the window sees this picture (the input, gray or RGB).
+  void look(const LocalMap& map, const cv::Mat& picture);
+
+  /// The oldest keyframe is about to leave the window for the one that comes.
+  void leave(const LocalMap& map, const Keyframe& coming);
   /// The whole window is about to be dropped; nothing will connect with it.
   void close(const LocalMap& map);
 
   [[nodiscard]] const std::vector<KeyframeMotion>& motions() const { return motions_; }
+  /// Well-constrained landmarks that have left.
+  [[nodiscard]] const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
 
  private:
+  /// What is known of a track that the window sees.
+  struct Track {
+    int num_keyframes = 0;
+    double max_parallax_rad = 0.0;
+    std::array<std::uint8_t, 3> rgb{};
+  };
+  void keep(const LocalMap& map, const Keyframe& last_seen_from, int track_id);
+
+  bool keeps_landmarks_ = false;
   std::vector<KeyframeMotion> motions_;
+  std::vector<MapLandmark> landmarks_;
+  std::map<int, Track> tracks_;
 };
 
 /// Poses of all frames, with look-ahead: a keyframe follows its predecessor by their refined

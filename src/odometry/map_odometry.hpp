@@ -31,6 +31,9 @@ class MapOdometry {
                                       const Matches& matches,
                                       const Rigid3& world_from_prev,
                                       MeasuredMotion motion);
+  void keep_landmarks() { tracker_.keep_landmarks(); }
+  /// The input picture of the last frame given to refine, for the landmarks' colours.
+  void look(const cv::Mat& picture) { tracker_.look(picture); }
   /// Keyframe motions and landmarks as they were last refined.
   [[nodiscard]] MapHistory history() const { return tracker_.history(); }
   /// Of log(metres per map unit), after the last frame; nullopt where the road is not asked.

@@ -30,6 +30,12 @@ void MapTracker::start_anew(bool is_last_pose_kept) {
   map_.clear();
 }
 
+void MapTracker::look(const cv::Mat& picture) {
+  if (!map_.keyframes.empty() && map_.keyframes.back().frame == frame_) {
+    history_.look(map_, picture);
+  }
+}
+
 MapHistory MapTracker::history() const {
   MapHistory history = history_;
   history.close(map_);
@@ -62,7 +68,9 @@ void MapTracker::add(int frame,
 
 void MapTracker::add_to_window(Keyframe keyframe) {
   if (static_cast<int>(map_.keyframes.size()) >= options_.map.num_keyframes) {
-    history_.leave(map_);
+    std::sort(keyframe.observations.begin(), keyframe.observations.end(),
+              [](const auto& a, const auto& b) { return a.track_id < b.track_id; });
+    history_.leave(map_, keyframe);
   }
   add_keyframe(map_, std::move(keyframe), options_.map);
 }

@@ -44,6 +44,9 @@ class MapTracker {
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
   [[nodiscard]] const LocalMap& map() const { return map_; }
+  void keep_landmarks() { history_.keep_landmarks(); }
+  /// The input picture of the last frame, for the landmarks' colours.
+  void look(const cv::Mat& picture);
   /// What has left the window, and the window as it stands now.
   [[nodiscard]] MapHistory history() const;
   /// Multiplies every length; `center` (in the world) stays where it is.

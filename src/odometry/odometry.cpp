@@ -138,6 +138,7 @@ FrameResult Odometry::process_picture(const cv::Mat& frame) {
   if (self.map.has_value()) {
     self.motion = self.map->refine(self.frame_number(), self.image, self.matches,
                                    self.chain.world_from_picture(), std::move(self.motion));
+    self.map->look(frame);
   }
   result.state = self.chain.add(self.motion);
   result.times.pose_ms = watch.lap_ms();
@@ -174,6 +175,16 @@ FrameResult Odometry::skip_frame() {
     result.road_reason = "no picture";
   }
   return result;
+}
+
+void Odometry::keep_landmarks() {
+  if (impl_->map.has_value()) {
+    impl_->map->keep_landmarks();
+  }
+}
+
+std::vector<MapLandmark> Odometry::landmarks() const {
+  return impl_->map.has_value() ? impl_->map->history().landmarks() : std::vector<MapLandmark>();
 }
 
 std::vector<Rigid3> Odometry::refined_trajectory() const {

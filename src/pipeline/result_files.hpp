@@ -22,6 +22,14 @@ namespace stemvo::pipeline {
 [[nodiscard]] Status write_refined_trajectory(const std::filesystem::path& out_dir,
                                               const std::optional<Trajectory>& refined);
 
+/// map.ply: the landmarks and the camera's path in the world of trajectory_refined_kitti.txt.
+/// `refined` are the poses the landmarks belong to, `written` the same in the file: where steps
+/// were rescaled, landmarks are with them.
+[[nodiscard]] Status write_point_map(const std::filesystem::path& out_dir,
+                                     std::span<const MapLandmark> landmarks,
+                                     std::span<const Rigid3> refined,
+                                     std::span<const Rigid3> written);
+
 /// config.yaml: the effective configuration under comments that say which program, frames and model
 /// made the results. `stemvo run --config` takes it as it is.
 [[nodiscard]] Status write_config(const std::filesystem::path& out_dir,

@@ -172,6 +172,10 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (const Status status = validate(request.config); !status) {
     return tl::unexpected(status.error());
   }
+  if (request.write_map && request.config.odometry.mode != "map") {
+    return fail(fmt::format("--map: expected odometry.mode map, which makes one, found {}",
+                            request.config.odometry.mode));
+  }
   const ThreadScope threads(request.num_threads);
   const Expected<KittiSequence> sequence = open_sequence(request);
   if (!sequence) {
@@ -193,6 +197,9 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return tl::unexpected(csv.error());
   }
 
+  if (request.write_map) {
+    odometry->keep_landmarks();
+  }
   Drive done = drive(request, *sequence, *odometry, *csv, progress);
   if (request.config.scale.source == "ground_truth") {
     done.trajectory = rescale_steps(done.trajectory, *truth_of(*sequence, done.trajectory.size()));
@@ -209,6 +216,10 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   keep_first(written, done.written);
   keep_first(written, pipeline::write_config(request.out_dir, request.config, *sequence,
                                              odometry->stem_info()));
+  if (request.write_map) {
+    keep_first(written, pipeline::write_point_map(request.out_dir, odometry->landmarks(),
+                                                  odometry->refined_trajectory(), *done.refined));
+  }
   keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
   keep_first(written, pipeline::write_map(request.out_dir, *sequence, done.trajectory, report));
   if (!written) {

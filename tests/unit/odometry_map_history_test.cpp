@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -97,6 +98,54 @@ TEST(MapHistory, RescalingTheWindowDoesNotTearWhatHasLeft) {
     const bool has_left = static_cast<int>(i) <= 20 - window;
     EXPECT_NEAR(length / truth, has_left ? 1.0 : 2.0, 0.02) << i;
   }
+}
+
+TEST(MapHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
+  const int num_frames = 40;
+  const DriveTracks drive(num_frames, 0.1, 24);
+  MapTrackerOptions options;
+  options.first_step = drive.world_from_camera[1].translation.norm();
+  MapTracker tracker(drive.camera, options);
+  tracker.keep_landmarks();
+  std::vector<Rigid3> online(1);
+  cv::Mat picture(drive.camera.height_px, drive.camera.width_px, CV_8UC3);
+  const TwoViewEstimator estimator({}, drive.camera);
+  for (int i = 1; i < num_frames; ++i) {
+    const Matches matches = drive.matches(i);
+    tracker.add(i, online.back(), matches,
+                estimator.measure(matches.prev_uv, matches.cur_uv, false, 1));
+    online.push_back(tracker.world_from_camera());
+    picture.setTo(cv::Scalar(i, 2 * i, 3 * i));
+    tracker.look(picture);
+  }
+  const MapHistory history = tracker.history();
+  const std::vector<Rigid3> refined = refined_poses(online, history.motions());
+  std::vector<double> errors;
+  for (const MapLandmark& landmark : history.landmarks()) {
+    const Eigen::Vector3d place =
+        refined[static_cast<std::size_t>(landmark.frame)] * landmark.position.cast<double>();
+    double nearest = 1e9;  // landmarks do not tell their number; true points are metres apart
+    for (const Eigen::Vector3d& point : drive.points) {
+      nearest = std::min(nearest, (point - place).norm());
+    }
+    errors.push_back(nearest);
+    ASSERT_GE(landmark.frame, 1);
+    ASSERT_LT(landmark.frame, num_frames);
+    EXPECT_EQ(landmark.rgb[0], landmark.frame);  // of the last frame that saw it
+    EXPECT_EQ(landmark.rgb[2], 3 * landmark.frame);
+  }
+  ASSERT_GT(errors.size(), 300U);
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
+  EXPECT_LT(errors[errors.size() * 95 / 100], 0.5);
+}
+
+TEST(MapHistory, LandmarksAreKeptOnlyWhereTheyAreAskedFor) {
+  const DriveTracks drive(20, 0.0, 25);
+  MapTracker tracker(drive.camera, {});
+  std::vector<Rigid3> online(1);
+  drive_on(tracker, drive, 1, 20, online);
+  EXPECT_TRUE(tracker.history().landmarks().empty());
 }
 
 TEST(MapHistory, APoseTheCallerDidNotTakeIsForgotten) {

@@ -14,6 +14,8 @@
 #include "stemvo/evaluation/trajectory.hpp"
 #include "stemvo/pipeline/channel_pictures.hpp"
 #include "stemvo/pipeline/run.hpp"
+#include "stemvo/report/map_ply.hpp"
+#include "support/ply_reader.hpp"
 
 namespace stemvo {
 namespace {
@@ -136,6 +138,49 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   EXPECT_GE(metrics.ate_rmse.none_m, metrics.null_offset_m * 0.5) << "two times too long";
   EXPECT_THAT(read_file(request_.out_dir / "metrics.json"), HasSubstr("\"alignment\": \"sim3\""));
   EXPECT_THAT(read_file(request_.out_dir / "trajectory.svg"), HasSubstr("<svg"));
+}
+
+TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
+  request_.config.odometry.mode = "map";
+  request_.config.scale.source = "ground_truth";
+  request_.write_map = true;
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  const auto refined = read_kitti_trajectory(request_.out_dir / "trajectory_refined_kitti.txt");
+  ASSERT_TRUE(refined) << refined.error().message;
+  const testing::PlyFile map = testing::read_ply(request_.out_dir / "map.ply");
+  ASSERT_EQ(map.edges.size() + 1, refined->size());
+  ASSERT_GT(map.vertices.size(), 100U + refined->size());
+  const std::size_t num_points = map.vertices.size() - refined->size();
+  for (std::size_t i = 0; i < refined->size(); ++i) {
+    EXPECT_LT(
+        (map.vertices[num_points + i].position - (*refined)[i].translation.cast<float>()).norm(),
+        1e-5F);
+    EXPECT_EQ(map.vertices[num_points + i].rgb, kMapPathColor);
+  }
+  // The wall's left half stands at 12 m, its right half at 20 m.
+  std::size_t num_good = 0;
+  for (std::size_t i = 0; i < num_points; ++i) {
+    const testing::PlyFile::Vertex& point = map.vertices[i];
+    const float depth_m = point.position.x() < 0.0F ? 12.0F : 20.0F;
+    num_good += std::abs(point.position.z() - depth_m) < 0.05F * depth_m ? 1 : 0;
+    EXPECT_EQ(point.rgb[0], point.rgb[1]) << "a gray camera";
+  }
+  EXPECT_GE(num_good, num_points * 8 / 10) << num_good << " of " << num_points;
+  EXPECT_EQ(summary->report.refined.has_value(), true);
+}
+
+TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
+  request_.config.odometry.mode = "two_frame";
+  request_.config.scale.source = "constant";
+  fs::create_directories(request_.out_dir);
+  std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_FALSE(fs::exists(request_.out_dir / "trajectory_refined_kitti.txt"));
+  EXPECT_FALSE(summary->report.refined.has_value());
+  request_.write_map = true;
+  EXPECT_THAT(error_of(request_), HasSubstr("--map: expected odometry.mode map"));
 }
 
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {

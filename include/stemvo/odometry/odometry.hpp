@@ -72,6 +72,14 @@ struct FrameResult {
   std::string problem;  ///< why the stem gave no channel (the frame counts as broken), else empty
 };
 
+/// A landmark of the local map, where it was seen last: in the camera of that frame, in units of
+/// the trajectory. refined_trajectory()[frame] * position is its place in the world.
+struct MapLandmark {
+  int frame = 0;  ///< counted from the first one given
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();
+  std::array<std::uint8_t, 3> rgb{};  ///< of the frame's pixel; gray where the camera is gray
+};
+
 /// The facade: frames in, poses out, one at a time, no look-ahead.
 class Odometry {
  public:
@@ -92,6 +100,12 @@ class Odometry {
   /// One pose per frame so far, as the local map last knew them: with the look-ahead of its window.
   /// Mode two_frame refines nothing: the poses as they came.
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
+
+  /// Before the first frame: landmarks are kept (some 30 bytes each). Mode two_frame has none.
+  void keep_landmarks();
+  /// Landmarks seen from at least 3 keyframes under at least 1.5 degrees of parallax, as they were
+  /// when they left the window, or are now. Empty without keep_landmarks().
+  [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
   /// Of the last frame processed, for pictures.
   [[nodiscard]] const ChannelImage& channel_image() const;

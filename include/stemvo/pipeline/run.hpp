@@ -25,8 +25,9 @@ struct RunRequest {
   Config config;
   std::optional<FrameRangeRequest> frames;
   std::optional<std::filesystem::path> ground_truth;
-  int num_threads = 0;    ///< 0: all cores
-  int picture_every = 0;  ///< 0: no per-frame pictures
+  int num_threads = 0;     ///< 0: all cores
+  int picture_every = 0;   ///< 0: no per-frame pictures
+  bool write_map = false;  ///< map.ply; needs odometry.mode map
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
@@ -45,10 +46,10 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
 /// else an old one is removed, frames.csv, config.yaml, metrics.json,
-/// trajectory.png, trajectory.svg, pictures/%06d.png). A wrong request (configuration, sequence,
-/// ground truth that scale.source needs, model, out_dir that cannot be written) is an error before
-/// work starts. A frame that cannot be read is a warning and gets a pose. When a result cannot be
-/// written the others still are, and the first failure is the error.
+/// trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request (configuration,
+/// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
+/// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
+/// result cannot be written the others still are, and the first failure is the error.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

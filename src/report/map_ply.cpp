@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/report/map_ply.hpp"
+
+#include <bit>
+#include <cstring>
+#include <string>
+#include <type_traits>
+
+#include <fmt/core.h>
+
+#include "evaluation/text_file.hpp"
+#include "stemvo/version.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Appends a number of four bytes, the least significant first.
+template <typename Number>
+void append(Number number, std::string& bytes) {
+  static_assert(sizeof(Number) == 4 && std::is_trivially_copyable_v<Number>);
+  auto bits = std::bit_cast<std::uint32_t>(number);
+  for (int i = 0; i < 4; ++i, bits >>= 8U) {
+    bytes.push_back(static_cast<char>(bits & 0xffU));
+  }
+}
+
+void append_vertex(const ColoredPoint& point, std::string& bytes) {
+  for (const float coordinate : point.position) {
+    append(coordinate, bytes);
+  }
+  for (const std::uint8_t level : point.rgb) {
+    bytes.push_back(static_cast<char>(level));
+  }
+}
+
+std::string header(std::size_t num_vertices, std::size_t num_edges) {
+  return fmt::format(
+      "ply\n"
+      "format binary_little_endian 1.0\n"
+      "comment stemvo {}: x right, y down, z forward of the first camera\n"
+      "element vertex {}\n"
+      "property float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element edge {}\n"
+      "property int vertex1\nproperty int vertex2\n"
+      "end_header\n",
+      version(), num_vertices, num_edges);
+}
+
+}  // namespace
+
+Status write_map_ply(const std::filesystem::path& file,
+                     std::span<const ColoredPoint> points,
+                     std::span<const Rigid3> world_from_camera) {
+  std::string vertices;
+  std::size_t num_points = 0;
+  for (const ColoredPoint& point : points) {
+    if (point.position.allFinite()) {
+      append_vertex(point, vertices);
+      ++num_points;
+    }
+  }
+  std::size_t num_cameras = 0;
+  for (const Rigid3& pose : world_from_camera) {
+    if (pose.translation.allFinite()) {
+      append_vertex({pose.translation.cast<float>(), kMapPathColor}, vertices);
+      ++num_cameras;
+    }
+  }
+  std::string edges;
+  for (std::size_t i = 1; i < num_cameras; ++i) {
+    append(static_cast<std::int32_t>(num_points + i - 1), edges);
+    append(static_cast<std::int32_t>(num_points + i), edges);
+  }
+  const std::size_t num_edges = num_cameras > 0 ? num_cameras - 1 : 0;
+  return write_text_file(file, header(num_points + num_cameras, num_edges) + vertices + edges);
+}
+
+}  // namespace stemvo
