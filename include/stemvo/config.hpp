@@ -51,8 +51,10 @@ struct RefineOptions {
 struct ScaleOptions {
   /// `none` (up to scale), `constant`, `camera_height` (mode map) or `ground_truth`
   std::string source = "constant";
-  double constant_m = 1.0;        ///< per frame
-  double camera_height_m = 1.65;  ///< above the road, for `camera_height`
+  double constant_m = 1.0;          ///< per frame
+  double camera_height_m = 1.65;    ///< above the road, for `camera_height`
+  std::string estimators = "both";  ///< of the road: `both`, `dense` or `points`
+  bool joining = true;              ///< of the road's measurements over time
 };
 
 /// The whole configuration. Defaults stand here, once; config/default.yaml is generated from them.

@@ -150,6 +150,11 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
       {"scale", "constant_m", &o.constant_m, above(0), "metres per frame when constant"},
       {"scale", "camera_height_m", &o.camera_height_m, above(0),
        "above the road, for camera_height"},
+      {"scale", "estimators", &o.estimators, one_of({"both", "dense", "points"}),
+       "camera_height: what measures the road: dense (its picture aligned), points (tracked "
+       "corners; the first frames are dense all the same), or both"},
+      {"scale", "joining", &o.joining, any(),
+       "camera_height: measurements are joined over time; false: each frame's stands alone"},
   };
 }
 

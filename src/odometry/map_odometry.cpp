@@ -24,6 +24,9 @@ MapOdometry::MapOdometry(const Config& config, const Camera& camera)
   if (config.scale.source == "camera_height") {
     RoadOptions options;
     options.camera_height_m = config.scale.camera_height_m;
+    options.use_dense = config.scale.estimators != "points";
+    options.use_points = config.scale.estimators != "dense";
+    options.join_frames = config.scale.joining;
     road_.emplace(options, camera);
   }
 }

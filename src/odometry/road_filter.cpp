@@ -31,6 +31,11 @@ bool RoadFilter::update(double log_scale, double sigma) {
     sigma_ = std::max(measured, kFirstSigma);
     return true;
   }
+  if (!options_.join_frames) {
+    log_scale_ = log_scale;
+    sigma_ = measured;
+    return true;
+  }
   const double innovation = log_scale - log_scale_;
   double distance = std::abs(innovation) / std::hypot(measured, sigma_);
   if (distance < kDoubt) {

@@ -15,7 +15,7 @@ class RoadFilter {
 
   /// One frame passes: the map may have drifted.
   void predict();
-  /// Returns whether the measurement was believed.
+  /// Returns whether the measurement was believed; always where frames are not joined.
   bool update(double log_scale, double sigma);
   void shift(double log_factor) { log_scale_ += log_factor; }
   void restart();

@@ -31,6 +31,7 @@ struct RoadOptions {
   bool use_points = true;
 
   // Joining over time.
+  bool join_frames = true;       ///< false: every measurement is believed as it comes
   double flatness_sigma = 0.03;  ///< error of log_scale that both estimators and neighbours share
   double drift_sigma = 0.002;    ///< of log(metres per unit), per frame
 

@@ -44,6 +44,19 @@ TEST(RoadFilter, OneWildMeasurementMovesLittleSeveralWin) {
   EXPECT_NEAR(filter.log_scale(), 1.0, 0.02);
 }
 
+TEST(RoadFilter, WithoutJoiningEachMeasurementStandsAlone) {
+  RoadOptions options;
+  options.join_frames = false;
+  RoadFilter filter(options);
+  for (const double log_scale : {0.0, 1.0, -0.5}) {
+    filter.predict();
+    EXPECT_TRUE(filter.update(log_scale, 0.01));
+    EXPECT_EQ(filter.log_scale(), log_scale);
+  }
+  EXPECT_FALSE(filter.update(std::numeric_limits<double>::quiet_NaN(), 0.01));
+  EXPECT_EQ(filter.log_scale(), -0.5);
+}
+
 TEST(RoadFilter, WithoutMeasurementsTheDoubtGrows) {
   RoadFilter filter{RoadOptions{}};
   filter.update(0.0, 0.01);
