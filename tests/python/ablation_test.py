@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""tools/ablation.py: the means, the file it writes into, and rows that cannot run."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import ablation
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = os.environ["STEMVO_PROGRAM"]
+
+
+def numbers(t_rel, segments):
+    return {"t_rel_percent": t_rel, "r_rel_deg_per_100m": 1.0, "average_offset_m": 2.0, "segments": segments}
+
+
+class Means(unittest.TestCase):
+    def test_segments_are_pooled(self):
+        self.assertAlmostEqual(ablation.pooled([numbers(1.0, 30), numbers(2.0, 10)], "t_rel_percent"), 1.25)
+
+    def test_a_sequence_too_short_for_a_segment_does_not_count(self):
+        self.assertEqual(ablation.pooled([numbers(1.0, 30), numbers(None, 0)], "t_rel_percent"), 1.0)
+        self.assertIsNone(ablation.pooled([numbers(None, 0)], "t_rel_percent"))
+
+    def test_seeds_are_averaged(self):
+        self.assertAlmostEqual(ablation.averaged([numbers(1.0, 3), numbers(2.0, 3)])["t_rel_percent"], 1.5)
+        self.assertEqual(ablation.averaged([numbers(None, 0)])["t_rel_percent"], None)
+
+
+class File(unittest.TestCase):
+    def test_only_what_is_between_the_marks_is_replaced(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "page.md"
+            file.write_text(f"before\n{ablation.BEGIN}\nold\n{ablation.END}\nafter\n", encoding="utf-8")
+            ablation.write(file, "new")
+            ablation.write(file, "newer")
+            self.assertEqual(file.read_text(encoding="utf-8"),
+                             f"before\n{ablation.BEGIN}\nnewer\n{ablation.END}\nafter\n")
+            plain = pathlib.Path(folder) / "plain.md"
+            ablation.write(plain, "all of it")
+            self.assertEqual(plain.read_text(encoding="utf-8"), "all of it\n")
+
+
+class Command(unittest.TestCase):
+    def test_every_row_of_a_rendered_drive(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            subprocess.run([PROGRAM, "synth", str(folder), "--frames", "20", "--width", "310", "--height", "94"],
+                           check=True, capture_output=True)
+            out = folder / "table.md"
+            done = subprocess.run([sys.executable, str(ROOT / "tools/ablation.py"), str(folder), "--out", str(out),
+                                   "--sequences", "00", "--program", PROGRAM], capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            lines = out.read_text(encoding="utf-8").splitlines()
+        for row in ablation.ROWS:
+            found = [line for line in lines if line.startswith(f"| {row.heading}")]
+            self.assertEqual(len(found), len(row.protocols), row.heading)
+            for line in found:
+                told = any(problem.startswith(f"Not possible: {row.heading}") for problem in lines)
+                self.assertTrue(told or " / " in line, line)
+        # What every build can do: the defaults with true steps.
+        self.assertIn(" / ", next(line for line in lines if line.startswith("| the defaults")))
+
+    def test_a_sequence_that_is_not_there_is_wrong_usage(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, str(ROOT / "tools/ablation.py"), folder, "--out", f"{folder}/x"],
+                                  capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("expected a sequence folder", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
