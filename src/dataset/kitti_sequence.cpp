@@ -207,6 +207,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
       return fail(poses.error().message);
     }
     sequence.ground_truth_ = std::move(*poses);
+    sequence.ground_truth_file_ = *pose_file;
   }
   const auto size = find_image_size(sequence.files_, sequence.is_color_);
   if (!size) {

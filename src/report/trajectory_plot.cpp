@@ -27,6 +27,9 @@ constexpr Color kTruth{0.62, 0.62, 0.62};
 constexpr Color kEstimate{0.0, 114.0 / 255.0, 178.0 / 255.0};
 constexpr Color kStart{0.0, 158.0 / 255.0, 115.0 / 255.0};
 constexpr Color kEnd{213.0 / 255.0, 94.0 / 255.0, 0.0};
+constexpr Color kOthers[] = {{204.0 / 255.0, 121.0 / 255.0, 167.0 / 255.0},
+                             {230.0 / 255.0, 159.0 / 255.0, 0.0},
+                             {86.0 / 255.0, 180.0 / 255.0, 233.0 / 255.0}};
 
 // The truth is a broad gray road under the thin estimate: both stay visible where they agree.
 constexpr double kTruthWidth_px = 9.0;
@@ -105,6 +108,8 @@ void draw_markers(const CairoCanvas& canvas,
               kStart_px, kStart);
 }
 
+const Color& color_of_other(std::size_t index) { return kOthers[index % std::size(kOthers)]; }
+
 /// Left-aligned with the plot; shrinks until it fits the figure.
 void draw_fitting_text(const CairoCanvas& canvas,
                        const PlotLayout& layout,
@@ -130,7 +135,7 @@ void draw_titles(const CairoCanvas& canvas, const PlotLayout& layout, const Traj
 }
 
 /// One line above the plot, where it can hide no data.
-void draw_legend(const CairoCanvas& canvas, const PlotLayout& layout, bool has_truth) {
+void draw_legend(const CairoCanvas& canvas, const PlotLayout& layout, const TrajectoryPlot& plot) {
   const double y = layout.top_px - 30.0;
   double x = layout.left_px;
   canvas.set_font(kTick_px);
@@ -145,10 +150,13 @@ void draw_legend(const CairoCanvas& canvas, const PlotLayout& layout, bool has_t
     x += 76.0;
     label(text);
   };
-  if (has_truth) {
+  if (plot.ground_truth) {
     swatch(kTruth, kTruthWidth_px, "ground truth");
   }
-  swatch(kEstimate, kEstimateWidth_px, "estimate");
+  swatch(kEstimate, kEstimateWidth_px, plot.estimate_name);
+  for (std::size_t i = 0; i < plot.others.size(); ++i) {
+    swatch(color_of_other(i), kEstimateWidth_px, plot.others[i].name);
+  }
   canvas.disk(x + kStart_px, y, kStart_px, kStart);
   x += 2.0 * kStart_px + 14.0;
   label("start");
@@ -163,6 +171,9 @@ PlotLayout layout_of(const TrajectoryPlot& plot) {
   if (plot.ground_truth) {
     trajectories.push_back(&*plot.ground_truth);
   }
+  for (const NamedTrajectory& other : plot.others) {
+    trajectories.push_back(&other.trajectory);
+  }
   return make_plot_layout(trajectories);
 }
 
@@ -171,10 +182,13 @@ Status draw(cairo_surface_t* surface, const PlotLayout& layout, const Trajectory
   const CairoCanvas canvas(surface);
   canvas.fill_background(kWhite);
   draw_titles(canvas, layout, plot);
-  draw_legend(canvas, layout, plot.ground_truth.has_value());
+  draw_legend(canvas, layout, plot);
   draw_grid(canvas, layout, plot.unit);
   if (plot.ground_truth) {
     draw_path(canvas, layout, *plot.ground_truth, kTruth, kTruthWidth_px);
+  }
+  for (std::size_t i = plot.others.size(); i-- > 0;) {
+    draw_path(canvas, layout, plot.others[i].trajectory, color_of_other(i), kEstimateWidth_px);
   }
   draw_path(canvas, layout, plot.estimate, kEstimate, kEstimateWidth_px);
   draw_markers(canvas, layout, plot.estimate);

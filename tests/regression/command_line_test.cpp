@@ -20,7 +20,7 @@ using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
 const std::vector<std::string> kCommands = {"run",   "evaluate", "channel",
-                                            "synth", "check",    "models"};
+                                            "synth", "check",    "models", "benchmark"};
 
 TEST(CommandLine, HelpOfTheProgramNamesEveryCommand) {
   const ProgramResult result = run_stemvo({"--help"});
@@ -82,6 +82,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"synth", "x", "--seed", "-3"}, "--seed"},
       {{"check", "metrics.json"}, "--against"},
       {{"models", "x"}, "x"},
+      {{"benchmark", "x"}, "--out"},
   };
   for (const Misuse& misuse : cases) {
     const ProgramResult result = run_stemvo(misuse.arguments);

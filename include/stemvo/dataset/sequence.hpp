@@ -50,6 +50,10 @@ class KittiSequence {
   [[nodiscard]] const std::vector<double>& timestamps_s() const { return timestamps_s_; }
   /// First pose is the identity; absent when there is no file.
   [[nodiscard]] const std::optional<Trajectory>& ground_truth() const { return ground_truth_; }
+  /// The pose file the ground truth was read from.
+  [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
+    return ground_truth_file_;
+  }
   [[nodiscard]] const std::filesystem::path& file(std::size_t index) const { return files_[index]; }
 
   /// Frame `index` in [0, size()): CV_8UC1 for the gray cameras, CV_8UC3 in RGB order for colour.
@@ -64,6 +68,7 @@ class KittiSequence {
   std::vector<std::filesystem::path> files_;
   std::vector<double> timestamps_s_;
   std::optional<Trajectory> ground_truth_;
+  std::optional<std::filesystem::path> ground_truth_file_;
 };
 
 }  // namespace stemvo

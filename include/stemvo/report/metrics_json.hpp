@@ -38,6 +38,11 @@ struct MetricsReport {
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
 
+/// What write_metrics_json wrote, bit for bit (of `refined` the four errors); a null number that
+/// has no nullopt is NaN. Errors: the file cannot be read, is not JSON, lacks a key or has another
+/// type there.
+[[nodiscard]] Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file);
+
 /// The same numbers as an aligned table; each row names its alignment, the trajectory that never
 /// moves stands beside the offset. Ends with a newline.
 [[nodiscard]] std::string format_metrics_table(const MetricsReport& report);

@@ -4,11 +4,18 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stemvo/error.hpp"
 #include "stemvo/evaluation/trajectory.hpp"
 
 namespace stemvo {
+
+/// One more estimate of the same drive, with its name for the legend.
+struct NamedTrajectory {
+  std::string name;
+  Trajectory trajectory;
+};
 
 /// Top view of a drive: x to the right, z (forward) up, equal axes. Poses are drawn as they
 /// are; give both trajectories in the same world (first pose = identity).
@@ -17,7 +24,9 @@ struct TrajectoryPlot {
   std::string subtitle;  ///< the numbers, one line; may be empty
   Trajectory estimate;   ///< at least one pose (checked)
   std::optional<Trajectory> ground_truth;
-  std::string unit = "m";  ///< of both axes
+  std::string unit = "m";                    ///< of both axes
+  std::string estimate_name = "estimate";    ///< for the legend
+  std::vector<NamedTrajectory> others = {};  ///< drawn under the estimate, in colours of their own
 };
 
 /// 1100 to 1600 pixels wide, 800 to 1430 high, after the drive's shape. The same plot gives the
