@@ -99,6 +99,27 @@ TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   EXPECT_EQ(json["frames"], 200);
 }
 
+TEST(MetricsJson, IsReadBackAsItWasWritten) {
+  const TempFolder folder;
+  MetricsReport without_truth = example();
+  without_truth.metrics.reset();
+  without_truth.refined.reset();
+  without_truth.road_measured_fraction.reset();
+  for (const MetricsReport& report : {example(), without_truth}) {
+    ASSERT_TRUE(write_metrics_json(folder / "a.json", report));
+    const Expected<MetricsReport> read = read_metrics_json(folder / "a.json");
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_TRUE(write_metrics_json(folder / "b.json", *read));
+    EXPECT_EQ(read_all(folder / "a.json"), read_all(folder / "b.json"));
+  }
+  for (const char* text : {"{}", "[1]", "no json", "{\"stemvo_version\": 3}"}) {
+    const Expected<MetricsReport> read = read_metrics_json(folder.file("broken.json", text));
+    ASSERT_FALSE(read) << text;
+    EXPECT_THAT(read.error().message, HasSubstr("broken.json: expected the metrics of a run"));
+  }
+  EXPECT_FALSE(read_metrics_json(folder / "nothing.json"));
+}
+
 TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();
