@@ -130,7 +130,8 @@ def table(arguments, protocol):
 
 
 def report(arguments):
-    version = subprocess.run([arguments.program, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    done = subprocess.run([arguments.program, "--version"], capture_output=True, text=True, check=True)
+    version = done.stdout.strip()
     seeds = "" if arguments.seeds == ["1"] else f" --seeds {','.join(arguments.seeds)}"
     lines = [f"t_rel % / r_rel degrees per 100 m / average offset m, no alignment; {version}.", ""]
     for protocol in PROTOCOLS:

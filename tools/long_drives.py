@@ -7,9 +7,11 @@
 POSES_DIR holds NN.txt, KITTI's official poses (without the option: $STEMVO_SHARED_DATA/full_poses).
 CACHE keeps the rendered frames (some 0.2 MB each at 620x188), so that the next run starts at once.
 The defaults of the program are run, with what --set changes. Errors are those of `stemvo run`, no
-alignment. Memory is the largest resident set while the first half of the frames ran / after it; time
-is per frame in each quarter of the drive, without reading the files; length is the estimated length
-of each quarter over the true one. docs/accuracy.md shows a table.
+alignment. Memory is the largest resident set in the first half of the frames / in the second / after
+the last (writing the results); the ratio is that of the halves. Time is per frame in each quarter of
+the drive, without reading the files; processor time is that of all threads, which other programs on
+the machine do not stretch; length is the estimated length of each quarter over the true one.
+docs/accuracy.md shows a table.
 """
 
 import _environment  # noqa: F401  starts this tool again in the environment of `make build`
@@ -24,7 +26,7 @@ from drives import rendered, watched_run
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 HEADINGS = ("drive", "frames", "t_rel %", "r_rel deg/100 m", "offset m", "measured %", "memory MB", "ratio",
-            "ms per frame by quarter", "length by quarter", "frames/s")
+            "ms per frame by quarter", "processor ms by quarter", "length by quarter", "frames/s")
 
 
 def number(value, digits):
@@ -37,10 +39,11 @@ def numbers(values, digits):
 
 def row_of(name, result, ratios):
     m = result.metrics
-    first, second = result.memory_mb
+    memory = " / ".join(number(value, 0) for value in result.memory_mb)
     return (name, str(m["frames"]), number(m["t_rel_percent"], 2), number(m["r_rel_deg_per_100m"], 3),
-            number(m["average_offset_m"], 2), number(100.0 * m["tracked_fraction"], 1), f"{first:.0f} / {second:.0f}",
-            f"{result.memory_ratio:.2f}", numbers(result.quarters_ms, 1), numbers(ratios, 3), f"{m['fps']:.1f}")
+            number(m["average_offset_m"], 2), number(100.0 * m["tracked_fraction"], 1), memory,
+            f"{result.memory_ratio:.2f}", numbers(result.quarters_ms, 1), numbers(result.quarters_cpu_ms, 1),
+            numbers(ratios, 3), f"{m['fps']:.1f}")
 
 
 def row(cells):

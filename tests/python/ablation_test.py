@@ -52,8 +52,9 @@ class Command(unittest.TestCase):
             subprocess.run([PROGRAM, "synth", str(folder), "--frames", "20", "--width", "310", "--height", "94"],
                            check=True, capture_output=True)
             out = folder / "table.md"
-            done = subprocess.run([sys.executable, str(ROOT / "tools/ablation.py"), str(folder), "--out", str(out),
-                                   "--sequences", "00", "--program", PROGRAM], capture_output=True, text=True, check=False)
+            command = [sys.executable, str(ROOT / "tools/ablation.py"), str(folder), "--out", str(out), "--sequences",
+                       "00", "--program", PROGRAM]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
             lines = out.read_text(encoding="utf-8").splitlines()
         for row in ablation.ROWS:

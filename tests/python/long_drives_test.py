@@ -84,7 +84,7 @@ class WatchedRuns(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             frames = pathlib.Path(folder) / "frames.csv"
             process = subprocess.Popen([sys.executable, "-c", script, str(frames)])
-            first, second = watched_run.watch(process, frames, 40)
+            first, second, _ = watched_run.watch(process, frames, 40).memory_mb
         self.assertGreater(second - first, 20.0)  # of 40 MB
 
     def test_lengths_by_quarter(self):
@@ -112,7 +112,7 @@ class Command(unittest.TestCase):
             self.assertEqual(len(rows), 3, done.stdout)
             cells = [cell.strip() for cell in rows[2].strip("|").split("|")]
             self.assertEqual(cells[:2], ["31", "40"])
-            first, second = map(float, cells[6].split("/"))
+            first, second, _ = map(float, cells[6].split("/"))
             self.assertGreater(first, 5.0)
             self.assertGreater(second, 5.0)
             self.assertTrue(all(float(value) > 0.0 for value in cells[8].split()))

@@ -4,11 +4,12 @@
 import csv
 import dataclasses
 import json
+import os
 import pathlib
 import subprocess
 import time
 
-SAMPLE_S = 0.05
+SAMPLE_S = 0.02
 STAGES = ("stem_ms", "features_ms", "pose_ms")
 
 
@@ -19,8 +20,9 @@ class RunError(Exception):
 @dataclasses.dataclass
 class Result:
     metrics: dict  # metrics.json
-    memory_mb: tuple  # largest resident set while the first half of the frames ran, and after it
+    memory_mb: tuple  # largest resident set in the first half of the frames, in the second, and after the last
     quarters_ms: list  # mean time per frame of each quarter, without reading the files
+    quarters_cpu_ms: list  # mean processor time per frame of each quarter, of all threads
 
     @property
     def memory_ratio(self):
@@ -37,6 +39,16 @@ def resident_mb(pid):
     except OSError:
         pass
     return 0.0
+
+
+def processor_s(pid):
+    """User and system time of all threads so far; 0 once the process is gone."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as stat:
+            fields = stat.read().rpartition(")")[2].split()  # the name before it may hold blanks
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    except OSError:
+        return 0.0
 
 
 class RowCounter:
@@ -59,17 +71,35 @@ class RowCounter:
             self.stream.close()
 
 
+@dataclasses.dataclass
+class Watched:
+    """Samples of a running process."""
+
+    memory_mb: list = dataclasses.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    marks: list = dataclasses.field(default_factory=list)  # (frames, processor seconds) at the quarters
+
+    def add(self, pid, rows, num_frames):
+        part = 2 if rows >= num_frames else 1 if 2 * rows >= num_frames else 0
+        self.memory_mb[part] = max(self.memory_mb[part], resident_mb(pid))
+        if len(self.marks) < 5 and (rows > 0 or self.marks) and 4 * rows >= len(self.marks) * num_frames:
+            self.marks.append((rows, processor_s(pid)))
+
+    def quarters_cpu_ms(self):
+        """None where the run was too short to tell."""
+        pairs = list(zip(self.marks, self.marks[1:]))
+        return [1000.0 * (t1 - t0) / (n1 - n0) if n1 > n0 and t1 > t0 else None for (n0, t0), (n1, t1) in pairs]
+
+
 def watch(process, frames_csv, num_frames):
-    """Largest resident set before and after the middle frame, MB, until the process ends. What
-    writing the results takes counts to the second half."""
-    largest = [0.0, 0.0]
+    """Memory up to the middle frame, up to the last one, and from then until the process ends
+    (evaluating, drawing the map); processor time at the quarters."""
+    watched = Watched()
     counter = RowCounter(frames_csv)
     while process.poll() is None:
-        half = 0 if 2 * counter.update() < num_frames else 1
-        largest[half] = max(largest[half], resident_mb(process.pid))
+        watched.add(process.pid, counter.update(), num_frames)
         time.sleep(SAMPLE_S)
     counter.close()
-    return largest
+    return watched
 
 
 def quarters_of(frames_csv):
@@ -88,7 +118,7 @@ def run(program, sequence, out, num_frames, options):
     with open(out / "messages.txt", "w+", encoding="utf-8", errors="replace") as messages:
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=messages)
         try:
-            memory_mb = watch(process, out / "frames.csv", num_frames)
+            watched = watch(process, out / "frames.csv", num_frames)
         finally:
             if process.poll() is None:
                 process.terminate()
@@ -97,10 +127,10 @@ def run(program, sequence, out, num_frames, options):
         text = " ".join(messages.read().split())
     if process.returncode != 0:
         raise RunError(text or f"{program}: exit code {process.returncode}")
-    if not memory_mb[0] or not memory_mb[1]:
+    if not watched.memory_mb[0] or not watched.memory_mb[1]:
         raise RunError(f"{out}: the run was too short to sample its memory")
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
-    return Result(metrics, tuple(memory_mb), quarters_of(out / "frames.csv"))
+    return Result(metrics, tuple(watched.memory_mb), quarters_of(out / "frames.csv"), watched.quarters_cpu_ms())
 
 
 def lengths_ratio(estimate, truth):
