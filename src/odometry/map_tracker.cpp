@@ -60,7 +60,9 @@ void MapTracker::add(int frame,
   frame_ = frame;
   world_from_camera_ = place(matches, motion);
   const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
-  last_step_ = step > 0.0 ? step : last_step_;
+  // Standing still and turning on the spot leave a step of rounding errors, which is no length.
+  const bool has_moved = motion.cur_from_prev.translation.norm() > 0.0;
+  last_step_ = has_moved && step > 0.0 ? step : last_step_;
   if (is_new_keyframe(motion)) {
     extend_map(matches, motion.inlier_mask);
   }

@@ -159,6 +159,32 @@ TEST(MapTracker, RescalingMultipliesWhatComesAfter) {
   EXPECT_NEAR(ratio, 2.0 * true_ratio, 0.02);
 }
 
+// The caller's pose differs by rounding errors; a step of that size must not become the unit of a
+// new map (rendered drive 05 lost its scale at a traffic light).
+TEST(MapTracker, StandingStillKeepsMapAndScale) {
+  const DriveTracks drive(16, 0.0, 6);
+  MapTracker tracker(drive.camera, {});
+  Rigid3 pose = drive_tracker(tracker, drive, 1, 9);
+  const Rigid3 stop = pose;
+  Matches still = drive.matches(8);
+  still.prev_uv = still.cur_uv;
+  MeasuredMotion motion;
+  motion.state = FrameState::kStanding;
+  motion.inlier_mask.assign(still.cur_uv.size(), 1);
+  for (int i = 0; i < 40; ++i) {
+    pose.translation.x() += 1e-15 * (i % 3);
+    tracker.add(9 + i, pose, still, motion);
+    pose = tracker.world_from_camera();
+  }
+  EXPECT_GT(tracker.map().keyframes.size(), 2U);
+  const Rigid3 end = drive_tracker(tracker, drive, 9, 16);
+  const double true_ratio =
+      (drive.world_from_camera[15].translation - drive.world_from_camera[8].translation).norm() /
+      drive.world_from_camera[8].translation.norm();
+  const double ratio = (end.translation - stop.translation).norm() / stop.translation.norm();
+  EXPECT_NEAR(ratio, true_ratio, 0.02);
+}
+
 TEST(MapTracker, StartsAnewWhereTheCallerMovedThePose) {
   const DriveTracks drive(12, 0.0, 7);
   MapTracker tracker(drive.camera, {});
