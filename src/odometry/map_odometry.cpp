@@ -12,7 +12,9 @@ MapTrackerOptions tracker_options(const Config& config) {
   options.refine_every = config.refine.every;
   options.refinement.loss_scale_px = config.refine.loss_px;
   options.refinement.max_iterations = config.refine.max_iterations;
-  options.pose.loss_scale_px = config.refine.loss_px;
+  options.placement.pose.loss_scale_px = config.refine.loss_px;
+  options.placement.seed = config.seed;
+  options.epipolar_bound_px = 2.0 * config.two_view.inlier_threshold_px;
   options.first_step = assumed_step(config.scale);
   return options;
 }
@@ -44,11 +46,13 @@ MeasuredMotion MapOdometry::refine(int frame,
                                    const Matches& matches,
                                    const Rigid3& world_from_prev,
                                    MeasuredMotion motion) {
-  if (motion.state == FrameState::kLost) {
+  if (!tracker_.add(frame, world_from_prev, matches, motion)) {
     restart(frame, image);
     return motion;
   }
-  tracker_.add(frame, world_from_prev, matches, motion);
+  if (road_.has_value() && !tracker_.keeps_unit()) {
+    road_->start_new_unit();
+  }
   const Rigid3 cur_from_prev = tracker_.world_from_camera().inverse() * world_from_prev;
   if (road_.has_value()) {
     make_metric(image, cur_from_prev, world_from_prev.translation);

@@ -42,30 +42,42 @@ MapHistory MapTracker::history() const {
   return history;
 }
 
-void MapTracker::add(int frame,
+bool MapTracker::add(int frame,
                      const Rigid3& world_from_prev,
                      const Matches& matches,
-                     const MeasuredMotion& motion) {
+                     MeasuredMotion& motion) {
   // The caller chains relative motions: the same pose but for rounding.
   const Rigid3 moved = world_from_camera_.inverse() * world_from_prev;
   const bool is_where_we_left =
       moved.translation.norm() < kSamePose * last_step_ && moved.angle_rad() < kSamePose;
+  keeps_unit_ = is_where_we_left || map_.keyframes.empty();
   if (!is_where_we_left) {
     start_anew(/*is_last_pose_kept=*/false);
     world_from_camera_ = world_from_prev;
+  }
+  const std::optional<Rigid3> placed = place(matches, motion);
+  if (!placed.has_value() && !is_believable(matches, motion)) {
+    motion.state = FrameState::kLost;
+    motion.cur_from_prev = {};
+    return false;
+  }
+  if (!placed.has_value() && motion.state == FrameState::kTracking) {
+    keeps_unit_ = keeps_unit_ && map_.keyframes.size() < 2;
+    if (static_cast<int>(map_.landmarks.size()) >= options_.placement.min_landmarks) {
+      start_anew(/*is_last_pose_kept=*/true);  // the landmarks are elsewhere, or wrong
+    }
   }
   if (map_.keyframes.empty()) {
     open_map(matches, motion.inlier_mask);
   }
   frame_ = frame;
-  world_from_camera_ = place(matches, motion);
-  const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
-  // Standing still and turning on the spot leave a step of rounding errors, which is no length.
-  const bool has_moved = motion.cur_from_prev.translation.norm() > 0.0;
-  last_step_ = has_moved && step > 0.0 ? step : last_step_;
+  world_from_camera_ = placed.value_or(guess_pose(motion));
   if (is_new_keyframe(motion)) {
+    const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
+    last_step_ = step > 0.0 ? step : last_step_;
     extend_map(matches, motion.inlier_mask);
   }
+  return true;
 }
 
 void MapTracker::add_to_window(Keyframe keyframe) {
@@ -88,28 +100,66 @@ void MapTracker::open_map(const Matches& matches, const std::vector<char>& is_in
   add_to_window(std::move(first));
 }
 
-Rigid3 MapTracker::place(const Matches& matches, const MeasuredMotion& motion) {
+Rigid3 MapTracker::guess_pose(const MeasuredMotion& motion) const {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
-  const Rigid3 guess =
-      world_from_camera_ * Rigid3(prev_from_cur.rotation, last_step_ * prev_from_cur.translation);
-  if (!(prev_from_cur.translation.norm() > 0.0)) {
-    return guess;
+  // Slow frames show their direction badly and their length not at all: landmarks tell both.
+  const double step = motion.state == FrameState::kTracking ? last_step_ : 0.0;
+  return world_from_camera_ * Rigid3(prev_from_cur.rotation, step * prev_from_cur.translation);
+}
+
+std::optional<Rigid3> MapTracker::place(const Matches& matches, MeasuredMotion& motion) const {
+  if (motion.state == FrameState::kStanding || motion.state == FrameState::kRotating) {
+    return guess_pose(motion);
   }
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> uv;
-  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
-    const auto landmark = map_.landmarks.find(matches.track_ids[i]);
-    if (motion.inlier_mask[i] != 0 && landmark != map_.landmarks.end()) {
-      points.push_back(landmark->second);
-      uv.push_back(matches.cur_uv[i]);
+  const SeenLandmarks seen = find_seen_landmarks(map_, matches, motion.inlier_mask);
+  std::optional<Placement> placement =
+      place_from_guess(seen, guess_pose(motion), camera_, options_.placement);
+  const int num_agreeing = placement.has_value() ? placement->num_agreeing : 0;
+  if (num_agreeing < options_.placement.min_agreement * seen.size()) {
+    const auto found = place_by_search(seen, camera_, options_.placement);
+    if (found.has_value() && found->num_agreeing > num_agreeing) {
+      placement = found;
+      correct_motion(found->world_from_camera, matches, motion);
     }
   }
-  if (static_cast<int>(points.size()) < options_.min_landmarks) {
-    return guess;
+  if (!placement.has_value()) {
+    return std::nullopt;
   }
-  const AbsolutePose pose =
-      refine_absolute_pose(guess.inverse(), points, uv, camera_, options_.pose);
-  return pose.num_inliers >= options_.min_landmarks ? pose.camera_from_world.inverse() : guess;
+  if (!is_agreed_on(matches, motion)) {
+    correct_motion(placement->world_from_camera, matches, motion);
+  }
+  return placement->world_from_camera;
+}
+
+void MapTracker::correct_motion(const Rigid3& world_from_camera,
+                                const Matches& matches,
+                                MeasuredMotion& motion) const {
+  const Rigid3 cur_from_prev = world_from_camera.inverse() * world_from_camera_;
+  const double step = cur_from_prev.translation.norm();
+  if (!(step > 0.0)) {
+    return;
+  }
+  motion.state = motion.state == FrameState::kLost ? FrameState::kTracking : motion.state;
+  motion.cur_from_prev = Rigid3(cur_from_prev.rotation, cur_from_prev.translation / step);
+  motion.inlier_mask = epipolar_inliers(motion.cur_from_prev, matches.prev_uv, matches.cur_uv,
+                                        camera_, options_.epipolar_bound_px);
+  motion.num_inliers =
+      static_cast<int>(std::count(motion.inlier_mask.begin(), motion.inlier_mask.end(), char{1}));
+}
+
+bool MapTracker::is_agreed_on(const Matches& matches, const MeasuredMotion& motion) const {
+  return motion.num_inliers >=
+         options_.placement.min_agreement * static_cast<double>(matches.cur_uv.size());
+}
+
+/// A two-frame motion that the landmarks do not confirm. Where they are out of view it must do;
+/// where they are in view (a cut: tracks that end up anywhere) most matches must agree with it.
+bool MapTracker::is_believable(const Matches& matches, const MeasuredMotion& motion) const {
+  if (motion.state == FrameState::kLost) {
+    return false;
+  }
+  const SeenLandmarks seen = find_seen_landmarks(map_, matches, motion.inlier_mask);
+  return seen.size() < options_.placement.min_landmarks || is_agreed_on(matches, motion);
 }
 
 /// Frames without parallax to the one before tell nothing of depth.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -8,9 +9,9 @@
 #include "odometry/bundle_adjustment.hpp"
 #include "odometry/local_map.hpp"
 #include "odometry/map_history.hpp"
+#include "odometry/map_placement.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/features/front_end.hpp"
-#include "stemvo/geometry/absolute_pose.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
 
@@ -19,10 +20,14 @@ namespace stemvo {
 struct MapTrackerOptions {
   LocalMapOptions map;
   BundleAdjustmentOptions refinement;
-  AbsolutePoseOptions pose;
-  int refine_every = 1;     ///< keyframes between refinements, the paper's m; 0: never
-  int min_landmarks = 30;   ///< fewer in view: the two-frame motion is taken as it is
-  double first_step = 1.0;  ///< length of the first step, map units
+  PlacementOptions placement;
+  int refine_every = 1;            ///< keyframes between refinements, the paper's m; 0: never
+  double first_step = 1.0;         ///< length of the first step, map units
+  double epipolar_bound_px = 1.0;  ///< of the inliers of a motion that the map has corrected
+  /// Of the landmarks in view that agree with a pose: fewer, and a pose is searched among all of
+  /// them without the two-frame motion.
+  double min_agreement = 0.5;
+  std::uint64_t seed = 1;  ///< of that search
 };
 
 /// Poses from a local map: each frame is placed against the landmarks, becomes a keyframe when it
@@ -33,12 +38,18 @@ class MapTracker {
 
   /// A frame whose matches start at the last one given (here or to restart), of pose
   /// `world_from_prev`. Numbers of frames grow. The two-frame motion brings inliers and a first
-  /// guess. Where the pose is not the one left here (the frames between were lost, or the caller
-  /// moved it) the map starts anew from it.
-  void add(int frame,
+  /// guess; where it disagrees with the landmarks seen (or is lost), the frame is searched among
+  /// them, and `motion` becomes what they say. Where the pose is not the one left here (the caller
+  /// moved it) the map starts anew from it, as it does where the landmarks are out of view. Returns
+  /// false where neither tells how the camera moved: `motion` is lost, nothing was added; to go on,
+  /// `restart`.
+  bool add(int frame,
            const Rigid3& world_from_prev,
            const Matches& matches,
-           const MeasuredMotion& motion);
+           MeasuredMotion& motion);
+  /// False: the length of the last frame's step is a guess (the last one's); what was known of the
+  /// map's unit no longer holds.
+  [[nodiscard]] bool keeps_unit() const { return keeps_unit_; }
   /// Nothing connects this frame with the ones before; the next matches start at it.
   void restart(int frame);
 
@@ -53,7 +64,16 @@ class MapTracker {
   void rescale(double factor, const Eigen::Vector3d& center);
 
  private:
-  [[nodiscard]] Rigid3 place(const Matches& matches, const MeasuredMotion& motion);
+  /// By the two-frame motion and the length of the last step.
+  [[nodiscard]] Rigid3 guess_pose(const MeasuredMotion& motion) const;
+  /// By the landmarks; corrects the motion where they agree on another. nullopt: they do not tell.
+  [[nodiscard]] std::optional<Rigid3> place(const Matches& matches, MeasuredMotion& motion) const;
+  void correct_motion(const Rigid3& world_from_camera,
+                      const Matches& matches,
+                      MeasuredMotion& motion) const;
+  /// Whether most matches are the motion's inliers.
+  [[nodiscard]] bool is_agreed_on(const Matches& matches, const MeasuredMotion& motion) const;
+  [[nodiscard]] bool is_believable(const Matches& matches, const MeasuredMotion& motion) const;
   void start_anew(bool is_last_pose_kept);
   void add_to_window(Keyframe keyframe);
   void open_map(const Matches& matches, const std::vector<char>& is_inlier);
@@ -65,7 +85,8 @@ class MapTracker {
   LocalMap map_;
   MapHistory history_;
   Rigid3 world_from_camera_;
-  double last_step_;
+  double last_step_;  ///< of a frame that was tracked
+  bool keeps_unit_ = true;
   int frame_ = 0;  ///< the last one given
   int keyframes_since_refinement_ = 0;
 };

@@ -134,12 +134,12 @@ FrameResult Odometry::process_picture(const cv::Mat& frame) {
   }
   self.motion = self.estimator.measure(self.matches.prev_uv, self.matches.cur_uv,
                                        self.chain.is_initializing(), self.seed);
-  self.front_end->keep(self.motion.inlier_mask);
   if (self.map.has_value()) {
     self.motion = self.map->refine(self.frame_number(), self.image, self.matches,
                                    self.chain.world_from_picture(), std::move(self.motion));
     self.map->look(frame);
   }
+  self.front_end->keep(self.motion.inlier_mask);
   result.state = self.chain.add(self.motion);
   result.times.pose_ms = watch.lap_ms();
 

@@ -11,6 +11,8 @@ namespace {
 
 /// Below this OpenCV's estimators have nothing to choose from, and some versions crash.
 constexpr std::size_t kMinMatches = 8;
+constexpr double kPoseConfidence = 0.9999;
+constexpr int kPoseIterations = 1000;
 
 std::vector<cv::Point2d> to_points(std::span<const Eigen::Vector2d> uv) {
   std::vector<cv::Point2d> points;
@@ -94,6 +96,61 @@ std::optional<Eigen::Matrix3d> estimate_essential(std::span<const Eigen::Vector2
     return cv::findEssentialMat(prev, cur, intrinsics, intrinsics, cv::noArray(), cv::noArray(),
                                 cv::noArray(), usac_params(options, seed));
   });
+}
+
+std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> points_in_world,
+                                             std::span<const Eigen::Vector2d> uv,
+                                             const Camera& camera,
+                                             double bound_px,
+                                             std::uint64_t seed) {
+  if (uv.size() < kMinMatches || points_in_world.size() != uv.size()) {
+    return std::nullopt;
+  }
+  // Single precision inside: points far from the origin would lose digits.
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points_in_world) {
+    center += point / static_cast<double>(points_in_world.size());
+  }
+  std::vector<cv::Point3d> points;
+  points.reserve(points_in_world.size());
+  for (const Eigen::Vector3d& point : points_in_world) {
+    const Eigen::Vector3d near = point - center;
+    points.emplace_back(near.x(), near.y(), near.z());
+  }
+  cv::UsacParams params;
+  params.confidence = kPoseConfidence;
+  params.isParallel = false;
+  params.maxIterations = kPoseIterations;
+  params.threshold = bound_px;
+  params.score = cv::SCORE_METHOD_MSAC;
+  params.sampler = cv::SAMPLING_UNIFORM;
+  params.loMethod = cv::LOCAL_OPTIM_INNER_LO;
+  params.randomGeneratorState = static_cast<int>(seed & 0x7fffffffU);
+  cv::Mat intrinsics;
+  cv::eigen2cv(camera.matrix(), intrinsics);
+  cv::Mat rotation;
+  cv::Mat translation;
+  cv::Mat inliers;
+  try {
+    if (!cv::solvePnPRansac(points, to_points(uv), intrinsics, cv::noArray(), rotation, translation,
+                            inliers, params)) {
+      return std::nullopt;
+    }
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  }
+  if (rotation.total() != 3 || translation.total() != 3) {
+    return std::nullopt;
+  }
+  Eigen::Vector3d w;
+  Eigen::Vector3d t;
+  cv::cv2eigen(rotation, w);
+  cv::cv2eigen(translation, t);
+  if (!w.allFinite() || !t.allFinite()) {
+    return std::nullopt;
+  }
+  const Rigid3 camera_from_centered(so3_exp(w), t);
+  return camera_from_centered * Rigid3(Eigen::Quaterniond::Identity(), -center);
 }
 
 }  // namespace stemvo

@@ -9,6 +9,7 @@
 
 #include "stemvo/config.hpp"
 #include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
 
 namespace stemvo {
 
@@ -33,6 +34,16 @@ namespace stemvo {
     std::span<const Eigen::Vector2d> cur_uv,
     const Camera& camera,
     const TwoViewOptions& options,
+    std::uint64_t seed);
+
+/// camera_from_world from 2D-3D matches of which many may be wrong: samples of three points (P3P),
+/// consensus within `bound_px` of reprojection. A start for refine_absolute_pose. nullopt for fewer
+/// than 8 matches, and where no pose was found.
+[[nodiscard]] std::optional<Rigid3> estimate_absolute_pose(
+    std::span<const Eigen::Vector3d> points_in_world,
+    std::span<const Eigen::Vector2d> uv,
+    const Camera& camera,
+    double bound_px,
     std::uint64_t seed);
 
 }  // namespace stemvo

@@ -62,4 +62,11 @@ class TwoViewEstimator {
   Camera camera_;
 };
 
+/// Matches within `bound_px` of their epipolar lines; one flag per match.
+[[nodiscard]] std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,
+                                                 std::span<const Eigen::Vector2d> prev_uv,
+                                                 std::span<const Eigen::Vector2d> cur_uv,
+                                                 const Camera& camera,
+                                                 double bound_px);
+
 }  // namespace stemvo

@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -39,12 +40,10 @@ class FileLock {
   int descriptor_;
 };
 
-/// Folder with sequences/00 and poses/00.txt. Read it only; copy what is to be broken.
-inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
+/// The folder for rendered drives, empty when the program is a new one. Hold its lock file.
+inline std::filesystem::path drives_folder() {
   namespace fs = std::filesystem;
   const fs::path base = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
-  fs::create_directories(base);
-  const FileLock lock(base / "lock");
   const std::string built =
       std::to_string(fs::last_write_time(STEMVO_PROGRAM).time_since_epoch().count());
   if (read_file(base / "program") != built) {  // drives of an older program
@@ -55,21 +54,41 @@ inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
     }
     std::ofstream(base / "program") << built;
   }
-  const std::string name = std::to_string(size.frames) + "x" + std::to_string(size.width_px) + "x" +
-                           std::to_string(size.height_px);
-  const fs::path drive = base / name;
+  return base;
+}
+
+/// Renders a drive by these options of `stemvo synth`, or takes the one that is there. Returns the
+/// folder with sequences/00 and poses/00.txt. Read it only; copy what is to be broken.
+inline std::filesystem::path render_once(const std::string& name,
+                                         const DriveSize& size,
+                                         const std::optional<std::filesystem::path>& poses) {
+  namespace fs = std::filesystem;
+  const fs::path parent = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
+  fs::create_directories(parent);
+  const FileLock lock(parent / "lock");
+  const fs::path drive = drives_folder() / name;
   if (!fs::exists(drive)) {
-    const fs::path unfinished = base / (name + ".unfinished");
+    const fs::path unfinished = parent / (name + ".unfinished");
     fs::remove_all(unfinished);
-    const ProgramResult result = run_stemvo(
-        {"synth", unfinished.string(), "--frames", std::to_string(size.frames), "--width",
-         std::to_string(size.width_px), "--height", std::to_string(size.height_px)});
+    std::vector<std::string> arguments = {
+        "synth",   unfinished.string(),           "--frames", std::to_string(size.frames),
+        "--width", std::to_string(size.width_px), "--height", std::to_string(size.height_px)};
+    if (poses) {
+      arguments.insert(arguments.end(), {"--trajectory", poses->string()});
+    }
+    const ProgramResult result = run_stemvo(arguments);
     if (result.exit_code != 0) {
       throw std::runtime_error("stemvo synth failed: " + result.err);
     }
     fs::rename(unfinished, drive);
   }
   return drive;
+}
+
+inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
+  return render_once(std::to_string(size.frames) + "x" + std::to_string(size.width_px) + "x" +
+                         std::to_string(size.height_px),
+                     size, std::nullopt);
 }
 
 /// The first frames of the rendered drive, copied, to be broken.

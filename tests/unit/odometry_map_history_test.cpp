@@ -49,8 +49,8 @@ void drive_on(
   const TwoViewEstimator estimator({}, drive.camera);
   for (int i = from; i < to; ++i) {
     const Matches matches = drive.matches(i);
-    tracker.add(i, online.back(), matches,
-                estimator.measure(matches.prev_uv, matches.cur_uv, false, 1));
+    MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
+    tracker.add(i, online.back(), matches, motion);
     online.push_back(tracker.world_from_camera());
   }
 }
@@ -112,8 +112,8 @@ TEST(MapHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   const TwoViewEstimator estimator({}, drive.camera);
   for (int i = 1; i < num_frames; ++i) {
     const Matches matches = drive.matches(i);
-    tracker.add(i, online.back(), matches,
-                estimator.measure(matches.prev_uv, matches.cur_uv, false, 1));
+    MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
+    tracker.add(i, online.back(), matches, motion);
     online.push_back(tracker.world_from_camera());
     picture.setTo(cv::Scalar(i, 2 * i, 3 * i));
     tracker.look(picture);

@@ -127,7 +127,7 @@ Rigid3 drive_tracker(MapTracker& tracker, const DriveTracks& drive, int from, in
   Rigid3 pose = tracker.world_from_camera();
   for (int i = from; i < to; ++i) {
     const Matches matches = drive.matches(i);
-    const MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
+    MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
     tracker.add(i, pose, matches, motion);
     pose = tracker.world_from_camera();
   }
@@ -192,7 +192,8 @@ TEST(MapTracker, StartsAnewWhereTheCallerMovedThePose) {
   const TwoViewEstimator estimator({}, drive.camera);
   const Matches matches = drive.matches(6);
   const Rigid3 elsewhere(Eigen::Quaterniond::Identity(), {100.0, 0.0, 0.0});
-  tracker.add(6, elsewhere, matches, estimator.measure(matches.prev_uv, matches.cur_uv, false, 1));
+  MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
+  tracker.add(6, elsewhere, matches, motion);
   EXPECT_EQ(tracker.map().keyframes.size(), 2U);
   EXPECT_LT((tracker.world_from_camera().translation - elsewhere.translation).norm(), 3.0);
 }
