@@ -61,20 +61,22 @@ bool MapTracker::add(int frame,
     motion.cur_from_prev = {};
     return false;
   }
-  if (!placed.has_value() && motion.state == FrameState::kTracking) {
-    keeps_unit_ = keeps_unit_ && map_.keyframes.size() < 2;
-    if (static_cast<int>(map_.landmarks.size()) >= options_.placement.min_landmarks) {
-      start_anew(/*is_last_pose_kept=*/true);  // the landmarks are elsewhere, or wrong
-    }
+  const bool has_landmarks =
+      static_cast<int>(map_.landmarks.size()) >= options_.placement.min_landmarks;
+  if (!placed.has_value() && motion.state == FrameState::kTracking && has_landmarks) {
+    start_anew(/*is_last_pose_kept=*/true);  // they are elsewhere, or wrong
+    keeps_unit_ = false;
   }
   if (map_.keyframes.empty()) {
     open_map(matches, motion.inlier_mask);
   }
   frame_ = frame;
   world_from_camera_ = placed.value_or(guess_pose(motion));
+  const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
+  if (motion.state == FrameState::kTracking && step > 0.0) {
+    last_step_ = step;
+  }
   if (is_new_keyframe(motion)) {
-    const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
-    last_step_ = step > 0.0 ? step : last_step_;
     extend_map(matches, motion.inlier_mask);
   }
   return true;

@@ -47,8 +47,8 @@ class MapTracker {
            const Rigid3& world_from_prev,
            const Matches& matches,
            MeasuredMotion& motion);
-  /// False: the length of the last frame's step is a guess (the last one's); what was known of the
-  /// map's unit no longer holds.
+  /// False: a map was left behind, and the last frame's step is as long as the one before by guess;
+  /// what was known of the unit no longer holds.
   [[nodiscard]] bool keeps_unit() const { return keeps_unit_; }
   /// Nothing connects this frame with the ones before; the next matches start at it.
   void restart(int frame);

@@ -179,6 +179,8 @@ TEST_F(BadInput, Configuration) {
   expect_error(run({"--set", "scale.source=gps"}), 1,
                {"none, constant, camera_height, ground_truth, found 'gps'"});
   expect_error(run({"--set", "scale.constant_m=nan"}), 1, {"scale.constant_m", "nan"});
+  expect_error(run({"--map", "--set", "odometry.mode=two_frame", "--set", "scale.source=constant"}),
+               1, {"--map", "odometry.mode map", "found two_frame"});
 }
 
 TEST_F(BadInput, FramesOutsideTheSequence) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -11,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/drives.hpp"
+#include "support/ply_reader.hpp"
 #include "support/run_program.hpp"
 
 namespace stemvo {
@@ -163,6 +165,41 @@ TEST_F(Run, FramesInTheMiddleStartAtTheIdentity) {
   const nlohmann::json metrics = metrics_of(out_);
   EXPECT_LT(metrics["average_offset_m"].get<double>(),
             0.2 * metrics["null_offset_m"].get<double>());
+}
+
+TEST_F(Run, TheMapShowsTheStreetAndLeavesTheDrivenWayFree) {
+  const ProgramResult result =
+      run_drive(sequence_, out_, {"--map", "--set", "odometry.mode=map", "--set", kTrueScale});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("map.ply"));
+  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_refined_kitti.txt")), 60);
+  EXPECT_LT(metrics_of(out_)["refined"]["t_rel_percent"].get<double>(), 2.0);
+  const testing::PlyFile map = testing::read_ply(out_ + "/map.ply");
+  ASSERT_EQ(map.edges.size(), 59U);
+  const std::size_t num_points = map.vertices.size() - 60;
+  ASSERT_GT(num_points, 1000U);
+  std::size_t num_of_road = 0;
+  std::size_t num_in_the_way = 0;
+  std::size_t num_colored = 0;
+  for (std::size_t i = 0; i < num_points; ++i) {
+    const testing::PlyFile::Vertex& point = map.vertices[i];
+    num_colored += point.rgb[0] != point.rgb[2] ? 1 : 0;
+    float nearest = 1e9F;
+    float below = 0.0F;  // the camera there, along y
+    for (std::size_t k = num_points; k < map.vertices.size(); ++k) {
+      const Eigen::Vector3f offset = point.position - map.vertices[k].position;
+      const float across = std::hypot(offset.x(), offset.z());
+      if (across < nearest) {
+        nearest = across;
+        below = offset.y();
+      }
+    }
+    num_of_road += nearest < 3.0F && below > 1.4F && below < 1.9F ? 1 : 0;
+    num_in_the_way += nearest < 1.0F && std::abs(below) < 1.0F ? 1 : 0;
+  }
+  EXPECT_GT(num_of_road, num_points / 20);
+  EXPECT_LE(num_in_the_way, num_points / 200);
+  EXPECT_GT(num_colored, num_points / 4);
 }
 
 TEST_F(Run, BrokenFramesGetAStateAndTheRunGoesOn) {
