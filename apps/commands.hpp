@@ -20,6 +20,7 @@ CLI::App* add_run(CLI::App& app, Action& action);
 CLI::App* add_evaluate(CLI::App& app, Action& action);
 CLI::App* add_channel(CLI::App& app, Action& action);
 CLI::App* add_synth(CLI::App& app, Action& action);
+CLI::App* add_calibrate(CLI::App& app, Action& action);
 CLI::App* add_check(CLI::App& app, Action& action);
 CLI::App* add_benchmark(CLI::App& app, Action& action);
 CLI::App* add_models(CLI::App& app, Action& action);

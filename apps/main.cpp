@@ -55,8 +55,8 @@ int run_program(int argc, char** argv) {
         };
       },
       "Print the default configuration, every key explained");
-  for (const auto add :
-       {add_run, add_evaluate, add_channel, add_synth, add_check, add_models, add_benchmark}) {
+  for (const auto add : {add_run, add_evaluate, add_channel, add_synth, add_calibrate, add_check,
+                         add_models, add_benchmark}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
   }
@@ -68,8 +68,8 @@ int run_program(int argc, char** argv) {
   }
   if (!action) {
     print_error(
-        "expected a command: run, evaluate, channel, synth, check, models or benchmark (see "
-        "'stemvo "
+        "expected a command: run, evaluate, channel, synth, calibrate, check, models or benchmark "
+        "(see 'stemvo "
         "--help')");
     return kExitUsage;
   }

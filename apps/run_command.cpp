@@ -33,6 +33,7 @@ struct Arguments {
   RunRequest request;
   ConfigArguments config;
   std::string ground_truth;
+  std::string calibration;
   bool is_quiet = false;
 };
 
@@ -59,6 +60,9 @@ int run(Arguments& arguments) {
   request.started = process_start();
   if (!arguments.ground_truth.empty()) {
     request.ground_truth = arguments.ground_truth;
+  }
+  if (!arguments.calibration.empty()) {
+    request.calibration = arguments.calibration;
   }
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
@@ -94,6 +98,10 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
   command->add_option("--gt", arguments->ground_truth, "Ground truth: a pose file of KITTI")
+      ->type_name("FILE");
+  command
+      ->add_option("--calib", arguments->calibration,
+                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'")
       ->type_name("FILE");
   command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
       ->type_name("N")

@@ -154,6 +154,11 @@ Expected<Trajectory> read_ground_truth(const fs::path& file, const FrameRange& r
   return relative_to_first(std::span(*poses).subspan(range.begin, range.end - range.begin));
 }
 
+bool has_center_inside(const Camera& camera) {
+  return camera.cx_px > 0.0 && camera.cx_px < camera.width_px && camera.cy_px > 0.0 &&
+         camera.cy_px < camera.height_px;
+}
+
 template <typename T>
 std::vector<T> cut(const std::vector<T>& all, const FrameRange& range) {
   const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
@@ -180,7 +185,8 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   if (!range) {
     return fail(range.error().message);
   }
-  const auto camera = dataset::read_kitti_camera(directory / "calib.txt", *camera_index);
+  const fs::path calibration = options.calibration.value_or(directory / "calib.txt");
+  const auto camera = dataset::read_kitti_camera(calibration, *camera_index);
   if (!camera) {
     return fail(camera.error().message);
   }
@@ -215,6 +221,12 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   }
   sequence.camera_.width_px = size->width;
   sequence.camera_.height_px = size->height;
+  if (options.calibration && !has_center_inside(sequence.camera_)) {
+    return fail(fmt::format(
+        "{}: expected a principal point inside pictures of {}x{} pixels, found ({}, {}): a "
+        "calibration of another picture size",
+        calibration.string(), size->width, size->height, camera->cx_px, camera->cy_px));
+  }
   return sequence;
 }
 

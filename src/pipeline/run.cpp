@@ -56,7 +56,8 @@ struct Drive {
 
 Expected<KittiSequence> open_sequence(const RunRequest& request) {
   Expected<KittiSequence> sequence = KittiSequence::open(
-      request.sequence_dir, {request.config.input.camera, request.frames, request.ground_truth});
+      request.sequence_dir,
+      {request.config.input.camera, request.frames, request.ground_truth, request.calibration});
   if (sequence && request.config.scale.source == "ground_truth" && !sequence->ground_truth()) {
     const auto file = request.sequence_dir / "../../poses" / (sequence->name() + ".txt");
     return fail(fmt::format(

@@ -27,19 +27,22 @@ struct FrameRangeRequest {
 };
 [[nodiscard]] Expected<FrameRangeRequest> parse_frame_range(const std::string& text);
 
-/// Keys `input.*` of the configuration, and the program's --frames and --gt.
+/// Keys `input.*` of the configuration, and the program's --frames, --gt and --calib.
 struct SequenceOptions {
   std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
   std::optional<FrameRangeRequest> frames = std::nullopt;
   /// Else ../../poses/NN.txt if it exists.
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
+  /// Else calib.txt in the folder.
+  std::optional<std::filesystem::path> calibration = std::nullopt;
 };
 
 /// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt.
 class KittiSequence {
  public:
   /// Errors: folder, images, calib row, times missing or malformed; gap in the numbering; range
-  /// outside; fewer poses or times than frames; a --gt file that cannot be read.
+  /// outside; fewer poses or times than frames; a --gt file that cannot be read; a --calib file
+  /// whose principal point is outside the picture (one of another picture size).
   [[nodiscard]] static Expected<KittiSequence> open(const std::filesystem::path& directory,
                                                     const SequenceOptions& options = {});
 

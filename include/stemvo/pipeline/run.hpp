@@ -25,6 +25,7 @@ struct RunRequest {
   Config config;
   std::optional<FrameRangeRequest> frames;
   std::optional<std::filesystem::path> ground_truth;
+  std::optional<std::filesystem::path> calibration;  ///< else calib.txt of the sequence
   int num_threads = 0;     ///< 0: all cores
   int picture_every = 0;   ///< 0: no per-frame pictures
   bool write_map = false;  ///< map.ply; needs odometry.mode map

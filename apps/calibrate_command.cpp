@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "install_paths.hpp"
+#include "options.hpp"
+#include "progress.hpp"
+#include "stemvo/calibration/calibrate.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Follows points through the drive and asks under which focal length and principal point they fit
+together best. Turns tell of both, a straight road of neither: a number that the drive does not
+determine stays as given and is marked. Ground truth is not read. Nothing uses FILE unless it is
+given to a run.
+
+Examples:
+  stemvo calibrate kitti/sequences/00 --out refined.txt
+  stemvo run kitti/sequences/00 --out result --calib refined.txt)";
+
+struct Arguments {
+  CalibrationRequest request;
+  ConfigArguments config;
+  std::string calibration;
+  bool is_quiet = false;
+};
+
+/// One line of progress per stage.
+class TwoStages {
+ public:
+  explicit TwoStages(bool is_quiet) : is_quiet_(is_quiet), tracking_("frames", is_quiet) {}
+
+  bool update(CalibrationStage stage, std::size_t done, std::size_t total) {
+    if (stage == CalibrationStage::kTracking) {
+      return tracking_.update(done, total);
+    }
+    if (!solving_) {
+      solving_ = std::make_unique<Progress>("solver steps", is_quiet_);
+    }
+    return solving_->update(done, total);
+  }
+
+ private:
+  bool is_quiet_;
+  Progress tracking_;
+  std::unique_ptr<Progress> solving_;
+};
+
+int report(const Arguments& arguments, const CalibrationReport& report) {
+  const std::string file = arguments.request.out_file.string();
+  for (const std::string& warning : report.warnings) {
+    print_warning(warning);
+  }
+  if (report.interrupted) {
+    print_warning(fmt::format("interrupted; {} was not written", file));
+    return kExitInterrupted;
+  }
+  if (!arguments.is_quiet) {
+    print(format_calibration_table(report));
+  }
+  if (!report.written) {
+    print_error(
+        fmt::format("{}: not written: expected a drive that determines the focal length "
+                    "or the principal point (turns do), found one that determines neither",
+                    file));
+    return kExitFailed;
+  }
+  if (!arguments.is_quiet) {
+    print(fmt::format("calibration: {}\n", file));
+  }
+  return kExitDone;
+}
+
+int calibrate(Arguments& arguments) {
+  const Expected<Config> config = read_config(arguments.config);
+  if (!config) {
+    print_error(config.error().message);
+    return kExitFailed;
+  }
+  CalibrationRequest& request = arguments.request;
+  request.config = *config;
+  request.models_dir = data_folder("models");
+  if (!arguments.calibration.empty()) {
+    request.calibration = arguments.calibration;
+  }
+  TwoStages progress(arguments.is_quiet);
+  const Expected<CalibrationReport> result = calibrate_sequence(
+      request, [&progress](CalibrationStage stage, std::size_t done, std::size_t total) {
+        return progress.update(stage, done, total);
+      });
+  if (!result) {
+    print_error(result.error().message);
+    return kExitFailed;
+  }
+  return report(arguments, *result);
+}
+
+}  // namespace
+
+CLI::App* add_calibrate(CLI::App& app, Action& action) {
+  CLI::App* command =
+      app.add_subcommand("calibrate", "Refine focal length and principal point over a drive");
+  const auto arguments = std::make_shared<Arguments>();
+  CalibrationRequest& request = arguments->request;
+  command->add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
+      ->required()
+      ->type_name("");
+  command->add_option("--out", request.out_file, "File for the calibration, as KITTI's calib.txt")
+      ->required()
+      ->type_name("FILE");
+  command
+      ->add_option("--calib", arguments->calibration,
+                   "Calibration to start from; default: the folder's calib.txt")
+      ->type_name("FILE");
+  add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
+  add_config_options(*command, arguments->config);
+  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
+  command->footer(kFooter);
+  command->callback(
+      [arguments, &action] { action = [arguments] { return calibrate(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps
