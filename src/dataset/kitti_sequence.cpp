@@ -201,6 +201,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   sequence.name_ = absolute.filename().string();
   sequence.range_ = *range;
   sequence.camera_ = *camera;
+  sequence.given_calibration_ = options.calibration;
   sequence.is_color_ = *camera_index >= 2;
   sequence.files_ = cut(*images, *range);
   sequence.timestamps_s_ = cut(*times_s, *range);

@@ -80,7 +80,11 @@ Status write_config(const std::filesystem::path& out_dir,
   out << fmt::format("# {}\n", one_line(describe_frames(sequence, sequence.size())));
   out << fmt::format("# model {}: {} filters, sampled every {} px", one_line(stem.model),
                      stem.num_filters, stem.sampling_px);
-  out << (stem.sha256.empty() ? "" : fmt::format(", sha256 {}", stem.sha256)) << "\n\n";
+  out << (stem.sha256.empty() ? "" : fmt::format(", sha256 {}", stem.sha256)) << "\n";
+  if (const auto& calibration = sequence.given_calibration()) {
+    out << fmt::format("# calibration {}\n", one_line(calibration->string()));
+  }
+  out << "\n";
   Config effective = config;  // with what -1 and 0 stand for, which may change with the manifest
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;

@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-const std::vector<std::string> kCommands = {"run",   "evaluate", "channel",
-                                            "synth", "check",    "models", "benchmark"};
+const std::vector<std::string> kCommands = {"run",       "evaluate", "channel", "synth",
+                                            "calibrate", "check",    "models",  "benchmark"};
 
 TEST(CommandLine, HelpOfTheProgramNamesEveryCommand) {
   const ProgramResult result = run_stemvo({"--help"});
@@ -80,6 +80,8 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"channel", "x", "--out", "o", "--filters", "4:4"}, "A < B"},
       {{"synth", "x", "--frames", "0"}, "--frames"},
       {{"synth", "x", "--seed", "-3"}, "--seed"},
+      {{"calibrate", "x"}, "--out"},
+      {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
       {{"check", "metrics.json"}, "--against"},
       {{"models", "x"}, "x"},
       {{"benchmark", "x"}, "--out"},

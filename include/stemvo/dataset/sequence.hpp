@@ -57,6 +57,10 @@ class KittiSequence {
   [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
     return ground_truth_file_;
   }
+  /// Of the options; absent: calib.txt in the folder was read.
+  [[nodiscard]] const std::optional<std::filesystem::path>& given_calibration() const {
+    return given_calibration_;
+  }
   [[nodiscard]] const std::filesystem::path& file(std::size_t index) const { return files_[index]; }
 
   /// Frame `index` in [0, size()): CV_8UC1 for the gray cameras, CV_8UC3 in RGB order for colour.
@@ -67,6 +71,7 @@ class KittiSequence {
   std::string name_;
   FrameRange range_;
   Camera camera_;
+  std::optional<std::filesystem::path> given_calibration_;
   bool is_color_ = false;
   std::vector<std::filesystem::path> files_;
   std::vector<double> timestamps_s_;

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using test::read_file;
+using test::rendered_drive;
+using test::run_stemvo;
+using test::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+struct Intrinsics {
+  double f = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+};
+
+Intrinsics read_intrinsics(const fs::path& file) {
+  Intrinsics result;
+  const std::string text = read_file(file);
+  const std::size_t at = text.find("P2:");
+  double zero = 0.0;
+  double fy = 0.0;
+  const int read = at == std::string::npos
+                       ? 0
+                       : std::sscanf(text.c_str() + at, "P2: %lf %lf %lf %lf %lf %lf %lf",
+                                     &result.f, &zero, &result.cx, &zero, &zero, &fy, &result.cy);
+  EXPECT_EQ(read, 7) << file;
+  EXPECT_EQ(result.f, fy);
+  return result;
+}
+
+void write_intrinsics(const fs::path& file, const Intrinsics& k) {
+  char row[256];
+  std::snprintf(row, sizeof(row), "P2: %.12e 0 %.12e 0 0 %.12e %.12e 0 0 0 1 0\n", k.f, k.cx, k.f,
+                k.cy);
+  std::ofstream(file) << row;
+}
+
+class Calibrate : public ::testing::Test {
+ protected:
+  ProgramResult calibrate(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"calibrate", sequence_.string(), "--out", out_});
+    return run_stemvo(more);
+  }
+
+  TemporaryFolder folder_;
+  std::string out_ = folder_ / "refined.txt";
+  fs::path sequence_ = rendered_drive() / "sequences/00";
+};
+
+// The whole program: tracks, alignment, solve. The pictures show no distortion, so that what is
+// found is the camera that rendered them.
+TEST_F(Calibrate, FindsTheCameraThatRenderedTheDrive) {
+  sequence_ = rendered_drive({100, 1241, 376}) / "sequences/00";
+  const Intrinsics truth = read_intrinsics(sequence_ / "calib.txt");
+  const std::string wrong = folder_ / "wrong.txt";
+  write_intrinsics(wrong, {1.005 * truth.f, truth.cx + 4.0, truth.cy - 3.0});
+  const ProgramResult result = calibrate({"--calib", wrong});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Intrinsics found = read_intrinsics(out_);
+  EXPECT_NEAR(found.f / truth.f, 1.0, 0.001);
+  EXPECT_NEAR(found.cx, truth.cx, 1.0);
+  EXPECT_NEAR(found.cy, truth.cy, 1.0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("focal length"), HasSubstr("deviation"),
+                                HasSubstr("reprojection error"), HasSubstr(out_)));
+  EXPECT_THAT(result.err, HasSubstr("100/100 frames"));
+  std::cout << result.out;
+}
+
+TEST_F(Calibrate, TwoRunsGiveTheSameBytesAndTheGivenCalibrationIsLeftAlone) {
+  const std::string before = read_file(sequence_ / "calib.txt");
+  const ProgramResult first = calibrate({});
+  ASSERT_EQ(first.exit_code, 0) << first.err << first.out;
+  const std::string bytes = read_file(out_);
+  const ProgramResult second = calibrate({"--quiet"});
+  EXPECT_EQ(second.exit_code, 0);
+  EXPECT_THAT(second.out + second.err, IsEmpty());
+  EXPECT_EQ(read_file(out_), bytes);
+  EXPECT_FALSE(bytes.empty());
+  EXPECT_EQ(read_file(sequence_ / "calib.txt"), before);
+}
+
+TEST_F(Calibrate, ARunUsesTheFileItIsGivenAndNoOther) {
+  const fs::path copy = test::copy_drive(folder_.path(), 12);
+  const std::string wrong = folder_ / "wrong.txt";
+  const Intrinsics truth = read_intrinsics(copy / "calib.txt");
+  write_intrinsics(wrong, {1.1 * truth.f, truth.cx, truth.cy});
+  const auto run = [&](const std::string& out, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"run", copy.string(), "--out", folder_ / out, "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramResult result = run_stemvo(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return read_file(folder_ / (out + "/trajectory_kitti.txt"));
+  };
+  const std::string own = run("own", {});
+  const std::string given = run("given", {"--calib", wrong});
+  fs::copy_file(wrong, copy / "calib.txt", fs::copy_options::overwrite_existing);
+  EXPECT_EQ(given, run("replaced", {}));
+  EXPECT_NE(given, own);
+  EXPECT_THAT(read_file(folder_ / "given/config.yaml"), HasSubstr("# calibration " + wrong));
+}
+
+void expect_error(const ProgramResult& result, const std::vector<std::string>& words) {
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_THAT(result.err, HasSubstr("error: "));
+  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("internal")));
+  for (const std::string& word : words) {
+    EXPECT_THAT(result.err, HasSubstr(word));
+  }
+}
+
+TEST_F(Calibrate, WhatIsWrongIsSaid) {
+  expect_error(calibrate({"--frames", "0:8", "--quiet"}), {sequence_.string(), "8 frames"});
+  expect_error(calibrate({"--set", "features.method=orb"}), {"features.method", "klt", "orb"});
+  expect_error(calibrate({"--calib", folder_ / "none.txt"}), {"none.txt"});
+  const std::string other = folder_ / "other.txt";
+  write_intrinsics(other, {1000.0, 2000.0, 100.0});
+  expect_error(calibrate({"--calib", other}), {"other.txt", "620x188", "2000"});
+  expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}),
+               {"other.txt", "620x188"});
+  write_intrinsics(out_, read_intrinsics(sequence_ / "calib.txt"));
+  expect_error(calibrate({"--calib", out_}), {out_, "another file"});
+  fs::remove(out_);
+  expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), {folder_ / "none"});
+  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_.path().string()}),
+               {folder_.path().string(), "folder"});
+  expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_ / "no/file.txt"}),
+               {"no/file.txt"});
+  EXPECT_FALSE(fs::exists(out_));
+}
+
+// The same picture again and again: a camera that stands determines nothing.
+TEST_F(Calibrate, StandingStillIsAnError) {
+  sequence_ = test::copy_drive(folder_.path(), 30);
+  for (int i = 1; i < 30; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    fs::copy_file(sequence_ / "image_2/000000.png", sequence_ / name,
+                  fs::copy_options::overwrite_existing);
+  }
+  expect_error(calibrate({"--quiet"}), {"that move", "30 frames"});
+  EXPECT_FALSE(fs::exists(out_));
+}
+
+TEST_F(Calibrate, InterruptWritesNothingAndSaysSo) {
+  test::RunningProgram program(STEMVO_PROGRAM, {"calibrate", sequence_.string(), "--out", out_});
+  std::this_thread::sleep_for(std::chrono::milliseconds(700));
+  program.send(SIGINT);
+  const ProgramResult result = program.wait();
+  EXPECT_EQ(result.exit_code, 130) << result.err;
+  EXPECT_THAT(result.err, AllOf(HasSubstr("interrupted"), HasSubstr("was not written")));
+  EXPECT_FALSE(fs::exists(out_));
+  EXPECT_FALSE(fs::exists(out_ + ".unfinished"));
+}
+
+}  // namespace
+}  // namespace stemvo
