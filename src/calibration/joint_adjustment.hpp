@@ -41,7 +41,7 @@ class JointAdjustment {
 
   /// Called after each iteration; false stops.
   using Callback = std::function<bool()>;
-  /// Moves segments and shared numbers. False: not solvable; they are as far as it came.
+  /// Moves segments and shared numbers. False: not solvable, or stopped; they stay.
   bool solve(const AdjustmentOptions& options, const Callback& callback);
 
   [[nodiscard]] const SharedVector& shared() const { return shared_; }

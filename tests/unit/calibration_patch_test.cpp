@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
+#include <Eigen/Dense>
 #include <gtest/gtest.h>
 
 #include "calibration/patch_alignment.hpp"

@@ -16,8 +16,8 @@ using testing::SceneRandom;
 
 struct DriveOptions {
   int num_segments = 6;
-  double yaw_rad = 0.03;  ///< per keyframe
-  double noise_px = 0.05;
+  double yaw_rad = 0.05;  ///< per keyframe
+  double noise_px = 0.03;
   double outlier_ratio = 0.0;
   SharedVector truth = shared_of(kitti_camera());
 };
@@ -82,7 +82,7 @@ Camera wrong_camera() {
 
 TEST(CalibrationRefineCamera, TurnsGiveBackAWrongCamera) {
   const SharedVector truth = shared_of(kitti_camera());
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+  for (const std::uint64_t seed : {1U, 2U}) {
     std::vector<Segment> segments = make_drive({}, seed);
     const RefinedCamera refined = refine_camera(segments, wrong_camera(), {}, {});
     EXPECT_NEAR(refined.shared[0] / truth[0], 1.0, 0.001);
@@ -93,7 +93,7 @@ TEST(CalibrationRefineCamera, TurnsGiveBackAWrongCamera) {
       EXPECT_LE(std::abs(refined.shared[i] - truth[i]), 4.0 * refined.deviation[i]) << i;
       EXPECT_GT(refined.deviation[i], 0.0) << i;
     }
-    EXPECT_NEAR(refined.refined_error_px, 0.05, 0.01);
+    EXPECT_NEAR(refined.refined_error_px, 0.03, 0.01);
     EXPECT_GT(refined.given_error_px, 1.02 * refined.refined_error_px);
   }
 }
@@ -104,7 +104,7 @@ TEST(CalibrationRefineCamera, OutliersDoNotPull) {
   std::vector<Segment> segments = make_drive(options, 4);
   const RefinedCamera refined = refine_camera(segments, wrong_camera(), {}, {});
   EXPECT_NEAR(refined.shared[0] / shared_of(kitti_camera())[0], 1.0, 0.001);
-  EXPECT_LT(refined.refined_error_px, 0.07);
+  EXPECT_LT(refined.refined_error_px, 0.04);
 }
 
 // Distortion that the model did not have would end up in the focal length.
