@@ -26,9 +26,9 @@ struct RunRequest {
   std::optional<FrameRangeRequest> frames;
   std::optional<std::filesystem::path> ground_truth;
   std::optional<std::filesystem::path> calibration;  ///< else calib.txt of the sequence
-  int num_threads = 0;     ///< 0: all cores
-  int picture_every = 0;   ///< 0: no per-frame pictures
-  bool write_map = false;  ///< map.ply; needs odometry.mode map
+  int num_threads = 0;                               ///< 0: all cores
+  int picture_every = 0;                             ///< 0: no per-frame pictures
+  bool write_map = false;                            ///< map.ply; needs odometry.mode map
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
