@@ -8,8 +8,8 @@
 
 #include "benchmark/names.hpp"
 #include "benchmark/runner.hpp"
-#include "evaluation/text_file.hpp"
 #include "stemvo/report/trajectory_plot.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::benchmark {
 namespace {

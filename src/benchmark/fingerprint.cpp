@@ -11,9 +11,9 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "evaluation/text_file.hpp"
 #include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::benchmark {
 namespace {

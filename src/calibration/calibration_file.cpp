@@ -9,9 +9,8 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
-#include "dataset/text_file.hpp"
-#include "evaluation/text_file.hpp"
 #include "stemvo/geometry/rigid3.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::calibration {
 namespace {
@@ -33,7 +32,7 @@ std::optional<Matrix34d> parse_row(const std::vector<std::string_view>& words) {
   }
   Matrix34d projection;
   for (int i = 0; i < 12; ++i) {
-    const auto number = dataset::parse_finite(words[static_cast<std::size_t>(i) + 1], "");
+    const auto number = parse_finite(words[static_cast<std::size_t>(i) + 1], "");
     if (!number) {
       return std::nullopt;
     }
@@ -54,13 +53,13 @@ fs::path beside(const fs::path& file) { return fs::path(file.string() + ".unfini
 Expected<std::string> rewrite_calibration(const fs::path& file,
                                           const Camera& given,
                                           const Camera& refined) {
-  const Expected<std::vector<std::string>> lines = dataset::read_lines(file);
+  const Expected<std::vector<std::string>> lines = read_lines(file);
   if (!lines) {
     return tl::unexpected(lines.error());
   }
   std::string text;
   for (const std::string& line : *lines) {
-    const std::vector<std::string_view> words = dataset::split_words(line);
+    const std::vector<std::string_view> words = split_words(line);
     std::optional<Matrix34d> row = parse_row(words);
     if (!row || !has_intrinsics(*row, given)) {
       text += line + "\n";

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "dataset/text_file.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::dataset {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <fmt/core.h>
 
-#include "evaluation/text_file.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/evaluation/trajectory.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <yaml-cpp/yaml.h>
 
-#include "evaluation/text_file.hpp"
 #include "report/text_table.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 

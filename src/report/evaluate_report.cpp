@@ -7,9 +7,9 @@
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
-#include "evaluation/text_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "report/text_table.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 

@@ -8,10 +8,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "evaluation/text_file.hpp"
 #include "report/picture_drawing.hpp"
 #include "report/plot_layout.hpp"
 #include "stemvo/check.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 

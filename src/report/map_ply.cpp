@@ -8,8 +8,8 @@
 
 #include <fmt/core.h>
 
-#include "evaluation/text_file.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {

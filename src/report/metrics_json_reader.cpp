@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "evaluation/text_file.hpp"
 #include "stemvo/report/evaluate_report.hpp"
 #include "stemvo/report/metrics_json.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {

@@ -8,10 +8,10 @@
 #include <cairo-svg.h>
 #include <fmt/core.h>
 
-#include "evaluation/text_file.hpp"
 #include "report/cairo_canvas.hpp"
 #include "report/plot_layout.hpp"
 #include "stemvo/check.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 
