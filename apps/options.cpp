@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
+#include <map>
 #include <string_view>
 #include <system_error>
 
@@ -53,7 +54,14 @@ Expected<Config> read_config(const ConfigArguments& arguments) {
     }
     config = *loaded;
   }
+  std::map<std::string, std::string> given;  // key -> the assignment
   for (const std::string& assignment : arguments.overrides) {
+    const auto [before, is_new] =
+        given.emplace(assignment.substr(0, assignment.find('=')), assignment);
+    if (!is_new) {
+      return fail("--set " + before->first + ": expected once, found '" + before->second +
+                  "' and '" + assignment + "'");
+    }
     if (const Status status = apply_override(config, assignment); !status) {
       return tl::unexpected(status.error());
     }

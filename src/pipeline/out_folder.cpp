@@ -4,7 +4,9 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -30,6 +32,27 @@ Status create_out_folder(const std::filesystem::path& folder) {
   }
   out.close();
   std::filesystem::remove(probe, code);
+  return {};
+}
+
+Status remove_old_pictures(const std::filesystem::path& folder) {
+  std::error_code code;
+  std::vector<std::filesystem::path> old;
+  std::filesystem::directory_iterator entry(folder, code);
+  for (; !code && entry != std::filesystem::directory_iterator(); entry.increment(code)) {
+    const std::string stem = entry->path().stem().string();
+    const bool is_number = stem.size() == 6 && stem.find_first_not_of("0123456789") == stem.npos;
+    std::error_code ignored;
+    if (is_number && entry->path().extension() == ".png" && entry->is_regular_file(ignored)) {
+      old.push_back(entry->path());
+    }
+  }
+  for (const std::filesystem::path& file : old) {
+    if (!code && !std::filesystem::remove(file, code) && code) {
+      return fail(fmt::format("{}: an earlier run's picture cannot be removed ({})", file.string(),
+                              code.message()));
+    }
+  }
   return {};
 }
 

@@ -193,6 +193,12 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
       !status) {
     return tl::unexpected(status.error());
   }
+  if (has_pictures) {
+    if (const Status status = pipeline::remove_old_pictures(request.out_dir / "pictures");
+        !status) {
+      return tl::unexpected(status.error());
+    }
+  }
   Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
   if (!csv) {
     return tl::unexpected(csv.error());

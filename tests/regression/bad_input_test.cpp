@@ -175,6 +175,8 @@ TEST_F(BadInput, Configuration) {
   expect_error(run_with_config("stem: [\n"), 1, {"my.yaml:2: not YAML"});
   expect_error(run({"--config", folder_ / "none.yaml"}), 1, {"none.yaml"});
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
+  expect_error(run({"--set", "stem.filter=3", "--set", "seed=2", "--set", "stem.filter=4"}), 1,
+               {"--set stem.filter: expected once", "'stem.filter=3'", "'stem.filter=4'"});
   expect_error(run({"--set", "stem.filtre=3"}), 1, {"--set stem.filtre: unknown key"});
   expect_error(run({"--set", "scale.source=gps"}), 1,
                {"none, constant, camera_height, ground_truth, found 'gps'"});

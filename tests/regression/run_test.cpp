@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -72,6 +73,19 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
   EXPECT_FALSE(fs::exists(out_ + "/pictures/000001.png"));
   EXPECT_THAT(result.out, AllOf(HasSubstr("t_rel"), HasSubstr("trajectory.png")));
   EXPECT_THAT(result.err, HasSubstr("60/60 frames"));
+}
+
+TEST_F(Run, PicturesAreOfThisRunOnly) {
+  fs::create_directories(out_ + "/pictures");
+  for (const char* name : {"000001.png", "000777.png", "holiday.png", "1.png", "000003.txt"}) {
+    std::ofstream(out_ + "/pictures/" + name) << "old";
+  }
+  ASSERT_EQ(run_drive(sequence_, out_, {"--frames", "0:4", "--pictures", "2"}).exit_code, 0);
+  for (const char* name : {"000000.png", "000002.png", "holiday.png", "1.png", "000003.txt"}) {
+    EXPECT_TRUE(fs::exists(out_ + "/pictures/" + name)) << name;
+  }
+  EXPECT_FALSE(fs::exists(out_ + "/pictures/000001.png"));
+  EXPECT_FALSE(fs::exists(out_ + "/pictures/000777.png"));
 }
 
 TEST_F(Run, MetricsHaveEveryKeyOfTheContract) {
