@@ -13,6 +13,7 @@ heading and the options that make it (ROWS); standard library only.
 """
 
 import argparse
+import concurrent.futures
 import dataclasses
 import json
 import pathlib
@@ -99,29 +100,31 @@ def line(words):
     return "| " + " | ".join(words) + " |"
 
 
-def measure_row(arguments, row, protocol):
+def start_row(pool, arguments, row, protocol):
+    """The runs of a row, per sequence and seed; they wait in the pool."""
+    def settings(seed):
+        return (*arguments.set, *row.settings, f"scale.source={protocol}", f"seed={seed}")
+
+    return [[pool.submit(metrics_of_run, arguments.program, arguments.kitti_root / "sequences" / name, settings(seed))
+             for seed in arguments.seeds] for name in arguments.sequences]
+
+
+def finish_row(row, runs):
     """The cells of a row, and what kept it from being measured."""
-    sequences = []
-    for name in arguments.sequences:
-        folder = arguments.kitti_root / "sequences" / name
-        try:
-            sequences.append(averaged([
-                metrics_of_run(arguments.program, folder, (*row.settings, f"scale.source={protocol}", f"seed={seed}"))
-                for seed in arguments.seeds]))
-        except RunError as error:
-            return ["-"] * (len(arguments.sequences) + 1), f"{row.heading}: {error}"
-    return cells(sequences), None
+    try:
+        return cells([averaged([run.result() for run in seeds]) for seeds in runs]), None
+    except RunError as error:
+        return ["-"] * (len(runs) + 1), f"{row.heading}: {error}"
 
 
-def table(arguments, protocol):
+def table(arguments, protocol, started):
+    """`started`: the rows of this protocol with their runs."""
     lines = [f"{PROTOCOLS[protocol]}:", "", line(["", *arguments.sequences, "together"]),
              "|" + "---|" * (len(arguments.sequences) + 2)]
     problems = []
-    for row in ROWS:
-        if protocol not in row.protocols:
-            continue
-        print(f"{protocol}: {row.heading}", file=sys.stderr, flush=True)
-        found, problem = measure_row(arguments, row, protocol)
+    for row, runs in started:
+        found, problem = finish_row(row, runs)
+        print(f"{protocol}, {row.heading}: {found[-1]}", file=sys.stderr, flush=True)
         settings = " ".join(f"`{setting}`" for setting in row.settings)
         lines.append(line([f"{row.heading} {settings}".strip(), *found]))
         if problem:
@@ -134,9 +137,13 @@ def report(arguments):
     version = done.stdout.strip()
     seeds = "" if arguments.seeds == ["1"] else f" --seeds {','.join(arguments.seeds)}"
     lines = [f"t_rel % / r_rel degrees per 100 m / average offset m, no alignment; {version}.", ""]
-    for protocol in PROTOCOLS:
-        lines += table(arguments, protocol)
-    command = f"tools/ablation.py KITTI --sequences {','.join(arguments.sequences)}{seeds} --out {arguments.out.name}"
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        started = {protocol: [(row, start_row(pool, arguments, row, protocol)) for row in ROWS
+                              if protocol in row.protocols] for protocol in PROTOCOLS}
+        for protocol in PROTOCOLS:
+            lines += table(arguments, protocol, started[protocol])
+    base = "".join(f" --set {setting}" for setting in arguments.set)
+    command = f"tools/ablation.py KITTI --sequences {','.join(arguments.sequences)}{seeds}{base} --out FILE"
     return "\n".join(lines + ["```", command, "```"])
 
 
@@ -154,6 +161,8 @@ def parse_arguments(arguments):
     parser.add_argument("--out", metavar="FILE", type=pathlib.Path, required=True)
     parser.add_argument("--sequences", default="03,00,06", type=lambda text: text.split(","))
     parser.add_argument("--seeds", default="1", type=lambda text: text.split(","))
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of every row")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at a time; speed is not measured")
     parser.add_argument("--program", default=str(ROOT / "build/release/stemvo"))
     parsed = parser.parse_args(arguments)
     for name in parsed.sequences:
