@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/bundle_adjustment.hpp"
 
-#include <algorithm>
-#include <map>
 #include <memory>
 #include <vector>
 
@@ -13,82 +11,87 @@
 namespace stemvo {
 namespace {
 
-/// The parameter blocks of one solve.
-struct Parameters {
-  std::vector<Rigid3> cameras_from_world;
-  std::map<int, Eigen::Vector3d> points;
+/// A keyframe's part of one solve: camera_from_world = exp(w) rotation, t; change = (w, t).
+struct PoseBlock {
+  Eigen::Matrix3d rotation;
+  Eigen::Matrix<double, 6, 1> change;
+
+  explicit PoseBlock(const Rigid3& camera_from_world)
+      : rotation(camera_from_world.rotation_matrix()) {
+    change << Eigen::Vector3d::Zero(), camera_from_world.translation;
+  }
+  [[nodiscard]] Rigid3 camera_from_world() const {
+    return {so3_exp(change.head<3>()) * Eigen::Quaterniond(rotation), change.tail<3>()};
+  }
 };
 
-std::map<int, int> count_observations(const LocalMap& map) {
-  std::map<int, int> counts;
-  for (const Keyframe& keyframe : map.keyframes) {
-    for (const MapObservation& observation : keyframe.observations) {
-      ++counts[observation.track_id];
+struct PointBlock {
+  int track_id;
+  Eigen::Vector3d point;
+  int num_observations = 0;
+};
+
+/// Everything the solver changes; the map takes it over only where it succeeds.
+struct Window {
+  std::vector<PoseBlock> poses;
+  std::vector<PointBlock> points;  ///< ordered by track id
+};
+
+/// Calls use(keyframe, observation, point) for every observation of a landmark; both lists are
+/// ordered by track id.
+template <typename Use>
+void for_each_observation(const LocalMap& map, std::vector<PointBlock>& points, const Use& use) {
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    auto point = points.begin();
+    for (const MapObservation& observation : map.keyframes[i].observations) {
+      while (point != points.end() && point->track_id < observation.track_id) {
+        ++point;
+      }
+      if (point != points.end() && point->track_id == observation.track_id) {
+        use(i, observation, *point);
+      }
     }
   }
-  return counts;
 }
 
-Parameters collect(const LocalMap& map, const BundleAdjustmentOptions& options) {
-  Parameters parameters;
+Window open_window(const LocalMap& map, const BundleAdjustmentOptions& options) {
+  Window window;
   for (const Keyframe& keyframe : map.keyframes) {
-    parameters.cameras_from_world.push_back(keyframe.world_from_camera.inverse());
+    window.poses.emplace_back(keyframe.world_from_camera.inverse());
   }
-  const std::map<int, int> counts = count_observations(map);
   for (const auto& [track_id, point] : map.landmarks) {
-    const auto count = counts.find(track_id);
-    if (count != counts.end() && count->second >= options.min_observations) {
-      parameters.points.emplace(track_id, point);
-    }
+    window.points.push_back({track_id, point});
   }
-  return parameters;
+  for_each_observation(
+      map, window.points,
+      [](std::size_t, const MapObservation&, PointBlock& point) { ++point.num_observations; });
+  std::erase_if(window.points, [&](const PointBlock& point) {
+    return point.num_observations < options.min_observations;
+  });
+  return window;
 }
 
 /// Adds a residual per observation; every block's order is fixed, so the result is too.
 int add_residuals(const LocalMap& map,
                   const Camera& camera,
                   ceres::LossFunction* loss,
-                  Parameters& parameters,
+                  Window& window,
                   ceres::Problem& problem) {
   int num_residuals = 0;
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    Rigid3& pose = parameters.cameras_from_world[i];
-    for (const MapObservation& observation : map.keyframes[i].observations) {
-      const auto point = parameters.points.find(observation.track_id);
-      if (point == parameters.points.end()) {
-        continue;
-      }
-      auto* cost = new ceres::AutoDiffCostFunction<ReprojectionCost, 2, 4, 3, 3>(
-          new ReprojectionCost{camera, observation.uv});  // the problem takes it
-      problem.AddResidualBlock(cost, loss, pose.rotation.coeffs().data(), pose.translation.data(),
-                               point->second.data());
-      ++num_residuals;
-    }
-  }
+  for_each_observation(
+      map, window.points,
+      [&](std::size_t keyframe, const MapObservation& observation, PointBlock& point) {
+        PoseBlock& pose = window.poses[keyframe];
+        problem.AddResidualBlock(new ReprojectionCost(camera, pose.rotation, observation.uv), loss,
+                                 pose.change.data(), point.point.data());  // it takes the cost
+        ++num_residuals;
+      });
   return num_residuals;
 }
 
-void fix_gauge(const BundleAdjustmentOptions& options,
-               ceres::Manifold* quaternions,
-               Parameters& parameters,
-               ceres::Problem& problem) {
-  for (std::size_t i = 0; i < parameters.cameras_from_world.size(); ++i) {
-    Rigid3& pose = parameters.cameras_from_world[i];
-    double* rotation = pose.rotation.coeffs().data();
-    if (!problem.HasParameterBlock(rotation)) {
-      continue;
-    }
-    problem.SetManifold(rotation, quaternions);
-    if (static_cast<int>(i) < options.num_fixed_keyframes) {
-      problem.SetParameterBlockConstant(rotation);
-      problem.SetParameterBlockConstant(pose.translation.data());
-    }
-  }
-}
-
 ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
-                                      Parameters& parameters,
-                                      const ceres::Problem& problem) {
+                                      Window& window,
+                                      ceres::Problem& problem) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.max_num_iterations = options.max_iterations;
@@ -96,28 +99,28 @@ ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
   solver.logging_type = ceres::SILENT;
   solver.function_tolerance = 1e-5;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (auto& [track_id, point] : parameters.points) {
-    if (problem.HasParameterBlock(point.data())) {
-      ordering->AddElementToGroup(point.data(), 0);
-    }
+  for (PointBlock& point : window.points) {
+    ordering->AddElementToGroup(point.point.data(), 0);
   }
-  for (Rigid3& pose : parameters.cameras_from_world) {
-    if (problem.HasParameterBlock(pose.translation.data())) {
-      ordering->AddElementToGroup(pose.rotation.coeffs().data(), 1);
-      ordering->AddElementToGroup(pose.translation.data(), 1);
+  for (std::size_t i = 0; i < window.poses.size(); ++i) {
+    double* pose = window.poses[i].change.data();
+    if (problem.HasParameterBlock(pose)) {
+      ordering->AddElementToGroup(pose, 1);
+      if (static_cast<int>(i) < options.num_fixed_keyframes) {
+        problem.SetParameterBlockConstant(pose);
+      }
     }
   }
   solver.linear_solver_ordering = ordering;
   return solver;
 }
 
-void write_back(const Parameters& parameters, LocalMap& map) {
+void write_back(const Window& window, LocalMap& map) {
   for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    const Rigid3& pose = parameters.cameras_from_world[i];
-    map.keyframes[i].world_from_camera = Rigid3(pose.rotation, pose.translation).inverse();
+    map.keyframes[i].world_from_camera = window.poses[i].camera_from_world().inverse();
   }
-  for (const auto& [track_id, point] : parameters.points) {
-    map.landmarks[track_id] = point;
+  for (const PointBlock& point : window.points) {
+    map.landmarks[point.track_id] = point.point;
   }
 }
 
@@ -130,26 +133,24 @@ BundleAdjustmentReport refine_window(LocalMap& map,
   if (static_cast<int>(map.keyframes.size()) <= options.num_fixed_keyframes) {
     return report;
   }
-  Parameters parameters = collect(map, options);
+  Window window = open_window(map, options);
   ceres::CauchyLoss loss(options.loss_scale_px);
-  ceres::EigenQuaternionManifold quaternions;
-  ceres::Problem::Options ownership;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(ownership);
-  report.num_residuals = add_residuals(map, camera, &loss, parameters, problem);
+  ceres::Problem::Options problem_options;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.disable_all_safety_checks = true;
+  ceres::Problem problem(problem_options);
+  report.num_residuals = add_residuals(map, camera, &loss, window, problem);
   if (report.num_residuals == 0) {
     return report;
   }
-  fix_gauge(options, &quaternions, parameters, problem);
   ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(options, parameters, problem), &problem, &summary);
+  ceres::Solve(solver_options(options, window, problem), &problem, &summary);
   report.num_iterations = static_cast<int>(summary.iterations.size());
   report.initial_cost = summary.initial_cost;
   report.final_cost = summary.final_cost;
   report.is_usable = summary.IsSolutionUsable();
   if (report.is_usable) {
-    write_back(parameters, map);
+    write_back(window, map);
   }
   return report;
 }

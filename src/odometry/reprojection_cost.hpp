@@ -3,30 +3,30 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <ceres/sized_cost_function.h>
 
 #include "stemvo/geometry/camera.hpp"
 
 namespace stemvo {
 
-/// Reprojection error (px) of a landmark in a keyframe, for automatic differentiation. Parameters:
-/// camera_from_world as unit quaternion (x, y, z, w) and translation, point in the world.
-struct ReprojectionCost {
-  Camera camera;
-  Eigen::Vector2d uv;
+/// Reprojection error (px) of a landmark in a keyframe, with its derivatives. Parameters: a change
+/// of the keyframe's pose (rotation vector w, rad, and translation t) and the point in the world X;
+/// x = exp(w) R X + t in the camera, where R is the rotation the change starts from.
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
+ public:
+  /// The rotation must outlive the cost: the keyframe's observations share it.
+  ReprojectionCost(const Camera& camera, const Eigen::Matrix3d& rotation, const Eigen::Vector2d& uv)
+      : camera_(camera), rotation_(rotation), uv_(uv) {}
 
-  template <typename T>
-  bool operator()(const T* rotation, const T* translation, const T* point, T* residual) const {
-    const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
-    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(translation);
-    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> x_in_world(point);
-    const Eigen::Matrix<T, 3, 1> x = q * x_in_world + t;
-    if (!(x.z() > T(1e-6))) {
-      return false;  // the solver takes a shorter step
-    }
-    residual[0] = camera.fx_px * x.x() / x.z() + camera.cx_px - uv.x();
-    residual[1] = camera.fy_px * x.y() / x.z() + camera.cy_px - uv.y();
-    return true;
-  }
+  /// False for a point behind the camera: the solver takes a shorter step.
+  bool Evaluate(const double* const* parameters,
+                double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const Camera& camera_;
+  const Eigen::Matrix3d& rotation_;
+  Eigen::Vector2d uv_;
 };
 
 }  // namespace stemvo
