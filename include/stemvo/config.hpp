@@ -31,7 +31,7 @@ struct TwoViewOptions {
 
 /// Keys `odometry.*`.
 struct OdometryOptions {
-  std::string mode = "two_frame";     ///< `two_frame` chains pairs; `map` adds a local map
+  std::string mode = "map";           ///< `two_frame` chains pairs; `map` adds a local map
   std::string composition = "right";  ///< `right`: R_c R; `paper`: R R_c
   std::string gate = "translation";   ///< `translation`, `paper` (drops the rotation too), `off`
   int min_inliers = 20;               ///< fewer: the frame is lost
@@ -42,15 +42,15 @@ struct OdometryOptions {
 /// Keys `refine.*`: bundle adjustment of the local map (odometry.mode: map).
 struct RefineOptions {
   int every = 1;    ///< keyframes between refinements, the paper's m; 0: never
-  int window = 10;  ///< keyframes refined together
-  int max_iterations = 6;
+  int window = 8;  ///< keyframes refined together
+  int max_iterations = 4;
   double loss_px = 0.5;  ///< Cauchy scale on the reprojection error
 };
 
 /// Keys `scale.*`.
 struct ScaleOptions {
-  /// `none` (up to scale), `constant`, `camera_height` (mode map) or `ground_truth`
-  std::string source = "constant";
+  /// `none` (up to scale), `constant`, `camera_height` or `ground_truth`
+  std::string source = "camera_height";
   double constant_m = 1.0;          ///< per frame
   double camera_height_m = 1.65;    ///< above the road, for `camera_height`
   std::string estimators = "both";  ///< of the road: `both`, `dense` or `points`

@@ -97,14 +97,6 @@ Status validate(const Config& config) {
         "stem.stretch_low_percent: expected less than stem.stretch_high_percent ({}), found {}",
         config.stem.stretch_high_percent, config.stem.stretch_low_percent));
   }
-  if (config.odometry.mode == "map" && config.features.method != "klt") {
-    return fail(fmt::format("odometry.mode: map expects features.method klt, found {}",
-                            config.features.method));
-  }
-  if (config.scale.source == "camera_height" && config.odometry.mode != "map") {
-    return fail(fmt::format("scale.source: camera_height expects odometry.mode map, found {}",
-                            config.odometry.mode));
-  }
   return {};
 }
 

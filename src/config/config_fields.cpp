@@ -116,7 +116,7 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
   return {
       {"odometry", "mode", &o.mode, one_of({"two_frame", "map"}),
        "two_frame: motions of pairs of frames are chained; map: each frame is placed against "
-       "landmarks of the last keyframes, which are refined together (needs features.method klt)"},
+       "landmarks of the last keyframes, which are refined together"},
       {"odometry", "composition", &o.composition, one_of({"right", "paper"}),
        "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)"},
       {"odometry", "gate", &o.gate, one_of({"translation", "paper", "off"}),
@@ -144,9 +144,8 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
   return {
       {"scale", "source", &o.source, one_of({"none", "constant", "camera_height", "ground_truth"}),
        "length of a step: none, up to scale (1 unit; mode map: the first one); constant, the same "
-       "in metres; camera_height, from the road (mode map); ground_truth, each output step "
-       "rescaled "
-       "(the paper's protocol; needs the pose file)"},
+       "in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
+       "paper's protocol; needs the pose file)"},
       {"scale", "constant_m", &o.constant_m, above(0), "metres per frame when constant"},
       {"scale", "camera_height_m", &o.camera_height_m, above(0),
        "above the road, for camera_height"},

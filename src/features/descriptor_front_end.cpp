@@ -38,15 +38,28 @@ Matches DescriptorFrontEnd::process(const ChannelImage& image) {
   Described current = describe(image);
   Matches matches;
   matches.num_keypoints = static_cast<int>(current.uv.size());
+  matched_.clear();
   if (last_.size == current.size) {
     for (const cv::DMatch& pair : match(last_, current)) {
       matches.prev_uv.push_back(last_.uv[static_cast<std::size_t>(pair.queryIdx)]);
       matches.cur_uv.push_back(current.uv[static_cast<std::size_t>(pair.trainIdx)]);
-      matches.track_ids.push_back(-1);
+      const int past_id = last_.track_ids[static_cast<std::size_t>(pair.queryIdx)];
+      const int track_id = past_id >= 0 ? past_id : num_tracks_++;
+      current.track_ids[static_cast<std::size_t>(pair.trainIdx)] = track_id;
+      matches.track_ids.push_back(track_id);
+      matched_.push_back(static_cast<std::size_t>(pair.trainIdx));
     }
   }
   last_ = std::move(current);
   return matches;
+}
+
+void DescriptorFrontEnd::keep(const std::vector<char>& is_good) {
+  for (std::size_t i = 0; i < std::min(is_good.size(), matched_.size()); ++i) {
+    if (is_good[i] == 0) {
+      last_.track_ids[matched_[i]] = -1;
+    }
+  }
 }
 
 DescriptorFrontEnd::Described DescriptorFrontEnd::describe(const ChannelImage& image) const {
@@ -70,6 +83,7 @@ DescriptorFrontEnd::Described DescriptorFrontEnd::describe(const ChannelImage& i
   for (const cv::KeyPoint& keypoint : kept) {
     described.uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
   }
+  described.track_ids.assign(described.uv.size(), -1);
   return described;
 }
 

@@ -17,10 +17,12 @@ class DescriptorFrontEnd : public FrontEnd {
   DescriptorFrontEnd(Kind kind, const FeatureOptions& options);
 
   [[nodiscard]] Matches process(const ChannelImage& image) override;
+  void keep(const std::vector<char>& is_good) override;
 
  private:
   struct Described {
     std::vector<Eigen::Vector2d> uv;  ///< input pixels
+    std::vector<int> track_ids;       ///< -1: not matched with the picture before
     cv::Mat descriptors;              ///< one row per keypoint
     cv::Size size;                    ///< of the picture
   };
@@ -32,6 +34,8 @@ class DescriptorFrontEnd : public FrontEnd {
   FeatureOptions options_;
   cv::Ptr<cv::Feature2D> feature_;
   Described last_;
+  std::vector<std::size_t> matched_;  ///< keypoints of last_ that the last matches led to
+  int num_tracks_ = 0;
 };
 
 }  // namespace stemvo

@@ -37,8 +37,10 @@ struct LocalMap {
 };
 
 struct LocalMapOptions {
-  int num_keyframes = 10;         ///< length of the window
-  double min_parallax_deg = 0.5;  ///< of a new landmark, between its first and last keyframe
+  int num_keyframes = 8;  ///< length of the window
+  /// Of a new landmark, between its first and last keyframe: only the direction of distant ones is
+  /// known, but that holds the rotation.
+  double min_parallax_deg = 0.1;
   double max_reprojection_error_px = 1.5;  ///< of a landmark in any keyframe
 };
 

@@ -6,8 +6,12 @@
 namespace stemvo {
 namespace {
 
+/// Without a map a unit is the last step: what drifts is the car's speed, log per frame.
+constexpr double kSpeedSigma = 0.02;
+
 MapTrackerOptions tracker_options(const Config& config) {
   MapTrackerOptions options;
+  options.use_landmarks = config.odometry.mode == "map";
   options.map.num_keyframes = config.refine.window;
   options.refine_every = config.refine.every;
   options.refinement.loss_scale_px = config.refine.loss_px;
@@ -26,6 +30,9 @@ MapOdometry::MapOdometry(const Config& config, const Camera& camera)
   if (config.scale.source == "camera_height") {
     RoadOptions options;
     options.camera_height_m = config.scale.camera_height_m;
+    if (config.odometry.mode != "map") {
+      options.drift_sigma = kSpeedSigma;
+    }
     options.use_dense = config.scale.estimators != "points";
     options.use_points = config.scale.estimators != "dense";
     options.join_frames = config.scale.joining;

@@ -67,7 +67,7 @@ bool MapTracker::add(int frame,
     start_anew(/*is_last_pose_kept=*/true);  // they are elsewhere, or wrong
     keeps_unit_ = false;
   }
-  if (map_.keyframes.empty()) {
+  if (options_.use_landmarks && map_.keyframes.empty()) {
     open_map(matches, motion.inlier_mask);
   }
   frame_ = frame;
@@ -166,7 +166,7 @@ bool MapTracker::is_believable(const Matches& matches, const MeasuredMotion& mot
 
 /// Frames without parallax to the one before tell nothing of depth.
 bool MapTracker::is_new_keyframe(const MeasuredMotion& motion) const {
-  return motion.state == FrameState::kTracking;
+  return options_.use_landmarks && motion.state == FrameState::kTracking;
 }
 
 void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_inlier) {

@@ -21,6 +21,7 @@ struct MapTrackerOptions {
   LocalMapOptions map;
   BundleAdjustmentOptions refinement;
   PlacementOptions placement;
+  bool use_landmarks = true;       ///< false: two-frame motions, each as long as the last step
   int refine_every = 1;            ///< keyframes between refinements, the paper's m; 0: never
   double first_step = 1.0;         ///< length of the first step, map units
   double epipolar_bound_px = 1.0;  ///< of the inliers of a motion that the map has corrected

@@ -42,7 +42,7 @@ struct Odometry::Impl {
         front_end(std::move(front_end_in)),
         estimator(config, camera_in),
         chain(config.odometry, config.scale) {
-    if (config.odometry.mode == "map") {
+    if (config.odometry.mode == "map" || config.scale.source == "camera_height") {
       map.emplace(config, camera_in);
     }
   }

@@ -31,7 +31,7 @@ struct FeatureOptions {
 struct Matches {
   std::vector<Eigen::Vector2d> prev_uv;
   std::vector<Eigen::Vector2d> cur_uv;
-  std::vector<int> track_ids;  ///< klt: the same id while a point is followed; else -1
+  std::vector<int> track_ids;  ///< the same id while a point is followed
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
@@ -43,8 +43,8 @@ class FrontEnd {
   /// Matches from the previous picture (none on the first). A picture of another size starts over.
   [[nodiscard]] virtual Matches process(const ChannelImage& image) = 0;
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
-  /// not followed further. Front ends without tracks ignore it.
-  virtual void keep(const std::vector<char>& is_good) { static_cast<void>(is_good); }
+  /// not followed further.
+  virtual void keep(const std::vector<char>& is_good) = 0;
 };
 
 /// Error: unknown method (lists the known ones).
