@@ -25,7 +25,7 @@ KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
 Examples:
   stemvo run kitti/sequences/03 --out result
   stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth   the paper's protocol
-  stemvo run kitti/sequences/03 --out result --map --set odometry.mode=map     with a point cloud
+  stemvo run kitti/sequences/03 --out result --map                            with a point cloud
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
   stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn)";
 

@@ -104,6 +104,8 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
 }
 
 TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
+  request_.config.odometry.mode = "two_frame";
+  request_.config.scale.source = "constant";
   ASSERT_TRUE(run_sequence(request_));
   const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   request_.config.scale.source = "ground_truth";
