@@ -62,7 +62,6 @@ class BenchmarkRuns : public ::testing::Test {
     Config config;
     config.stem.model = "gray";
     config.odometry.mode = "map";
-    config.refine.every = 0;
     request_.configurations = {{"one", config}};
     config.seed = 2;
     request_.configurations.push_back({"two", config});
