@@ -4,8 +4,9 @@
 
     tools/measure.py KITTI_ROOT [--sequences 00,03,06] [--efficientnet MODEL.onnx:FILTER]
 
-KITTI_ROOT holds sequences/NN and poses/NN.txt. Each step is scaled to its true length (the paper's
-protocol). Every row names the options that made it; standard library only.
+KITTI_ROOT holds sequences/NN and poses/NN.txt. First table: each step is scaled to its true length
+(the paper's protocol). Second: metres from the camera's height, no ground truth. No alignment in
+either. Every row names the options that made it; standard library only.
 """
 
 import argparse
@@ -17,7 +18,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GRAY = ["--set", "stem.model=gray"]
-GROUND_TRUTH_STEPS = ["--set", "scale.source=ground_truth"]
+PROTOCOLS = {"ground_truth": "true steps", "camera_height": "camera height"}
 
 
 def configurations(efficientnet):
@@ -25,7 +26,7 @@ def configurations(efficientnet):
     paper = ["--config", str(ROOT / "config/paper.yaml")]
     rows = [
         ("learned channel (the defaults)", []),
-        ("learned channel, local map (`odometry.mode=map`)", ["--set", "odometry.mode=map"]),
+        ("learned channel, pairs of frames (`odometry.mode=two_frame`)", ["--set", "odometry.mode=two_frame"]),
         ("gray image, same back end", GRAY),
         ("learned channel, SIFT (brute force)", ["--set", "features.method=sift"]),
         ("learned channel, ORB (brute force)", ["--set", "features.method=orb"]),
@@ -39,10 +40,10 @@ def configurations(efficientnet):
     return rows
 
 
-def run(program, sequence, options):
+def run(program, sequence, protocol, options):
     """The metrics of one run; stops with the program's own message where it fails."""
     with tempfile.TemporaryDirectory() as out:
-        command = [program, "run", str(sequence), "--out", out, "--quiet", *GROUND_TRUTH_STEPS, *options]
+        command = [program, "run", str(sequence), "--out", out, "--quiet", *options, "--set", f"scale.source={protocol}"]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             sys.exit(done.stderr.strip() or f"{program}: exit code {done.returncode}")
@@ -57,6 +58,22 @@ def cell(metrics):
     return f"{number('t_rel_percent', 2)} / {number('r_rel_deg_per_100m', 2)} / {number('average_offset_m', 2)}"
 
 
+def print_table(arguments, protocol, title):
+    sequences = arguments.sequences.split(",")
+    print(f"| {title} | " + " | ".join(sequences) + " | frames/s |")
+    print("|---|" + "---|" * (len(sequences) + 1))
+    null = {}
+    for heading, options in configurations(arguments.efficientnet):
+        results = []
+        for name in sequences:
+            folder = arguments.kitti_root / "sequences" / name
+            results.append(run(arguments.program, folder, protocol, options))
+            null[name] = results[-1]["null_offset_m"]
+        speed = sum(m["frames"] for m in results) / sum(m["frames"] / m["fps"] for m in results)
+        print(f"| {heading} | " + " | ".join(cell(m) for m in results) + f" | {speed:.0f} |", flush=True)
+    print("| never moving | " + " | ".join(f"- / - / {null[name]:.2f}" for name in sequences) + " | |\n", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("kitti_root", type=pathlib.Path)
@@ -64,19 +81,9 @@ def main():
     parser.add_argument("--program", default=str(ROOT / "build/release/stemvo"))
     parser.add_argument("--efficientnet", default="", help="MODEL.onnx:FILTER, made by tools/export_stem.py")
     arguments = parser.parse_args()
-    sequences = arguments.sequences.split(",")
 
-    print("| | " + " | ".join(sequences) + " | frames/s |")
-    print("|---|" + "---|" * (len(sequences) + 1))
-    null = {}
-    for heading, options in configurations(arguments.efficientnet):
-        results = []
-        for name in sequences:
-            results.append(run(arguments.program, arguments.kitti_root / "sequences" / name, options))
-            null[name] = results[-1]["null_offset_m"]
-        speed = sum(m["frames"] for m in results) / sum(m["frames"] / m["fps"] for m in results)
-        print(f"| {heading} | " + " | ".join(cell(m) for m in results) + f" | {speed:.0f} |", flush=True)
-    print("| never moving | " + " | ".join(f"- / - / {null[name]:.2f}" for name in sequences) + " | |")
+    for protocol, heading in PROTOCOLS.items():
+        print_table(arguments, protocol, heading)
 
 
 if __name__ == "__main__":

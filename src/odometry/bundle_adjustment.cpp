@@ -29,6 +29,7 @@ struct PointBlock {
   int track_id;
   Eigen::Vector3d point;
   int num_observations = 0;
+  bool is_in_front = true;  ///< of every keyframe that sees it
 };
 
 /// Everything the solver changes; the map takes it over only where it succeeds.
@@ -63,10 +64,14 @@ Window open_window(const LocalMap& map, const BundleAdjustmentOptions& options) 
     window.points.push_back({track_id, point});
   }
   for_each_observation(
-      map, window.points,
-      [](std::size_t, const MapObservation&, PointBlock& point) { ++point.num_observations; });
-  std::erase_if(window.points, [&](const PointBlock& point) {
-    return point.num_observations < options.min_observations;
+      map, window.points, [&](std::size_t keyframe, const MapObservation&, PointBlock& point) {
+        const PoseBlock& pose = window.poses[keyframe];
+        const double depth = pose.rotation.row(2).dot(point.point) + pose.change[5];
+        point.is_in_front = point.is_in_front && depth > ReprojectionCost::kMinDepth;
+        ++point.num_observations;
+      });
+  std::erase_if(window.points, [&](const PointBlock& point) {  // the solver must start somewhere
+    return point.num_observations < options.min_observations || !point.is_in_front;
   });
   return window;
 }

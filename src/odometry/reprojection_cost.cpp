@@ -8,8 +8,6 @@
 namespace stemvo {
 namespace {
 
-constexpr double kMinDepth = 1e-6;
-
 /// exp(w) and the left Jacobian J of SO(3), exp(w + d) = exp(J d) exp(w) for small d (Solà,
 /// Deray, Atchuthan: A micro Lie theory, 2018, eqs. 134 and 145).
 struct RotationChange {

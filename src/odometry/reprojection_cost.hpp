@@ -14,6 +14,9 @@ namespace stemvo {
 /// x = exp(w) R X + t in the camera, where R is the rotation the change starts from.
 class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
  public:
+  /// Points nearer than this (or behind) have no residual; map units.
+  static constexpr double kMinDepth = 1e-6;
+
   /// The rotation must outlive the cost: the keyframe's observations share it.
   ReprojectionCost(const Camera& camera, const Eigen::Matrix3d& rotation, const Eigen::Vector2d& uv)
       : camera_(camera), rotation_(rotation), uv_(uv) {}

@@ -125,6 +125,18 @@ TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
   }
 }
 
+TEST(BundleAdjustment, ALandmarkBehindAKeyframeDoesNotStopTheRest) {
+  const DriveTracks drive(8, 0.0, 3);
+  LocalMap map = map_of(drive, {});
+  const int behind = map.landmarks.begin()->first;
+  map.landmarks.begin()->second.z() = -5.0;
+  map.keyframes.back().world_from_camera.translation.x() += 0.02;
+  const BundleAdjustmentReport report = refine_window(map, drive.camera, {});
+  ASSERT_TRUE(report.is_usable);
+  EXPECT_LT(report.final_cost, 0.1 * report.initial_cost);
+  EXPECT_EQ(map.landmarks.at(behind).z(), -5.0);
+}
+
 TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
   const DriveTracks drive(2, 0.0, 4);
   LocalMap map = map_of(drive, {});
