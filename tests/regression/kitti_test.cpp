@@ -41,7 +41,7 @@ TEST_P(Kitti, StaysInsideTheThresholdsFromTheCameraHeight) {
 }
 
 // 25 frames a second on two cores is measured by hand on an idle machine (README); held here, where
-// other tests run beside it, is the time of the cores: 36 ms a frame when this was written.
+// other tests run beside it, is the time of the cores: measured alone.
 TEST(KittiSpeed, ProcessorTimePerFrameIsBounded) {
   const auto data = test::shared_data();
   if (!data) {

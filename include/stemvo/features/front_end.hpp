@@ -20,7 +20,7 @@ struct FeatureOptions {
   int grid_rows = 6;
   double corner_quality = 0.005;         ///< klt: least corner response over the strongest
   double min_distance_px = 8.0;          ///< klt: between keypoints, in input pixels
-  int klt_window = 15;                   ///< klt: pixels of the tracked picture, odd
+  int klt_window = 11;                   ///< klt: pixels of the tracked picture, odd
   int klt_levels = 4;                    ///< klt: pyramid levels
   double max_forward_backward_px = 0.5;  ///< klt: input pixels
   int fast_threshold = 10;               ///< orb
