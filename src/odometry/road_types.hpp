@@ -33,8 +33,8 @@ struct RoadOptions {
   // Joining over time.
   bool join_frames = true;       ///< false: every measurement is believed as it comes
   double flatness_sigma = 0.03;  ///< error of log_scale that both estimators and neighbours share
-  /// Of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips, steadily;
-  /// a random walk must be loose enough to follow without lagging behind.
+  /// Of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips,
+  /// steadily; a random walk must be loose enough to follow without lagging behind.
   double drift_sigma = 0.006;
 
   // The estimators.
