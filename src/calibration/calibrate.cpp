@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using calibration::Segment;
 
+constexpr int kTrackWindow = 15;  ///< of KLT, px
 /// Bounds the time of the solver on long drives.
 constexpr std::size_t kMaxSegments = 30;
 /// Fewer do not tell how well they agree.
@@ -132,6 +133,8 @@ Expected<Odometry> create_odometry(const CalibrationRequest& request, const Came
   Config config = request.config;
   config.odometry.mode = "map";
   config.scale.source = "constant";
+  // Long tracks count here, and their bias does not: every observation is aligned anew.
+  config.features.klt_window = std::max(config.features.klt_window, kTrackWindow);
   return Odometry::create(config, camera, request.models_dir);
 }
 

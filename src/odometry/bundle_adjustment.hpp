@@ -9,7 +9,7 @@ namespace stemvo {
 struct BundleAdjustmentOptions {
   int num_fixed_keyframes = 2;  ///< the oldest: they hold the gauge, scale included
   int max_iterations = 4;
-  double loss_scale_px = 0.5;  ///< Cauchy scale on the reprojection error
+  double loss_scale_px = 0.2;  ///< Cauchy scale on the reprojection error
   int min_observations = 3;    ///< of a landmark that takes part
 };
 
