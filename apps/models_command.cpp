@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -27,9 +28,11 @@ std::string describe(const ModelEntry& entry, const Status& status) {
   return text;
 }
 
-int list_models() {
-  const auto manifest = data_folder("models") / "manifest.yaml";
-  const Expected<std::vector<ModelEntry>> entries = load_manifest(manifest);
+/// `model` empty: all.
+int list_models(const std::string& model) {
+  const auto folder = data_folder("models");
+  const Expected<std::vector<ModelEntry>> entries =
+      model.empty() ? load_manifest(folder / "manifest.yaml") : find_layers(model, folder);
   if (!entries) {
     print_error(entries.error().message);
     return kExitFailed;
@@ -52,7 +55,9 @@ CLI::App* add_models(CLI::App& app, Action& action) {
   CLI::App* command =
       app.add_subcommand("models", "List the models and check that each file is sound");
   command->footer(kFooter);
-  command->callback([&action] { action = list_models; });
+  const auto model = std::make_shared<std::string>();
+  command->add_option("MODEL", *model, "Only this one's layers: its name, or the path of an .onnx");
+  command->callback([&action, model] { action = [model] { return list_models(*model); }; });
   return command;
 }
 

@@ -54,10 +54,12 @@ Expected<std::string> model_identity(const Config& config, const fs::path& model
   if (model == "gray" || model == "input_layer") {
     return model;
   }
-  return internal::find_model(model, models_dir).map([](const ModelEntry& entry) {
-    return fmt::format("{} {} {} {} {} {}", entry.sha256, entry.num_filters, entry.kernel_px,
-                       entry.stride_px, entry.padding_px, entry.default_filter);
-  });
+  return internal::find_model(model, config.stem.layer, models_dir)
+      .map([](const ModelEntry& entry) {
+        return fmt::format("{} {} {} {} {} {} {}", entry.sha256, entry.layer, entry.num_filters,
+                           entry.kernel_px, entry.stride_px, entry.padding_px,
+                           entry.default_filter);
+      });
 }
 
 Expected<std::string> frames_identity(const KittiSequence& sequence) {

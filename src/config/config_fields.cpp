@@ -52,6 +52,8 @@ std::vector<Field> stem_fields(StemOptions& o) {
       {"stem", "model", &o.model, any(),
        "name in models/manifest.yaml, path of an .onnx, gray, or input_layer (filters 0-2 = R, G, "
        "B)"},
+      {"stem", "layer", &o.layer, any(),
+       "of a model that has several layers (stemvo models MODEL lists them), or first"},
       {"stem", "filter", &o.filter, at_least(-1),
        "the one filter whose response is the picture; -1: the default_filter of the manifest"},
       {"stem", "sampling_px", &o.sampling_px, at_least(0),

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -22,6 +21,7 @@ constexpr int kLargestNumber = 100000;
 constexpr std::array<std::string_view, 12> kKeys = {
     "name",   "file",   "sha256",  "network",        "layer",   "filters",
     "kernel", "stride", "padding", "default_filter", "licence", "command"};
+constexpr std::string_view kSampling = "sampling";  // optional
 
 /// An empty document has no mark.
 int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
@@ -65,6 +65,19 @@ class EntryReader {
     return value;
   }
 
+  /// False where the key is missing or says `any`.
+  bool native_sampling() {
+    if (values_.find(kSampling) == values_.end()) {
+      return false;
+    }
+    const std::string value = text(kSampling);
+    if (value != "any" && value != "native") {
+      error(line(kSampling),
+            fmt::format("{}: expected any or native, found '{}'", kSampling, value.substr(0, 40)));
+    }
+    return value == "native";
+  }
+
   int number(std::string_view key, int min) { return number(key, find(key), min); }
 
   template <std::size_t N>
@@ -90,10 +103,13 @@ class EntryReader {
   void add(const YAML::Node& key, const YAML::Node& value) {
     const std::string name = key.IsScalar() ? key.Scalar() : "?";
     const auto* const known = std::find(kKeys.begin(), kKeys.end(), name);
-    if (known == kKeys.end()) {
-      error(line_of(key), fmt::format("unknown key '{}'; known keys: {}", name.substr(0, 40),
-                                      fmt::join(kKeys, ", ")));
-    } else if (!values_.emplace(*known, Value{line_of(key), value}).second) {
+    if (known == kKeys.end() && name != kSampling) {
+      error(line_of(key), fmt::format("unknown key '{}'; known keys: {}, {}", name.substr(0, 40),
+                                      fmt::join(kKeys, ", "), kSampling));
+      return;
+    }
+    const std::string_view own = known == kKeys.end() ? kSampling : *known;
+    if (!values_.emplace(own, Value{line_of(key), value}).second) {
       error(line_of(key), fmt::format("duplicated key '{}'", name));
     }
   }
@@ -133,6 +149,9 @@ void check_values(const ModelEntry& entry, EntryReader& reader) {
     reader.error(reader.line("name"),
                  fmt::format("name: '{}' means something else in stem.model", entry.name));
   }
+  if (entry.layer == "first") {
+    reader.error(reader.line("layer"), "layer: 'first' means something else in stem.layer");
+  }
   if (entry.default_filter >= entry.num_filters) {
     reader.error(reader.line("default_filter"),
                  fmt::format("default_filter: expected 0 to {}, found {}", entry.num_filters - 1,
@@ -165,11 +184,33 @@ ModelEntry read_entry(const std::filesystem::path& source, EntryReader& reader) 
   entry.kernel_px = reader.numbers<2>("kernel", 1);
   entry.stride_px = reader.number("stride", 1);
   entry.padding_px = reader.numbers<4>("padding", 0);
+  entry.native_sampling_only = reader.native_sampling();
   entry.default_filter = reader.number("default_filter", 0);
   entry.licence = reader.text("licence");
   entry.command = reader.text("command");
   check_values(entry, reader);
   return entry;
+}
+
+/// Entries of one name are layers of one file.
+void check_against(const std::vector<ModelEntry>& others,
+                   const ModelEntry& entry,
+                   EntryReader& reader) {
+  for (const ModelEntry& other : others) {
+    if (other.name != entry.name) {
+      continue;
+    }
+    if (other.layer == entry.layer) {
+      reader.error(reader.line("name"), fmt::format("name: '{}' with layer '{}' stands here twice",
+                                                    entry.name, entry.layer));
+    } else if (other.file != entry.file || other.sha256 != entry.sha256) {
+      reader.error(
+          reader.line("file"),
+          fmt::format("file: expected {} with the same sha256 as the other layers of '{}', "
+                      "found {}",
+                      other.file.filename().string(), entry.name, entry.file.filename().string()));
+    }
+  }
 }
 
 /// The list under the one key `models`.
@@ -203,12 +244,11 @@ Expected<std::vector<ModelEntry>> load_manifest(const std::filesystem::path& fil
     return tl::unexpected<Error>(models.error());
   }
   std::vector<ModelEntry> entries;
-  std::set<std::string> names;
   for (const YAML::Node& node : *models) {
     EntryReader reader(file, node);
     ModelEntry entry = reader.error().empty() ? read_entry(file, reader) : ModelEntry();
-    if (reader.error().empty() && !names.insert(entry.name).second) {
-      reader.error(reader.line("name"), fmt::format("name: '{}' stands here twice", entry.name));
+    if (reader.error().empty()) {
+      check_against(entries, entry, reader);
     }
     if (!reader.error().empty()) {
       return fail(reader.error());

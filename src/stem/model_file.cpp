@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kManifest = "manifest.yaml";
 
-Expected<ModelEntry> find_by_path(const std::filesystem::path& file) {
+Expected<std::vector<ModelEntry>> find_by_path(const std::filesystem::path& file) {
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) {
     return fail(fmt::format("{}: no such file", file.string()));
@@ -35,14 +35,38 @@ Expected<ModelEntry> find_by_path(const std::filesystem::path& file) {
   if (!entries) {
     return tl::unexpected<Error>(entries.error());
   }
-  const auto found = std::find_if(entries->begin(), entries->end(), [&](const ModelEntry& entry) {
-    return entry.file.filename() == file.filename();
-  });
-  if (found == entries->end()) {
+  std::vector<ModelEntry> found;
+  std::copy_if(entries->begin(), entries->end(), std::back_inserter(found),
+               [&](const ModelEntry& entry) { return entry.file.filename() == file.filename(); });
+  if (found.empty()) {
     return fail(fmt::format("{}: expected an entry with 'file: {}', found none", manifest.string(),
                             file.filename().string()));
   }
-  return *found;
+  return found;
+}
+
+Expected<std::vector<ModelEntry>> find_by_name(const std::string& model,
+                                               const std::filesystem::path& manifest) {
+  auto entries = load_manifest(manifest);
+  if (!entries) {
+    return entries;
+  }
+  std::vector<ModelEntry> found;
+  std::vector<std::string> known;
+  for (ModelEntry& entry : *entries) {
+    if (known.empty() || known.back() != entry.name) {
+      known.push_back(entry.name);
+    }
+    if (entry.name == model) {
+      found.push_back(std::move(entry));
+    }
+  }
+  if (!found.empty()) {
+    return found;
+  }
+  known.insert(known.end(), {"gray", "input_layer", "the path of an .onnx"});
+  return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest.string(),
+                          fmt::join(known, ", "), model));
 }
 
 }  // namespace
@@ -61,25 +85,22 @@ Expected<std::string> read_bytes(const std::filesystem::path& file) {
   return bytes;
 }
 
-Expected<ModelEntry> find_model(const std::string& model, const std::filesystem::path& models_dir) {
-  if (model.ends_with(".onnx")) {
-    return find_by_path(model);
-  }
-  const std::filesystem::path manifest = models_dir / kManifest;
-  auto entries = load_manifest(manifest);
-  if (!entries) {
-    return tl::unexpected<Error>(std::move(entries).error());
+Expected<ModelEntry> find_model(const std::string& model,
+                                const std::string& layer,
+                                const std::filesystem::path& models_dir) {
+  auto layers = find_layers(model, models_dir);
+  if (!layers) {
+    return tl::unexpected<Error>(std::move(layers).error());
   }
   std::vector<std::string> known;
-  for (ModelEntry& entry : *entries) {
-    if (entry.name == model) {
+  for (ModelEntry& entry : *layers) {
+    if (layer == "first" || entry.layer == layer) {
       return std::move(entry);
     }
-    known.push_back(entry.name);
+    known.push_back(entry.layer);
   }
-  known.insert(known.end(), {"gray", "input_layer", "the path of an .onnx"});
-  return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest.string(),
-                          fmt::join(known, ", "), model));
+  return fail(fmt::format("{}: stem.layer: expected one of {}, found '{}'", model,
+                          fmt::join(known, ", "), layer));
 }
 
 Expected<OnnxSession> open_model(const ModelEntry& entry) {
@@ -92,7 +113,7 @@ Expected<OnnxSession> open_model(const ModelEntry& entry) {
     return fail(fmt::format("{}: expected sha256 {} as in the manifest, found {}", file,
                             entry.sha256, hash));
   }
-  auto session = OnnxSession::create(file, *bytes);
+  auto session = OnnxSession::create(file, *bytes, entry.layer);
   if (!session) {
     return session;
   }
@@ -100,7 +121,10 @@ Expected<OnnxSession> open_model(const ModelEntry& entry) {
     return fail(fmt::format("{}: expected {} filters as in the manifest, found {}", file,
                             entry.num_filters, session->num_filters()));
   }
-  if (Status status = check_window(file, *session, SamplingPlan(entry, entry.stride_px)); !status) {
+  const SamplingPlan native(entry, entry.stride_px);
+  Status status = entry.native_sampling_only ? check_sizes(file, *session, native)
+                                             : check_window(file, *session, native);
+  if (!status) {
     return tl::unexpected<Error>(std::move(status).error());
   }
   return session;
@@ -109,6 +133,12 @@ Expected<OnnxSession> open_model(const ModelEntry& entry) {
 }  // namespace stemvo::internal
 
 namespace stemvo {
+
+Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
+                                              const std::filesystem::path& models_dir) {
+  return model.ends_with(".onnx") ? internal::find_by_path(model)
+                                  : internal::find_by_name(model, models_dir / internal::kManifest);
+}
 
 Status check_model(const ModelEntry& entry) {
   const auto session = internal::open_model(entry);

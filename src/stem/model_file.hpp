@@ -17,10 +17,11 @@ namespace stemvo::internal {
 /// SHA-256 as 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 
-/// The manifest's entry for `model`: a name in models_dir/manifest.yaml, or the path of an .onnx
-/// that a manifest.yaml beside it lists. Errors: no manifest, unknown name (lists the known ones),
-/// a file the manifest does not list.
+/// The manifest's entry for a layer of `model`: a name in models_dir/manifest.yaml, or the path of
+/// an .onnx that a manifest.yaml beside it lists. Layer `first`: its first. Errors: those of
+/// find_layers, unknown layer (lists the known ones).
 [[nodiscard]] Expected<ModelEntry> find_model(const std::string& model,
+                                              const std::string& layer,
                                               const std::filesystem::path& models_dir);
 
 /// Reads, hashes and loads the file, and holds the graph against the entry: hash, number of

@@ -16,7 +16,7 @@ namespace {
 // than the header still answers.
 constexpr std::uint32_t kApiVersion = 1;
 constexpr const char* kInputName = "image";
-constexpr const char* kOutputName = "channels";
+constexpr const char* kOnlyOutput = "channels";
 
 /// The one place where an OrtStatus becomes an Error (of one line) and is freed.
 Status to_status(const OrtApi& api, const std::string& label, OrtStatus* raw) {
@@ -152,7 +152,9 @@ OnnxSession::OnnxSession(std::string label,
       memory_(std::move(memory)),
       session_(std::move(session)) {}
 
-Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) {
+Expected<OnnxSession> OnnxSession::create(const std::string& label,
+                                          std::string_view model,
+                                          const std::string& layer) {
   const auto found = find_api();
   if (!found) {
     return tl::unexpected<Error>(found.error());
@@ -177,38 +179,59 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_
   OnnxHandle<OrtSession> handle(raw_session, api.ReleaseSession);
 
   OnnxSession session(label, api, std::move(env), std::move(memory), std::move(handle));
-  if (Status status = session.check_graph(); !status) {
+  Status status = session.check_input();
+  if (status) {
+    status = session.choose_output(layer);
+  }
+  if (!status) {
     return tl::unexpected<Error>(std::move(status).error());
   }
   return session;
 }
 
-Status OnnxSession::check_graph() {
+Status OnnxSession::check_input() {
   std::size_t inputs = 0;
-  std::size_t outputs = 0;
   STEMVO_ORT_TRY(*api_, label_, api_->SessionGetInputCount(session_.get(), &inputs));
-  STEMVO_ORT_TRY(*api_, label_, api_->SessionGetOutputCount(session_.get(), &outputs));
-  if (inputs != 1 || outputs != 1) {
-    return fail(
-        fmt::format("{}: expected 1 input and 1 output, found {} and {}", label_, inputs, outputs));
+  if (inputs != 1) {
+    return fail(fmt::format("{}: expected 1 input, found {}", label_, inputs));
   }
   const auto input = read_tensor_info(*api_, label_, session_.get(), true, 0);
-  const auto output = read_tensor_info(*api_, label_, session_.get(), false, 0);
-  if (!input || !output) {
-    return tl::unexpected<Error>(input ? output.error() : input.error());
+  if (!input) {
+    return tl::unexpected<Error>(input.error());
   }
   if (!fits(*input, kInputName, {1, 3, -1, -1})) {
     return fail(fmt::format("{}: expected input '{} float 1x3xHxW', found '{}'", label_, kInputName,
                             describe(*input)));
   }
-  if (!fits(*output, kOutputName, {1, -1, -1, -1}) || output->shape[1] < 1) {
-    return fail(fmt::format("{}: expected output '{} float 1xCxhxw' with C known, found '{}'",
-                            label_, kOutputName, describe(*output)));
-  }
-  num_filters_ = static_cast<int>(output->shape[1]);
   fixed_size_ = {static_cast<int>(std::max<std::int64_t>(input->shape[3], 0)),
                  static_cast<int>(std::max<std::int64_t>(input->shape[2], 0))};
   return {};
+}
+
+Status OnnxSession::choose_output(const std::string& layer) {
+  std::size_t count = 0;
+  STEMVO_ORT_TRY(*api_, label_, api_->SessionGetOutputCount(session_.get(), &count));
+  std::vector<std::string> known;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto output = read_tensor_info(*api_, label_, session_.get(), false, i);
+    if (!output) {
+      return tl::unexpected<Error>(output.error());
+    }
+    known.push_back(describe(*output));
+    if (output->name != layer && (count > 1 || output->name != kOnlyOutput)) {
+      continue;
+    }
+    if (!fits(*output, output->name.c_str(), {1, -1, -1, -1}) || output->shape[1] < 1) {
+      return fail(fmt::format("{}: expected output '{} float 1xCxhxw' with C known, found '{}'",
+                              label_, output->name, describe(*output)));
+    }
+    output_ = output->name;
+    num_filters_ = static_cast<int>(output->shape[1]);
+    return {};
+  }
+  return fail(fmt::format("{}: expected an output '{}'{}, found '{}'", label_, layer,
+                          count > 1 ? "" : fmt::format(" or '{}'", kOnlyOutput),
+                          fmt::join(known, "', '")));
 }
 
 Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
@@ -221,10 +244,11 @@ Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
                      shape.size(), ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, &raw_input));
   const OnnxHandle<OrtValue> input(raw_input, api_->ReleaseValue);
   const OrtValue* const inputs[] = {raw_input};
+  const char* const output_name = output_.c_str();
   OrtValue* raw_output = nullptr;  // null: the runtime makes it, of the size we ask for
   STEMVO_ORT_TRY(
       *api_, label_,
-      api_->Run(session_.get(), nullptr, &kInputName, inputs, 1, &kOutputName, 1, &raw_output));
+      api_->Run(session_.get(), nullptr, &kInputName, inputs, 1, &output_name, 1, &raw_output));
   const OnnxHandle<OrtValue> output(raw_output, api_->ReleaseValue);
   OrtTensorTypeAndShapeInfo* raw_info = nullptr;
   STEMVO_ORT_TRY(*api_, label_, api_->GetTensorTypeAndShape(raw_output, &raw_info));
@@ -253,6 +277,7 @@ Status OnnxSession::run(const float* image,
                      memory_.get(), const_cast<float*>(image), in_bytes, in_shape.data(),
                      in_shape.size(), ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT, &raw_input));
   const OnnxHandle<OrtValue> input(raw_input, api_->ReleaseValue);
+  const char* const output_name = output_.c_str();
   OrtValue* raw_output = nullptr;
   STEMVO_ORT_TRY(*api_, label_,
                  api_->CreateTensorWithDataAsOrtValue(
@@ -262,7 +287,7 @@ Status OnnxSession::run(const float* image,
   const OrtValue* const inputs[] = {raw_input};
   STEMVO_ORT_TRY(
       *api_, label_,
-      api_->Run(session_.get(), nullptr, &kInputName, inputs, 1, &kOutputName, 1, &raw_output));
+      api_->Run(session_.get(), nullptr, &kInputName, inputs, 1, &output_name, 1, &raw_output));
   return {};
 }
 

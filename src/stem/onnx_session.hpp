@@ -22,14 +22,17 @@ namespace stemvo::internal {
 template <typename T>
 using OnnxHandle = std::unique_ptr<T, void (*)(T*)>;
 
-/// A stem's graph, loaded: `image` 1x3xHxW float -> `channels` 1xCxhxw float. The only class that
+/// A layer of a model, loaded: `image` 1x3xHxW float -> 1xCxhxw float. The only class that
 /// sees ONNX Runtime. Single-threaded inside; `run` may be called from several threads at once.
 class OnnxSession {
  public:
   /// `model` holds the bytes of the .onnx file, `label` is what messages call it (its path).
-  /// Errors: not a model, other names, element types, ranks or shapes than above.
+  /// The output is the one called `layer`; a graph with one output may call it `channels`. Other
+  /// outputs are computed and dropped. Errors: not a model, no such output (lists those there are),
+  /// other names, element types, ranks or shapes than above.
   [[nodiscard]] static Expected<OnnxSession> create(const std::string& label,
-                                                    std::string_view model);
+                                                    std::string_view model,
+                                                    const std::string& layer);
 
   [[nodiscard]] int num_filters() const { return num_filters_; }
   /// The only size of image the graph takes; 0 where an axis is free.
@@ -51,13 +54,15 @@ class OnnxSession {
               OnnxHandle<OrtEnv> env,
               OnnxHandle<OrtMemoryInfo> memory,
               OnnxHandle<OrtSession> session);
-  [[nodiscard]] Status check_graph();
+  [[nodiscard]] Status choose_output(const std::string& layer);
+  [[nodiscard]] Status check_input();
 
   std::string label_;
   const OrtApi* api_;
   OnnxHandle<OrtEnv> env_;  // must outlive the session: declared before it
   OnnxHandle<OrtMemoryInfo> memory_;
   OnnxHandle<OrtSession> session_;
+  std::string output_;
   int num_filters_ = 0;
   cv::Size fixed_size_;
 };

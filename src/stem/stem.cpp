@@ -47,13 +47,27 @@ Expected<int> choose_sampling(int asked, int stride) {
                           fmt::join(allowed, ", "), stride, asked));
 }
 
+/// The same for a network's layer, which may allow its own stride only.
+Expected<int> choose_sampling(int asked, const ModelEntry& entry) {
+  if (!entry.native_sampling_only) {
+    return choose_sampling(asked, entry.stride_px);
+  }
+  if (asked == 0 || asked == entry.stride_px) {
+    return entry.stride_px;
+  }
+  return fail(fmt::format(
+      "stem.sampling_px: expected {} for layer {} of {}, which the manifest allows at its native "
+      "stride only, found {}",
+      entry.stride_px, entry.layer, entry.file.string(), asked));
+}
+
 Expected<LoadedLayer> load_network(const StemOptions& options,
                                    const std::filesystem::path& models_dir) {
-  const auto entry = internal::find_model(options.model, models_dir);
+  const auto entry = internal::find_model(options.model, options.layer, models_dir);
   if (!entry) {
     return tl::unexpected<Error>(entry.error());
   }
-  const auto sampling = choose_sampling(options.sampling_px, entry->stride_px);
+  const auto sampling = choose_sampling(options.sampling_px, *entry);
   if (!sampling) {
     return tl::unexpected<Error>(sampling.error());
   }
@@ -86,6 +100,10 @@ Expected<LoadedLayer> load_layer(const StemOptions& options,
   if (!is_gray && options.model != "input_layer") {
     return load_network(options, models_dir);
   }
+  if (options.layer != "first") {
+    return fail(
+        fmt::format("stem.layer: expected none for {}, found '{}'", options.model, options.layer));
+  }
   if (const auto sampling = choose_sampling(options.sampling_px, 1); !sampling) {
     return tl::unexpected<Error>(sampling.error());
   }
@@ -110,8 +128,10 @@ Expected<Stem> Stem::create(const StemOptions& options, const std::filesystem::p
   }
   const int filter = options.filter == -1 ? loaded->default_filter : options.filter;
   if (filter < 0 || filter >= loaded->info.num_filters) {
-    return fail(fmt::format("stem.filter: expected 0 to {} for {}, found {}",
-                            loaded->info.num_filters - 1, options.model, filter));
+    return fail(fmt::format(
+        "stem.filter: expected 0 to {} for {}, found {}", loaded->info.num_filters - 1,
+        options.layer == "first" ? options.model : options.model + " layer " + options.layer,
+        filter));
   }
   loaded->info.filter = filter;
   auto impl = std::make_unique<Impl>();
@@ -134,6 +154,13 @@ Expected<Channel> Stem::apply(const cv::Mat& frame) const {
 Expected<std::vector<Channel>> Stem::apply_all(const cv::Mat& frame) const {
   STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
   return impl_->layer->apply(frame, 0, impl_->info.num_filters);
+}
+
+Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame, int first, int last) const {
+  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
+  STEMVO_CHECK(0 <= first && first < last && last <= impl_->info.num_filters,
+               "a range of filters lies inside the layer");
+  return impl_->layer->apply(frame, first, last);
 }
 
 }  // namespace stemvo

@@ -15,6 +15,8 @@ namespace {
 
 // An output away from all borders, in the middle of a frame of this many strides and a kernel.
 constexpr int kStrides = 6;
+// Side of a picture that all of a deep network's layers can take.
+constexpr int kSmallest = 96;
 // Of the output's size: differences below it are rounding.
 constexpr float kRounding = 1e-4F;
 
@@ -127,16 +129,14 @@ Status check_dependence(const std::string& label,
   return {};
 }
 
-}  // namespace
-
-Status check_window(const std::string& label,
-                    const OnnxSession& session,
-                    const SamplingPlan& native) {
-  const cv::Size frame(probe_size(native.x, session.fixed_size().width),
-                       probe_size(native.y, session.fixed_size().height));
+/// Error: another one than the plan says.
+Expected<cv::Size> channel_size_as_planned(const std::string& label,
+                                           const OnnxSession& session,
+                                           const SamplingPlan& native,
+                                           cv::Size frame) {
   const auto found = session.channel_size(frame);
   if (!found) {
-    return tl::unexpected<Error>(found.error());
+    return found;
   }
   if (const cv::Size expected = native.channel_size(frame); *found != expected) {
     return fail(fmt::format(
@@ -144,6 +144,40 @@ Status check_window(const std::string& label,
         "padding, found {}x{}",
         label, expected.width, expected.height, frame.width, frame.height, found->width,
         found->height));
+  }
+  return found;
+}
+
+/// A few strides wide, not whole ones; small, since a deep network is slow.
+int small_size(const SamplingAxis& axis, int fixed) {
+  return fixed > 0 ? fixed : std::max(kStrides * axis.stride, kSmallest) + axis.stride - 1;
+}
+
+}  // namespace
+
+Status check_sizes(const std::string& label,
+                   const OnnxSession& session,
+                   const SamplingPlan& native) {
+  const cv::Size small(small_size(native.x, session.fixed_size().width),
+                       small_size(native.y, session.fixed_size().height));
+  const cv::Size other =
+      session.fixed_size().empty() ? small + cv::Size(1, native.y.stride) : small;
+  for (const cv::Size frame : {small, other}) {
+    if (const auto size = channel_size_as_planned(label, session, native, frame); !size) {
+      return tl::unexpected<Error>(size.error());
+    }
+  }
+  return {};
+}
+
+Status check_window(const std::string& label,
+                    const OnnxSession& session,
+                    const SamplingPlan& native) {
+  const cv::Size frame(probe_size(native.x, session.fixed_size().width),
+                       probe_size(native.y, session.fixed_size().height));
+  const auto found = channel_size_as_planned(label, session, native, frame);
+  if (!found) {
+    return tl::unexpected<Error>(found.error());
   }
   const cv::Point output(probe_output(native.x), probe_output(native.y));
   const cv::Rect window = window_of(native, output);

@@ -42,6 +42,23 @@ def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W"))
     write(name, nodes, [value("image", [1, 3, *size])], [value("channels", [1, filters, "h", "w"])], constants)
 
 
+def two_layers(name):
+    """`stem` as plain_k4s4; `deep` is a padded box of 3x3 over it, less its mean over the frame for the last filter."""
+    box = np.zeros((2, 3, 3, 3), np.float32)
+    box[0, 0] = box[1, 1] = 1.0 / 9.0
+    constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
+                 numpy_helper.from_array(weights(3, 4), "weights"), numpy_helper.from_array(box, "box"),
+                 numpy_helper.from_array(np.array([0.0, 1.0], np.float32).reshape(1, 2, 1, 1), "which")]
+    nodes = [helper.make_node("Sub", ["image", "mean"], ["centred"]),
+             helper.make_node("Conv", ["centred", "weights"], ["stem"], kernel_shape=[4, 4], strides=[4, 4]),
+             helper.make_node("Conv", ["stem", "box"], ["smooth"], kernel_shape=[3, 3], pads=[1, 1, 1, 1]),
+             helper.make_node("GlobalAveragePool", ["smooth"], ["average"]),
+             helper.make_node("Mul", ["average", "which"], ["level"]),
+             helper.make_node("Sub", ["smooth", "level"], ["deep"])]
+    write(name, nodes, [value("image", [1, 3, "H", "W"])],
+          [value("stem", [1, 3, "h", "w"]), value("deep", [1, 2, "h", "w"])], constants)
+
+
 def value(name, shape, kind=TensorProto.FLOAT):
     return helper.make_tensor_value_info(name, kind, shape)
 
@@ -69,6 +86,7 @@ def main():
     stem("plain_k7s2p3", 3, 7, 2, [3, 3, 3, 3])
     stem("fixed_k4s4", 3, 4, 4, none, size=(32, 48))
 
+    two_layers("two_layers")
     picture, shape = ["H", "W"], [1, 3, "H", "W"]
     identity("wrong_input_name", [value("x", shape)], [value("channels", shape)])
     identity("wrong_output_name", [value("image", shape)], [value("y", shape)])
@@ -80,9 +98,6 @@ def main():
           [numpy_helper.from_array(np.array([True, False, True]), "which")])
     write("wrong_two_inputs", [helper.make_node("Add", ["image", "more"], ["channels"])],
           [value("image", shape), value("more", shape)], [value("channels", shape)])
-    write("wrong_two_outputs", [helper.make_node("Identity", ["image"], ["channels"]),
-                                helper.make_node("Neg", ["image"], ["more"])],
-          [value("image", shape)], [value("channels", shape), value("more", shape)])
     write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
           [value("image", shape)], [value("channels", [1, *picture])])
 

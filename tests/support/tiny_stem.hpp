@@ -66,6 +66,24 @@ inline void write_models(const TempFolder& folder, const TinyStem& stem) {
   (void)folder.file("manifest.yaml", "models:\n" + manifest_entry(stem));
 }
 
+/// Both layers of two_layers.onnx, as make_models.py writes them: `stem` is kPlain4, `deep` a
+/// padded 3x3 box over its first two filters; of the second the mean over the frame is taken off.
+inline void write_two_layers(const TempFolder& folder) {
+  const std::string file = "two_layers.onnx";
+  std::filesystem::copy_file(tiny_stems() / file, folder / file);
+  const auto entry = [&](const std::string& layer, int filters, int kernel, int padding,
+                         const std::string& sampling) {
+    return fmt::format(
+        "  - name: two\n    file: {}\n    sha256: {}\n    network: tiny\n    layer: {}\n"
+        "    filters: {}\n    kernel: [{}, {}]\n    stride: 4\n    padding: [{}, {}, {}, {}]\n"
+        "    sampling: {}\n    default_filter: 1\n    licence: MIT\n    command: make_models.py\n",
+        file, internal::sha256_hex(read_all(tiny_stems() / file)), layer, filters, kernel, kernel,
+        padding, padding, padding, padding, sampling);
+  };
+  (void)folder.file("manifest.yaml", "models:\n" + entry("stem", 3, 4, 0, "any") +
+                                         entry("deep", 2, 12, 4, "native"));
+}
+
 /// A textured frame with no symmetry, from sines: CV_8UC3 or CV_8UC1.
 inline cv::Mat textured_frame(cv::Size size, int type) {
   cv::Mat frame(size, type);

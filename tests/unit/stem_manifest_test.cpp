@@ -69,9 +69,29 @@ TEST_F(Manifest, ReadsEveryKey) {
   EXPECT_THAT(entry.kernel_px, ElementsAre(4, 5));
   EXPECT_EQ(entry.stride_px, 2);
   EXPECT_THAT(entry.padding_px, ElementsAre(0, 1, 2, 3));
+  EXPECT_FALSE(entry.native_sampling_only);
   EXPECT_EQ(entry.default_filter, 7);
   EXPECT_EQ(entry.licence, "MIT");
   EXPECT_EQ(entry.command, "make it");
+}
+
+std::string with(const std::string& text, const std::string& from, const std::string& to) {
+  return std::string(text).replace(text.find(from), from.size(), to);
+}
+
+TEST_F(Manifest, OneNameMayHaveSeveralLayersOfOneFile) {
+  const std::string entry = std::string(kEntry).substr(8);
+  const std::string deep = with(with(entry, "layer: stem", "layer: deep"), "stride: 2",
+                                "sampling: native\n    stride: 2");
+  const auto entries = load_manifest(folder.file("manifest.yaml", kEntry + deep));
+  ASSERT_TRUE(entries) << entries.error().message;
+  ASSERT_EQ(entries->size(), 2U);
+  EXPECT_TRUE(entries->back().native_sampling_only);
+  EXPECT_EQ(error_of(kEntry + with(deep, "file: one", "file: two")),
+            ":15: file: expected one.onnx with the same sha256 as the other layers of 'one', found "
+            "two.onnx");
+  EXPECT_EQ(error_with("stride: 2", "sampling: dense\n    stride: 2"),
+            ":9: sampling: expected any or native, found 'dense'");
 }
 
 TEST_F(Manifest, UnknownMissingAndDuplicatedKeysNameTheLine) {
@@ -81,7 +101,7 @@ TEST_F(Manifest, UnknownMissingAndDuplicatedKeysNameTheLine) {
   EXPECT_EQ(error_with("    stride: 2\n", "    stride: 2\n    stride: 4\n"),
             ":10: duplicated key 'stride'");
   const std::string entry = std::string(kEntry).substr(8);
-  EXPECT_EQ(error_of(kEntry + entry), ":14: name: 'one' stands here twice");
+  EXPECT_EQ(error_of(kEntry + entry), ":14: name: 'one' with layer 'stem' stands here twice");
   EXPECT_EQ(error_of("models: []\nmodels: []\n"), ":1: expected the one key 'models'");
   EXPECT_EQ(error_of("models: []\nmore: 1\n"), ":1: expected the one key 'models'");
 }

@@ -24,12 +24,12 @@ std::string read_model(const std::string& name) {
 }
 
 std::string error_of(const std::string& name, const std::string& bytes) {
-  const auto session = OnnxSession::create(name, bytes);
+  const auto session = OnnxSession::create(name, bytes, "stem");
   return session ? "no error" : session.error().message;
 }
 
 TEST(OnnxSession, LoadsAStem) {
-  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
+  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"), "stem");
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ(session->num_filters(), 3);
   EXPECT_EQ(session->fixed_size(), cv::Size(0, 0));
@@ -37,7 +37,7 @@ TEST(OnnxSession, LoadsAStem) {
 }
 
 TEST(OnnxSession, LoadsAStemOfOneSize) {
-  const auto session = OnnxSession::create("fixed", read_model("fixed_k4s4.onnx"));
+  const auto session = OnnxSession::create("fixed", read_model("fixed_k4s4.onnx"), "stem");
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ(session->fixed_size(), cv::Size(48, 32));
   EXPECT_EQ(session->channel_size({48, 32}).value(), cv::Size(12, 8));
@@ -46,7 +46,7 @@ TEST(OnnxSession, LoadsAStemOfOneSize) {
 }
 
 TEST(OnnxSession, RunsOnTheCallersBuffers) {
-  auto created = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
+  auto created = OnnxSession::create("plain", read_model("plain_k4s4.onnx"), "stem");
   ASSERT_TRUE(created) << created.error().message;
   const OnnxSession session = std::move(*created);  // still works after a move
   const std::vector<float> image(3 * 8 * 8, 100.0F);
@@ -58,6 +58,18 @@ TEST(OnnxSession, RunsOnTheCallersBuffers) {
   }
   EXPECT_THAT(session.run(image.data(), {8, 8}, channels.data(), {1, 2}).error().message,
               HasSubstr("plain: ONNX Runtime"));
+}
+
+TEST(OnnxSession, ChoosesTheOutputOfTheLayer) {
+  const std::string bytes = read_model("two_layers.onnx");
+  const auto stem = OnnxSession::create("two", bytes, "stem");
+  const auto deep = OnnxSession::create("two", bytes, "deep");
+  ASSERT_TRUE(stem) << stem.error().message;
+  ASSERT_TRUE(deep) << deep.error().message;
+  EXPECT_EQ(stem->num_filters(), 3);
+  EXPECT_EQ(deep->num_filters(), 2);
+  EXPECT_EQ(OnnxSession::create("two", bytes, "other").error().message,
+            "two: expected an output 'other', found 'stem float 1x3x?x?', 'deep float 1x2x?x?'");
 }
 
 TEST(OnnxSession, RefusesWhatIsNoModel) {
@@ -72,15 +84,13 @@ TEST(OnnxSession, RefusesWhatIsNoModel) {
 TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"wrong_input_name", "expected input 'image float 1x3xHxW', found 'x float 1x3x?x?'"},
-      {"wrong_output_name",
-       "expected output 'channels float 1xCxhxw' with C known, found 'y float 1x3x?x?'"},
+      {"wrong_output_name", "expected an output 'stem' or 'channels', found 'y float 1x3x?x?'"},
       {"wrong_rank", "expected input 'image float 1x3xHxW', found 'image float 3x?x?'"},
       {"wrong_planes", "expected input 'image float 1x3xHxW', found 'image float 1x1x?x?'"},
       {"wrong_type", "expected input 'image float 1x3xHxW', found 'image uint8 1x3x?x?'"},
       {"wrong_free_filters",
        "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
-      {"wrong_two_inputs", "expected 1 input and 1 output, found 2 and 1"},
-      {"wrong_two_outputs", "expected 1 input and 1 output, found 1 and 2"},
+      {"wrong_two_inputs", "expected 1 input, found 2"},
       {"wrong_output_rank",
        "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
   };

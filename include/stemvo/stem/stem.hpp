@@ -16,8 +16,9 @@ struct StemOptions {
   /// Name in models/manifest.yaml, path of an .onnx (with a manifest.yaml beside it), `gray`, or
   /// `input_layer` (filters 0, 1, 2 = R, G, B).
   std::string model = "default";
-  int filter = -1;      ///< -1: the manifest's default_filter (gray, input_layer: 0)
-  int sampling_px = 0;  ///< divisor of the native stride; 0: 2 if it divides it, else 1
+  std::string layer = "first";  ///< of a model that has several, by name
+  int filter = -1;              ///< -1: the manifest's default_filter (gray, input_layer: 0)
+  int sampling_px = 0;          ///< divisor of the native stride; 0: 2 if it divides it, else 1
   std::string upsample = "bicubic";  ///< `bicubic` (to the input's size) or `native`
   double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
   double stretch_high_percent = 99.5;
@@ -40,8 +41,9 @@ struct StemInfo {
 class Stem {
  public:
   /// Loads and checks the model. Errors: unknown name (lists the known ones), hash other than in
-  /// the manifest, not ONNX, inputs or outputs other than 1x3xHxW -> 1xCxhxw float, filter outside
-  /// [0, C), sampling_px not a divisor of the stride (lists the allowed values).
+  /// the manifest, not ONNX, inputs or outputs other than 1x3xHxW -> 1xCxhxw float, unknown layer
+  /// (lists the known ones), filter outside [0, C), sampling_px not a divisor of the stride (lists
+  /// the allowed values).
   [[nodiscard]] static Expected<Stem> create(const StemOptions& options,
                                              const std::filesystem::path& models_dir);
 
@@ -55,6 +57,11 @@ class Stem {
   [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
   /// All filters of the layer from one pass, in order.
   [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const;
+  /// Filters [first, last) of the layer from one pass: no more memory than theirs.
+  /// 0 <= first < last <= info().num_filters.
+  [[nodiscard]] Expected<std::vector<Channel>> apply_range(const cv::Mat& frame,
+                                                           int first,
+                                                           int last) const;
 
  private:
   struct Impl;
