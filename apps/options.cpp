@@ -45,10 +45,10 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments) {
       });
 }
 
-Expected<Config> read_config(const ConfigArguments& arguments) {
-  Config config;
+Expected<Config> read_config(const ConfigArguments& arguments, const Config& base) {
+  Config config = base;
   if (!arguments.file.empty()) {
-    const Expected<Config> loaded = load_config(find_config(arguments.file));
+    const Expected<Config> loaded = load_config(find_config(arguments.file), base);
     if (!loaded) {
       return loaded;
     }

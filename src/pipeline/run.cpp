@@ -7,11 +7,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/core/utility.hpp>
 
 #include "pipeline/frame_reader.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
+#include "pipeline/thread_scope.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/evaluation/metrics.hpp"
 #include "stemvo/evaluation/trajectory.hpp"
@@ -21,20 +21,6 @@
 
 namespace stemvo {
 namespace {
-
-/// OpenCV's number of threads belongs to the process: it is given back.
-class ThreadScope {
- public:
-  explicit ThreadScope(int num_threads) : before_(cv::getNumThreads()) {
-    cv::setNumThreads(num_threads > 0 ? num_threads : cv::getNumberOfCPUs());
-  }
-  ~ThreadScope() { cv::setNumThreads(before_); }
-  ThreadScope(const ThreadScope&) = delete;
-  ThreadScope& operator=(const ThreadScope&) = delete;
-
- private:
-  int before_;
-};
 
 /// The first thing that went wrong while writing; the rest is written all the same.
 void keep_first(Status& first, Status next) {
@@ -177,7 +163,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return fail(fmt::format("--map: expected odometry.mode map, which makes one, found {}",
                             request.config.odometry.mode));
   }
-  const ThreadScope threads(request.num_threads);
+  const pipeline::ThreadScope threads(request.num_threads);
   const Expected<KittiSequence> sequence = open_sequence(request);
   if (!sequence) {
     return tl::unexpected(sequence.error());

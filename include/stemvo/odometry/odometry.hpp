@@ -116,8 +116,6 @@ class Odometry {
  private:
   struct Impl;
   explicit Odometry(std::unique_ptr<Impl> impl);
-  FrameResult process_picture(const cv::Mat& frame);
-  FrameResult skip_frame();
   std::unique_ptr<Impl> impl_;
 };
 

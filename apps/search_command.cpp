@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "console.hpp"
+#include "install_paths.hpp"
+#include "interrupt.hpp"
+#include "options.hpp"
+#include "progress.hpp"
+#include "stemvo/search/search.hpp"
+
+namespace stemvo::apps {
+namespace {
+
+constexpr const char* kFooter =
+    R"(Every filter of the model (and, for comparison, ORB on the gray picture and the input's R, G and B)
+is given an odometry of its own and ranked by t_rel, each step having its true length. Ground truth is
+needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
+
+--out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
+best.yaml (for 'stemvo run --config'), sheet.png (best, median and worst) and records.jsonl, from which
+--resume goes on after Ctrl-C or a crash.
+
+Examples:
+  stemvo search kitti/sequences/00 --model stems/efficientnet.onnx --out result
+  stemvo search kitti/sequences/00 --frames 0:100 --held-out kitti/sequences/03 --out result
+  stemvo search kitti/sequences/00 --exhaustive --filters 0:8 --out part0     part of a layer
+  stemvo search --merge part0 part1 --out result                              parts to one table)";
+
+struct Arguments {
+  SearchRequest request;
+  ConfigArguments config;
+  std::string held_out;
+  std::vector<std::filesystem::path> merge;
+  bool no_baselines = false;
+  bool is_quiet = false;
+};
+
+Expected<SearchReport> search(Arguments& arguments) {
+  SearchRequest& request = arguments.request;
+  request.models_dir = data_folder("models");
+  if (!arguments.merge.empty()) {
+    return merge_searches(arguments.merge, request.out_dir, request.models_dir);
+  }
+  const Expected<Config> config = read_config(arguments.config, search_defaults());
+  if (!config) {
+    return tl::unexpected(config.error());
+  }
+  request.config = *config;
+  request.baselines = !arguments.no_baselines;
+  if (!arguments.held_out.empty()) {
+    request.held_out_dir = arguments.held_out;
+  }
+  Progress progress("filter-frames", arguments.is_quiet);
+  return run_search(request, [&progress](std::size_t done, std::size_t total) {
+    return progress.update(done, total) && !is_interrupted();
+  });
+}
+
+void print_summary(const SearchReport& report, const std::filesystem::path& out_dir) {
+  print(format_search_table(report));
+  const SearchWork& work = report.work;
+  print(fmt::format(
+      "work: {} filter-frames, {:.1f} % of an exhaustive search\n", work.filter_frames,
+      100.0 * static_cast<double>(work.filter_frames) /
+          static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1))));
+  print(fmt::format("table: {}\n", (out_dir / "filters.csv").string()));
+}
+
+int run(Arguments& arguments) {
+  const bool is_merge = !arguments.merge.empty();
+  if (is_merge != arguments.request.sequence_dirs.empty()) {
+    print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
+    return kExitUsage;
+  }
+  const Expected<SearchReport> report = search(arguments);
+  if (!report) {
+    print_error(report.error().message);
+    return kExitFailed;
+  }
+  for (const std::string& warning : report->warnings) {
+    print_warning(warning);
+  }
+  if (!arguments.is_quiet) {
+    print_summary(*report, arguments.request.out_dir);
+  }
+  if (report->interrupted) {
+    print_warning("interrupted; what is done is kept, --resume goes on from there");
+    return kExitInterrupted;
+  }
+  return kExitDone;
+}
+
+void add_options(CLI::App& command, Arguments& arguments) {
+  SearchRequest& request = arguments.request;
+  command
+      .add_option("SEQUENCE_DIR", request.sequence_dirs,
+                  "Sequences in KITTI's layout, with ground truth; ranked by the mean")
+      ->type_name("");
+  command.add_option("--out", request.out_dir, "Folder for the results; created")
+      ->required()
+      ->type_name("DIR");
+  command
+      .add_option("--model", request.model,
+                  "Name in models/manifest.yaml or path of an .onnx; default: default")
+      ->type_name("MODEL");
+  command.add_option("--layers", request.layers, "Layers of the model, e.g. a,b; default: all")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,..");
+  add_range_option(command, "--filters", request.filters,
+                   "Filters A to B-1 of each layer; default: all");
+  add_range_option(command, "--frames", request.frames, "Frames A to B-1 of each sequence");
+  command
+      .add_option("--held-out", arguments.held_out, "A sequence that is reported, not ranked by")
+      ->type_name("DIR");
+  add_range_option(command, "--held-out-frames", request.held_out_frames,
+                   "Frames A to B-1 of the held-out sequence");
+  command.add_flag("--exhaustive", request.exhaustive, "Every filter over every frame");
+  command.add_flag("--resume", request.resume, "Go on with the search in --out, if there is one");
+  command.add_flag("--no-baselines", arguments.no_baselines, "Only the model's filters");
+  command
+      .add_option("--merge", arguments.merge,
+                  "Join parts of one exhaustive search (folders --out) into --out")
+      ->type_name("DIR..");
+  command
+      .add_option("--block", request.block,
+                  "Filters in flight: what a kill may lose; memory grows with it; default: 64")
+      ->type_name("N")
+      ->check(in_range(1, 100000));
+  command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
+      ->type_name("N")
+      ->check(in_range(0, 1024));
+  command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
+  add_config_options(command, arguments.config);
+}
+
+}  // namespace
+
+CLI::App* add_search(CLI::App& app, Action& action) {
+  CLI::App* command = app.add_subcommand("search", "Find the best filter of a network");
+  const auto arguments = std::make_shared<Arguments>();
+  add_options(*command, *arguments);
+  command->footer(kFooter);
+  command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+  return command;
+}
+
+}  // namespace stemvo::apps

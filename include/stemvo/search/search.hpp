@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stemvo/config.hpp"
+#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo {
+
+/// The configuration a search starts from: the same odometry as a run's, made cheap (pairs of
+/// frames on pictures of the channel's own size, fewer points), steps of the true length. Ranks
+/// filters as the defaults of a run do (docs/search.md).
+[[nodiscard]] Config search_defaults();
+
+/// Everything `stemvo search` was asked for.
+struct SearchRequest {
+  std::vector<std::filesystem::path> sequence_dirs;   ///< ranked by the mean over them
+  std::optional<std::filesystem::path> held_out_dir;  ///< reported, never ranked by
+  std::optional<FrameRangeRequest> frames;            ///< of each sequence that ranks
+  std::optional<FrameRangeRequest> held_out_frames;   ///< of the held-out one
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+  std::string model = "default";             ///< as StemOptions::model; gray and input_layer too
+  std::vector<std::string> layers;           ///< of the model; empty: all it has
+  std::optional<FrameRangeRequest> filters;  ///< of each layer, half open; else all
+  bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B
+  Config config = search_defaults();         ///< stem.model, .layer and .filter are not looked at
+  bool exhaustive = false;                   ///< every filter over every frame; else halving
+  bool resume = false;                       ///< go on from what out_dir holds
+  int num_threads = 0;                       ///< 0: all cores
+  int block = 64;                            ///< filters in flight: what a kill may lose
+};
+
+/// One row's identity: a filter of a layer of a model, and what finds matches on its channel.
+struct FilterKey {
+  std::string model;
+  std::string layer;  ///< `input` for the input layer and gray
+  int filter = 0;
+  std::string features;  ///< `klt`, `orb`, `sift`
+};
+bool operator==(const FilterKey& a, const FilterKey& b);
+/// "efficientnetv2-b0 stem 12", with the features where they are not `klt`.
+[[nodiscard]] std::string to_string(const FilterKey& key);
+
+/// A point of the drawn path, metres.
+struct PathPoint {
+  double x_m = 0.0;
+  double z_m = 0.0;
+};
+
+/// A filter's odometry over one sequence, as far as it ran. Steps have their true length.
+struct DriveScore {
+  std::string sequence;
+  std::size_t num_frames = 0;
+  bool is_detected = false;
+  std::string reason;                   ///< why the pose was not detected, else empty
+  std::optional<double> t_rel_percent;  ///< nullopt: no segment fits into the frames run
+  std::optional<double> r_rel_deg_per_100m;
+  double average_offset_m = 0.0;
+  double translation_change_m = 0.0;  ///< paper, Table 2: E_t, mean over consecutive poses
+  double rotation_change_deg = 0.0;   ///< E_r, with R_p transposed
+  double mean_inliers = 0.0;
+  double tracked_fraction = 0.0;    ///< of the frames after the first: motion measured
+  double step_error_percent = 0.0;  ///< what halving goes by (docs/search.md)
+  std::vector<PathPoint> path;      ///< at most 400 points, evenly spaced in frames
+};
+
+/// What became of a filter.
+enum class FilterStatus {
+  kRanked,       ///< ran over all frames, has a t_rel
+  kStopped,      ///< halving: others were better on the frames it ran
+  kNotDetected,  ///< the paper's "pose not detected"
+};
+[[nodiscard]] std::string_view to_string(FilterStatus status);
+
+struct FilterRow {
+  FilterKey key;
+  FilterStatus status = FilterStatus::kRanked;
+  int rung = 0;                        ///< the last one it ran
+  std::vector<DriveScore> drives;      ///< one per sequence that ranks
+  std::optional<DriveScore> held_out;  ///< of filters that ran over all frames
+};
+
+/// What a search costs: frames times filters, and what was run again after a kill.
+struct SearchWork {
+  std::size_t filter_frames = 0;  ///< of the sequences that rank
+  std::size_t held_out_filter_frames = 0;
+  std::size_t exhaustive_filter_frames = 0;  ///< what ranking all filters on all frames takes
+};
+
+struct SearchReport {
+  std::vector<FilterRow> rows;  ///< by rank
+  std::size_t num_filters = 0;  ///< asked for; more than rows where it was interrupted
+  SearchWork work;
+  std::vector<std::string> warnings;
+  bool interrupted = false;
+};
+
+/// Called after each frame of a block: filter-frames done, and in all as far as known; false stops.
+using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
+
+/// Ranks the filters. Each has an odometry of its own; one pass of the stem serves all filters of a
+/// layer; filters run in parallel. out_dir receives records.jsonl (appended as blocks of filters
+/// end, what `resume` reads), filters.csv, filters.json, config.yaml, best.yaml and, where the
+/// frames can be read, sheet.png. The tables do not depend on threads, blocks or interruptions.
+/// Errors, before work starts: unknown model or layer (lists the known ones), filters outside,
+/// no ground truth, a path too short for a segment, out_dir holds another search, or with `resume`
+/// one of another model, sequence or configuration (says what changed).
+[[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
+                                                const SearchProgress& progress = {});
+
+/// Joins parts of an exhaustive search (other filters, layers or models, the same sequences and
+/// configuration) into out_dir, whose filters.csv is that of one search over all of them. Errors:
+/// a folder without records, parts that differ in more than filters, a filter with two different
+/// results.
+[[nodiscard]] Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
+                                                    const std::filesystem::path& out_dir,
+                                                    const std::filesystem::path& models_dir);
+
+/// The ranked table for people.
+[[nodiscard]] std::string format_search_table(const SearchReport& report);
+
+}  // namespace stemvo

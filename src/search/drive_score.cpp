@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include "search/drive_score.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "stemvo/check.hpp"
+#include "stemvo/evaluation/metrics.hpp"
+#include "stemvo/evaluation/trajectory.hpp"
+
+namespace stemvo::search {
+namespace {
+
+constexpr double kLeastTracked = 0.5;
+constexpr std::size_t kMostPathPoints = 400;
+
+double to_deg(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
+
+/// E_t and E_r of the paper's Table 2, means over consecutive poses.
+void add_changes(std::span<const Rigid3> trajectory, DriveScore& score) {
+  double translation_m = 0.0;
+  double rotation_rad = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    const Rigid3 change = trajectory[i - 1].inverse() * trajectory[i];
+    translation_m += change.translation.norm();
+    rotation_rad += change.angle_rad();
+  }
+  const auto num_steps = static_cast<double>(std::max<std::size_t>(trajectory.size(), 2) - 1);
+  score.translation_change_m = translation_m / num_steps;
+  score.rotation_change_deg = to_deg(rotation_rad) / num_steps;
+}
+
+/// For halving, on too few frames for a t_rel.
+double step_error_percent(std::span<const Rigid3> trajectory, std::span<const Rigid3> truth) {
+  double sum = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    const Rigid3 estimated = trajectory[i - 1].inverse() * trajectory[i];
+    const Rigid3 true_step = truth[i - 1].inverse() * truth[i];
+    sum += (true_step.inverse() * estimated).angle_rad();
+  }
+  return 100.0 * sum / static_cast<double>(std::max<std::size_t>(trajectory.size(), 2) - 1);
+}
+
+/// Evenly spaced, first and last included, to the centimetre.
+std::vector<PathPoint> path_of(std::span<const Rigid3> trajectory) {
+  const std::size_t count = std::min(trajectory.size(), kMostPathPoints);
+  std::vector<PathPoint> path;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t index = count < 2 ? 0 : i * (trajectory.size() - 1) / (count - 1);
+    const Eigen::Vector3d& position = trajectory[index].translation;
+    path.push_back({std::round(100.0 * position.x()) / 100.0,  //
+                    std::round(100.0 * position.z()) / 100.0});
+  }
+  return path;
+}
+
+}  // namespace
+
+void FilterDrive::count(const FrameResult& result) {
+  if (num_frames() <= 1) {
+    return;
+  }
+  num_matches_ += static_cast<std::size_t>(result.num_matches);
+  num_inliers_ += static_cast<std::size_t>(result.num_inliers);
+  if (is_measured(result.state)) {
+    ++num_measured_;
+  } else if (result.state == FrameState::kBroken) {
+    ++num_broken_;
+  } else if (result.state == FrameState::kGated) {
+    ++num_gated_;
+  } else if (result.num_matches < min_inliers_) {
+    ++num_few_matches_;
+  } else {
+    ++num_few_inliers_;
+  }
+}
+
+std::string FilterDrive::missing_reason() const {
+  const std::size_t num_steps = num_frames() - 1;
+  if (num_matches_ == 0 && num_broken_ < num_steps) {
+    return "no matches: a channel without contrast";
+  }
+  const std::array<std::pair<std::size_t, const char*>, 4> reasons = {
+      {{num_few_matches_, "too few matches"},
+       {num_few_inliers_, "too few inliers"},
+       {num_gated_, "not a forward motion"},
+       {num_broken_, "no picture"}}};
+  const auto most =
+      std::max_element(reasons.begin(), reasons.end(),
+                       [](const auto& a, const auto& b) { return a.first < b.first; });
+  return fmt::format("{} in {} of {} frames", most->second, most->first, num_steps);
+}
+
+DriveScore FilterDrive::score(const std::string& sequence,
+                              std::span<const Rigid3> truth,
+                              const EvaluationOptions& options) const {
+  STEMVO_CHECK(num_frames() > 0 && truth.size() >= num_frames(), "a true pose for each frame");
+  const std::span<const Rigid3> so_far = truth.first(num_frames());
+  const Trajectory trajectory = rescale_steps(odometry_.poses(), so_far);
+  const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
+  const Metrics metrics = evaluate(trajectory, so_far, options);
+  DriveScore score;
+  score.sequence = sequence;
+  score.num_frames = num_frames();
+  score.t_rel_percent = metrics.t_rel_percent;
+  score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
+  score.average_offset_m = metrics.average_offset_m;
+  score.mean_inliers = static_cast<double>(num_inliers_) / num_steps;
+  score.tracked_fraction = static_cast<double>(num_measured_) / num_steps;
+  add_changes(trajectory, score);
+  score.step_error_percent = step_error_percent(trajectory, so_far);
+  score.path = path_of(trajectory);
+  score.is_detected = num_frames() == 1 || score.tracked_fraction >= kLeastTracked;
+  if (!score.is_detected) {
+    score.reason = missing_reason();
+  }
+  return score;
+}
+
+DriveScore unusable_score(const std::string& sequence, const std::string& reason) {
+  DriveScore score;
+  score.sequence = sequence;
+  score.reason = reason;
+  return score;
+}
+
+}  // namespace stemvo::search

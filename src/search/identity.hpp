@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "search/schedule.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo::search {
+
+/// Filters [first, last) of a layer, and what its response depends on.
+struct LayerIdentity {
+  std::string model;
+  std::string layer;
+  std::string features;
+  int first = 0;
+  int last = 0;
+  std::string hash;  ///< of the model's file and the manifest's entry
+  int sampling_px = 1;
+  std::string stem_model;  ///< as stem.model takes it here; not compared
+};
+
+struct SequenceIdentity {
+  std::string name;
+  bool is_held_out = false;
+  std::size_t first_frame = 0;
+  std::size_t num_frames = 0;
+  std::string frames;  ///< hashes, as those of benchmark::Fingerprint
+  std::string calibration;
+  std::string ground_truth;
+  std::string directory;  ///< where it was found; not compared
+};
+
+/// The first line of records.jsonl: everything that the records depend on.
+struct SearchIdentity {
+  std::string program;        ///< hash
+  std::string configuration;  ///< YAML of every key, without the model
+  Schedule schedule;
+  std::vector<LayerIdentity> layers;
+  std::vector<SequenceIdentity> sequences;
+};
+
+[[nodiscard]] std::size_t num_filters(const SearchIdentity& identity);
+
+/// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty where
+/// nothing did. With `as_parts` other layers, models and filters are no change.
+[[nodiscard]] std::string describe_change(const SearchIdentity& before,
+                                          const SearchIdentity& now,
+                                          bool as_parts);
+
+}  // namespace stemvo::search

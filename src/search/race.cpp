@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+#include "search/race.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "search/ranking.hpp"
+#include "stemvo/check.hpp"
+
+namespace stemvo::search {
+namespace {
+
+/// Odometries kept from rung to rung, some 2 MB each; beyond it they start again, which counts.
+constexpr std::size_t kMostKept = 512;
+
+}  // namespace
+
+Race::Race(const SearchPlan& plan,
+           const SearchRequest& request,
+           SearchProgress progress,
+           RecordWriter writer,
+           std::vector<Record> records)
+    : plan_(plan),
+      evaluation_(request.config.evaluation),
+      block_size_(static_cast<std::size_t>(std::max(1, request.block))),
+      progress_(std::move(progress)),
+      writer_(std::move(writer)),
+      records_(std::move(records)) {
+  for (const Record& record : records_) {
+    frames_done_ += record.filter_frames + record.held_out_filter_frames;
+  }
+}
+
+Status Race::run() {
+  Block alive(plan_.candidates.size());
+  std::iota(alive.begin(), alive.end(), std::size_t{0});
+  for (std::size_t rung = 0; rung < plan_.identity.schedule.size() && !is_stopped_; ++rung) {
+    if (rung > 0) {
+      alive = survivors(alive, rung);
+    }
+    if (Status status = run_rung(rung, alive); !status) {
+      return status;
+    }
+  }
+  return {};
+}
+
+bool Race::is_last(std::size_t rung) const { return rung + 1 == plan_.identity.schedule.size(); }
+
+/// Without what is repeated.
+std::size_t Race::frames_planned() const {
+  const Schedule& schedule = plan_.identity.schedule;
+  std::size_t planned = plan_.num_frames(true) * schedule.back().num_filters;
+  for (const PlanSequence& sequence : plan_.sequences) {
+    std::size_t before = 0;
+    for (std::size_t rung = 0; rung < schedule.size() && !sequence.is_held_out; ++rung) {
+      const std::size_t frames = frames_at(schedule[rung], sequence.sequence.size());
+      planned += schedule[rung].num_filters * (frames - before);
+      before = frames;
+    }
+  }
+  return std::max(planned, frames_done_);
+}
+
+const Record* Race::find(std::size_t candidate, std::size_t rung) const {
+  const FilterKey& key = plan_.candidates[candidate].key;
+  const auto found = std::find_if(records_.begin(), records_.end(), [&](const Record& record) {
+    return record.rung == static_cast<int>(rung) && record.key == key;
+  });
+  return found == records_.end() ? nullptr : &*found;
+}
+
+Race::Block Race::survivors(const Block& alive, std::size_t rung) {
+  std::vector<const Record*> done;
+  for (const std::size_t candidate : alive) {
+    done.push_back(find(candidate, rung - 1));
+    STEMVO_CHECK(done.back() != nullptr, "a rung is complete before the next");
+  }
+  const auto keys = choose_survivors(done, plan_.identity.schedule[rung].num_filters);
+  Block chosen;
+  for (const std::size_t candidate : alive) {
+    if (std::find(keys.begin(), keys.end(), plan_.candidates[candidate].key) != keys.end()) {
+      chosen.push_back(candidate);
+    } else {
+      kept_.erase(candidate);
+    }
+  }
+  return chosen;
+}
+
+/// Those without a record, in blocks; those that go on apart from those that start, since a block
+/// is at one frame.
+Status Race::run_rung(std::size_t rung, const Block& alive) {
+  Block going_on;
+  Block starting;
+  for (const std::size_t candidate : alive) {
+    if (find(candidate, rung) == nullptr) {
+      (kept_.count(candidate) > 0 ? going_on : starting).push_back(candidate);
+    }
+  }
+  for (const Block& group : {going_on, starting}) {
+    for (std::size_t begin = 0; begin < group.size() && !is_stopped_; begin += block_size_) {
+      const std::size_t end = std::min(begin + block_size_, group.size());
+      const Block block(group.begin() + static_cast<std::ptrdiff_t>(begin),
+                        group.begin() + static_cast<std::ptrdiff_t>(end));
+      if (Status status = run_block_of(rung, block); !status) {
+        return status;
+      }
+    }
+  }
+  return {};
+}
+
+Status Race::run_block_of(std::size_t rung, const Block& block) {
+  std::vector<Record> done(block.size());
+  std::vector<Drives> drives(block.size());
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    done[i].key = plan_.candidates[block[i]].key;
+    done[i].rung = static_cast<int>(rung);
+    if (auto kept = kept_.extract(block[i]); !kept.empty()) {
+      drives[i] = std::move(kept.mapped());
+    }
+    drives[i].resize(plan_.sequences.size());
+  }
+  for (std::size_t s = 0; s < plan_.sequences.size(); ++s) {
+    const bool is_asked = !plan_.sequences[s].is_held_out || is_last(rung);
+    if (is_asked && (is_stopped_ || !run_sequence_of(rung, s, block, drives, done))) {
+      return {};
+    }
+  }
+  if (Status status = writer_.append(done); !status) {
+    return status;
+  }
+  std::move(done.begin(), done.end(), std::back_inserter(records_));
+  for (std::size_t i = 0; i < block.size() && !is_last(rung) && kept_.size() < kMostKept; ++i) {
+    kept_.emplace(block[i], std::move(drives[i]));
+  }
+  return {};
+}
+
+bool Race::run_sequence_of(std::size_t rung,
+                           std::size_t sequence_index,
+                           const Block& block,
+                           std::vector<Drives>& drives,
+                           std::vector<Record>& records) {
+  const PlanSequence& planned = plan_.sequences[sequence_index];
+  const KittiSequence& sequence = planned.sequence;
+  const std::size_t end = planned.is_held_out
+                              ? sequence.size()
+                              : frames_at(plan_.identity.schedule[rung], sequence.size());
+  std::vector<BlockMember> members;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const Candidate& candidate = plan_.candidates[block[i]];
+    std::optional<FilterDrive>& drive = drives[i][sequence_index];
+    if (!planned.unusable[candidate.layer].empty()) {
+      continue;
+    }
+    if (!drive) {
+      drive.emplace(make_drive(candidate, sequence.camera()));
+    }
+    begin = drive->num_frames();
+    members.push_back({&candidate, &*drive});
+  }
+  const auto count = [this](std::size_t frames) {
+    frames_done_ += frames;
+    is_stopped_ = progress_ && !progress_(frames_done_, frames_planned());
+    return !is_stopped_;
+  };
+  if (!run_block(plan_, sequence, members, begin, end, count, warnings_)) {
+    return false;
+  }
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    add_score(planned, plan_.candidates[block[i]], drives[i][sequence_index], end - begin,
+              records[i]);
+  }
+  return true;
+}
+
+FilterDrive Race::make_drive(const Candidate& candidate, const Camera& camera) const {
+  const Config& config = plan_.layers[candidate.layer].config;
+  Expected<ChannelOdometry> odometry = ChannelOdometry::create(config, camera);
+  STEMVO_CHECK(odometry.has_value(), "the configuration was checked");
+  return FilterDrive(std::move(*odometry), config.odometry.min_inliers);
+}
+
+void Race::add_score(const PlanSequence& planned,
+                     const Candidate& candidate,
+                     const std::optional<FilterDrive>& drive,
+                     std::size_t num_frames,
+                     Record& record) const {
+  const KittiSequence& sequence = planned.sequence;
+  DriveScore score = unusable_score(sequence.name(), planned.unusable[candidate.layer]);
+  if (drive) {
+    score = drive->score(sequence.name(), *sequence.ground_truth(), evaluation_);
+    (planned.is_held_out ? record.held_out_filter_frames : record.filter_frames) += num_frames;
+  }
+  if (planned.is_held_out) {
+    record.held_out = std::move(score);
+  } else {
+    record.drives.push_back(std::move(score));
+  }
+}
+
+}  // namespace stemvo::search

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "search/block_runner.hpp"
+#include "search/drive_score.hpp"
+#include "search/plan.hpp"
+#include "search/record_file.hpp"
+#include "stemvo/search/search.hpp"
+
+namespace stemvo::search {
+
+/// Runs the rungs of a plan's schedule, in blocks of filters; each block's records are appended as
+/// it ends. Records of an earlier call are not repeated.
+class Race {
+ public:
+  /// The plan must outlive it.
+  Race(const SearchPlan& plan,
+       const SearchRequest& request,
+       SearchProgress progress,
+       RecordWriter writer,
+       std::vector<Record> records);
+
+  /// Error: the records cannot be written.
+  [[nodiscard]] Status run();
+
+  [[nodiscard]] bool is_stopped() const { return is_stopped_; }
+  [[nodiscard]] const std::vector<Record>& records() const { return records_; }
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  /// A candidate's odometry on each sequence; none where it has not started, or cannot.
+  using Drives = std::vector<std::optional<FilterDrive>>;
+  using Block = std::vector<std::size_t>;  // indices of candidates
+
+  [[nodiscard]] bool is_last(std::size_t rung) const;
+  [[nodiscard]] std::size_t frames_planned() const;
+  [[nodiscard]] const Record* find(std::size_t candidate, std::size_t rung) const;
+  [[nodiscard]] Block survivors(const Block& alive, std::size_t rung);
+  Status run_rung(std::size_t rung, const Block& alive);
+  Status run_block_of(std::size_t rung, const Block& block);
+  /// False: stopped before the last frame.
+  bool run_sequence_of(std::size_t rung,
+                       std::size_t sequence,
+                       const Block& block,
+                       std::vector<Drives>& drives,
+                       std::vector<Record>& records);
+  void add_score(const PlanSequence& planned,
+                 const Candidate& candidate,
+                 const std::optional<FilterDrive>& drive,
+                 std::size_t num_frames,
+                 Record& record) const;
+  [[nodiscard]] FilterDrive make_drive(const Candidate& candidate, const Camera& camera) const;
+
+  const SearchPlan& plan_;
+  EvaluationOptions evaluation_;
+  std::size_t block_size_;
+  SearchProgress progress_;
+  RecordWriter writer_;
+  std::vector<Record> records_;
+  std::map<std::size_t, Drives> kept_;  ///< of candidates that may go on to the next rung
+  std::vector<std::string> warnings_;
+  std::size_t frames_done_ = 0;
+  bool is_stopped_ = false;
+};
+
+}  // namespace stemvo::search

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+#include "search/ranking.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <tuple>
+
+#include <fmt/format.h>
+
+namespace stemvo {
+
+bool operator==(const FilterKey& a, const FilterKey& b) {
+  return a.model == b.model && a.layer == b.layer && a.filter == b.filter &&
+         a.features == b.features;
+}
+
+std::string to_string(const FilterKey& key) {
+  return fmt::format("{} {} {}{}", key.model, key.layer, key.filter,
+                     key.features == "klt" ? "" : " " + key.features);
+}
+
+std::string_view to_string(FilterStatus status) {
+  switch (status) {
+    case FilterStatus::kRanked:
+      return "ranked";
+    case FilterStatus::kStopped:
+      return "stopped";
+    default:
+      return "not detected";
+  }
+}
+
+}  // namespace stemvo
+
+namespace stemvo::search {
+namespace {
+
+constexpr double kWorst = std::numeric_limits<double>::infinity();
+
+bool all_detected(const std::vector<DriveScore>& drives) {
+  return std::all_of(drives.begin(), drives.end(),
+                     [](const DriveScore& drive) { return drive.is_detected; });
+}
+
+FilterRow row_of(const Record& record, std::size_t num_rungs) {
+  FilterRow row{record.key, FilterStatus::kRanked, record.rung, record.drives, record.held_out};
+  if (!all_detected(record.drives)) {
+    row.status = FilterStatus::kNotDetected;
+  } else if (record.rung + 1 < static_cast<int>(num_rungs)) {
+    row.status = FilterStatus::kStopped;
+  }
+  return row;
+}
+
+/// Smaller is better, number by number.
+std::tuple<int, double, double> order_of(const FilterRow& row) {
+  const MeanScore mean = mean_score(row.drives);
+  switch (row.status) {
+    case FilterStatus::kRanked:
+      return {0, mean.t_rel_percent.value_or(kWorst), mean.r_rel_deg_per_100m.value_or(kWorst)};
+    case FilterStatus::kStopped:
+      return {1, -row.rung, mean.step_error_percent};
+    default:
+      return {2, 0.0, 0.0};
+  }
+}
+
+}  // namespace
+
+MeanScore mean_score(const std::vector<DriveScore>& drives) {
+  MeanScore mean;
+  const auto count = static_cast<double>(drives.size());
+  mean.t_rel_percent = 0.0;
+  mean.r_rel_deg_per_100m = 0.0;
+  const auto add = [count](std::optional<double>& sum, const std::optional<double>& value) {
+    sum = sum && value ? std::optional(*sum + *value / count) : std::nullopt;
+  };
+  for (const DriveScore& drive : drives) {
+    add(mean.t_rel_percent, drive.t_rel_percent);
+    add(mean.r_rel_deg_per_100m, drive.r_rel_deg_per_100m);
+    mean.average_offset_m += drive.average_offset_m / count;
+    mean.translation_change_m += drive.translation_change_m / count;
+    mean.rotation_change_deg += drive.rotation_change_deg / count;
+    mean.mean_inliers += drive.mean_inliers / count;
+    mean.tracked_fraction += drive.tracked_fraction / count;
+    mean.step_error_percent += drive.step_error_percent / count;
+    mean.num_frames += drive.num_frames;
+  }
+  return mean;
+}
+
+bool comes_before(const FilterKey& a, const FilterKey& b) {
+  return std::tie(a.model, a.layer, a.features, a.filter) <
+         std::tie(b.model, b.layer, b.features, b.filter);
+}
+
+std::vector<FilterRow> rank_filters(std::span<const Record> records, std::size_t num_rungs) {
+  std::vector<const Record*> sorted;
+  for (const Record& record : records) {
+    sorted.push_back(&record);
+  }
+  std::sort(sorted.begin(), sorted.end(), [](const Record* a, const Record* b) {
+    return comes_before(a->key, b->key) || (a->key == b->key && a->rung > b->rung);
+  });
+  std::vector<FilterRow> rows;
+  for (const Record* record : sorted) {
+    if (rows.empty() || !(rows.back().key == record->key)) {  // its last rung comes first
+      rows.push_back(row_of(*record, num_rungs));
+    }
+  }
+  std::stable_sort(rows.begin(), rows.end(), [](const FilterRow& a, const FilterRow& b) {
+    return order_of(a) < order_of(b);
+  });
+  return rows;
+}
+
+std::vector<FilterKey> choose_survivors(std::vector<const Record*> records, std::size_t count) {
+  const auto order = [](const Record& record) {
+    return std::pair(all_detected(record.drives) ? 0 : 1,
+                     mean_score(record.drives).step_error_percent);
+  };
+  std::sort(records.begin(), records.end(), [&order](const Record* a, const Record* b) {
+    const auto first = order(*a);
+    const auto second = order(*b);
+    return first < second || (first == second && comes_before(a->key, b->key));
+  });
+  std::vector<FilterKey> chosen;
+  for (std::size_t i = 0; i < std::min(count, records.size()); ++i) {
+    chosen.push_back(records[i]->key);
+  }
+  return chosen;
+}
+
+}  // namespace stemvo::search

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "search/record_file.hpp"
+#include "stemvo/search/search.hpp"
+
+namespace stemvo::search {
+
+/// Means over the sequences that rank; nullopt where one of them has none.
+struct MeanScore {
+  std::optional<double> t_rel_percent;
+  std::optional<double> r_rel_deg_per_100m;
+  double average_offset_m = 0.0;
+  double translation_change_m = 0.0;
+  double rotation_change_deg = 0.0;
+  double mean_inliers = 0.0;
+  double tracked_fraction = 0.0;
+  double step_error_percent = 0.0;
+  std::size_t num_frames = 0;  ///< of all of them together
+};
+[[nodiscard]] MeanScore mean_score(const std::vector<DriveScore>& drives);
+
+/// By model, layer, features and filter: what decides where numbers do not.
+[[nodiscard]] bool comes_before(const FilterKey& a, const FilterKey& b);
+
+/// One row per filter from its last rung, ranked: by t_rel, ties by r_rel; then those that were
+/// stopped, the later the better; not detected last. Does not depend on the records' order.
+[[nodiscard]] std::vector<FilterRow> rank_filters(std::span<const Record> records,
+                                                  std::size_t num_rungs);
+
+/// Of records of one rung, those that go on: the `count` best by the error of their steps.
+[[nodiscard]] std::vector<FilterKey> choose_survivors(std::vector<const Record*> records,
+                                                      std::size_t count);
+
+}  // namespace stemvo::search

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "search/report.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "search/ranking.hpp"
+#include "search/tables.hpp"
+
+namespace stemvo::search {
+namespace {
+
+/// All records of the last rung are there.
+bool is_complete(const SearchIdentity& identity, const std::vector<Record>& records) {
+  const int last = static_cast<int>(identity.schedule.size()) - 1;
+  const auto done = std::count_if(records.begin(), records.end(),
+                                  [last](const Record& record) { return record.rung == last; });
+  return static_cast<std::size_t>(done) == identity.schedule.back().num_filters;
+}
+
+SearchWork work_of(const SearchIdentity& identity, const std::vector<Record>& records) {
+  SearchWork work;
+  for (const Record& record : records) {
+    work.filter_frames += record.filter_frames;
+    work.held_out_filter_frames += record.held_out_filter_frames;
+  }
+  for (const SequenceIdentity& sequence : identity.sequences) {
+    work.exhaustive_filter_frames +=
+        sequence.is_held_out ? 0 : sequence.num_frames * num_filters(identity);
+  }
+  return work;
+}
+
+}  // namespace
+
+Expected<SearchReport> finish(const Folders& folders,
+                              const SearchIdentity& identity,
+                              const std::vector<Record>& records,
+                              std::vector<std::string> warnings) {
+  SearchReport report;
+  report.rows = rank_filters(records, identity.schedule.size());
+  report.num_filters = num_filters(identity);
+  report.work = work_of(identity, records);
+  report.warnings = std::move(warnings);
+  report.interrupted = !is_complete(identity, records);
+  if (const Status status = write_tables(folders.out_dir, identity, report); !status) {
+    return tl::unexpected(status.error());
+  }
+  return report;
+}
+
+}  // namespace stemvo::search

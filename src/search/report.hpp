@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "search/identity.hpp"
+#include "search/record_file.hpp"
+#include "stemvo/search/search.hpp"
+
+namespace stemvo::search {
+
+inline constexpr const char* kRecordsFile = "records.jsonl";
+
+/// Where results go, and where named models are found.
+struct Folders {
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+};
+
+/// Ranks the records and writes the tables (and the sheet). Where records are missing the search
+/// was interrupted.
+[[nodiscard]] Expected<SearchReport> finish(const Folders& folders,
+                                            const SearchIdentity& identity,
+                                            const std::vector<Record>& records,
+                                            std::vector<std::string> warnings);
+
+}  // namespace stemvo::search
