@@ -10,6 +10,9 @@
 
 namespace stemvo::search {
 
+/// What the layer of gray and input_layer is called in tables.
+inline constexpr const char* kInputLayer = "input";
+
 /// Filters [first, last) of a layer, and what its response depends on.
 struct LayerIdentity {
   std::string model;

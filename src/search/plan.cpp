@@ -9,8 +9,8 @@
 #include <fmt/ranges.h>
 
 #include "benchmark/fingerprint.hpp"
-#include "stem/model_file.hpp"
 #include "stemvo/evaluation/metrics.hpp"
+#include "stemvo/stem/manifest.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -21,13 +21,12 @@ namespace fs = std::filesystem;
 constexpr int kLeastSide_px = 16;
 /// Shifted passes of a coarse layer cost more than they tell.
 constexpr int kMostShifts = 2;
-constexpr const char* kInput = "input";
 
 bool is_input(const std::string& model) { return model == "gray" || model == "input_layer"; }
 
 /// 0: every second pixel where that takes no more than 4 passes, else half the stride.
 int sampling_of(int asked, const ModelEntry& entry) {
-  if (asked != 0) {
+  if (asked != 0 || entry.native_sampling_only) {
     return asked;
   }
   for (int sampling = 2; sampling < entry.stride_px; ++sampling) {
@@ -40,23 +39,19 @@ int sampling_of(int asked, const ModelEntry& entry) {
 
 /// The model's layers, or those asked for in that order.
 Expected<std::vector<ModelEntry>> find_entries(const SearchRequest& request) {
-  Expected<ModelEntry> entry = internal::find_model(request.model, request.models_dir);
-  if (!entry) {
-    return tl::unexpected(entry.error());
-  }
-  const std::vector<ModelEntry> all = {*entry};
-  if (request.layers.empty()) {
+  const Expected<std::vector<ModelEntry>> all = find_layers(request.model, request.models_dir);
+  if (!all || request.layers.empty()) {
     return all;
   }
   std::vector<std::string> known;
-  for (const ModelEntry& one : all) {
+  for (const ModelEntry& one : *all) {
     known.push_back(one.layer);
   }
   std::vector<ModelEntry> chosen;
   for (const std::string& layer : request.layers) {
-    const auto found = std::find_if(all.begin(), all.end(),
+    const auto found = std::find_if(all->begin(), all->end(),
                                     [&](const ModelEntry& one) { return one.layer == layer; });
-    if (found == all.end()) {
+    if (found == all->end()) {
       return fail(fmt::format("--layers: {}: expected one of {}, found '{}'", request.model,
                               fmt::join(known, ", "), layer));
     }
@@ -114,13 +109,14 @@ Expected<PlanLayer> make_layer(Config config,
 Status add_model(const SearchRequest& request, SearchPlan& plan) {
   Config config = request.config;
   config.stem.model = from_anywhere(request.model);
+  config.stem.layer = StemOptions().layer;
   config.stem.filter = 0;
   if (is_input(request.model)) {
     if (!request.layers.empty()) {
       return fail(fmt::format("--layers: expected none for {}, found '{}'", request.model,
                               fmt::join(request.layers, ",")));
     }
-    Expected<PlanLayer> layer = make_layer(config, request.model, kInput, request, false);
+    Expected<PlanLayer> layer = make_layer(config, request.model, kInputLayer, request, false);
     return layer ? (plan.layers.push_back(std::move(*layer)), Status())
                  : tl::unexpected(layer.error());
   }
@@ -129,6 +125,7 @@ Status add_model(const SearchRequest& request, SearchPlan& plan) {
     return tl::unexpected(entries.error());
   }
   for (const ModelEntry& entry : *entries) {
+    config.stem.layer = entry.layer;
     config.stem.sampling_px = sampling_of(request.config.stem.sampling_px, entry);
     Expected<PlanLayer> layer = make_layer(config, entry.name, entry.layer, request, false);
     if (!layer) {
@@ -144,6 +141,7 @@ Status add_baselines(const SearchRequest& request, SearchPlan& plan) {
   for (const std::string model : {"gray", "input_layer"}) {
     Config config = request.config;
     config.stem.model = model;
+    config.stem.layer = StemOptions().layer;
     config.stem.sampling_px = 1;
     config.stem.filter = 0;
     if (model == "gray") {
@@ -156,7 +154,7 @@ Status add_baselines(const SearchRequest& request, SearchPlan& plan) {
     if (is_searched) {
       continue;
     }
-    Expected<PlanLayer> layer = make_layer(config, model, kInput, request, true);
+    Expected<PlanLayer> layer = make_layer(config, model, kInputLayer, request, true);
     if (!layer) {
       return tl::unexpected(layer.error());
     }
@@ -308,6 +306,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   }
   Config common = request.config;
   common.stem.model = "default";  // the layers say which
+  common.stem.layer = StemOptions().layer;
   common.stem.filter = -1;
   plan.identity.configuration = dump_config(common);
   plan.identity.schedule = request.exhaustive ? exhaustive_schedule(plan.candidates.size())

@@ -187,8 +187,8 @@ std::string best_head(const FilterRow& best, const Config& config, bool was_stop
   text += "# What repeats its row: the search's fast odometry, steps of the true length.\n";
   text += fmt::format(
       "# The filter with the defaults of a run: stemvo run SEQUENCE --out DIR --set "
-      "stem.model={} --set stem.filter={}\n\n",
-      config.stem.model, config.stem.filter);
+      "stem.model={} --set stem.layer={} --set stem.filter={}\n\n",
+      config.stem.model, config.stem.layer, config.stem.filter);
   return text;
 }
 
@@ -247,6 +247,8 @@ Expected<Config> config_of(const std::filesystem::path& out_dir,
       });
   STEMVO_CHECK(layer != identity.layers.end(), "each row has a layer");
   config->stem.model = layer->stem_model;
+  const bool is_network = key.model != "gray" && key.model != "input_layer";
+  config->stem.layer = is_network ? key.layer : StemOptions().layer;
   config->stem.filter = key.filter;
   config->stem.sampling_px = layer->sampling_px;
   config->features.method = key.features;
