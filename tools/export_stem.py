@@ -1,14 +1,20 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Turns the weights of a pretrained stem (.npz) into OUT/NAME.onnx with all its filters, and adds
-it to OUT/manifest.yaml.
+"""Turns the weights of a pretrained network into OUT/NAME.onnx and adds its layers to OUT/manifest.yaml.
 
-The graph takes RGB 0..255; the network's preprocessing and its batch norm are folded into it.
+WEIGHTS is one of
+  .h5 .keras             Keras: ConvNeXt, EfficientNetV2, NASNet, ResNet; the stem
+  .safetensors .pth .pt  PyTorch (timm, torchvision, the authors'): the same; the stem
+  .onnx                  any whole network, cut at the tensors named by --layers
+  .npz                   arrays of a stem (tools/stems/weights.py lists the keys)
+
+The graph takes RGB 0..255; preprocessing and batch norm are inside it.
 
 Padding: the default is none, as stemvo samples a stem more densely by running it on shifted copies
 of the frame, and padding would put borders between them. "same" is what the network was trained
-with (TensorFlow's on even sizes: bottom and right only), for comparing values with the network.
-Four numbers are the pixels at the top, left, bottom and right.
+with (TensorFlow's depends on the picture's size, --size; without it: even), for comparing values
+with the network. Four numbers are the pixels at the top, left, bottom and right.
+docs/search.md has examples.
 """
 
 import _environment  # noqa: F401  starts this tool again in the environment of `make build`
@@ -19,7 +25,7 @@ import re
 import shlex
 import sys
 
-from stems import manifest, onnx_writer, weights
+from stems import exports, families, layer_list, manifest, weights
 
 
 def parse_padding(text):
@@ -30,63 +36,111 @@ def parse_padding(text):
     return tuple(int(pixels) for pixels in text.split(","))
 
 
+def parse_size(text):
+    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"expected WIDTHxHEIGHT in pixels, found {text!r}")
+    return int(match[1]), int(match[2])
+
+
+def parse_fold(text):
+    if text != "exact" and not (re.fullmatch(r"\d{1,3}", text) and int(text) >= 1):
+        raise argparse.ArgumentTypeError(f"expected exact or a number of rows, found {text!r}")
+    return text
+
+
+def parse_layers(text):
+    names = text.split(",")
+    if not all(names) or len(set(names)) != len(names) or "first" in names:
+        raise argparse.ArgumentTypeError(f"expected different names joined by commas, found {text!r}")
+    return names
+
+
 def parse_arguments(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("weights", metavar="WEIGHTS.npz", type=pathlib.Path)
-    parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True, help="created where missing")
+    parser.add_argument("weights", metavar="WEIGHTS", type=pathlib.Path)
+    parser.add_argument("--out", metavar="DIR", type=pathlib.Path, help="created where missing")
+    parser.add_argument("--list", action="store_true", help="print the layers, write nothing")
+    parser.add_argument("--layers", type=parse_layers, metavar="A,B,..", help="to export, by name (default: the stem behind its norm)")
+    parser.add_argument("--filter", type=int, metavar="K", help="export this filter only")
+    parser.add_argument("--fold", type=parse_fold, nargs="?", const="exact", metavar="ROWS",
+                        help="with --filter: a layer norm without all the other filters; exact, or cut to ROWS rows (needs --frames)")
+    parser.add_argument("--frames", type=pathlib.Path, metavar="DIR", help="PNG files to fit --fold ROWS to, and to report its error on")
+    parser.add_argument("--size", type=parse_size, metavar="WxH", help="of the pictures that \"same\" padding is for")
+    parser.add_argument("--preprocessing", choices=sorted(families.PREPROCESSING), help="what the network is fed (.onnx: needed)")
     parser.add_argument("--name", help="of the model (default: of the file)")
     parser.add_argument("--padding", type=parse_padding, default="none", help="none | same | T,L,B,R (default: none)")
-    parser.add_argument("--network", help="for the manifest (default: the name)")
-    parser.add_argument("--layer", default="stem", help="for the manifest (default: stem)")
+    parser.add_argument("--network", help="for the manifest (default: as found, else the name); a known one is held against the file")
+    parser.add_argument("--layer", default="stem", help="of an .npz, for the manifest (default: stem)")
     parser.add_argument("--licence", default="unknown", help="of the weights, for the manifest (default: unknown)")
     parser.add_argument("--default-filter", type=int, default=0)
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if not options.list and options.out is None:
+        parser.error("the following arguments are required: --out (or --list)")
+    return options
 
 
 def export(options):
-    """Writes the files; returns the manifest's entry."""
-    name = options.name or options.weights.stem
+    """Writes the files; returns the manifest's entries and what is to be said of them."""
+    name = options.name or options.weights.stem + ("" if options.filter is None else f"_filter{options.filter}")
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
         raise manifest.ManifestError(f"--name: expected letters, digits, `.`, `_` and `-`, found {name!r}")
-    stem = weights.load(options.weights, options.padding)
-    for before, after, size in zip(stem.padding[:2], stem.padding[2:], stem.kernel):
-        if max(before, after) >= size:
-            raise weights.WeightsError(f"--padding: expected less than the kernel's {size} pixels, "
-                                       f"found {max(before, after)}")
-    if not 0 <= options.default_filter < stem.filters:
-        raise weights.WeightsError(f"{options.weights}: --default-filter: expected 0 to {stem.filters - 1}, "
-                                   f"found {options.default_filter}")
+    made = exports.make(options)
+    for layer, shape in made.layers.items():
+        if not 0 <= options.default_filter < shape.filters:
+            raise weights.WeightsError(f"{options.weights}: {layer}: --default-filter: expected 0 to {shape.filters - 1}, "
+                                       f"found {options.default_filter}")
     manifest_file = options.out / "manifest.yaml"
     manifest.load(manifest_file)  # a broken one is found before anything is written
     options.out.mkdir(parents=True, exist_ok=True)
     onnx_file = options.out / f"{name}.onnx"
-    onnx_writer.write(stem, onnx_file)
-    entry = manifest.entry(name, onnx_file, stem, network=options.network or name, layer=options.layer,
-                           licence=options.licence, default_filter=options.default_filter,
-                           command=command_line(options, name))
-    manifest.add(manifest_file, entry)
-    return entry
+    onnx_file.write_bytes(made.model)
+    entries = [manifest.entry(name, onnx_file, shape, network=options.network or made.network or name, layer=layer,
+                              licence=options.licence, default_filter=options.default_filter,
+                              command=command_line(options, name), sampling=getattr(shape, "sampling", "any"))
+               for layer, shape in made.layers.items()]
+    manifest.add(manifest_file, *entries)
+    return entries, made.notes
 
 
 def command_line(options, name):
     """That makes the same file again: without folders, which differ from machine to machine."""
     padding = options.padding if isinstance(options.padding, str) else ",".join(map(str, options.padding))
     words = ["tools/export_stem.py", options.weights.name, "--out", ".", "--name", name, "--padding", padding]
+    for option, value in (("--layers", ",".join(options.layers or [])), ("--filter", options.filter), ("--fold", options.fold),
+                          ("--frames", options.fold not in (None, "exact") and options.frames.name),
+                          ("--size", options.size and "x".join(map(str, options.size))),
+                          ("--preprocessing", options.preprocessing)):
+        if value not in (None, "", False):
+            words += [option, str(value)]
     return shlex.join(words)
+
+
+def list_layers(options):
+    suffix = options.weights.suffix
+    if suffix == ".onnx":
+        return layer_list.of_graph(options.weights, options.size)
+    return layer_list.of_arrays(options.weights) if suffix == ".npz" else layer_list.of_weights(options.weights)
 
 
 def main(arguments=None):
     options = parse_arguments(arguments)
     try:
-        entry = export(options)
+        if options.list:
+            print(layer_list.text(list_layers(options)))
+            return 0
+        entries, notes = export(options)
     except (weights.WeightsError, manifest.ManifestError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except OSError as error:
         print(f"error: {error.filename}: expected to write here, found: {error.strerror}", file=sys.stderr)
         return 1
-    print(f"{options.out / entry['file']}: {entry['filters']} filters, kernel {entry['kernel']}, "
-          f"stride {entry['stride']}, padding {entry['padding']}")
+    for entry in entries:
+        print(f"{options.out / entry['file']}: {entry['network']}, {entry['layer']}: {entry['filters']} filters, "
+              f"kernel {entry['kernel']}, stride {entry['stride']}, padding {entry['padding']}")
+    for note in notes:
+        print(f"  {note}")
     return 0
 
 

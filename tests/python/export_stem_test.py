@@ -168,7 +168,7 @@ class Errors(Folder):
             damaged.write_bytes(content)
             self.expect(damaged, "damaged.npz", "expected an .npz file")
         self.expect(self.folder / "absent.npz", "found nothing")
-        self.expect(self.folder, "found another kind of file")
+        self.expect(self.folder, "found no suffix")
 
     def test_broken_manifest_is_not_overwritten(self):
         weights = self.save(random_arrays((3, 3), 2, norm="batch"))

@@ -83,7 +83,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
       {{"check", "metrics.json"}, "--against"},
-        {{"models", "x", "y"}, "y"},
+      {{"models", "x", "y"}, "y"},
       {{"benchmark", "x"}, "--out"},
   };
   for (const Misuse& misuse : cases) {

@@ -9,6 +9,7 @@ import yaml
 # In this order in the file.
 KEYS = ("name", "file", "sha256", "network", "layer", "filters", "kernel", "stride", "padding",
         "default_filter", "licence", "command")
+OPTIONAL = ("sampling",)  # any (where it is missing) or native
 _COMMENTS = {"kernel": "y, x", "padding": "top, left, bottom, right, inside the graph"}
 
 
@@ -20,14 +21,14 @@ def sha256(path):
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
 
 
-def entry(name, onnx_file, stem, *, network, layer, licence, command, default_filter=0):
-    """The entry of a stem that has been written to onnx_file."""
+def entry(name, onnx_file, stem, *, network, layer, licence, command, default_filter=0, sampling="any"):
+    """The entry of a stem (or another layer with filters, kernel, stride, padding) that has been written to onnx_file."""
     return {
         "name": name, "file": pathlib.Path(onnx_file).name, "sha256": sha256(onnx_file),
         "network": network, "layer": layer, "filters": int(stem.filters), "kernel": list(stem.kernel),
         "stride": int(stem.stride), "padding": [int(pixels) for pixels in stem.padding],
         "default_filter": int(default_filter), "licence": licence, "command": command,
-    }
+    } | ({} if sampling == "any" else {"sampling": sampling})
 
 
 def load(path):
@@ -43,22 +44,21 @@ def load(path):
     if not isinstance(models, list) or not all(isinstance(model, dict) for model in models):
         raise ManifestError(f"{path}: expected a list `models`, found {type(document).__name__}")
     for model in models:
-        if set(model) != set(KEYS):
-            odd = sorted(set(model) ^ set(KEYS), key=str)
+        odd = sorted(set(model) - set(OPTIONAL) ^ set(KEYS), key=str)
+        if odd:
             raise ManifestError(f"{path}: model {model.get('name')}: expected the keys {', '.join(KEYS)}, "
                                 f"missing or unknown: {', '.join(map(str, odd))}")
     return models
 
 
-def add(path, new_entry):
-    """Replaces the entry of the same name, or appends; the others stay as they are."""
+def add(path, *new_entries):
+    """The layers of one model: they replace the entries of its name, or are appended; the others stay as they are."""
+    name = new_entries[0]["name"]
     models = load(path)
-    names = [model["name"] for model in models]
-    if new_entry["name"] in names:
-        models[names.index(new_entry["name"])] = new_entry
-    else:
-        models.append(new_entry)
-    pathlib.Path(path).write_text(_text(models), encoding="utf-8")
+    places = [index for index, model in enumerate(models) if model["name"] == name]
+    kept = [model for model in models if model["name"] != name]
+    at = sum(model["name"] != name for model in models[:places[0]]) if places else len(kept)
+    pathlib.Path(path).write_text(_text(kept[:at] + list(new_entries) + kept[at:]), encoding="utf-8")
 
 
 def _one_line(error):
@@ -72,7 +72,7 @@ def _scalar(value):
 def _text(models):
     lines = ["models:"]
     for model in models:
-        for index, key in enumerate(KEYS):
+        for index, key in enumerate([key for key in (*KEYS, *OPTIONAL) if key in model]):
             comment = f"  # {_COMMENTS[key]}" if key in _COMMENTS else ""
             lines.append(f"{'  - ' if index == 0 else '    '}{key}: {_scalar(model[key])}{comment}")
     return "\n".join(lines) + "\n"

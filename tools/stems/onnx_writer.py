@@ -12,6 +12,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from stems import fold
 from stems import stem as stem_module
 
 # Old enough for every ONNX Runtime since 1.7: the graph needs nothing newer.
@@ -22,19 +23,24 @@ OUTPUT = "channels"
 
 
 class _Graph:
-    """Nodes in a chain, and their constants."""
+    """Nodes in a chain, and their constants. prefix: of all names but the input's."""
 
-    def __init__(self):
-        self.nodes, self.constants = [], []
+    def __init__(self, prefix=""):
+        self.nodes, self.constants, self._prefix = [], [], prefix
         self.last = INPUT
 
-    def constant(self, name, values):
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values, np.float32), name))
+    def constant(self, name, values, kind=np.float32):
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values, kind), self._prefix + name))
         return name
 
+    def integers(self, name, values):
+        return self.constant(name, values, np.int64)
+
     def add(self, kind, output, *constants, inputs=None, **attributes):
-        inputs = inputs or [self.last]
-        self.nodes.append(helper.make_node(kind, [*inputs, *constants], [output], name=output,
+        """inputs: names of earlier outputs (default: of the last one)."""
+        names = [self._prefix + name for name in (*(inputs or []), *constants)]
+        output = self._prefix + output
+        self.nodes.append(helper.make_node(kind, names if inputs else [self.last, *names], [output], name=output,
                                            **attributes))
         self.last = output
 
@@ -44,44 +50,75 @@ def _add_layer_norm(graph, layer_norm):
     LayerNormalization wants the channels last, and two transposes cost more than it saves."""
     column = (1, -1, 1, 1)
     channels = layer_norm.gamma.size
-    centred = graph.last
     graph.add("ReduceSumSquare", "power", axes=[1], keepdims=1)
     graph.add("Mul", "variance", graph.constant("one_over_channels", np.full((1, 1, 1, 1), 1.0 / channels)))
     graph.add("Add", "variance_and_epsilon", graph.constant("epsilon", np.full((1, 1, 1, 1), layer_norm.epsilon)))
     graph.add("Sqrt", "deviation")
-    graph.add("Div", "normalised", inputs=[centred, "deviation"])
+    graph.add("Div", "normalised", inputs=["convolution", "deviation"])
     if not np.all(layer_norm.gamma == 1.0):
         graph.add("Mul", "scaled", graph.constant("gamma", layer_norm.gamma.reshape(column)))
     if not np.all(layer_norm.beta == 0.0):
         graph.add("Add", "shifted", graph.constant("beta", layer_norm.beta.reshape(column)))
 
 
-def build(stem):
-    """The graph of a stem, checked by ONNX."""
+def _add_folded(graph, stem):
+    """See fold.py: one channel, divided by the length of all rows."""
+    graph.add("Conv", "rows", graph.constant("weights", stem.weights), graph.constant("bias", stem.bias),
+              kernel_shape=list(stem.kernel), strides=[stem.stride, stem.stride], pads=list(stem.padding))
+    graph.add("ReduceSumSquare", "power", axes=[1], keepdims=1)
+    graph.add("Add", "power_and_floor", graph.constant("floor", np.full((1, 1, 1, 1), stem.floor)))
+    graph.add("Sqrt", "length")
+    graph.add("Slice", "own", *(graph.integers(name, [value]) for name, value in
+                                (("from", 0), ("to", 1), ("axis", 1))), inputs=["rows"])
+    graph.add("Div", "normalised", inputs=["own", "length"])
+    graph.add("Mul", "scaled", graph.constant("gain", np.full((1, 1, 1, 1), stem.gain)))
+    graph.add("Add", "shifted", graph.constant("shift", np.full((1, 1, 1, 1), stem.shift)))
+
+
+def _add_stem(graph, stem):
     if stem.layer_norm is not None:
         stem = stem_module.fold_layer_norm_mean(stem)
     if not any(stem.padding):
         stem = stem_module.fold_mean(stem)
-
-    graph = _Graph()
     if np.any(stem.mean != 0.0):
         graph.add("Sub", "centred_image", graph.constant("mean", stem.mean.reshape(1, 3, 1, 1)))
     graph.add("Conv", "convolution", graph.constant("weights", stem.weights), graph.constant("bias", stem.bias),
               kernel_shape=list(stem.kernel), strides=[stem.stride, stem.stride], pads=list(stem.padding))
     if stem.layer_norm is not None:
         _add_layer_norm(graph, stem.layer_norm)
-    graph.nodes[-1].output[0] = OUTPUT
+
+
+def build(stem, pick=None):
+    """The graph of a stem or a FoldedStem, checked by ONNX. pick: this filter only, of all that are computed."""
+    return build_layers({OUTPUT: stem}, pick)
+
+
+def build_layers(stems, pick=None):
+    """One graph with several outputs: name -> stem."""
+    nodes, constants, outputs = [], [], []
+    for name, stem in stems.items():
+        graph = _Graph(prefix="" if len(stems) == 1 else f"{name}/")
+        (_add_folded if isinstance(stem, fold.FoldedStem) else _add_stem)(graph, stem)
+        if pick is not None:
+            graph.add("Gather", "picked", graph.integers("filter", [pick]), axis=1)
+        graph.nodes[-1].output[0] = name
+        nodes, constants = nodes + graph.nodes, constants + graph.constants
+        filters = stem.filters if pick is None else 1
+        outputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, filters, "h", "w"]))
 
     image = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, [1, 3, "H", "W"])
-    channels = helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, [1, stem.filters, "h", "w"])
-    model = helper.make_model(helper.make_graph(graph.nodes, "stem", [image], [channels], graph.constants),
+    model = helper.make_model(helper.make_graph(nodes, "stem", [image], outputs, constants),
                               opset_imports=[helper.make_opsetid("", OPSET)], producer_name="stemvo")
     model.ir_version = IR_VERSION
     onnx.checker.check_model(model)
     return model
 
 
+def to_bytes(model):
+    """The same model gives the same bytes."""
+    return model.SerializeToString(deterministic=True)
+
+
 def write(stem, path):
-    """The same stem gives the same bytes."""
     with open(path, "wb") as file:
-        file.write(build(stem).SerializeToString(deterministic=True))
+        file.write(to_bytes(build(stem)))

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""What export_stem.py writes: a model's bytes and its layers, from any kind of weights. Nothing is written here."""
+
+import dataclasses
+
+from stems import families, fold, fold_report, frames, graph_check, graph_cut, onnx_writer, pretrained, weight_files, weights
+from stems.weights import WeightsError
+
+# Fitted and judged on frames of their own, in turn.
+_FRAMES = 20
+
+
+@dataclasses.dataclass
+class Export:
+    """layers: name -> what the manifest says (filters, kernel, stride, padding, sampling)."""
+
+    model: bytes
+    layers: dict
+    network: str | None = None
+    notes: tuple = ()
+
+
+def _check_padding(stem):
+    for before, after, size in zip(stem.padding[:2], stem.padding[2:], stem.kernel):
+        if max(before, after) >= size:
+            raise WeightsError(f"--padding: expected less than the kernel's {size} pixels, found {max(before, after)}")
+
+
+def _check_filter(path, layer, filters, index):
+    if not 0 <= index < filters:
+        raise WeightsError(f"{path}: {layer}: --filter: expected 0 to {filters - 1}, found {index}")
+
+
+def _chosen(path, stems, wanted, default):
+    """The layers asked for, of name -> stem."""
+    if not wanted:
+        return {default: stems[default]}
+    for name in wanted:
+        if name not in stems:
+            raise WeightsError(f"{path}: --layers: expected {', '.join(stems)} (deeper layers need the whole network as .onnx), "
+                               f"found {name!r}")
+    return {name: stems[name] for name in wanted}
+
+
+def _stems_of(options):
+    """Name -> stem, the default layer, the network's name, notes."""
+    if options.weights.suffix == ".npz":
+        return {options.layer: weights.load(options.weights, options.padding)}, options.layer, None, ()
+    size = options.size or (2, 2)
+    found = pretrained.load(options.weights, options.padding, size, options.network, options.preprocessing)
+    notes = ()
+    if options.padding == "same" and len(set(found.trained_padding)) > 1:
+        kinds = ["even" if side % 2 == 0 else "odd" for side in size]
+        notes = (f"padding {list(found.trained_padding)} as TensorFlow pads pictures of {kinds[0]} width and {kinds[1]} height",)
+    return {layer.name: layer.stem for layer in found.layers}, found.layers[-1].name, found.network, notes
+
+
+def _fold_one(options, name, stem):
+    """The model of one filter, folded, and what it cost in accuracy."""
+    _check_filter(options.weights, name, stem.filters, options.filter)
+    if stem.layer_norm is None:
+        folded = fold.one_filter(stem, options.filter)
+    elif any(stem.padding):
+        raise WeightsError(f"{options.weights}: --fold: expected --padding none for a stem with a layer norm, found "
+                           f"{list(stem.padding)}")
+    elif options.fold == "exact":
+        folded = fold.layer_norm_filter(stem, options.filter)
+    else:
+        if options.frames is None:
+            raise WeightsError("--fold ROWS: expected --frames DIR, which says what patches look like, found none")
+        fit = [frames.read(file) for file in frames.find(options.frames, 2 * _FRAMES)[0::2]]
+        moment = fold.second_moment(stem.kernel, stem.stride, fit)
+        folded = fold.layer_norm_filter(stem, options.filter, int(options.fold), moment)
+    model = onnx_writer.build_layers({name: folded})
+    notes = [f"filter {options.filter}: {len(folded.weights)} rows instead of {stem.filters}"]
+    if options.frames is not None:
+        judged = (frames.read(file) for file in frames.find(options.frames, 2 * _FRAMES)[1::2])
+        notes.append(str(fold_report.difference(onnx_writer.build(stem), model, options.filter, judged)))
+    return model, folded, tuple(notes)
+
+
+def _of_stems(options):
+    stems, default, network, notes = _stems_of(options)
+    stems = _chosen(options.weights, stems, options.layers, default)
+    for stem in stems.values():
+        _check_padding(stem)
+    single = len(stems) == 1
+    if options.fold is not None:
+        if options.filter is None or not single:
+            raise WeightsError("--fold: expected --filter K and one layer, found "
+                               f"{'no --filter' if options.filter is None else f'{len(stems)} layers'}")
+        name, stem = next(iter(stems.items()))
+        model, folded, more = _fold_one(options, name, stem)
+        return Export(onnx_writer.to_bytes(model), {name: folded}, network, notes + more)
+    layers = stems
+    if options.filter is not None:
+        for name, stem in stems.items():
+            _check_filter(options.weights, name, stem.filters, options.filter)
+        layers = {name: fold.one_filter(dataclasses.replace(stem, layer_norm=None), options.filter) for name, stem in stems.items()}
+    # A model of one layer calls its output `channels`, as it always did.
+    named = {onnx_writer.OUTPUT: next(iter(stems.values()))} if single else stems
+    return Export(onnx_writer.to_bytes(onnx_writer.build_layers(named, options.filter)), layers, network, notes)
+
+
+def _of_graph(options):
+    if not options.layers:
+        raise WeightsError(f"{options.weights}: expected --layers (--list shows them), found none")
+    if options.preprocessing is None:
+        raise WeightsError(f"{options.weights}: expected --preprocessing, what the network is fed "
+                           f"({', '.join(families.PREPROCESSING)}), found none")
+    if options.padding != "none" or options.fold is not None:
+        raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
+    model, layers = graph_cut.cut(options.weights, graph_cut.read(options.weights), options.layers,
+                                  families.PREPROCESSING[options.preprocessing], options.size, options.filter)
+    model = graph_check.checked(options.weights, model, layers, options.size)
+    notes = tuple(f"{layer.name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
+                  f"stride {layer.stride} only" for layer in layers if layer.sampling == "native")
+    return Export(onnx_writer.to_bytes(model), {layer.name: layer for layer in layers}, None, notes)
+
+
+def make(options):
+    """Reads, checks, builds. Error: WeightsError, of one line."""
+    if options.weights.suffix not in (".npz", ".onnx", *weight_files.SUFFIXES):
+        raise WeightsError(f"{options.weights}: expected one of .npz, .onnx, {', '.join(weight_files.SUFFIXES)}, "
+                           f"found {options.weights.suffix or 'no suffix'}")
+    return _of_graph(options) if options.weights.suffix == ".onnx" else _of_stems(options)

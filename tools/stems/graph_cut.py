@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: MIT
+"""Cuts a whole network (.onnx) at named tensors: image 1x3xHxW, RGB 0..255 -> the layers asked for.
+
+Preprocessing goes in front; "same" paddings, which depend on the size of the picture, become numbers; a
+network whose pictures have their colours last gets a transposition.
+"""
+
+import dataclasses
+import difflib
+
+import numpy as np
+import onnx
+from google.protobuf.message import DecodeError
+from onnx import TensorProto, helper, numpy_helper, shape_inference
+
+from stems import onnx_writer, receptive_field
+from stems.weights import WeightsError
+
+
+@dataclasses.dataclass(frozen=True)
+class CutLayer:
+    """One output of the cut graph."""
+
+    name: str
+    filters: int
+    field: receptive_field.Field
+
+    @property
+    def kernel(self):
+        return (self.field.y.kernel, self.field.x.kernel)
+
+    @property
+    def stride(self):
+        return self.field.y.stride
+
+    @property
+    def padding(self):
+        (top, bottom), (left, right) = self.field.y.padding, self.field.x.padding
+        return (top, left, bottom, right)
+
+    @property
+    def sampling(self):
+        """Only of a single convolution is it certain that passes over a shifted frame fit together."""
+        return "any" if self.field.layers <= 1 and not self.field.whole_frame else "native"
+
+
+def read(path):
+    """The model. Errors: unreadable, not one picture in."""
+    if not path.is_file():
+        raise WeightsError(f"{path}: expected an .onnx file, found {'a folder' if path.is_dir() else 'nothing'}")
+    try:
+        model = onnx.load(path)
+        onnx.checker.check_model(model)
+    except (OSError, DecodeError, ValueError, onnx.checker.ValidationError) as error:
+        raise WeightsError(f"{path}: expected an .onnx file, found: {' '.join(str(error).split())[:200]}") from error
+    if not model.graph.node:
+        raise WeightsError(f"{path}: expected an .onnx file, found an empty graph")
+    return model
+
+
+def _image_input(path, model):
+    constants = {item.name for item in model.graph.initializer}
+    inputs = [item for item in model.graph.input if item.name not in constants]
+    shapes = [[size.dim_value if size.HasField("dim_value") else None for size in item.type.tensor_type.shape.dim]
+              for item in inputs]
+    if len(inputs) == 1 and len(shapes[0]) == 4 and 3 in (shapes[0][1], shapes[0][3]):
+        return inputs[0], shapes[0][1] != 3
+    found = ", ".join(f"{item.name} {'x'.join(str(size or '?') for size in shape)}" for item, shape in zip(inputs, shapes))
+    raise WeightsError(f"{path}: expected one input 1x3xHxW or 1xHxWx3, found {found or 'none'}")
+
+
+def _set_input(model, image, colours_last, size):
+    """size: width, height, or None for any."""
+    sides = ["H", "W"] if size is None else [size[1], size[0]]
+    shape = [1, *sides, 3] if colours_last else [1, 3, *sides]
+    index = list(model.graph.input).index(image)
+    fixed = helper.make_tensor_value_info(image.name, image.type.tensor_type.elem_type, shape)
+    model.graph.input[index].CopyFrom(fixed)
+
+
+def infer(model):
+    """Tensor -> its shape (None where unknown), after shape inference."""
+    inferred = shape_inference.infer_shapes(model, data_prop=True)
+    return {item.name: [size.dim_value if size.HasField("dim_value") else None for size in item.type.tensor_type.shape.dim]
+            for item in [*inferred.graph.value_info, *inferred.graph.output, *inferred.graph.input]}
+
+
+def _with_free_sizes(model, image, colours_last):
+    """A copy without the sizes that the exporter wrote down for its own example."""
+    copy = onnx.ModelProto()
+    copy.CopyFrom(model)
+    del copy.graph.value_info[:]
+    for output in copy.graph.output:
+        output.type.tensor_type.ClearField("shape")
+    _set_input(copy, next(item for item in copy.graph.input if item.name == image.name), colours_last, None)
+    return copy
+
+
+def _at_size(model, image, colours_last, size):
+    """A copy for pictures of one size (width, height)."""
+    copy = _with_free_sizes(model, image, colours_last)
+    _set_input(copy, next(item for item in copy.graph.input if item.name == image.name), colours_last, size)
+    return copy
+
+
+def shapes_at(path, model, size):
+    """Tensor -> shape, for pictures of one size."""
+    image, colours_last = _image_input(path, model)
+    return infer(_at_size(model, image, colours_last, size))
+
+
+def _make_paddings_numbers(model, shapes):
+    """shapes: of all tensors for one size of picture."""
+    for node in model.graph.node:
+        mode = next((item for item in node.attribute if item.name == "auto_pad"), None)
+        if mode is None or mode.s in (b"NOTSET", b""):
+            continue
+        if not any(item.name == "kernel_shape" for item in node.attribute):
+            weights = next(item for item in model.graph.initializer if item.name == node.input[1])
+            node.attribute.append(helper.make_attribute("kernel_shape", list(weights.dims[2:])))
+        pads = receptive_field.explicit_pads(node, [size or 0 for size in shapes[node.input[0]][2:]])
+        kept = [item for item in node.attribute if item.name not in ("auto_pad", "pads")]
+        del node.attribute[:]
+        node.attribute.extend([*kept, helper.make_attribute("pads", pads)])
+
+
+def _find(path, model, names):
+    """Tensors by their own name or their node's."""
+    outputs = {output: output for node in model.graph.node for output in node.output if output}
+    by_node = {node.name: node.output[0] for node in model.graph.node if node.name}
+    found = []
+    for name in names:
+        tensor = outputs.get(name) or by_node.get(name)
+        if tensor is None:
+            convolutions = [node.output[0] for node in model.graph.node if node.op_type == "Conv"]
+            near = difflib.get_close_matches(name, outputs, n=3) or convolutions[:8]
+            raise WeightsError(f"{path}: --layers: expected the network's layers (--list shows all {len(outputs)}), such as "
+                               f"{', '.join(near)}; found {name!r}")
+        found.append(tensor)
+    return found
+
+
+def _needed(graph, tensors):
+    """Nodes that the tensors depend on, in order."""
+    wanted, kept = set(tensors), []
+    for node in reversed(graph.node):
+        if wanted & set(node.output):
+            kept.append(node)
+            wanted |= set(node.input)
+            for attribute in node.attribute:
+                for inner in attribute.g.node:
+                    wanted |= set(inner.input)
+    return kept[::-1], wanted
+
+
+def _preprocessing_nodes(fed, target, colours_last):
+    """image -> target: (image - mean) / std, planes reversed for BGR."""
+    nodes, constants, last = [], [], onnx_writer.INPUT
+
+    def add(kind, *more, **attributes):
+        nonlocal last
+        output = f"stemvo_{kind.lower()}"
+        nodes.append(helper.make_node(kind, [last, *more], [output], **attributes))
+        last = output
+
+    for kind, values, neutral in (("Sub", fed.mean, 0.0), ("Div", fed.std, 1.0)):
+        if any(value != neutral for value in values):
+            name = f"stemvo_{kind.lower()}_by"
+            constants.append(numpy_helper.from_array(np.array(values, np.float32).reshape(1, 3, 1, 1), name))
+            add(kind, name)
+    if fed.takes_bgr:
+        constants.append(numpy_helper.from_array(np.array([2, 1, 0], np.int64), "stemvo_bgr"))
+        add("Gather", "stemvo_bgr", axis=1)
+    if colours_last:
+        add("Transpose", perm=[0, 2, 3, 1])
+    nodes.append(helper.make_node("Identity", [last], [target]))
+    return nodes, constants
+
+
+def _picked(nodes, constants, tensor, filter_index):
+    """Nodes that give one channel of a tensor: of a convolution's weights, else a slice behind it."""
+    name = f"{tensor}/filter_{filter_index}"
+    constants.append(numpy_helper.from_array(np.array([filter_index], np.int64), f"{name}/index"))
+    nodes.append(helper.make_node("Gather", [tensor, f"{name}/index"], [name], axis=1))
+    return name
+
+
+def cut(path, model, names, fed, size=None, filter_index=None):
+    """The cut model and its layers. size: width, height: "same" paddings are for pictures of its parity (None:
+    even at every level), and where the graph takes one size only, it is this one."""
+    image, colours_last = _image_input(path, model)
+    tensors = _find(path, model, names)
+    if image.type.tensor_type.elem_type != TensorProto.FLOAT:
+        raise WeightsError(f"{path}: expected an input of type float, found another")
+    copy = _with_free_sizes(model, image, colours_last)
+    shapes = infer(_at_size(model, image, colours_last, size or (256, 256)))
+    _make_paddings_numbers(copy, shapes)
+    nodes, wanted = _needed(copy.graph, tensors)
+    if image.name not in wanted:
+        raise WeightsError(f"{path}: {tensors[0]}: expected a layer of the picture, found one that does not depend on it")
+    body = helper.make_graph(nodes, "body", [], [], [item for item in copy.graph.initializer if item.name in wanted])
+    start = receptive_field.Field(axes=(1, 2) if colours_last else (2, 3))
+    walk = receptive_field.Walk(body, image.name, start)
+    layers, outputs = [], []
+    front, constants = _preprocessing_nodes(fed, image.name, colours_last)
+    nodes, constants = [*front, *nodes], [*constants, *body.initializer]
+    for tensor in tensors:
+        field = walk.fields.get(tensor)
+        if not isinstance(field, receptive_field.Field):
+            why = f"behind {field}" if isinstance(field, str) else "without the picture's height and width"
+            raise WeightsError(f"{path}: {tensor}: expected a layer of pictures, found one {why}")
+        output, filters = _as_output(nodes, constants, tensor, field, shapes, filter_index, path)
+        layers.append(CutLayer(output, filters, field))
+        outputs.append(helper.make_tensor_value_info(output, TensorProto.FLOAT, [1, filters, None, None]))
+    return _assembled(copy, nodes, constants, outputs), layers
+
+
+def _as_output(nodes, constants, tensor, field, shapes, filter_index, path):
+    """Name and filters of the output for a tensor: its colours second, one channel where one is asked for."""
+    shape = shapes.get(tensor) or [None] * 4
+    channel_axis = next(axis for axis in (1, 2, 3) if axis not in field.axes)
+    filters = shape[channel_axis] if len(shape) == 4 else None
+    if not filters:
+        raise WeightsError(f"{path}: {tensor}: expected a known number of filters, found none")
+    if field.axes != (2, 3):
+        nodes.append(helper.make_node("Transpose", [tensor], [f"{tensor}/planes"], perm=[0, channel_axis, *field.axes]))
+        tensor = f"{tensor}/planes"
+    if filter_index is not None:
+        if not 0 <= filter_index < filters:
+            raise WeightsError(f"{path}: {tensor}: --filter: expected 0 to {filters - 1}, found {filter_index}")
+        return _picked(nodes, constants, tensor, filter_index), 1
+    return tensor, filters
+
+
+def _assembled(model, nodes, constants, outputs):
+    image = helper.make_tensor_value_info(onnx_writer.INPUT, TensorProto.FLOAT, [1, 3, "H", "W"])
+    graph = helper.make_graph(nodes, "layers", [image], outputs, constants)
+    cut_model = helper.make_model(graph, opset_imports=model.opset_import, functions=model.functions, producer_name="stemvo")
+    cut_model.ir_version = model.ir_version
+    onnx.checker.check_model(cut_model)
+    return cut_model

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Reads the variables of Keras files: layer -> its class, and name of the variable -> dataset.
+
+Three layouts (source: keras/src/saving, keras/src/legacy/saving/legacy_h5_format.py):
+- .h5 of whole models and of the weights that keras.applications downloads: a group per layer, names as in
+  the network; the attribute `layer_names` lists all layers, also those without weights;
+- .weights.h5 of Keras 3: groups layers/CLASS, layers/CLASS_1, .. in the network's order, variables 0, 1, ..;
+- .keras: a zip of the second, with config.json that has the names.
+"""
+
+import dataclasses
+import io
+import json
+import re
+import zipfile
+
+import h5py
+
+# Order of the variables in Keras 3.
+_VARIABLES = {"conv2d": ("kernel", "bias"), "depthwise_conv2d": ("kernel", "bias"), "dense": ("kernel", "bias"),
+              "separable_conv2d": ("depthwise_kernel", "pointwise_kernel", "bias"),
+              "layer_normalization": ("gamma", "beta"),
+              "batch_normalization": ("gamma", "beta", "moving_mean", "moving_variance")}
+
+
+@dataclasses.dataclass
+class Layer:
+    name: str
+    kind: str  # class in snake case; "" where the file does not say
+    variables: dict = dataclasses.field(default_factory=dict)  # name -> h5py dataset
+
+
+def snake_case(name):
+    """As Keras names a class in files: BatchNormalization -> batch_normalization, Conv2D -> conv2d."""
+    name = re.sub(r"\W+", "", name)
+    name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub(r"([a-z])([A-Z])", r"\1_\2", name).lower()
+
+
+def _datasets(group):
+    found = []
+    group.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def _text(value):
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _read_named(group):
+    """One group per layer. A nested model's layers are found by the folder that holds their variables."""
+    layers = []
+    for name in map(_text, group.attrs["layer_names"]):
+        layer = Layer(name, "")
+        nested = {}
+        for path, dataset in _datasets(group[name]) if name in group else []:
+            *folders, variable = path.split("/")
+            owner = folders[-1] if folders else name
+            nested.setdefault(owner, Layer(owner, "")).variables[variable.split(":")[0]] = dataset
+        inner = [item for owner, item in nested.items() if owner != name and len(nested) > 1]
+        layer.variables = nested[name].variables if name in nested else {}
+        if len(nested) == 1:
+            layer.variables = next(iter(nested.values())).variables
+        layers += [layer, *inner]
+    return layers
+
+
+def _read_numbered(group, names, prefix=""):
+    """names: path in the file -> the network's name, from config.json; empty where there is none."""
+    layers = []
+    for key in group:
+        kind = re.sub(r"_\d+$", "", key)
+        path = f"{prefix}{key}"
+        layer = Layer(names.get(path, path), kind)
+        variables = group[key].get("vars", {})
+        known = _VARIABLES.get(kind, ())
+        for index in sorted(variables, key=lambda text: int(text) if text.isdigit() else 0):
+            place = int(index) if index.isdigit() else -1
+            layer.variables[known[place] if 0 <= place < len(known) else index] = variables[index]
+        layers.append(layer)
+        if "layers" in group[key]:
+            layers += _read_numbered(group[key]["layers"], names, f"{path}/")
+    return layers
+
+
+def names_in_config(config, prefix=""):
+    """Path in the weights file -> the network's name, from the list of layers in the network's order."""
+    names, counts = {}, {}
+    for item in config.get("layers", []):
+        kind = snake_case(item["class_name"])
+        number = counts.get(kind, 0)
+        counts[kind] = number + 1
+        path = f"{prefix}{kind}_{number}" if number else f"{prefix}{kind}"
+        names[path] = item["config"].get("name", path)
+        names |= names_in_config(item["config"], f"{path}/")
+    return names
+
+
+def read(path):
+    """The layers, in the network's order where the file knows it. Raises what h5py, zipfile and json raise."""
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            config = json.loads(archive.read("config.json"))["config"]
+            file = h5py.File(io.BytesIO(archive.read("model.weights.h5")), "r")
+        names = names_in_config(config)
+        order = {name: index for index, name in enumerate(names.values())}
+        return sorted(_read_numbered(file["layers"], names), key=lambda layer: order.get(layer.name, len(order)))
+    file = h5py.File(path, "r")
+    group = file.get("model_weights", file)
+    if "layer_names" in group.attrs:
+        return _read_named(group)
+    if "layers" in group:
+        return _read_numbered(group["layers"], {})
+    raise ValueError(f"groups {', '.join(list(group)[:5]) or 'none'}, not those of a Keras file")

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: MIT
+"""What `export_stem.py --list` prints: the layers of a network, their filters, and which are convolutions (used
+by the search, as in the paper's section 3.1) and which not, with the totals of its Table 1."""
+
+import dataclasses
+
+from stems import graph_cut, weight_files, weights
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    name: str
+    kind: str
+    filters: int | None  # None: the file does not say
+    used: bool
+
+
+def of_weights(path):
+    """A weights file's layers; where it holds arrays only, layers without weights are not in it."""
+    file = weight_files.load(path)
+    return [Row(layer.name, layer.kind or "no weights", layer.filters, layer.kind == "convolution") for layer in file.layers]
+
+
+def of_arrays(path):
+    """An .npz holds one stem."""
+    stem = weights.load(path, "none")
+    return [Row("stem", "convolution", stem.filters, True)]
+
+
+def of_graph(path, size):
+    """All nodes of an .onnx that give a tensor."""
+    model = graph_cut.read(path)
+    shapes = graph_cut.shapes_at(path, model, size or (256, 256))
+    rows = []
+    for node in model.graph.node:
+        if node.op_type in ("Constant", "Shape", "Identity"):
+            continue
+        shape = shapes.get(node.output[0]) or []
+        filters = shape[1] if len(shape) == 4 else shape[-1] if shape else None
+        rows.append(Row(node.output[0], node.op_type, filters, node.op_type in ("Conv", "ConvTranspose")))
+    return rows
+
+
+def text(rows):
+    """The table, and the totals."""
+    width = max((len(row.name) for row in rows), default=4)
+    lines = [f"{'layer':{width}}  {'kind':15}  filters  used"]
+    for row in rows:
+        lines.append(f"{row.name:{width}}  {row.kind:15}  {'-' if row.filters is None else row.filters:>7}  "
+                     f"{'yes' if row.used else 'no'}")
+    used = sum(row.filters or 0 for row in rows if row.used)
+    total = sum(row.filters or 0 for row in rows)
+    unknown = sum(row.filters is None for row in rows)
+    lines.append(f"layers {len(rows)}, filters {total}, used {used} (in {sum(row.used for row in rows)} convolutions), "
+                 f"not used {total - used}" + (f"; {unknown} layers whose filters the file does not say" if unknown else ""))
+    return "\n".join(lines)

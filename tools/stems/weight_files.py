@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""Weights files as layers: .h5 and .keras (Keras), .safetensors and .pth (PyTorch)."""
+
+import dataclasses
+import json
+import pickle
+import struct
+import zipfile
+import zlib
+
+import numpy as np
+
+from stems import keras_files, torch_pickle
+from stems.weights import WeightsError
+
+SUFFIXES = (".h5", ".keras", ".safetensors", ".pth", ".pt")
+# What the readers raise on damaged and foreign files.
+_BROKEN_FILE = (OSError, ValueError, EOFError, TypeError, KeyError, IndexError, AttributeError, SyntaxError, MemoryError,
+                OverflowError, NotImplementedError, RecursionError, RuntimeError, pickle.UnpicklingError, struct.error,
+                zlib.error, zipfile.BadZipFile, json.JSONDecodeError, UnicodeDecodeError)
+
+
+@dataclasses.dataclass
+class Layer:
+    """A layer with its arrays. Shapes are known at once, values are read when asked for."""
+
+    name: str
+    kind: str  # "convolution", "normalization", "dense", "other", or "" where it has no weights
+    filters: int | None  # None: no weights, so the file does not say
+    shapes: dict  # name of the array -> shape
+    read: object  # name of the array -> values
+
+
+@dataclasses.dataclass
+class WeightsFile:
+    path: object
+    source: str  # keras, torch
+    layers: list
+
+    def find(self, pattern):
+        """Layers whose whole name matches."""
+        return [layer for layer in self.layers if pattern.fullmatch(layer.name)]
+
+
+def _keras_kind(layer, shapes):
+    kernels = [name for name in shapes if name.endswith("kernel") or name == "depthwise_kernel"]
+    if any(len(shapes[name]) in (3, 4, 5) for name in kernels):
+        return "convolution"
+    if "gamma" in shapes and "kernel" not in shapes and len(shapes) > 1 or "normalization" in layer.kind:
+        return "normalization"
+    return "dense" if "kernel" in shapes else "other" if shapes else ""
+
+
+def _keras_filters(shapes):
+    if "pointwise_kernel" in shapes:
+        return shapes["pointwise_kernel"][-1]
+    kernel = next((shapes[name] for name in ("kernel", "depthwise_kernel") if name in shapes), None)
+    if kernel is None:
+        return max((shape[-1] for shape in shapes.values() if shape), default=None)
+    # A depthwise kernel is kh x kw x channels x multiplier.
+    return kernel[-2] * kernel[-1] if "depthwise_kernel" in shapes else kernel[-1]
+
+
+def _read_keras(path):
+    layers = []
+    for layer in keras_files.read(path):
+        shapes = {name: tuple(item.shape) for name, item in layer.variables.items()}
+        layers.append(Layer(layer.name.removeprefix("layers/"), _keras_kind(layer, shapes), _keras_filters(shapes), shapes,
+                            lambda name, variables=layer.variables: np.asarray(variables[name])))
+    return layers
+
+
+def _torch_kind(shapes):
+    weight = shapes.get("weight", ())
+    if len(weight) in (3, 4, 5):
+        return "convolution"
+    if len(weight) == 2:
+        return "dense"
+    return "normalization" if len(weight) == 1 else "other"
+
+
+def _group_torch(tensors):
+    """tensors: name -> (shape, reader). Prefixes of wrapped and parallel models are taken off."""
+    for prefix in ("model.", "state_dict.", "model_ema.", "module.", "model."):
+        if tensors and all(name.startswith(prefix) for name in tensors):
+            tensors = {name.removeprefix(prefix): tensor for name, tensor in tensors.items()}
+        elif prefix in ("model.", "state_dict.") and any(name.startswith(prefix) for name in tensors):
+            # Of a checkpoint with an optimiser beside the model.
+            tensors = {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
+    groups = {}
+    for name, tensor in tensors.items():
+        owner, _, array = name.rpartition(".")
+        groups.setdefault(owner or array, {})[array] = tensor
+    layers = []
+    for name, arrays in groups.items():
+        shapes = {array: shape for array, (shape, _) in arrays.items()}
+        filters = next((shape[0] for array in ("weight", *shapes) if (shape := shapes.get(array))), None)
+        layers.append(Layer(name, _torch_kind(shapes), filters, shapes, lambda array, arrays=arrays: arrays[array][1]()))
+    return layers
+
+
+def _read_pth(path):
+    tensors = torch_pickle.read(path)
+    return _group_torch({name: (tensor.shape, tensor.array) for name, tensor in tensors.items()})
+
+
+def _read_safetensors(path):
+    import safetensors
+
+    try:
+        file = safetensors.safe_open(path, framework="numpy")
+        names = list(file.keys())
+        return _group_torch({name: (tuple(file.get_slice(name).get_shape()), lambda name=name: file.get_tensor(name))
+                             for name in names})
+    except safetensors.SafetensorError as error:
+        raise ValueError(str(error)) from error
+
+
+def load(path):
+    """The layers of a file, by its suffix."""
+    readers = {".h5": ("keras", _read_keras), ".keras": ("keras", _read_keras), ".pth": ("torch", _read_pth),
+               ".pt": ("torch", _read_pth), ".safetensors": ("torch", _read_safetensors)}
+    if path.suffix not in readers:
+        raise WeightsError(f"{path}: expected one of {', '.join(SUFFIXES)}, found {path.suffix or 'no suffix'}")
+    source, read = readers[path.suffix]
+    if not path.is_file():
+        raise WeightsError(f"{path}: expected a weights file, found {'a folder' if path.is_dir() else 'nothing'}")
+    try:
+        layers = read(path)
+    except _BROKEN_FILE as error:
+        raise WeightsError(f"{path}: expected a {path.suffix} weights file, found: {_one_line(error)}") from error
+    if not any(layer.shapes for layer in layers):
+        raise WeightsError(f"{path}: expected a {path.suffix} weights file, found no arrays in it")
+    return WeightsFile(path, source, layers)
+
+
+def read_array(file, layer, name):
+    """Values as float64. Error: unreadable, or not finite numbers."""
+    try:
+        values = np.asarray(layer.read(name)).astype(np.float64)
+    except _BROKEN_FILE as error:
+        raise WeightsError(f"{file.path}: {layer.name}.{name}: cannot read: {_one_line(error)}") from error
+    if not np.all(np.isfinite(values)):
+        raise WeightsError(f"{file.path}: {layer.name}.{name}: expected finite numbers, found NaN or infinity")
+    return values
+
+
+def _one_line(error):
+    return " ".join(str(error).split()) or type(error).__name__
