@@ -26,8 +26,15 @@ int probe_output(const SamplingAxis& axis) {
 }
 
 int probe_size(const SamplingAxis& axis, int fixed) {
+  if (fixed > 0) {
+    return fixed;
+  }
   // One less than whole strides: kernel and padding show in the number of outputs.
-  return fixed > 0 ? fixed : axis.kernel + axis.before + kStrides * axis.stride - 1;
+  int size = axis.kernel + axis.before + kStrides * axis.stride - 1;
+  while (size < kSmallest) {  // the graph may compute deeper layers beside this one
+    size += axis.stride;
+  }
+  return size;
 }
 
 cv::Rect window_of(const SamplingPlan& plan, cv::Point output) {

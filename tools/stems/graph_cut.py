@@ -7,9 +7,11 @@ network whose pictures have their colours last gets a transposition.
 
 import dataclasses
 import difflib
+import tempfile
 
 import numpy as np
 import onnx
+import onnxruntime
 from google.protobuf.message import DecodeError
 from onnx import TensorProto, helper, numpy_helper, shape_inference
 
@@ -103,10 +105,31 @@ def _at_size(model, image, colours_last, size):
     return copy
 
 
-def shapes_at(path, model, size):
-    """Tensor -> shape, for pictures of one size."""
+def filters_of(shape, field):
+    """Of a tensor of four dimensions with its Field: the one that is neither y nor x."""
+    if len(shape or []) != 4:
+        return None
+    return shape[next(axis for axis in (1, 2, 3) if axis not in field.axes)]
+
+
+def layers_at(path, model, size):
+    """Node, filters of its output (None where that is no tensor of pictures or numbers), for pictures of one size."""
     image, colours_last = _image_input(path, model)
-    return infer(_at_size(model, image, colours_last, size))
+    shapes = infer(_at_size(model, image, colours_last, size))
+    copy = onnx.ModelProto()
+    copy.CopyFrom(model)
+    _make_paddings_numbers(copy, shapes)
+    walk = receptive_field.Walk(copy.graph, image.name, _start(colours_last))
+    found = []
+    for node in copy.graph.node:
+        shape, field = shapes.get(node.output[0]) or [], walk.fields.get(node.output[0])
+        plain = shape[1] if len(shape) == 4 else shape[-1] if len(shape) > 1 else None
+        found.append((node, filters_of(shape, field) if isinstance(field, receptive_field.Field) else plain))
+    return found
+
+
+def _start(colours_last):
+    return receptive_field.Field(axes=(1, 2) if colours_last else (2, 3))
 
 
 def _make_paddings_numbers(model, shapes):
@@ -185,6 +208,25 @@ def _picked(nodes, constants, tensor, filter_index):
     return name
 
 
+def _without_size_arithmetic(path, model, tensors):
+    """What a graph computes from the size of its picture (timm's "same" padding) as numbers, for a model of one size."""
+    del model.graph.output[:]
+    model.graph.output.extend(helper.make_empty_tensor_value_info(name) for name in tensors)
+    for output in model.graph.output:
+        output.type.tensor_type.elem_type = TensorProto.FLOAT
+    with tempfile.TemporaryDirectory() as folder:
+        options = onnxruntime.SessionOptions()
+        options.log_severity_level = 4
+        options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC
+        options.optimized_model_filepath = f"{folder}/constant.onnx"
+        try:
+            onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+            return onnx.load(options.optimized_model_filepath)
+        except Exception as error:  # noqa: BLE001  the runtime's own types differ between its versions
+            raise WeightsError(f"{path}: expected a graph that ONNX Runtime loads, found: "
+                               f"{' '.join(str(error).split())[:200]}") from error
+
+
 def cut(path, model, names, fed, size=None, filter_index=None):
     """The cut model and its layers. size: width, height: "same" paddings are for pictures of its parity (None:
     even at every level), and where the graph takes one size only, it is this one."""
@@ -192,6 +234,9 @@ def cut(path, model, names, fed, size=None, filter_index=None):
     tensors = _find(path, model, names)
     if image.type.tensor_type.elem_type != TensorProto.FLOAT:
         raise WeightsError(f"{path}: expected an input of type float, found another")
+    if any(node.op_type == "Shape" for node in _needed(model.graph, tensors)[0]):
+        model = _without_size_arithmetic(path, _at_size(model, image, colours_last, size or (256, 256)), tensors)
+        image = next(item for item in model.graph.input if item.name == image.name)
     copy = _with_free_sizes(model, image, colours_last)
     shapes = infer(_at_size(model, image, colours_last, size or (256, 256)))
     _make_paddings_numbers(copy, shapes)
@@ -199,8 +244,7 @@ def cut(path, model, names, fed, size=None, filter_index=None):
     if image.name not in wanted:
         raise WeightsError(f"{path}: {tensors[0]}: expected a layer of the picture, found one that does not depend on it")
     body = helper.make_graph(nodes, "body", [], [], [item for item in copy.graph.initializer if item.name in wanted])
-    start = receptive_field.Field(axes=(1, 2) if colours_last else (2, 3))
-    walk = receptive_field.Walk(body, image.name, start)
+    walk = receptive_field.Walk(body, image.name, _start(colours_last))
     layers, outputs = [], []
     front, constants = _preprocessing_nodes(fed, image.name, colours_last)
     nodes, constants = [*front, *nodes], [*constants, *body.initializer]
@@ -217,13 +261,11 @@ def cut(path, model, names, fed, size=None, filter_index=None):
 
 def _as_output(nodes, constants, tensor, field, shapes, filter_index, path):
     """Name and filters of the output for a tensor: its colours second, one channel where one is asked for."""
-    shape = shapes.get(tensor) or [None] * 4
-    channel_axis = next(axis for axis in (1, 2, 3) if axis not in field.axes)
-    filters = shape[channel_axis] if len(shape) == 4 else None
+    filters = filters_of(shapes.get(tensor), field)
     if not filters:
         raise WeightsError(f"{path}: {tensor}: expected a known number of filters, found none")
     if field.axes != (2, 3):
-        nodes.append(helper.make_node("Transpose", [tensor], [f"{tensor}/planes"], perm=[0, channel_axis, *field.axes]))
+        nodes.append(helper.make_node("Transpose", [tensor], [f"{tensor}/planes"], perm=[0, ({1, 2, 3} - set(field.axes)).pop(), *field.axes]))
         tensor = f"{tensor}/planes"
     if filter_index is not None:
         if not 0 <= filter_index < filters:

@@ -28,6 +28,7 @@ class Layer:
     name: str
     kind: str  # class in snake case; "" where the file does not say
     variables: dict = dataclasses.field(default_factory=dict)  # name -> h5py dataset
+    filters: int | None = None  # of its output, where the file has the network's configuration
 
 
 def snake_case(name):
@@ -96,19 +97,55 @@ def names_in_config(config, prefix=""):
     return names
 
 
+def _tensors_in(value):
+    """The (layer, shape) that a configuration in Keras 3's words says a layer takes."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _tensors_in(item)
+    elif isinstance(value, dict):
+        if value.get("class_name") == "__keras_tensor__":
+            yield value["config"]["keras_history"][0], value["config"]["shape"]
+        for item in value.values():
+            yield from _tensors_in(item)
+
+
+def outputs_in_config(config):
+    """Layer -> its filters, as the layers behind it say."""
+    found = {}
+    for item in config.get("layers", []):
+        for layer, shape in _tensors_in(item.get("inbound_nodes", [])):
+            found[layer] = shape[-1]
+        shape = item["config"].get("batch_shape")
+        if shape:
+            found.setdefault(item["config"]["name"], shape[-1])
+        found |= outputs_in_config(item["config"])
+    return found
+
+
+def _with_config(layers, config):
+    """All layers of the configuration, in its order, with their filters."""
+    names, outputs = names_in_config(config), outputs_in_config(config)
+    by_name = {layer.name: layer for layer in layers}
+    for path, name in names.items():
+        layer = by_name.setdefault(name, Layer(name, re.sub(r"_\d+$", "", path.split("/")[-1])))
+        layer.filters = outputs.get(name)
+    order = {name: index for index, name in enumerate(names.values())}
+    return sorted(by_name.values(), key=lambda layer: order.get(layer.name, len(order)))
+
+
 def read(path):
     """The layers, in the network's order where the file knows it. Raises what h5py, zipfile and json raise."""
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
             config = json.loads(archive.read("config.json"))["config"]
             file = h5py.File(io.BytesIO(archive.read("model.weights.h5")), "r")
-        names = names_in_config(config)
-        order = {name: index for index, name in enumerate(names.values())}
-        return sorted(_read_numbered(file["layers"], names), key=lambda layer: order.get(layer.name, len(order)))
+        return _with_config(_read_numbered(file["layers"], names_in_config(config)), config)
     file = h5py.File(path, "r")
     group = file.get("model_weights", file)
     if "layer_names" in group.attrs:
-        return _read_named(group)
+        layers = _read_named(group)
+        config = file.attrs.get("model_config")
+        return layers if config is None else _with_config(layers, json.loads(_text(config))["config"])
     if "layers" in group:
         return _read_numbered(group["layers"], {})
     raise ValueError(f"groups {', '.join(list(group)[:5]) or 'none'}, not those of a Keras file")

@@ -29,16 +29,9 @@ def of_arrays(path):
 
 def of_graph(path, size):
     """All nodes of an .onnx that give a tensor."""
-    model = graph_cut.read(path)
-    shapes = graph_cut.shapes_at(path, model, size or (256, 256))
-    rows = []
-    for node in model.graph.node:
-        if node.op_type in ("Constant", "Shape", "Identity"):
-            continue
-        shape = shapes.get(node.output[0]) or []
-        filters = shape[1] if len(shape) == 4 else shape[-1] if shape else None
-        rows.append(Row(node.output[0], node.op_type, filters, node.op_type in ("Conv", "ConvTranspose")))
-    return rows
+    return [Row(node.output[0], node.op_type, filters, node.op_type in ("Conv", "ConvTranspose"))
+            for node, filters in graph_cut.layers_at(path, graph_cut.read(path), size or (256, 256))
+            if filters is not None and node.op_type not in ("Constant", "Identity", "Shape")]
 
 
 def text(rows):

@@ -65,7 +65,7 @@ def _read_keras(path):
     layers = []
     for layer in keras_files.read(path):
         shapes = {name: tuple(item.shape) for name, item in layer.variables.items()}
-        layers.append(Layer(layer.name.removeprefix("layers/"), _keras_kind(layer, shapes), _keras_filters(shapes), shapes,
+        layers.append(Layer(layer.name.removeprefix("layers/"), _keras_kind(layer, shapes), layer.filters or _keras_filters(shapes), shapes,
                             lambda name, variables=layer.variables: np.asarray(variables[name])))
     return layers
 
