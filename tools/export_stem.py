@@ -52,7 +52,7 @@ def parse_fold(text):
 def parse_layers(text):
     names = text.split(",")
     if not all(names) or len(set(names)) != len(names) or "first" in names:
-        raise argparse.ArgumentTypeError(f"expected different names joined by commas, found {text!r}")
+        raise argparse.ArgumentTypeError(f"expected different names joined by commas (`first` is none), found {text!r}")
     return names
 
 

@@ -263,7 +263,8 @@ def _as_output(nodes, constants, tensor, field, shapes, filter_index, path):
     """Name and filters of the output for a tensor: its colours second, one channel where one is asked for."""
     filters = filters_of(shapes.get(tensor), field)
     if not filters:
-        raise WeightsError(f"{path}: {tensor}: expected a known number of filters, found none")
+        raise WeightsError(f"{path}: {tensor}: expected a known number of filters, found none (a network of a single size "
+                           f"needs its --size WxH)")
     if field.axes != (2, 3):
         nodes.append(helper.make_node("Transpose", [tensor], [f"{tensor}/planes"], perm=[0, ({1, 2, 3} - set(field.axes)).pop(), *field.axes]))
         tensor = f"{tensor}/planes"
