@@ -29,6 +29,7 @@ class Layer:
     kind: str  # class in snake case; "" where the file does not say
     variables: dict = dataclasses.field(default_factory=dict)  # name -> h5py dataset
     filters: int | None = None  # of its output, where the file has the network's configuration
+    outer: str = ""  # the nested model it is a layer of
 
 
 def snake_case(name):
@@ -57,7 +58,7 @@ def _read_named(group):
         for path, dataset in _datasets(group[name]) if name in group else []:
             *folders, variable = path.split("/")
             owner = folders[-1] if folders else name
-            nested.setdefault(owner, Layer(owner, "")).variables[variable.split(":")[0]] = dataset
+            nested.setdefault(owner, Layer(owner, "", outer=name)).variables[variable.split(":")[0]] = dataset
         inner = [item for owner, item in nested.items() if owner != name and len(nested) > 1]
         layer.variables = nested[name].variables if name in nested else {}
         if len(nested) == 1:
@@ -72,7 +73,8 @@ def _read_numbered(group, names, prefix=""):
     for key in group:
         kind = re.sub(r"_\d+$", "", key)
         path = f"{prefix}{key}"
-        layer = Layer(names.get(path, path), kind)
+        outer = prefix.rstrip("/")
+        layer = Layer(names.get(path, path), kind, outer=names.get(outer, outer))
         variables = group[key].get("vars", {})
         known = _VARIABLES.get(kind, ())
         for index in sorted(variables, key=lambda text: int(text) if text.isdigit() else 0):
@@ -127,7 +129,9 @@ def _with_config(layers, config):
     names, outputs = names_in_config(config), outputs_in_config(config)
     by_name = {layer.name: layer for layer in layers}
     for path, name in names.items():
-        layer = by_name.setdefault(name, Layer(name, re.sub(r"_\d+$", "", path.split("/")[-1])))
+        layer = by_name.setdefault(name, Layer(name, ""))
+        layer.kind = re.sub(r"_\d+$", "", path.split("/")[-1])
+        layer.outer = names.get(path.rpartition("/")[0], "")
         layer.filters = outputs.get(name)
     order = {name: index for index, name in enumerate(names.values())}
     return sorted(by_name.values(), key=lambda layer: order.get(layer.name, len(order)))

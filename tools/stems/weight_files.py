@@ -25,10 +25,11 @@ class Layer:
     """A layer with its arrays. Shapes are known at once, values are read when asked for."""
 
     name: str
-    kind: str  # "convolution", "normalization", "dense", "other", or "" where it has no weights
+    kind: str  # "convolution", "separable", "depthwise", "normalization", "dense", "other", "" where it has no weights
     filters: int | None  # None: no weights, so the file does not say
     shapes: dict  # name of the array -> shape
     read: object  # name of the array -> values
+    outer: str = ""  # Keras: the nested model it is a layer of
 
 
 @dataclasses.dataclass
@@ -42,31 +43,41 @@ class WeightsFile:
         return [layer for layer in self.layers if pattern.fullmatch(layer.name)]
 
 
+def _is_depthwise(layer, shapes):
+    """One filter per input plane. Where the file does not name the class, its kernel's last size says so."""
+    kernel = shapes.get("kernel", ())
+    return ("depthwise_kernel" in shapes or layer.kind == "depthwise_conv2d" or
+            layer.kind == "" and len(kernel) == 4 and kernel[3] == 1 and kernel[2] > 1)
+
+
 def _keras_kind(layer, shapes):
-    kernels = [name for name in shapes if name.endswith("kernel") or name == "depthwise_kernel"]
-    if any(len(shapes[name]) in (3, 4, 5) for name in kernels):
+    kernel = shapes.get("kernel", ())
+    if "pointwise_kernel" in shapes:
+        return "separable"
+    if _is_depthwise(layer, shapes):
+        return "depthwise"
+    if len(kernel) in (3, 4, 5):
         return "convolution"
-    if "gamma" in shapes and "kernel" not in shapes and len(shapes) > 1 or "normalization" in layer.kind:
+    if "normalization" in layer.kind or "gamma" in shapes and len(shapes) > 1:
         return "normalization"
-    return "dense" if "kernel" in shapes else "other" if shapes else ""
+    return "dense" if kernel else "other" if shapes else ""
 
 
-def _keras_filters(shapes):
+def _keras_filters(layer, shapes):
     if "pointwise_kernel" in shapes:
         return shapes["pointwise_kernel"][-1]
-    kernel = next((shapes[name] for name in ("kernel", "depthwise_kernel") if name in shapes), None)
-    if kernel is None:
-        return max((shape[-1] for shape in shapes.values() if shape), default=None)
-    # A depthwise kernel is kh x kw x channels x multiplier.
-    return kernel[-2] * kernel[-1] if "depthwise_kernel" in shapes else kernel[-1]
+    kernel = shapes.get("kernel", shapes.get("depthwise_kernel"))
+    if kernel:
+        return kernel[-2] * kernel[-1] if _is_depthwise(layer, shapes) else kernel[-1]
+    return max((shape[-1] for shape in shapes.values() if shape), default=None)
 
 
 def _read_keras(path):
     layers = []
     for layer in keras_files.read(path):
         shapes = {name: tuple(item.shape) for name, item in layer.variables.items()}
-        layers.append(Layer(layer.name.removeprefix("layers/"), _keras_kind(layer, shapes), layer.filters or _keras_filters(shapes), shapes,
-                            lambda name, variables=layer.variables: np.asarray(variables[name])))
+        layers.append(Layer(layer.name.removeprefix("layers/"), _keras_kind(layer, shapes), layer.filters or _keras_filters(layer, shapes), shapes,
+                            lambda name, variables=layer.variables: np.asarray(variables[name]), layer.outer))
     return layers
 
 
