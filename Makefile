@@ -2,12 +2,13 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build demo test test-frameworks format check-format lint clean
+.PHONY: help setup build demo test test-frameworks cluster format check-format lint clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
 	@echo "make test          install what is missing, build, run all tests"
+	@echo "make cluster       install Ray, for tools/search_cluster.py (make test does too)"
 	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
 	@echo "make format        rewrite the C++ sources in the project's format"
 	@echo "make check-format  fail where a source is not in that format or names no licence"
@@ -26,10 +27,14 @@ demo: build
 	@tools/demo.sh
 
 test: build
+	@tools/setup.sh cluster || echo "==> Without Ray: the test of the cluster is skipped"
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running all tests"
 	@ctest --preset release --parallel $(JOBS)
+
+cluster: setup
+	@tools/setup.sh cluster
 
 test-frameworks: setup
 	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py

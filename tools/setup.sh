@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, a Python environment.
-# Safe to repeat; takes about a second when nothing is missing. Called by `make build`.
+# Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -110,21 +110,23 @@ pip_failed() { # pip_failed WHAT LOG
   die "pip could not fetch $1: $(grep -m1 -E '^ *ERROR' "$2" || echo unknown) (log: $2)"
 }
 
+# make_venv FOLDER LOG REQUIREMENTS..
 make_venv() {
-  local python wanted files=(tools/requirements.txt tools/requirements-format.txt)
+  local venv=$1 log=$2 python wanted
+  shift 2
   # The path is part of it because scripts of an environment hold it.
-  wanted="$PWD $(cat "${files[@]}" | sha256sum)"
-  if [[ -f $VENV/stamp && "$(<"$VENV/stamp")" == "$wanted" ]] && "$VENV/bin/python" -c '' 2>/dev/null; then
+  wanted="$PWD $(cat "$@" | sha256sum)"
+  if [[ -f $venv/stamp && "$(<"$venv/stamp")" == "$wanted" ]] && "$venv/bin/python" -c '' 2>/dev/null; then
     return
   fi
   python=$(find_python)
-  say "Making the Python environment $VENV (log: $LOGS/venv.log)"
-  rm -rf "$VENV"
-  "$python" -m venv "$VENV" >"$LOGS/venv.log" 2>&1 || die "'$python -m venv $VENV' failed (log: $LOGS/venv.log)"
-  "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input --only-binary=:all: \
-    --require-hashes "${files[@]/#/--requirement=}" </dev/null >>"$LOGS/venv.log" 2>&1 ||
-    pip_failed "the Python packages" "$LOGS/venv.log"
-  echo "$wanted" >"$VENV/stamp"
+  say "Making the Python environment $venv (log: $log)"
+  rm -rf "$venv"
+  "$python" -m venv "$venv" >"$log" 2>&1 || die "'$python -m venv $venv' failed (log: $log)"
+  "$venv/bin/python" -m pip install --disable-pip-version-check --no-input --only-binary=:all: \
+    --require-hashes "${@/#/--requirement=}" </dev/null >>"$log" 2>&1 ||
+    pip_failed "the Python packages" "$log"
+  echo "$wanted" >"$venv/stamp"
 }
 
 # Only the library inside the wheel is used, so one Python tag serves every Python.
@@ -156,10 +158,17 @@ install_onnxruntime() {
   mv "$ORT_DIR/SHA256SUMS.new" "$stamp"
 }
 
+# Ray, for searches on a cluster and their test: an environment of its own, which nothing else needs.
+if [[ "${1:-}" == cluster ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-ray "$LOGS/venv-ray.log" tools/requirements-ray.txt
+  exit
+fi
+
 mkdir -p "$LOGS" "$ORT_DIR" 2>/dev/null && [[ -w $LOGS && -w $ORT_DIR ]] ||
   die "$PWD/build and $PWD/$ORT_DIR must be writable: they may belong to root from an earlier 'sudo make'"
 check_system
 install_packages
 check_toolchain
-make_venv
+make_venv "$VENV" "$LOGS/venv.log" tools/requirements.txt tools/requirements-format.txt
 install_onnxruntime

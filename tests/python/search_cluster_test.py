@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""tools/search_cluster.py on several local Ray nodes, one of which is killed: the table is that of one machine."""
+
+import pathlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+import _environment  # noqa: E402,F401
+
+import numpy as np  # noqa: E402
+
+from stems import onnx_writer, manifest  # noqa: E402
+from stems import stem as stem_module  # noqa: E402
+
+PROGRAM = os.environ.get("STEMVO_PROGRAM", str(ROOT / "build/release/stemvo"))
+RAY = ROOT / "build/venv-ray/bin/python"
+
+
+def write_model(folder):
+    """Two layers of random filters, smoothed so that most of them can be tracked."""
+    rng = np.random.default_rng(3)
+    stems = {}
+    for name, filters in (("coarse", 5), ("fine", 4)):
+        weights = rng.normal(size=(filters, 3, 4, 4)) / 40 + rng.normal(size=(filters, 1, 1, 1)) / 10
+        stems[name] = stem_module.Stem(weights, np.zeros(filters), 4 if name == "coarse" else 2)
+    file = folder / "two.onnx"
+    file.write_bytes(onnx_writer.to_bytes(onnx_writer.build_layers(stems)))
+    manifest.add(folder / "manifest.yaml", *(manifest.entry("two", file, stem, network="random", layer=name, licence="MIT", command="test")
+                                             for name, stem in stems.items()))
+    return file
+
+
+class Nodes:
+    """A cluster of a head that runs nothing, a node of 1 processor and one of 2."""
+
+    def __enter__(self):
+        environment = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
+        self._process = subprocess.Popen([RAY, ROOT / "tests/python/ray_nodes.py"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                         stderr=subprocess.DEVNULL, text=True, env=environment)
+        self.address = self._process.stdout.readline().strip()
+        return self
+
+    def say(self, word):
+        self._process.stdin.write(word + "\n")
+        self._process.stdin.flush()
+
+    def kill(self):
+        self.say("kill")
+        return self._process.stdout.readline().strip()
+
+    def __exit__(self, *_error):
+        try:
+            self.say("stop")
+            self._process.wait(30)
+        except (OSError, subprocess.TimeoutExpired):
+            self._process.kill()
+            self._process.wait()
+        self._process.stdin.close()
+        self._process.stdout.close()
+
+
+@unittest.skipUnless(os.access(RAY, os.X_OK), "Ray is not installed (make cluster)")
+class SearchCluster(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.model = write_model(cls.folder)
+        subprocess.run([PROGRAM, "synth", cls.folder / "drive", "--frames", "14", "--width", "620", "--height", "188"], check=True, capture_output=True)
+        cls.what = [str(cls.folder / "drive/sequences/00"), "--model", str(cls.model)]
+
+    def cluster(self, *options):
+        return [RAY, ROOT / "tools/search_cluster.py", *self.what, "--program", PROGRAM, *map(str, options)]
+
+    def test_a_killed_node_changes_nothing(self):
+        subprocess.run([PROGRAM, "search", *self.what, "--exhaustive", "--out", self.folder / "single", "--quiet"], check=True)
+        out = self.folder / "cluster"
+        with Nodes() as nodes:
+            self.assertRegex(nodes.address, r":\d+$")
+            search = subprocess.Popen(self.cluster("--out", out, "--address", nodes.address, "--filters-per-task", 1, "--quiet"),
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            deadline = time.monotonic() + 120
+            while not list((out / "parts").glob("part*")):
+                self.assertIsNone(search.poll(), search.stderr.read() if search.poll() is not None else "")
+                self.assertLess(time.monotonic(), deadline)
+                time.sleep(0.02)
+            self.assertEqual(nodes.kill(), "killed")
+            said, complaints = search.communicate(timeout=300)
+        self.assertEqual(search.returncode, 0, complaints)
+        tasks, repeated = re.search(r"tasks: (\d+) run on \d+ nodes in \S+ s, (\d+) repeated, 0 from before", said).groups()
+        self.assertEqual(int(tasks), 9)
+        self.assertGreaterEqual(int(repeated), 1, "the killed node was idle")
+        single, merged = (self.folder / "single/filters.csv").read_bytes(), (out / "result/filters.csv").read_bytes()
+        self.assertEqual(single, merged)
+        self.assertEqual(len(single.splitlines()), 1 + 9 + 4)
+        self.assertIn(b",ranked,", single)
+        self.go_on(out)
+
+    def go_on(self, out):
+        """Parts that are done are not run again; another search is refused."""
+        before = (out / "result/filters.csv").read_bytes()
+        for part in ("part00003", "part00007"):
+            for file in (out / "parts" / part).iterdir():
+                file.unlink()
+            (out / "parts" / part).rmdir()
+        (out / "result").rename(out / "before")
+        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--quiet", "--resume"), capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("tasks: 2 run on 1 nodes", done.stdout)
+        self.assertEqual((out / "result/filters.csv").read_bytes(), before)
+        for options, message in ((("--filters-per-task", 1), "found a search (--resume goes on with it)"),
+                                 (("--filters-per-task", 1, "--frames", "0:12", "--resume"), "found others")):
+            done = subprocess.run(self.cluster("--out", out, *options), capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn(message, done.stderr)
+
+    def test_errors(self):
+        (self.folder / "text.onnx").write_text("text")
+        cases = ((("--layers", "coarse,top"), "--layers: expected coarse, fine of"), (("--filters", "0:5"), "inside 0:4 of"),
+                 (("--model", "nope"), "--model: expected default or the path of an .onnx, found 'nope'"),
+                 (("--model", self.folder / "text.onnx"), "expected an entry with 'file: text.onnx'"),
+                 (("--program", self.folder / "none"), "expected the program stemvo"),
+                 (("--address", "127.0.0.1:1"), "expected a Ray cluster"))
+        for options, message in cases:
+            done = subprocess.run(self.cluster("--out", self.folder / "none", *options), capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn(message, done.stderr)
+
+    def test_what_the_program_refuses_is_said_once(self):
+        done = subprocess.run(self.cluster("--out", self.folder / "refused", "--quiet", "--set", "stem.filtre=3"), capture_output=True,
+                              text=True, check=False)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("stem.filtre", done.stderr.splitlines()[-1])
+
+
+if __name__ == "__main__":
+    unittest.main()

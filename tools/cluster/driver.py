@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Gives the tasks to Ray, repeats those of lost workers, and writes the parts that come back."""
+
+import collections
+import dataclasses
+import os
+import socket
+import sys
+import time
+
+import ray
+
+from cluster import worker
+from cluster.plan import ClusterError
+
+
+@dataclasses.dataclass
+class Options:
+    program: str
+    common: list  # arguments of every task
+    model_files: dict  # model -> files to send along (name -> bytes); none for a model of the program's own
+    threads: int = 1
+    retries: int = 3
+    patience_s: float = 120.0
+    quiet: bool = False
+
+
+@dataclasses.dataclass
+class Outcome:
+    tasks: int = 0
+    repeated: int = 0
+    filters: int = 0
+    nodes: set = dataclasses.field(default_factory=set)
+    seconds: float = 0.0
+
+
+def _arguments(task, options):
+    files = options.model_files.get(task.model, {})
+    onnx = next((name for name in files if name.endswith(".onnx")), None)
+    words = task.arguments()
+    if onnx:
+        words[1] = "{folder}/" + onnx
+    return [*options.common, *words], files
+
+
+class _Queue:
+    """Tasks waiting, running and done. No more are with Ray than its processors can take, so that little is asked
+    for again when a worker is lost."""
+
+    def __init__(self, tasks, options, keep):
+        self._waiting = collections.deque(tasks)
+        self._running = {}  # Ray's reference -> task
+        self._tries = collections.Counter()
+        self._options, self._keep = options, keep
+        self._sent = {model: ray.put(files) for model, files in options.model_files.items()}
+        self._remote = ray.remote(num_cpus=options.threads, max_retries=0)(_run_here)
+        self._total = len(tasks)
+        self._last_room = time.monotonic()
+        self.outcome = Outcome()
+
+    def run(self):
+        start = time.monotonic()
+        while self._waiting or self._running:
+            self._submit()
+            ready, _ = ray.wait(list(self._running), timeout=1.0) if self._running else (time.sleep(0.5) or [], [])
+            for reference in ready:
+                self._collect(reference, self._running.pop(reference))
+            self.outcome.seconds = time.monotonic() - start
+        return self.outcome
+
+    def _slots(self):
+        return int(sum(node["Resources"].get("CPU", 0) // self._options.threads for node in ray.nodes() if node["Alive"]))
+
+    def _submit(self):
+        slots = self._slots()
+        now = time.monotonic()
+        if slots > 0:
+            self._last_room = now
+        elif now - self._last_room > self._options.patience_s:
+            raise ClusterError(f"expected a node with {self._options.threads} free processors, found none for "
+                               f"{self._options.patience_s:.0f} s; what is done is kept, --resume goes on")
+        while self._waiting and len(self._running) < slots:
+            task = self._waiting.popleft()
+            arguments, _ = _arguments(task, self._options)
+            files = self._sent.get(task.model, {})
+            reference = self._remote.remote(self._options.program, arguments, files, self._options.threads)
+            self._running[reference] = task
+
+    def _collect(self, reference, task):
+        try:
+            node, files = ray.get(reference)
+        except ray.exceptions.RayTaskError as error:
+            if isinstance(error.cause, worker.TaskFailed) or "TaskFailed" in type(error.cause).__name__:
+                raise ClusterError(str(error.cause)) from error
+            return self._again(task, error.cause)
+        except ray.exceptions.RayError as error:
+            return self._again(task, error)
+        self._keep(task, files)
+        self.outcome.tasks += 1
+        self.outcome.filters += task.filters
+        self.outcome.nodes.add(node)
+        return self._say(f"{task.name}: {task.layer} {task.first}:{task.last} done on {node}")
+
+    def _again(self, task, why):
+        self._tries[task.name] += 1
+        self.outcome.repeated += 1
+        reason = (" ".join(str(why).split()) or type(why).__name__)[:120]
+        if self._tries[task.name] > self._options.retries:
+            raise ClusterError(f"{task.name} ({task.layer} {task.first}:{task.last}): lost {self._tries[task.name]} times, at last: "
+                               f"{reason}; what is done is kept, --resume goes on")
+        self._waiting.appendleft(task)
+        return self._say(f"{task.name}: lost ({reason}), again")
+
+    def _say(self, text):
+        if not self._options.quiet:
+            done = self.outcome
+            rate = done.filters / done.seconds if done.seconds > 0 else 0.0
+            print(f"[{done.tasks}/{self._total}] {text}; {rate:.2f} filters/s", file=sys.stderr, flush=True)
+
+
+def _run_here(program, arguments, files, threads):
+    return ray.get_runtime_context().get_node_id()[:8], worker.run_task(program, arguments, files, threads)
+
+
+def run(tasks, options, keep):
+    """keep(task, files) is called for each part as it comes. Errors: the program refused a task, or a task was lost too
+    often, or no node is left."""
+    ray.cloudpickle.register_pickle_by_value(worker)
+    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    return _Queue(tasks, options, keep).run()
+
+
+def _check_listening(address):
+    """Ray itself waits for minutes for a cluster that is not there."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=10).close()
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"--address: expected a Ray cluster at HOST:PORT, found none at {address}: {error}") from error
+
+
+def connect(address):
+    """address: of a cluster, `auto` for the one this machine belongs to, or None: this machine alone."""
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    if address not in (None, "auto"):
+        _check_listening(address)
+    try:
+        ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR", include_dashboard=None if address else False)
+    except (ConnectionError, RuntimeError, ValueError, TimeoutError) as error:
+        raise ClusterError(f"--address {address}: expected a Ray cluster, found: {' '.join(str(error).split())[:200]}") from error

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Cuts a search into tasks: a layer's filters A to B-1 over all sequences."""
+
+import dataclasses
+import hashlib
+import json
+import pathlib
+
+import yaml
+
+
+class ClusterError(Exception):
+    """One line for the user."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Task:
+    name: str  # also of its folder
+    model: str
+    layer: str
+    first: int
+    last: int  # behind the last one
+    baselines: bool  # the rows of ORB on gray and of R, G, B come with this task
+
+    @property
+    def filters(self):
+        return self.last - self.first
+
+    def arguments(self):
+        """For `stemvo search`."""
+        words = ["--model", self.model, "--layers", self.layer, "--filters", f"{self.first}:{self.last}", "--exhaustive"]
+        return words if self.baselines else [*words, "--no-baselines"]
+
+
+def _entries(manifest):
+    try:
+        models = yaml.safe_load(manifest.read_text(encoding="utf-8"))["models"]
+        return [(entry["name"], entry["file"], entry["layer"], int(entry["filters"])) for entry in models]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise ClusterError(f"{manifest}: expected a manifest of models, found: {' '.join(str(error).split())}") from error
+
+
+def layers_of(model, models_dir):
+    """(layer, filters) of a model: its name in models_dir, or the path of an .onnx."""
+    if model.endswith(".onnx"):
+        file = pathlib.Path(model)
+        if not file.is_file():
+            raise ClusterError(f"{file}: no such file")
+        found = [(layer, filters) for _, name, layer, filters in _entries(file.parent / "manifest.yaml") if name == file.name]
+        known = f"an entry with 'file: {file.name}'"
+    else:
+        entries = _entries(models_dir / "manifest.yaml")
+        found = [(layer, filters) for name, _, layer, filters in entries if name == model]
+        known = f"{', '.join(sorted({entry[0] for entry in entries}))} or the path of an .onnx"
+    if not found:
+        raise ClusterError(f"--model: expected {known}, found '{model}'")
+    return found
+
+
+def _chosen(model, layers, wanted):
+    known = [layer for layer, _ in layers]
+    for layer in wanted or []:
+        if layer not in known:
+            raise ClusterError(f"--layers: expected {', '.join(known)} of {model}, found '{layer}'")
+    return [(layer, filters) for layer, filters in layers if not wanted or layer in wanted]
+
+
+def tasks_of(models, models_dir, layers=None, filters=None, per_task=32):
+    """All tasks, in order. filters: (A, B) of each layer, or None. Errors: unknown model or layer, filters outside."""
+    tasks = []
+    for model in models:
+        for layer, count in _chosen(model, layers_of(model, models_dir), layers):
+            first, last = filters or (0, count)
+            if not 0 <= first < last <= count:
+                raise ClusterError(f"--filters: expected filters inside 0:{count} of {model} layer {layer}, found {first}:{last}")
+            for start in range(first, last, per_task):
+                tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last), not tasks))
+    return tasks
+
+
+def fingerprint(tasks, arguments):
+    """Of everything that says what the tasks do, so that another search is not taken for this one."""
+    text = json.dumps([[dataclasses.astuple(task) for task in tasks], arguments])
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""`stemvo search --exhaustive` on a Ray cluster: cut into tasks, run on all nodes, merged.
+
+The table is that of one machine, byte for byte, also where workers are lost: their tasks are run again.
+Without --address this machine alone is the cluster; `--address auto` is the cluster that this machine joined with
+`ray start`. Each node needs Ray and the program (the same build), and the sequences at the same path; the models are
+sent along, the parts come back over Ray. docs/search.md tells more.
+"""
+
+import argparse
+import dataclasses
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+_RAY_PYTHON = ROOT / "build" / "venv-ray" / "bin" / "python"
+
+
+def _enter_ray():
+    """Any Python that has Ray will do (a cluster's own); else the one that `make cluster` made."""
+    try:
+        import ray  # noqa: F401
+    except ImportError:
+        if pathlib.Path(sys.prefix).resolve() == _RAY_PYTHON.parent.parent.resolve() or not os.access(_RAY_PYTHON, os.X_OK):
+            sys.exit("error: expected the Python package ray, found none: run `make cluster`, or pip install ray")
+        os.execv(_RAY_PYTHON, [str(_RAY_PYTHON), *sys.orig_argv[1:]])
+
+
+os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would report its use over the network
+_enter_ray()
+
+from cluster import driver, plan  # noqa: E402
+from cluster.plan import ClusterError  # noqa: E402
+
+
+def parse_range(text):
+    match = re.fullmatch(r"(\d{1,6}):(\d{1,6})", text)
+    if not match or int(match[1]) >= int(match[2]):
+        raise argparse.ArgumentTypeError(f"expected A:B with A < B, found {text!r}")
+    return int(match[1]), int(match[2])
+
+
+def positive(text):
+    if not re.fullmatch(r"[1-9]\d{0,5}", text):
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 1, found {text!r}")
+    return int(text)
+
+
+def parse_arguments(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sequences", metavar="SEQUENCE_DIR", nargs="+", type=pathlib.Path)
+    parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True)
+    parser.add_argument("--model", action="append", dest="models", help="name or path of an .onnx; may be repeated (default: default)")
+    parser.add_argument("--layers", type=lambda text: text.split(","), metavar="NAME,..", help="of the models (default: all)")
+    parser.add_argument("--filters", type=parse_range, metavar="A:B", help="of each layer (default: all)")
+    parser.add_argument("--frames", type=parse_range, metavar="A:B", help="of each sequence")
+    parser.add_argument("--held-out", type=pathlib.Path, metavar="DIR", help="a sequence that is reported, not ranked by")
+    parser.add_argument("--held-out-frames", type=parse_range, metavar="A:B")
+    parser.add_argument("--config", type=pathlib.Path, metavar="FILE", help="as of stemvo search; read on each node")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as of stemvo search")
+    parser.add_argument("--address", help="of a Ray cluster, or auto (default: this machine alone)")
+    parser.add_argument("--filters-per-task", type=positive, default=32, metavar="N", help="what a lost worker may lose (default: %(default)s)")
+    parser.add_argument("--threads", type=positive, default=1, metavar="N", help="processors of a task (default: %(default)s)")
+    parser.add_argument("--retries", type=int, default=3, metavar="N", help="of a task whose worker is lost (default: %(default)s)")
+    parser.add_argument("--patience", type=float, default=120.0, metavar="S", help="seconds without any node before giving up (default: %(default)s)")
+    parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/stemvo", help="on each node (default: %(default)s)")
+    parser.add_argument("--resume", action="store_true", help="go on with the search in --out")
+    parser.add_argument("--quiet", action="store_true", help="no progress")
+    return parser.parse_args(arguments)
+
+
+def common_arguments(options):
+    """Of every task. Paths are absolute: a task runs in another folder, maybe on another machine."""
+    words = [str(path.resolve()) for path in options.sequences]
+    for name, value in (("--frames", options.frames), ("--held-out", options.held_out), ("--held-out-frames", options.held_out_frames),
+                        ("--config", options.config)):
+        if value is not None:
+            words += [name, f"{value[0]}:{value[1]}" if isinstance(value, tuple) else str(value.resolve())]
+    for value in options.set:
+        words += ["--set", value]
+    return words
+
+
+def model_files(models):
+    """The .onnx and manifest of models given by path."""
+    found = {}
+    for model in models:
+        if model.endswith(".onnx"):
+            file = pathlib.Path(model)
+            found[model] = {file.name: file.read_bytes(), "manifest.yaml": (file.parent / "manifest.yaml").read_bytes()}
+    return found
+
+
+class Parts:
+    """OUT/parts: a folder per task that is done, and plan.json, which says what the tasks are."""
+
+    def __init__(self, out, tasks, fingerprint, resume):
+        """Refuses a folder with parts of another search, or of this one without --resume. Writes nothing."""
+        self.folder, self._plan_file = out / "parts", out / "plan.json"
+        self._content = {"fingerprint": fingerprint, "tasks": [dataclasses.asdict(task) for task in tasks]}
+        if self._plan_file.exists() and any(self.folder.glob("part*")):
+            if not resume:
+                raise ClusterError(f"{out}: expected an empty folder, found a search (--resume goes on with it)")
+            if json.loads(self._plan_file.read_text(encoding="utf-8")).get("fingerprint") != fingerprint:
+                raise ClusterError(f"{out}: --resume: expected the same models, filters, sequences and options, found others")
+
+    def begin(self):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._plan_file.write_text(json.dumps(self._content, indent=1) + "\n", encoding="utf-8")
+
+    def path(self, task):
+        return self.folder / task.name
+
+    def is_done(self, task):
+        return self.path(task).is_dir()
+
+    def keep(self, task, files):
+        """Appears whole or not at all."""
+        partial = self.folder / f".{task.name}.partial"
+        partial.mkdir(exist_ok=True)
+        for name, content in files.items():
+            (partial / name).write_bytes(content)
+        partial.rename(self.path(task))
+
+
+def merge(options, parts, tasks):
+    command = [options.program, "search", "--merge", *(parts.path(task) for task in tasks), "--out", options.out / "result"]
+    done = subprocess.run([str(word) for word in [*command, *(["--quiet"] if options.quiet else [])]], check=False)
+    if done.returncode != 0:
+        raise ClusterError(f"{options.program} search --merge ended with exit code {done.returncode}")
+
+
+def search(options):
+    models = options.models or ["default"]
+    if not os.access(options.program, os.X_OK):
+        raise ClusterError(f"--program: expected the program stemvo (make build), found none at {options.program}")
+    models_dir = ROOT / "models"
+    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task)
+    common = common_arguments(options)
+    files = model_files(models)
+    contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]
+    parts = Parts(options.out, tasks, plan.fingerprint(tasks, [common, contents]), options.resume)
+    waiting = [task for task in tasks if not parts.is_done(task)]
+    outcome = driver.Outcome()
+    if waiting:
+        driver.connect(options.address)
+        parts.begin()
+        outcome = driver.run(waiting, driver.Options(str(options.program.resolve()), common, files, options.threads, options.retries,
+                                                     options.patience, options.quiet), parts.keep)
+    merge(options, parts, tasks)
+    print(f"tasks: {outcome.tasks} run on {len(outcome.nodes)} nodes in {outcome.seconds:.1f} s, {outcome.repeated} repeated, "
+          f"{len(tasks) - len(waiting)} from before\ntable: {options.out / 'result' / 'filters.csv'}")
+
+
+def hash_of(content):
+    import hashlib
+
+    return hashlib.sha256(content).hexdigest()
+
+
+def main(arguments=None):
+    options = parse_arguments(arguments)
+    try:
+        search(options)
+    except ClusterError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted; what is done is kept, --resume goes on from there", file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
