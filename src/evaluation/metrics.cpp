@@ -95,11 +95,12 @@ std::size_t segment_end(std::span<const double> distances, std::size_t first, do
 /// t_rel and r_rel: mean over all segments of all lengths, each divided by its nominal length.
 void add_segment_errors(std::span<const Rigid3> estimate,
                         std::span<const Rigid3> ground_truth,
+                        std::size_t first_frame_step,
                         Metrics& metrics) {
   const std::vector<double> distances = distances_m(ground_truth);
   double t_sum = 0.0;
   double r_sum_rad_per_m = 0.0;
-  for (std::size_t first = 0; first < ground_truth.size(); first += kFirstFrameStep) {
+  for (std::size_t first = 0; first < ground_truth.size(); first += first_frame_step) {
     for (const double length_m : metrics.segment_lengths_m) {
       const std::size_t last = segment_end(distances, first, length_m);
       if (last == distances.size()) {
@@ -153,13 +154,29 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   metrics.average_offset_m = average_offset_m(est, truth);
   metrics.null_offset_m = average_offset_m(Trajectory(truth.size()), truth);
   metrics.segment_lengths_m = segment_lengths(options, metrics.path_length_m);
-  add_segment_errors(est, truth, metrics);
+  add_segment_errors(est, truth, kFirstFrameStep, metrics);
   metrics.ate_rmse.none_m = position_rmse_m(est, truth);
   metrics.ate_rmse.scale_m = position_rmse_m(align(est, truth, Alignment::kScale), truth);
   metrics.ate_rmse.se3_m = position_rmse_m(align(est, truth, Alignment::kSe3), truth);
   metrics.ate_rmse.sim3_m = position_rmse_m(align(est, truth, Alignment::kSim3), truth);
   metrics.rpe_rotation_deg = mean_rotation_error_deg(est, truth);
   return metrics;
+}
+
+std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
+                                          std::span<const Rigid3> ground_truth,
+                                          std::span<const double> path_shares) {
+  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
+  STEMVO_CHECK(!estimate.empty(), "at least one pose");
+  const double path_length_m = distances_m(ground_truth).back();
+  Metrics metrics;
+  for (const double share : path_shares) {
+    if (share * path_length_m > 0.0) {
+      metrics.segment_lengths_m.push_back(share * path_length_m);
+    }
+  }
+  add_segment_errors(estimate, ground_truth, 1, metrics);
+  return metrics.t_rel_percent;
 }
 
 Metrics evaluate_aligned(std::span<const Rigid3> estimate,

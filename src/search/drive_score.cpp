@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kLeastTracked = 0.5;
 constexpr std::size_t kMostPathPoints = 400;
+/// Of the path so far; chosen among prefixes of clips (docs/search.md).
+constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
 
 double to_deg(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
 
@@ -33,17 +35,6 @@ void add_changes(std::span<const Rigid3> trajectory, DriveScore& score) {
   const auto num_steps = static_cast<double>(std::max<std::size_t>(trajectory.size(), 2) - 1);
   score.translation_change_m = translation_m / num_steps;
   score.rotation_change_deg = to_deg(rotation_rad) / num_steps;
-}
-
-/// For halving, on too few frames for a t_rel.
-double step_error_percent(std::span<const Rigid3> trajectory, std::span<const Rigid3> truth) {
-  double sum = 0.0;
-  for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    const Rigid3 estimated = trajectory[i - 1].inverse() * trajectory[i];
-    const Rigid3 true_step = truth[i - 1].inverse() * truth[i];
-    sum += (true_step.inverse() * estimated).angle_rad();
-  }
-  return 100.0 * sum / static_cast<double>(std::max<std::size_t>(trajectory.size(), 2) - 1);
 }
 
 /// Evenly spaced, first and last included, to the centimetre.
@@ -113,7 +104,8 @@ DriveScore FilterDrive::score(const std::string& sequence,
   score.mean_inliers = static_cast<double>(num_inliers_) / num_steps;
   score.tracked_fraction = static_cast<double>(num_measured_) / num_steps;
   add_changes(trajectory, score);
-  score.step_error_percent = step_error_percent(trajectory, so_far);
+  // A standing start has no segments: nothing is known against the filter.
+  score.early_error_percent = dense_t_rel_percent(trajectory, so_far, kEarlyShares).value_or(0.0);
   score.path = path_of(trajectory);
   score.is_detected = num_frames() == 1 || score.tracked_fraction >= kLeastTracked;
   if (!score.is_detected) {

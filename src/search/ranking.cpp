@@ -59,7 +59,7 @@ std::tuple<int, double, double> order_of(const FilterRow& row) {
     case FilterStatus::kRanked:
       return {0, mean.t_rel_percent.value_or(kWorst), mean.r_rel_deg_per_100m.value_or(kWorst)};
     case FilterStatus::kStopped:
-      return {1, -row.rung, mean.step_error_percent};
+      return {1, -row.rung, mean.early_error_percent};
     default:
       return {2, 0.0, 0.0};
   }
@@ -83,7 +83,7 @@ MeanScore mean_score(const std::vector<DriveScore>& drives) {
     mean.rotation_change_deg += drive.rotation_change_deg / count;
     mean.mean_inliers += drive.mean_inliers / count;
     mean.tracked_fraction += drive.tracked_fraction / count;
-    mean.step_error_percent += drive.step_error_percent / count;
+    mean.early_error_percent += drive.early_error_percent / count;
     mean.num_frames += drive.num_frames;
   }
   return mean;
@@ -117,7 +117,7 @@ std::vector<FilterRow> rank_filters(std::span<const Record> records, std::size_t
 std::vector<FilterKey> choose_survivors(std::vector<const Record*> records, std::size_t count) {
   const auto order = [](const Record& record) {
     return std::pair(all_detected(record.drives) ? 0 : 1,
-                     mean_score(record.drives).step_error_percent);
+                     mean_score(record.drives).early_error_percent);
   };
   std::sort(records.begin(), records.end(), [&order](const Record* a, const Record* b) {
     const auto first = order(*a);

@@ -19,7 +19,7 @@ struct MeanScore {
   double rotation_change_deg = 0.0;
   double mean_inliers = 0.0;
   double tracked_fraction = 0.0;
-  double step_error_percent = 0.0;
+  double early_error_percent = 0.0;
   std::size_t num_frames = 0;  ///< of all of them together
 };
 [[nodiscard]] MeanScore mean_score(const std::vector<DriveScore>& drives);
@@ -32,7 +32,7 @@ struct MeanScore {
 [[nodiscard]] std::vector<FilterRow> rank_filters(std::span<const Record> records,
                                                   std::size_t num_rungs);
 
-/// Of records of one rung, those that go on: the `count` best by the error of their steps.
+/// Of records of one rung, those that go on: the `count` best by their early errors.
 [[nodiscard]] std::vector<FilterKey> choose_survivors(std::vector<const Record*> records,
                                                       std::size_t count);
 

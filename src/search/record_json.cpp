@@ -30,7 +30,7 @@ Json score_json(const DriveScore& score) {
   json["E_r_deg"] = score.rotation_change_deg;
   json["inliers"] = score.mean_inliers;
   json["tracked"] = score.tracked_fraction;
-  json["step_error_percent"] = score.step_error_percent;
+  json["early_error_percent"] = score.early_error_percent;
   json["path_xz_m"] = Json::array();
   for (const PathPoint& point : score.path) {
     json["path_xz_m"].push_back({point.x_m, point.z_m});
@@ -51,7 +51,7 @@ DriveScore read_score(const Json& json) {
   score.rotation_change_deg = json.at("E_r_deg").get<double>();
   score.mean_inliers = json.at("inliers").get<double>();
   score.tracked_fraction = json.at("tracked").get<double>();
-  score.step_error_percent = json.at("step_error_percent").get<double>();
+  score.early_error_percent = json.at("early_error_percent").get<double>();
   for (const Json& point : json.at("path_xz_m")) {
     score.path.push_back({point.at(0).get<double>(), point.at(1).get<double>()});
   }

@@ -46,6 +46,9 @@ Expected<SearchReport> finish(const Folders& folders,
   if (const Status status = write_tables(folders.out_dir, identity, report); !status) {
     return tl::unexpected(status.error());
   }
+  if (const Status status = write_contact_sheet(folders, identity, report); !status) {
+    report.warnings.push_back("no sheet.png: " + status.error().message);
+  }
   return report;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "search/contact_sheet.hpp"
 #include "search/identity.hpp"
 #include "search/record_file.hpp"
 #include "stemvo/search/search.hpp"
@@ -13,14 +14,8 @@ namespace stemvo::search {
 
 inline constexpr const char* kRecordsFile = "records.jsonl";
 
-/// Where results go, and where named models are found.
-struct Folders {
-  std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
-};
-
-/// Ranks the records and writes the tables (and the sheet). Where records are missing the search
-/// was interrupted.
+/// Ranks the records and writes the tables and the sheet (a warning where that cannot be drawn).
+/// Where records are missing the search was interrupted.
 [[nodiscard]] Expected<SearchReport> finish(const Folders& folders,
                                             const SearchIdentity& identity,
                                             const std::vector<Record>& records,

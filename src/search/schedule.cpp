@@ -5,23 +5,52 @@
 #include <cmath>
 
 namespace stemvo::search {
+namespace {
 
-Schedule halving_schedule(std::size_t num_filters) {
-  constexpr int kNumRungs = 5;
+constexpr int kNumRungs = 5;
+constexpr double kBudget = 0.25;
+constexpr std::size_t kLeastFinalists = 2;
+/// Powers tried, the slowest fall first.
+constexpr double kLeastPower = 0.3;
+constexpr double kMostPower = 3.0;
+constexpr double kPowerStep = 0.05;
+
+Schedule schedule_of(std::size_t num_filters, double power) {
   Schedule schedule;
-  double share = std::pow(0.5, kNumRungs - 1);
-  std::size_t count = num_filters;
   for (int i = 0; i < kNumRungs; ++i) {
-    schedule.push_back({share, count});
-    share *= 2.0;
-    count = std::min(count, std::max<std::size_t>(2, (count + 1) / 2));
+    const double growth = std::pow(2.0, i);
+    const auto count = static_cast<std::size_t>(
+        std::lround(static_cast<double>(num_filters) * std::pow(growth, -power)));
+    const std::size_t most = schedule.empty() ? num_filters : schedule.back().num_filters;
+    schedule.push_back(
+        {growth / std::pow(2.0, kNumRungs - 1), std::min(most, std::max(count, kLeastFinalists))});
   }
   return schedule;
 }
 
+}  // namespace
+
+Schedule halving_schedule(std::size_t num_filters) {
+  double power = kLeastPower;
+  while (power < kMostPower && cost_share(schedule_of(num_filters, power)) > kBudget) {
+    power += kPowerStep;
+  }
+  return schedule_of(num_filters, power);
+}
+
+double cost_share(const Schedule& schedule) {
+  double cost = 0.0;
+  double before = 0.0;
+  for (const Rung& rung : schedule) {
+    cost += static_cast<double>(rung.num_filters) * (rung.frame_share - before);
+    before = rung.frame_share;
+  }
+  return cost / static_cast<double>(schedule.front().num_filters);
+}
+
 std::size_t frames_at(const Rung& rung, std::size_t num_frames) {
   const auto frames =
-      static_cast<std::size_t>(std::ceil(rung.frame_share * static_cast<double>(num_frames)));
+      static_cast<std::size_t>(std::floor(rung.frame_share * static_cast<double>(num_frames)));
   return std::clamp<std::size_t>(frames, std::min<std::size_t>(2, num_frames), num_frames);
 }
 

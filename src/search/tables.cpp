@@ -135,7 +135,7 @@ Json drive_json(const DriveScore& drive) {
   json["E_r_deg"] = drive.rotation_change_deg;
   json["inliers"] = drive.mean_inliers;
   json["tracked"] = drive.tracked_fraction;
-  json["step_error_percent"] = drive.step_error_percent;
+  json["early_error_percent"] = drive.early_error_percent;
   return json;
 }
 

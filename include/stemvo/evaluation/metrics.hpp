@@ -45,8 +45,15 @@ struct Metrics {
                                std::span<const Rigid3> ground_truth,
                                const EvaluationOptions& options = {});
 
-/// The same after the estimate was fitted to the ground truth, for trajectories without a scale.
-/// The four kinds of ATE and the null offset are those of the estimate as it comes.
+/// t_rel of a path that may be too short for the devkit's: segments of these shares of its length,
+/// one from every frame on. nullopt: none fits (a path of length zero). Same length, at least one
+/// pose (checked).
+[[nodiscard]] std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
+                                                        std::span<const Rigid3> ground_truth,
+                                                        std::span<const double> path_shares);
+
+/// As evaluate(), after the estimate was fitted to the ground truth, for trajectories without a
+/// scale. The four kinds of ATE and the null offset are those of the estimate as it comes.
 [[nodiscard]] Metrics evaluate_aligned(std::span<const Rigid3> estimate,
                                        std::span<const Rigid3> ground_truth,
                                        Alignment alignment,

@@ -68,9 +68,9 @@ struct DriveScore {
   double translation_change_m = 0.0;  ///< paper, Table 2: E_t, mean over consecutive poses
   double rotation_change_deg = 0.0;   ///< E_r, with R_p transposed
   double mean_inliers = 0.0;
-  double tracked_fraction = 0.0;    ///< of the frames after the first: motion measured
-  double step_error_percent = 0.0;  ///< what halving goes by (docs/search.md)
-  std::vector<PathPoint> path;      ///< at most 400 points, evenly spaced in frames
+  double tracked_fraction = 0.0;     ///< of the frames after the first: motion measured
+  double early_error_percent = 0.0;  ///< t_rel of parts of the path so far: what halving goes by
+  std::vector<PathPoint> path;       ///< at most 400 points, evenly spaced in frames
 };
 
 /// What became of a filter.
@@ -110,10 +110,10 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Ranks the filters. Each has an odometry of its own; one pass of the stem serves all filters of a
 /// layer; filters run in parallel. out_dir receives records.jsonl (appended as blocks of filters
 /// end, what `resume` reads), filters.csv, filters.json, config.yaml, best.yaml and, where the
-/// frames can be read, sheet.png. The tables do not depend on threads, blocks or interruptions.
-/// Errors, before work starts: unknown model or layer (lists the known ones), filters outside,
-/// no ground truth, a path too short for a segment, out_dir holds another search, or with `resume`
-/// one of another model, sequence or configuration (says what changed).
+/// frames can be read, sheet.png and trajectories.png. The tables do not depend on threads, blocks
+/// or interruptions. Errors, before work starts: unknown model or layer (lists the known ones),
+/// filters outside, no ground truth, a path too short for a segment, out_dir holds another search,
+/// or with `resume` one of another model, sequence or configuration (says what changed).
 [[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
                                                 const SearchProgress& progress = {});
 

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ProgramResult;
+using test::read_file;
+using test::run_stemvo;
+using test::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::size_t count_lines(const fs::path& file) {
+  const std::string text = read_file(file);
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+class Search : public ::testing::Test {
+ protected:
+  using Words = std::vector<std::string>;
+
+  [[nodiscard]] Words command(const std::string& out, const Words& more) const {
+    Words words = {"search", sequence_.string(), "--out", folder_ / out, "--quiet"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  [[nodiscard]] ProgramResult search(const std::string& out, const Words& more) const {
+    return run_stemvo(command(out, more));
+  }
+  [[nodiscard]] std::string table(const std::string& out) const {
+    return read_file(folder_ / (out + "/filters.csv"));
+  }
+
+  TemporaryFolder folder_;
+  fs::path sequence_ =
+      test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94}) / "sequences/00";
+};
+
+TEST_F(Search, KilledAndResumedGivesTheSameBytes) {
+  const Words asked = {"--exhaustive", "--filters", "0:4", "--threads", "1", "--block", "100"};
+  ASSERT_EQ(search("whole", asked).exit_code, 0);
+  const Words other = {"--exhaustive", "--filters", "0:4", "--threads", "2", "--block", "1"};
+  test::RunningProgram program(STEMVO_PROGRAM, command("killed", other));
+  const fs::path records = folder_ / "killed/records.jsonl";
+  for (int i = 0; i < 6000 && count_lines(records) < 3; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  program.send(SIGKILL);
+  ASSERT_EQ(program.wait().exit_code, 128 + SIGKILL);
+  const std::size_t done = count_lines(records);
+  ASSERT_GE(done, 3U);
+  ASSERT_LT(done, 9U) << "the search was over before it was killed";
+  std::ofstream(records, std::ios::app) << "{\"model\":\"default\",\"la";  // as a kill may leave it
+  EXPECT_THAT(search("killed", other).err, HasSubstr("--resume goes on with it"));
+  const Words changed = {"--exhaustive", "--filters", "0:4", "--resume", "--set", "seed=2"};
+  EXPECT_THAT(search("killed", changed).err, HasSubstr("seed: 1, now seed: 2"));
+  Words resumed = other;
+  resumed.emplace_back("--resume");
+  const ProgramResult result = search("killed", resumed);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(count_lines(records), 9U);  // what searched, and 8 filters once
+  EXPECT_EQ(table("killed"), table("whole"));
+}
+
+TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
+  ASSERT_EQ(search("whole", {"--exhaustive", "--filters", "0:3"}).exit_code, 0);
+  ASSERT_EQ(search("a", {"--exhaustive", "--filters", "0:1"}).exit_code, 0);
+  ASSERT_EQ(search("b", {"--exhaustive", "--filters", "1:3", "--no-baselines"}).exit_code, 0);
+  const ProgramResult merged =
+      run_stemvo({"search", "--merge", folder_ / "b", folder_ / "a", "--out", folder_ / "merged"});
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(table("merged"), table("whole"));
+  EXPECT_EQ(read_file(folder_ / "merged/filters.json"), read_file(folder_ / "whole/filters.json"));
+  EXPECT_TRUE(fs::exists(folder_ / "merged/sheet.png"));
+  const ProgramResult run =
+      run_stemvo({"run", sequence_.string(), "--config", folder_ / "whole/best.yaml", "--out",
+                  folder_ / "run", "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto metrics = nlohmann::json::parse(read_file(folder_ / "run/metrics.json"));
+  const auto filters = nlohmann::json::parse(read_file(folder_ / "whole/filters.json"));
+  ASSERT_EQ(filters["filters"].size(), 7U);
+  EXPECT_EQ(metrics["t_rel_percent"], filters["filters"][0]["t_rel_percent"]);
+  EXPECT_EQ(metrics["filter"], filters["filters"][0]["filter"]);
+  EXPECT_LT(metrics["t_rel_percent"].get<double>(), 10.0);
+  EXPECT_EQ(filters["work"]["filter_frames"], 7 * 30);
+}
+
+TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
+  const fs::path small =
+      test::rendered_drive({.frames = 30, .width_px = 160, .height_px = 48}) / "sequences/00";
+  const ProgramResult result =
+      run_stemvo({"search", small.string(), "--exhaustive", "--no-baselines", "--filters", "0:2",
+                  "--set", "stem.sampling_px=4", "--out", folder_ / "small"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("pose not detected: channel 40x12"));
+  EXPECT_THAT(table("small"), HasSubstr("default,stem,0,klt,not detected,,,"));
+}
+
+TEST_F(Search, WrongRequestsAreNamedBeforeWorkStarts) {
+  const auto message = [this](const Words& more) {
+    const ProgramResult result = search("wrong", more);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_FALSE(fs::exists(folder_ / "wrong"));
+    return result.err;
+  };
+  EXPECT_THAT(message({"--layers", "block7"}), HasSubstr("expected one of stem, found 'block7'"));
+  EXPECT_THAT(message({"--filters", "10:17"}), HasSubstr("inside 0:16"));
+  EXPECT_THAT(message({"--model", "nothing"}), HasSubstr("expected one of default"));
+  EXPECT_THAT(message({"--set", "scale.source=none"}), HasSubstr("expected ground_truth"));
+  EXPECT_THAT(message({"--frames", "0:3"}), HasSubstr("holds a segment of 10 m"));
+  EXPECT_THAT(message({"--held-out", folder_ / "none"}), HasSubstr("none"));
+  fs::create_directories(folder_ / "sequences");
+  fs::copy(sequence_, folder_ / "sequences/00", fs::copy_options::recursive);
+  const ProgramResult blind =
+      run_stemvo({"search", folder_ / "sequences/00", "--out", folder_ / "wrong"});
+  EXPECT_THAT(blind.err, HasSubstr("expected a pose file, by which filters are ranked"));
+  EXPECT_EQ(run_stemvo({"search", "--out", folder_ / "wrong"}).exit_code, 2);
+}
+
+TEST_F(Search, WeightsThatAreNotThoseOfTheManifest) {
+  fs::copy(fs::path(STEMVO_SOURCE_DIR) / "models", folder_ / "models", fs::copy_options::recursive);
+  const std::string model = folder_ / "models/default.onnx";
+  std::ofstream(model, std::ios::app) << "x";
+  EXPECT_THAT(search("out", {"--model", model}).err,
+              AllOf(StartsWith("error: "), HasSubstr("expected sha256")));
+  fs::remove(model);
+  EXPECT_THAT(search("out", {"--model", model}).err, HasSubstr("default.onnx"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+TEST_F(Search, HalvingFindsTheWinnerForAQuarterOfTheWork) {
+  const auto data = test::shared_data();
+  if (!data) {
+    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+  }
+  sequence_ = *data / "kitti/sequences/00";
+  Words asked = {"--frames", "0:100", "--no-baselines", "--filters", "4:16"};
+  ASSERT_EQ(search("halving", asked).exit_code, 0);
+  asked.emplace_back("--exhaustive");
+  ASSERT_EQ(search("all", asked).exit_code, 0);
+  const auto halving = nlohmann::json::parse(read_file(folder_ / "halving/filters.json"));
+  const auto all = nlohmann::json::parse(read_file(folder_ / "all/filters.json"));
+  EXPECT_EQ(halving["filters"][0], [&] {
+    auto winner = all["filters"][0];
+    winner["rung"] = halving["rungs"].size() - 1;
+    return winner;
+  }());
+  EXPECT_EQ(halving["filters"].size(), all["filters"].size());
+  EXPECT_LE(halving["work"]["filter_frames"].get<int>(), 12 * 100 / 4);
+  EXPECT_EQ(all["work"]["filter_frames"], 12 * 100);
+}
+
+}  // namespace
+}  // namespace stemvo

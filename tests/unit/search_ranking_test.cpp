@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+
+#include <gmock/gmock.h>
+
+#include "search/ranking.hpp"
+#include "search/schedule.hpp"
+
+namespace stemvo::search {
+namespace {
+
+using ::testing::ElementsAre;
+
+DriveScore score(double t_rel, double r_rel) {
+  DriveScore score;
+  score.sequence = "00";
+  score.num_frames = 100;
+  score.is_detected = true;
+  score.t_rel_percent = t_rel;
+  score.r_rel_deg_per_100m = r_rel;
+  return score;
+}
+
+Record record(int filter, int rung, std::vector<DriveScore> drives) {
+  return {.key = {"net", "stem", filter, "klt"},
+          .rung = rung,
+          .drives = std::move(drives),
+          .held_out = std::nullopt,
+          .filter_frames = 100,
+          .held_out_filter_frames = 0};
+}
+
+std::vector<int> filters_of(const std::vector<FilterRow>& rows) {
+  std::vector<int> filters;
+  for (const FilterRow& row : rows) {
+    filters.push_back(row.key.filter);
+  }
+  return filters;
+}
+
+TEST(Ranking, ByTRelThenRRelThenNotDetected) {
+  DriveScore lost = score(0.1, 0.1);  // good numbers do not help
+  lost.is_detected = false;
+  const std::vector<Record> records = {record(0, 0, {score(2.0, 1.0)}), record(1, 0, {lost}),
+                                       record(2, 0, {score(1.0, 3.0)}),
+                                       record(3, 0, {score(1.0, 2.0)})};
+  const auto rows = rank_filters(records, 1);
+  EXPECT_THAT(filters_of(rows), ElementsAre(3, 2, 0, 1));
+  EXPECT_EQ(rows.back().status, FilterStatus::kNotDetected);
+}
+
+TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
+  DriveScore lost = score(0.0, 0.0);
+  lost.is_detected = false;
+  const std::vector<Record> records = {record(0, 0, {score(1.0, 1.0), score(4.0, 1.0)}),
+                                       record(1, 0, {score(2.0, 1.0), score(2.0, 1.0)}),
+                                       record(2, 0, {score(0.5, 1.0), lost})};
+  EXPECT_THAT(filters_of(rank_filters(records, 1)), ElementsAre(1, 0, 2));
+  EXPECT_DOUBLE_EQ(*mean_score(records[0].drives).t_rel_percent, 2.5);
+}
+
+TEST(Ranking, HeldOutAndStandingRankNothing) {
+  Record good = record(1, 0, {score(1.0, 1.0)});
+  Record other = record(0, 0, {score(2.0, 1.0)});
+  other.held_out = score(0.0, 0.0);
+  good.held_out = score(9.0, 9.0);
+  good.drives[0].translation_change_m = 5.0;  // E_t of `other` is that of a camera that stands
+  EXPECT_THAT(filters_of(rank_filters(std::vector<Record>{other, good}, 1)), ElementsAre(1, 0));
+}
+
+TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
+  DriveScore early = score(0.5, 0.5);
+  early.early_error_percent = 1.0;
+  DriveScore worse = early;
+  worse.early_error_percent = 2.0;
+  const std::vector<Record> records = {record(0, 0, {early}),           record(1, 0, {early}),
+                                       record(2, 0, {worse}),           record(3, 0, {early}),
+                                       record(0, 1, {score(9.0, 9.0)}), record(1, 1, {worse}),
+                                       record(0, 2, {score(9.0, 9.0)})};
+  const auto rows = rank_filters(records, 3);
+  EXPECT_THAT(filters_of(rows), ElementsAre(0, 1, 3, 2));
+  EXPECT_EQ(rows[0].status, FilterStatus::kRanked);
+  EXPECT_EQ(rows[1].status, FilterStatus::kStopped);
+}
+
+TEST(Ranking, DoesNotDependOnTheOrderOfRecords) {
+  std::vector<Record> records;
+  for (int i = 0; i < 6; ++i) {
+    records.push_back(record(i, 0, {score(i < 3 ? 1.0 : 2.0, 1.0)}));
+  }
+  const auto expected = filters_of(rank_filters(records, 1));
+  std::reverse(records.begin(), records.end());
+  EXPECT_EQ(filters_of(rank_filters(records, 1)), expected);
+}
+
+TEST(Ranking, SurvivorsAreTheLeastWrongOfThoseDetected) {
+  std::vector<Record> records;
+  for (int i = 0; i < 4; ++i) {
+    records.push_back(record(i, 0, {score(1.0, 1.0)}));
+    records.back().drives[0].early_error_percent = 4.0 - i;
+  }
+  records[3].drives[0].is_detected = false;
+  std::vector<const Record*> all;
+  for (const Record& one : records) {
+    all.push_back(&one);
+  }
+  const auto chosen = choose_survivors(all, 2);
+  ASSERT_EQ(chosen.size(), 2U);
+  EXPECT_EQ(chosen[0].filter, 2);
+  EXPECT_EQ(chosen[1].filter, 1);
+  EXPECT_EQ(choose_survivors(all, 9).size(), 4U);
+}
+
+TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
+  for (const std::size_t count : {12U, 20U, 36U, 68U, 260U, 4096U}) {
+    const Schedule schedule = halving_schedule(count);
+    EXPECT_LE(cost_share(schedule), 0.25) << count;
+    EXPECT_GE(cost_share(schedule), 0.20) << count;  // what is allowed is used
+    EXPECT_EQ(schedule.front().num_filters, count);
+    EXPECT_EQ(schedule.back().frame_share, 1.0);
+    EXPECT_GE(schedule.back().num_filters, 2U);
+    for (std::size_t i = 1; i < schedule.size(); ++i) {
+      EXPECT_LE(schedule[i].num_filters, schedule[i - 1].num_filters);
+      EXPECT_GT(schedule[i].frame_share, schedule[i - 1].frame_share);
+    }
+  }
+}
+
+TEST(HalvingSchedule, FewFilters) {
+  EXPECT_EQ(halving_schedule(1).back().num_filters, 1U);
+  EXPECT_EQ(halving_schedule(3).front().num_filters, 3U);
+  EXPECT_EQ(cost_share(exhaustive_schedule(7)), 1.0);
+}
+
+TEST(HalvingSchedule, FramesOfARungLieInTheSequence) {
+  EXPECT_EQ(frames_at({1.0 / 16.0, 4}, 100), 6U);
+  EXPECT_EQ(frames_at({1.0 / 16.0, 4}, 3), 2U);
+  EXPECT_EQ(frames_at({1.0, 4}, 100), 100U);
+  EXPECT_EQ(frames_at({1.0, 4}, 1), 1U);
+}
+
+}  // namespace
+}  // namespace stemvo::search

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+
+#include "search/record_file.hpp"
+#include "search/record_json.hpp"
+#include "support/matchers.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo::search {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+LayerIdentity layer(int first, int last) {
+  return {.model = "net",
+          .layer = "stem",
+          .features = "klt",
+          .first = first,
+          .last = last,
+          .hash = "abc",
+          .sampling_px = 2,
+          .stem_model = "net"};
+}
+
+SearchIdentity identity(int first, int last) {
+  SearchIdentity identity;
+  identity.program = "program";
+  identity.configuration = "seed: 1\nfeatures:\n  # levels\n  klt_levels: 3\n";
+  identity.schedule = exhaustive_schedule(static_cast<std::size_t>(last - first));
+  identity.layers = {layer(first, last)};
+  identity.sequences = {{.name = "00",
+                         .is_held_out = false,
+                         .first_frame = 0,
+                         .num_frames = 100,
+                         .frames = "f",
+                         .calibration = "c",
+                         .ground_truth = "g",
+                         .directory = "somewhere"}};
+  return identity;
+}
+
+Record record(int filter, double t_rel = 1.0) {
+  Record record;
+  record.key = {"net", "stem", filter, "klt"};
+  record.filter_frames = 100;
+  DriveScore score;
+  score.sequence = "00";
+  score.num_frames = 100;
+  score.is_detected = true;
+  score.t_rel_percent = t_rel;
+  score.r_rel_deg_per_100m = 1.0 / 3.0;
+  score.path = {{0.0, 0.0}, {0.25, 1.5}};
+  record.drives = {score};
+  return record;
+}
+
+class Records : public ::testing::Test {
+ protected:
+  void write(const std::string& name, const SearchIdentity& of, std::vector<Record> records) {
+    std::filesystem::create_directories(folder_ / name);
+    auto writer = RecordWriter::create(file(name), of);
+    ASSERT_TRUE(writer) << writer.error().message;
+    ASSERT_TRUE(writer->append(records));
+  }
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const {
+    return folder_ / name / "records.jsonl";
+  }
+  [[nodiscard]] Expected<SearchReport> merge(const std::vector<std::string>& names) const {
+    std::vector<std::filesystem::path> parts;
+    for (const std::string& name : names) {
+      parts.push_back(folder_ / name);
+    }
+    return merge_searches(parts, folder_ / "merged", folder_.path());
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(Records, ComeBackToTheBit) {
+  write("a", identity(0, 2), {record(0, 0.1), record(1, 1e-17)});
+  const auto content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  ASSERT_EQ(content->records.size(), 2U);
+  EXPECT_EQ(record_line(content->records[1]), record_line(record(1, 1e-17)));
+  EXPECT_EQ(*content->records[0].drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
+  EXPECT_EQ(describe_change(content->identity, identity(0, 2), false), "");
+  EXPECT_EQ(content->num_good_bytes, std::filesystem::file_size(file("a")));
+}
+
+TEST_F(Records, ATornLineIsLeftOutAndOverwritten) {
+  write("a", identity(0, 3), {record(0)});
+  const std::string torn = record_line(record(1)).substr(0, 50);
+  std::ofstream(file("a"), std::ios::app) << torn;
+  auto content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  EXPECT_EQ(content->records.size(), 1U);
+  auto writer = RecordWriter::go_on(file("a"), content->num_good_bytes);
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->append(std::vector<Record>{record(2)}));
+  content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  ASSERT_EQ(content->records.size(), 2U);
+  EXPECT_EQ(content->records[1].key.filter, 2);
+}
+
+TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
+  write("a", identity(0, 3), {record(0)});
+  std::ofstream(file("a"), std::ios::app) << "{\"model\": 1}\n";
+  EXPECT_THAT(read_records(file("a")).error().message, HasSubstr("records.jsonl:3: expected"));
+  EXPECT_FALSE(RecordWriter::create(file("a"), identity(0, 3)));  // never replaced
+}
+
+TEST_F(Records, ChangesAreNamed) {
+  const SearchIdentity before = identity(0, 3);
+  SearchIdentity now = before;
+  now.configuration = "seed: 1\nfeatures:\n  # levels\n  klt_levels: 4\n";
+  now.sequences[0].frames = "other";
+  EXPECT_EQ(describe_change(before, now, true),
+            "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed");
+  now = before;
+  now.layers[0].hash = "other";
+  EXPECT_EQ(describe_change(before, now, true), "the model net stem changed");
+  now = identity(0, 4);
+  EXPECT_THAT(describe_change(before, now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
+  EXPECT_EQ(describe_change(before, now, true), "");
+}
+
+TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
+  write("whole", identity(0, 4), {record(0, 4), record(1, 1), record(2, 3), record(3, 2)});
+  write("a", identity(0, 2), {record(0, 4), record(1, 1)});
+  write("b", identity(1, 4), {record(1, 1), record(3, 2), record(2, 3)});  // 1 twice, agreeing
+  const auto merged = merge({"b", "a"});
+  ASSERT_TRUE(merged) << merged.error().message;
+  EXPECT_EQ(merged->num_filters, 4U);
+  EXPECT_FALSE(merged->interrupted);
+  const std::string csv = testing::read_all(folder_ / "merged" / "filters.csv");
+  ASSERT_TRUE(merge_searches({folder_ / "whole"}, folder_ / "again", folder_.path()));
+  EXPECT_EQ(csv, testing::read_all(folder_ / "again" / "filters.csv"));
+  EXPECT_THAT(csv, AllOf(::testing::StartsWith("model,layer,filter,"),
+                         HasSubstr("\nnet,stem,1,klt,ranked,1.0000,0.3333,")));
+}
+
+TEST_F(Records, PartsThatDoNotFitAreRefused) {
+  write("a", identity(0, 2), {record(0), record(1)});
+  write("unfinished", identity(2, 4), {record(2)});
+  EXPECT_THAT(merge({"a", "unfinished"}).error().message,
+              HasSubstr("expected 2 filters, found 1: finish it with --resume"));
+  SearchIdentity other = identity(2, 3);
+  other.sequences[0].ground_truth = "other";
+  write("other", other, {record(2)});
+  EXPECT_THAT(merge({"a", "other"}).error().message, HasSubstr("the pose file of 00 changed"));
+  write("twice", identity(1, 2), {record(1, 7.0)});
+  EXPECT_THAT(merge({"a", "twice"}).error().message, HasSubstr("net stem 1"));
+  SearchIdentity halving = identity(2, 3);
+  halving.schedule = halving_schedule(1);
+  write("halving", halving, {record(2)});
+  EXPECT_THAT(merge({"a", "halving"}).error().message, HasSubstr("--exhaustive"));
+  EXPECT_FALSE(merge({"a", "nothing"}));
+}
+
+}  // namespace
+}  // namespace stemvo::search
