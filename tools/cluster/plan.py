@@ -28,7 +28,8 @@ class Task:
 
     def arguments(self):
         """For `stemvo search`."""
-        words = ["--model", self.model, "--layers", self.layer, "--filters", f"{self.first}:{self.last}", "--exhaustive"]
+        words = ["--model", self.model, "--layers", self.layer, "--filters", f"{self.first}:{self.last}", "--exhaustive",
+                 "--block", str(self.filters)]  # one pass of the network per frame for the whole task
         return words if self.baselines else [*words, "--no-baselines"]
 
 
