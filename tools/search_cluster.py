@@ -10,10 +10,12 @@ sent along, the parts come back over Ray. docs/search.md tells more.
 
 import argparse
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -107,7 +109,7 @@ class Parts:
             if not resume:
                 raise ClusterError(f"{out}: expected an empty folder, found a search (--resume goes on with it)")
             if json.loads(self._plan_file.read_text(encoding="utf-8")).get("fingerprint") != fingerprint:
-                raise ClusterError(f"{out}: --resume: expected the same models, filters, sequences and options, found others")
+                raise ClusterError(f"{out}: --resume: expected the same program, models, filters, sequences and options, found others")
 
     def begin(self):
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -129,10 +131,17 @@ class Parts:
 
 
 def merge(options, parts, tasks):
-    command = [options.program, "search", "--merge", *(parts.path(task) for task in tasks), "--out", options.out / "result"]
-    done = subprocess.run([str(word) for word in [*command, *(["--quiet"] if options.quiet else [])]], check=False)
+    """OUT/result, made anew: it holds nothing that the parts do not."""
+    partial, result = options.out / ".result.partial", options.out / "result"
+    shutil.rmtree(partial, ignore_errors=True)
+    command = [options.program, "search", "--merge", *(parts.path(task) for task in tasks), "--out", partial]
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise ClusterError(f"{options.program} search --merge ended with exit code {done.returncode}")
+        raise ClusterError(" ".join(done.stderr.removeprefix("error: ").split()) or f"{options.program} search --merge failed")
+    if not options.quiet:
+        print(done.stdout.rpartition("table: ")[0], end="")
+    shutil.rmtree(result, ignore_errors=True)
+    partial.rename(result)
 
 
 def search(options):
@@ -144,7 +153,7 @@ def search(options):
     common = common_arguments(options)
     files = model_files(models)
     contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]
-    parts = Parts(options.out, tasks, plan.fingerprint(tasks, [common, contents]), options.resume)
+    parts = Parts(options.out, tasks, plan.fingerprint(tasks, [common, contents, hash_of(options.program.read_bytes())]), options.resume)
     waiting = [task for task in tasks if not parts.is_done(task)]
     outcome = driver.Outcome()
     if waiting:
@@ -158,8 +167,6 @@ def search(options):
 
 
 def hash_of(content):
-    import hashlib
-
     return hashlib.sha256(content).hexdigest()
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """tools/search_cluster.py on several local Ray nodes, one of which is killed: the table is that of one machine."""
 
-import pathlib
+import json
 import os
+import pathlib
 import re
 import subprocess
 import sys
@@ -102,7 +103,15 @@ class SearchCluster(unittest.TestCase):
         self.assertEqual(single, merged)
         self.assertEqual(len(single.splitlines()), 1 + 9 + 4)
         self.assertIn(b",ranked,", single)
+        self.check_that_records_name_the_model_here(out)
         self.go_on(out)
+
+    def check_that_records_name_the_model_here(self, out):
+        for part in (*(out / "parts").iterdir(), out / "result"):
+            identity = json.loads((part / "records.jsonl").read_text(encoding="utf-8").splitlines()[0])
+            models = {layer["stem_model"] for layer in identity["layers"]}
+            self.assertIn(str(self.model), models)
+            self.assertLessEqual(models, {str(self.model), "gray", "input_layer"})
 
     def go_on(self, out):
         """Parts that are done are not run again; another search is refused."""
@@ -111,7 +120,6 @@ class SearchCluster(unittest.TestCase):
             for file in (out / "parts" / part).iterdir():
                 file.unlink()
             (out / "parts" / part).rmdir()
-        (out / "result").rename(out / "before")
         done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--quiet", "--resume"), capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("tasks: 2 run on 1 nodes", done.stdout)

@@ -3,6 +3,7 @@
 
 import collections
 import dataclasses
+import json
 import os
 import socket
 import sys
@@ -95,7 +96,9 @@ class _Queue:
             return self._again(task, error.cause)
         except ray.exceptions.RayError as error:
             return self._again(task, error)
-        self._keep(task, files)
+        # The model that was sent along is the one here: what the merge writes must name it.
+        here = json.dumps(os.path.abspath(os.path.dirname(task.model)), ensure_ascii=False)[1:-1].encode()
+        self._keep(task, {name: content.replace(b"{folder}", here) for name, content in files.items()})
         self.outcome.tasks += 1
         self.outcome.filters += task.filters
         self.outcome.nodes.add(node)
