@@ -97,18 +97,18 @@ class Files(unittest.TestCase):
 
 
 class Keras(Files):
-    def convnext(self, name, group=None):
+    def convnext(self, name, group=None, cut=None):
         stem = random_stem(96, 4, 4, "ln", 1e-6, IMAGENET)
         convolution, norm = keras_arrays(stem, "ln")
         outer, path = "convnext_tiny_stem", self.folder / name
         layers = {(outer, f"{outer}_conv"): dict(zip(("kernel", "bias"), convolution)),
                   (outer, f"{outer}_layernorm"): dict(zip(("gamma", "beta"), norm))}
-        writers.keras_named(path, layers, ["input_1", "convnext_tiny_prestem_normalization", outer, *CONVNEXT_TINY], group)
+        writers.keras_named(path, layers, ["input_1", "convnext_tiny_prestem_normalization", outer, *CONVNEXT_TINY], group, cut)
         return path, stem
 
     def test_convnext_by_names(self):
-        for group in (None, "model_weights"):
-            path, stem = self.convnext("convnext.h5", group)
+        for group, names_cut in ((None, None), ("model_weights", None), (None, 9)):
+            path, stem = self.convnext("convnext.h5", group, names_cut)
             self.check(path, stem, "ConvNeXt-Tiny")
 
     def test_convnext_by_numbers(self):

@@ -14,11 +14,16 @@ import h5py
 import numpy as np
 
 
-def keras_named(path, layers, order, group=None):
-    """As keras.applications' downloads: layers is layer -> variable -> array; order lists all layers."""
+def keras_named(path, layers, order, group=None, cut=None):
+    """As keras.applications' downloads: layers is layer -> variable -> array; order lists all layers, in two attributes
+    (as Keras does with long lists) with the first `cut` in the first."""
     with h5py.File(path, "w") as file:
         root = file.create_group(group) if group else file
-        root.attrs["layer_names"] = [name.encode() for name in order]
+        if cut:
+            root.attrs["layer_names0"] = [name.encode() for name in order[:cut]]
+            root.attrs["layer_names1"] = [name.encode() for name in order[cut:]]
+        else:
+            root.attrs["layer_names"] = [name.encode() for name in order]
         for name in order:
             root.create_group(name)
         for name, variables in layers.items():

@@ -49,10 +49,21 @@ def _text(value):
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
+def _layer_names(group):
+    """The attribute `layer_names`; a long one is cut into layer_names0, layer_names1, .. Empty where there is none."""
+    if "layer_names" in group.attrs:
+        return list(map(_text, group.attrs["layer_names"]))
+    names, index = [], 0
+    while f"layer_names{index}" in group.attrs:
+        names += map(_text, group.attrs[f"layer_names{index}"])
+        index += 1
+    return names
+
+
 def _read_named(group):
     """One group per layer. A nested model's layers are found by the folder that holds their variables."""
     layers = []
-    for name in map(_text, group.attrs["layer_names"]):
+    for name in _layer_names(group):
         layer = Layer(name, "")
         nested = {}
         for path, dataset in _datasets(group[name]) if name in group else []:
@@ -146,7 +157,7 @@ def read(path):
         return _with_config(_read_numbered(file["layers"], names_in_config(config)), config)
     file = h5py.File(path, "r")
     group = file.get("model_weights", file)
-    if "layer_names" in group.attrs:
+    if _layer_names(group):
         layers = _read_named(group)
         config = file.attrs.get("model_config")
         return layers if config is None else _with_config(layers, json.loads(_text(config))["config"])
