@@ -77,6 +77,10 @@ int run(Arguments& arguments) {
     print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
     return kExitUsage;
   }
+  if (arguments.held_out.empty() && arguments.request.held_out_frames) {
+    print_error("expected --held-out with --held-out-frames (see 'stemvo search --help')");
+    return kExitUsage;
+  }
   const Expected<SearchReport> report = search(arguments);
   if (!report) {
     print_error(report.error().message);

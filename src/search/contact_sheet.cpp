@@ -76,10 +76,10 @@ Status write_trajectories(const std::filesystem::path& file,
   TrajectoryPlot plot;
   plot.title = fmt::format("{}, each step of its true length", sequence.name());
   plot.estimate = trajectory_of(*shown.front().row);
-  plot.estimate_name = caption_of(shown.front());
+  plot.estimate_name = shown.front().place;
   plot.ground_truth = sequence.ground_truth();
   for (std::size_t i = 1; i < shown.size(); ++i) {
-    plot.others.push_back({caption_of(shown[i]), trajectory_of(*shown[i].row)});
+    plot.others.push_back({shown[i].place, trajectory_of(*shown[i].row)});
   }
   return write_trajectory_png(file, plot);
 }

@@ -7,12 +7,24 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include "search/record_json.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::search {
+namespace {
+
+/// Until the descriptor is closed, or the process is gone.
+Status lock(int descriptor, const std::filesystem::path& file) {
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    return fail(fmt::format("{}: another search is writing it", file.string()));
+  }
+  return {};
+}
+
+}  // namespace
 
 struct RecordWriter::Descriptor {
   explicit Descriptor(int number_in) : number(number_in) {}
@@ -66,6 +78,9 @@ Expected<RecordWriter> RecordWriter::create(const std::filesystem::path& file,
   if (descriptor->number < 0) {
     return fail(fmt::format("{}: cannot be created: {}", file.string(), std::strerror(errno)));
   }
+  if (const Status locked = lock(descriptor->number, file); !locked) {
+    return tl::unexpected(locked.error());
+  }
   RecordWriter writer(file, std::move(descriptor));
   if (const Status status = writer.write(identity_line(identity) + '\n'); !status) {
     return tl::unexpected(status.error());
@@ -77,6 +92,11 @@ Expected<RecordWriter> RecordWriter::go_on(const std::filesystem::path& file,
                                            std::uintmax_t num_good_bytes) {
   auto descriptor = std::make_shared<const Descriptor>(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
   const auto size = static_cast<off_t>(num_good_bytes);
+  if (descriptor->number >= 0) {
+    if (const Status locked = lock(descriptor->number, file); !locked) {
+      return tl::unexpected(locked.error());
+    }
+  }
   if (descriptor->number < 0 || ::ftruncate(descriptor->number, size) != 0 ||
       ::lseek(descriptor->number, 0, SEEK_END) < 0) {
     return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));

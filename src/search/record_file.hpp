@@ -35,7 +35,8 @@ struct RecordFileContent {
 /// Reads all whole lines. Errors: not there, a whole line that is no record, another format.
 [[nodiscard]] Expected<RecordFileContent> read_records(const std::filesystem::path& file);
 
-/// Appends records, so that what append() returned for is on the disk.
+/// Appends records, so that what append() returned for is on the disk. One at a time: a second one
+/// for the same file is an error.
 class RecordWriter {
  public:
   /// A new file with the identity in it. Error: there is one already, or it cannot be written.

@@ -14,6 +14,8 @@
 
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
+#include "support/temp_folder.hpp"
+#include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
@@ -100,6 +102,30 @@ TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   EXPECT_EQ(metrics["filter"], filters["filters"][0]["filter"]);
   EXPECT_LT(metrics["t_rel_percent"].get<double>(), 10.0);
   EXPECT_EQ(filters["work"]["filter_frames"], 7 * 30);
+}
+
+TEST_F(Search, LayersAndTheHeldOutSequence) {
+  const testing::TempFolder models;
+  testing::write_two_layers(models);
+  const std::string model = (models / "two_layers.onnx").string();
+  const Words asked = {"--model",           model,        "--exhaustive",
+                       "--no-baselines",    "--held-out", sequence_.string(),
+                       "--held-out-frames", "5:30"};
+  ASSERT_EQ(search("both", asked).exit_code, 0);
+  const auto both = nlohmann::json::parse(read_file(folder_ / "both/filters.json"));
+  ASSERT_EQ(both["filters"].size(), 5U);  // 3 of `stem`, 2 of `deep`
+  EXPECT_EQ(both["work"]["filter_frames"], 5 * 30);
+  EXPECT_EQ(both["work"]["held_out_filter_frames"], 5 * 25);
+  for (const auto& filter : both["filters"]) {
+    EXPECT_EQ(filter["held_out"]["frames"], 25);
+    EXPECT_EQ(filter["sequences"].size(), 1U);  // the held-out one ranks nothing
+  }
+  EXPECT_THAT(table("both"), HasSubstr(",frames,held_out_t_rel_percent,"));
+  Words deep = asked;
+  deep.insert(deep.end(), {"--layers", "deep"});
+  ASSERT_EQ(search("deep", deep).exit_code, 0);
+  EXPECT_EQ(count_lines(folder_ / "deep/filters.csv"), 3U);
+  EXPECT_THAT(table("deep"), AllOf(HasSubstr("two,deep,0,"), HasSubstr("two,deep,1,")));
 }
 
 TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {

@@ -114,6 +114,14 @@ TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
   EXPECT_FALSE(RecordWriter::create(file("a"), identity(0, 3)));  // never replaced
 }
 
+TEST_F(Records, OneWriterAtATime) {
+  const auto writer = RecordWriter::create(folder_ / "records.jsonl", identity(0, 3));
+  ASSERT_TRUE(writer);
+  const auto second = RecordWriter::go_on(folder_ / "records.jsonl", 0);
+  ASSERT_FALSE(second);
+  EXPECT_THAT(second.error().message, HasSubstr("another search is writing it"));
+}
+
 TEST_F(Records, ChangesAreNamed) {
   const SearchIdentity before = identity(0, 3);
   SearchIdentity now = before;
