@@ -110,8 +110,9 @@ def _of_graph(options):
                            f"({', '.join(families.PREPROCESSING)}), found none")
     if options.padding != "none" or options.fold is not None:
         raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
-    model, layers = graph_cut.cut(options.weights, graph_cut.read(options.weights), options.layers,
-                                  families.PREPROCESSING[options.preprocessing], options.size, options.filter)
+    with graph_cut.refusing_unsound(options.weights):
+        model, layers = graph_cut.cut(options.weights, graph_cut.read(options.weights), options.layers,
+                                      families.PREPROCESSING[options.preprocessing], options.size, options.filter)
     model = graph_check.checked(options.weights, model, layers, options.size)
     notes = tuple(f"{layer.name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
                   f"stride {layer.stride} only" for layer in layers if layer.sampling == "native")

@@ -5,6 +5,7 @@ Preprocessing goes in front; "same" paddings, which depend on the size of the pi
 network whose pictures have their colours last gets a transposition.
 """
 
+import contextlib
 import dataclasses
 import difflib
 import tempfile
@@ -17,6 +18,16 @@ from onnx import TensorProto, helper, numpy_helper, shape_inference
 
 from stems import onnx_writer, receptive_field
 from stems.weights import WeightsError
+
+
+@contextlib.contextmanager
+def refusing_unsound(path):
+    """Turns what a damaged graph makes these modules stumble over into an error of one line."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, StopIteration, RecursionError, TypeError, ValueError, RuntimeError,
+            onnx.checker.ValidationError, shape_inference.InferenceError) as error:
+        raise WeightsError(f"{path}: expected a sound graph, found: {' '.join(str(error).split())[:200] or type(error).__name__}") from error
 
 
 @dataclasses.dataclass(frozen=True)

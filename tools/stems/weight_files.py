@@ -148,7 +148,8 @@ def load(path):
 def read_array(file, layer, name):
     """Values as float64. Error: unreadable, or not finite numbers."""
     try:
-        values = np.asarray(layer.read(name)).astype(np.float64)
+        with np.errstate(all="ignore"):
+            values = np.asarray(layer.read(name)).astype(np.float64)
     except _BROKEN_FILE as error:
         raise WeightsError(f"{file.path}: {layer.name}.{name}: cannot read: {_one_line(error)}") from error
     if not np.all(np.isfinite(values)):
