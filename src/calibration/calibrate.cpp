@@ -13,7 +13,7 @@
 #include "calibration/calibration_file.hpp"
 #include "calibration/refine_camera.hpp"
 #include "calibration/segment_builder.hpp"
-#include "pipeline/frame_reader.hpp"
+#include "pipeline/frame_pipeline.hpp"
 #include "stemvo/odometry/odometry.hpp"
 
 namespace stemvo {
@@ -65,13 +65,10 @@ std::vector<Segment> track(const KittiSequence& sequence,
                            const CalibrationProgress& progress,
                            CalibrationReport& report) {
   calibration::SegmentBuilder builder(sequence.camera(), {});
-  pipeline::FrameReader reader(sequence);
-  for (std::size_t i = 0; i < sequence.size() && !report.interrupted; ++i) {
-    const Expected<cv::Mat> frame = reader.next();
+  const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
     const std::size_t number = sequence.range().begin + i;
     calibration::TrackedFrame tracked;
     if (frame) {
-      const FrameResult result = odometry.process(*frame);
       if (!result.problem.empty()) {
         report.warnings.push_back(fmt::format("frame {}: {}", number, result.problem));
       }
@@ -80,11 +77,13 @@ std::vector<Segment> track(const KittiSequence& sequence,
                  odometry.matches(), odometry.inlier_mask()};
     } else {
       report.warnings.push_back(frame.error().message);
-      tracked.world_from_camera = odometry.process_missing().world_from_camera;
+      tracked.world_from_camera = result.world_from_camera;
     }
     builder.add(tracked);
     report.interrupted = progress && !progress(CalibrationStage::kTracking, i + 1, sequence.size());
-  }
+    return !report.interrupted;
+  };
+  pipeline::run_frames(sequence, odometry, visit);
   std::vector<Segment> segments = builder.finish();
   calibration::keep_turns(segments, kMaxSegments);
   return segments;

@@ -2,8 +2,10 @@
 #include "features/descriptor_front_end.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "features/grid_quota.hpp"
+#include "stemvo/check.hpp"
 
 namespace stemvo {
 namespace {
@@ -34,35 +36,9 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 DescriptorFrontEnd::DescriptorFrontEnd(Kind kind, const FeatureOptions& options)
     : kind_(kind), options_(options), feature_(create_feature(kind, options)) {}
 
-Matches DescriptorFrontEnd::process(const ChannelImage& image) {
-  Described current = describe(image);
-  Matches matches;
-  matches.num_keypoints = static_cast<int>(current.uv.size());
-  matched_.clear();
-  if (last_.size == current.size) {
-    for (const cv::DMatch& pair : match(last_, current)) {
-      matches.prev_uv.push_back(last_.uv[static_cast<std::size_t>(pair.queryIdx)]);
-      matches.cur_uv.push_back(current.uv[static_cast<std::size_t>(pair.trainIdx)]);
-      const int past_id = last_.track_ids[static_cast<std::size_t>(pair.queryIdx)];
-      const int track_id = past_id >= 0 ? past_id : num_tracks_++;
-      current.track_ids[static_cast<std::size_t>(pair.trainIdx)] = track_id;
-      matches.track_ids.push_back(track_id);
-      matched_.push_back(static_cast<std::size_t>(pair.trainIdx));
-    }
-  }
-  last_ = std::move(current);
-  return matches;
-}
-
-void DescriptorFrontEnd::keep(const std::vector<char>& is_good) {
-  for (std::size_t i = 0; i < std::min(is_good.size(), matched_.size()); ++i) {
-    if (is_good[i] == 0) {
-      last_.track_ids[matched_[i]] = -1;
-    }
-  }
-}
-
-DescriptorFrontEnd::Described DescriptorFrontEnd::describe(const ChannelImage& image) const {
+std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
+    const ChannelImage& image) const {
+  auto described = std::make_shared<Described>(image);
   std::vector<cv::KeyPoint> found;
   feature_->detect(image.pixels, found);
   std::sort(found.begin(), found.end(), is_stronger);
@@ -73,18 +49,46 @@ DescriptorFrontEnd::Described DescriptorFrontEnd::describe(const ChannelImage& i
       kept.push_back(keypoint);
     }
   }
-  Described described;
-  described.size = image.pixels.size();
   if (kept.empty()) {
     return described;
   }
-  feature_->compute(image.pixels, kept, described.descriptors);
-  described.uv.reserve(kept.size());
+  feature_->compute(image.pixels, kept, described->descriptors);
+  described->uv.reserve(kept.size());
   for (const cv::KeyPoint& keypoint : kept) {
-    described.uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
+    described->uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
   }
-  described.track_ids.assign(described.uv.size(), -1);
   return described;
+}
+
+Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared) {
+  auto current = std::dynamic_pointer_cast<const Described>(std::move(prepared));
+  STEMVO_CHECK(current != nullptr, "a picture prepared by this front end");
+  Matches matches;
+  matches.num_keypoints = static_cast<int>(current->uv.size());
+  std::vector<int> track_ids(current->uv.size(), -1);
+  matched_.clear();
+  if (last_ != nullptr && last_->image.pixels.size() == current->image.pixels.size()) {
+    for (const cv::DMatch& pair : match(*last_, *current)) {
+      const auto from = static_cast<std::size_t>(pair.queryIdx);
+      const auto to = static_cast<std::size_t>(pair.trainIdx);
+      matches.prev_uv.push_back(last_->uv[from]);
+      matches.cur_uv.push_back(current->uv[to]);
+      track_ids[to] = track_ids_[from] >= 0 ? track_ids_[from] : num_tracks_++;
+      matches.track_ids.push_back(track_ids[to]);
+      matched_.push_back(to);
+    }
+  }
+  last_ = std::move(current);
+  track_ids_ = std::move(track_ids);
+  return matches;
+}
+
+void DescriptorFrontEnd::keep(const std::vector<char>& is_good) {
+  for (std::size_t i = 0; i < std::min(is_good.size(), matched_.size()); ++i) {
+    if (is_good[i] == 0) {
+      track_ids_[matched_[i]] = -1;
+    }
+  }
 }
 
 std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,

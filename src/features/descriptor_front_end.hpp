@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -16,24 +17,26 @@ class DescriptorFrontEnd : public FrontEnd {
   enum class Kind { kOrb, kSift };
   DescriptorFrontEnd(Kind kind, const FeatureOptions& options);
 
-  [[nodiscard]] Matches process(const ChannelImage& image) override;
+  using FrontEnd::process;
+  [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
+      const ChannelImage& image) const override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
-  struct Described {
+  struct Described : PreparedPicture {
+    using PreparedPicture::PreparedPicture;
     std::vector<Eigen::Vector2d> uv;  ///< input pixels
-    std::vector<int> track_ids;       ///< -1: not matched with the picture before
     cv::Mat descriptors;              ///< one row per keypoint
-    cv::Size size;                    ///< of the picture
   };
 
-  [[nodiscard]] Described describe(const ChannelImage& image) const;
   [[nodiscard]] std::vector<cv::DMatch> match(const Described& prev, const Described& cur) const;
 
   Kind kind_;
   FeatureOptions options_;
   cv::Ptr<cv::Feature2D> feature_;
-  Described last_;
+  std::shared_ptr<const Described> last_;
+  std::vector<int> track_ids_;        ///< of last_'s keypoints; -1: not matched with those before
   std::vector<std::size_t> matched_;  ///< keypoints of last_ that the last matches led to
   int num_tracks_ = 0;
 };

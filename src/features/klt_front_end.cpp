@@ -2,16 +2,20 @@
 #include "features/klt_front_end.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "features/grid_quota.hpp"
+#include "stemvo/check.hpp"
 
 namespace stemvo {
 namespace {
 
 constexpr int kBackLevels = 2;
+/// In a pyramid each level is followed by its derivatives.
+constexpr std::size_t kNextLevel = 2;
 
 Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
   return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
@@ -30,18 +34,30 @@ bool is_inside(const cv::Point2f& uv, cv::Size size) {
 
 }  // namespace
 
-Matches KltFrontEnd::process(const ChannelImage& image) {
-  const std::vector<cv::Mat> pyramid = build_pyramid(image.pixels);
+struct KltFrontEnd::Picture : PreparedPicture {
+  using PreparedPicture::PreparedPicture;
+  std::vector<cv::Mat> pyramid;
+};
+
+std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& image) const {
+  auto picture = std::make_shared<Picture>(image);
+  const cv::Size window(options_.klt_window, options_.klt_window);
+  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, window, options_.klt_levels - 1,
+                              /*withDerivatives=*/true);
+  return picture;
+}
+
+Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared) {
+  auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
+  STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
   Matches matches;
-  if (picture_.size() == image.pixels.size()) {
-    replenish(picture_);
-    matches = track(image, pyramid);
+  if (last_ != nullptr && last_->image.pixels.size() == picture->image.pixels.size()) {
+    replenish(*last_);
+    matches = track(*last_, *picture);
   } else {
     points_.clear();
   }
-  pyramid_ = pyramid;
-  picture_ = image.pixels;
-  map_ = image.map;
+  last_ = std::move(picture);
   return matches;
 }
 
@@ -59,15 +75,7 @@ void KltFrontEnd::keep(const std::vector<char>& is_good) {
   points_ = std::move(kept);
 }
 
-std::vector<cv::Mat> KltFrontEnd::build_pyramid(const cv::Mat& picture) const {
-  std::vector<cv::Mat> pyramid;
-  const cv::Size window(options_.klt_window, options_.klt_window);
-  cv::buildOpticalFlowPyramid(picture, pyramid, window, options_.klt_levels - 1,
-                              /*withDerivatives=*/true);
-  return pyramid;
-}
-
-Matches KltFrontEnd::track(const ChannelImage& image, const std::vector<cv::Mat>& pyramid) {
+Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
   Matches matches;
   matches.num_keypoints = static_cast<int>(points_.size());
   if (points_.empty()) {
@@ -84,39 +92,47 @@ Matches KltFrontEnd::track(const ChannelImage& image, const std::vector<cv::Mat>
   std::vector<cv::Point2f> back_uv = prev_uv;
   std::vector<unsigned char> found;
   std::vector<unsigned char> found_back;
-  cv::calcOpticalFlowPyrLK(pyramid_, pyramid, prev_uv, cur_uv, found, cv::noArray(), window,
+  cv::calcOpticalFlowPyrLK(prev.pyramid, cur.pyramid, prev_uv, cur_uv, found, cv::noArray(), window,
                            options_.klt_levels - 1, criteria);
   // The way back starts where the way there started: two levels are enough to leave a wrong place.
   const int back_levels = std::min(options_.klt_levels, kBackLevels);
-  cv::calcOpticalFlowPyrLK(pyramid, pyramid_, cur_uv, back_uv, found_back, cv::noArray(), window,
-                           back_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::calcOpticalFlowPyrLK(cur.pyramid, prev.pyramid, cur_uv, back_uv, found_back, cv::noArray(),
+                           window, back_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
 
   std::vector<Point> followed;
   followed.reserve(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const bool is_good =
-        found[i] != 0 && found_back[i] != 0 && is_inside(cur_uv[i], image.pixels.size()) &&
-        input_distance_px(map_, prev_uv[i], back_uv[i]) <= options_.max_forward_backward_px;
+    const bool is_good = found[i] != 0 && found_back[i] != 0 &&
+                         is_inside(cur_uv[i], cur.image.pixels.size()) &&
+                         input_distance_px(prev.image.map, prev_uv[i], back_uv[i]) <=
+                             options_.max_forward_backward_px;
     if (!is_good) {
       continue;
     }
     followed.push_back({cur_uv[i], points_[i].id});
-    matches.prev_uv.push_back(to_input(map_, prev_uv[i]));
-    matches.cur_uv.push_back(to_input(image.map, cur_uv[i]));
+    matches.prev_uv.push_back(to_input(prev.image.map, prev_uv[i]));
+    matches.cur_uv.push_back(to_input(cur.image.map, cur_uv[i]));
     matches.track_ids.push_back(points_[i].id);
   }
   points_ = std::move(followed);
   return matches;
 }
 
-void KltFrontEnd::replenish(const cv::Mat& picture) {
-  const double min_distance = options_.min_distance_px / map_.scale.minCoeff();
-  GridQuota quota(options_, picture.size());
-  cv::Mat mask(picture.size(), CV_8U, cv::Scalar(255));
+/// Corners are looked for one level up, at half the size: the window that follows them is several
+/// pixels wide, and any pixel of a corner will do.
+void KltFrontEnd::replenish(const Picture& picture) {
+  const bool is_halved = options_.klt_levels > 1 && picture.pyramid.size() > kNextLevel;
+  const cv::Mat& pixels = picture.pyramid[is_halved ? kNextLevel : 0];
+  const float to_pixels = is_halved ? 2.0F : 1.0F;
+  const double min_distance =
+      options_.min_distance_px / (picture.image.map.scale.minCoeff() * to_pixels);
+  GridQuota quota(options_, picture.image.pixels.size());
+  cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
   std::vector<Point> kept;
   kept.reserve(points_.size());
   for (const Point& point : points_) {
-    const cv::Point center(cvRound(point.uv.x), cvRound(point.uv.y));
+    const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
+                           std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
     if (mask.at<unsigned char>(center) == 0) {
       continue;  // tracks that ran into each other: the older one stays
     }
@@ -127,11 +143,11 @@ void KltFrontEnd::replenish(const cv::Mat& picture) {
   points_ = std::move(kept);
 
   std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(picture, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
+  cv::goodFeaturesToTrack(pixels, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
                           mask, /*blockSize=*/3);
   for (const cv::Point2f& corner : corners) {  // strongest first
-    if (quota.take(corner)) {
-      points_.push_back({corner, next_id_++});
+    if (quota.take(corner * to_pixels)) {
+      points_.push_back({corner * to_pixels, next_id_++});
     }
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -15,7 +16,10 @@ class KltFrontEnd : public FrontEnd {
  public:
   explicit KltFrontEnd(const FeatureOptions& options) : options_(options) {}
 
-  [[nodiscard]] Matches process(const ChannelImage& image) override;
+  using FrontEnd::process;
+  [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
+      const ChannelImage& image) const override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
@@ -25,15 +29,15 @@ class KltFrontEnd : public FrontEnd {
     int id = -1;
   };
 
-  [[nodiscard]] Matches track(const ChannelImage& image, const std::vector<cv::Mat>& pyramid);
-  void replenish(const cv::Mat& picture);
-  [[nodiscard]] std::vector<cv::Mat> build_pyramid(const cv::Mat& picture) const;
+  /// With its pyramid and the derivatives of every level, which both directions use.
+  struct Picture;
+
+  [[nodiscard]] Matches track(const Picture& prev, const Picture& cur);
+  void replenish(const Picture& picture);
 
   FeatureOptions options_;
-  std::vector<cv::Mat> pyramid_;  ///< of the last picture
-  cv::Mat picture_;               ///< the last picture
-  PixelMap map_;                  ///< of the last picture
-  std::vector<Point> points_;     ///< on the last picture
+  std::shared_ptr<const Picture> last_;
+  std::vector<Point> points_;  ///< on the last picture
   int next_id_ = 0;
 };
 

@@ -3,7 +3,10 @@
 
 #include <utility>
 
+#include <tbb/parallel_invoke.h>
+
 #include "odometry/map_history.hpp"
+#include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
 
 namespace stemvo {
@@ -19,71 +22,135 @@ Expected<ChannelOdometry> ChannelOdometry::create(const Config& config, const Ca
 ChannelOdometry::ChannelOdometry(const Config& config,
                                  const Camera& camera,
                                  std::unique_ptr<FrontEnd> front_end)
-    : seed_(config.seed),
+    : camera_(camera),
+      seed_(config.seed),
+      asks_road_(config.scale.source == "camera_height"),
       stretch_(config.stem),
       front_end_(std::move(front_end)),
       estimator_(config, camera),
       chain_(config.odometry, config.scale) {
-  if (config.odometry.mode == "map" || config.scale.source == "camera_height") {
+  if (config.odometry.mode == "map" || asks_road_) {
     map_.emplace(config, camera);
   }
 }
 
 FrameResult ChannelOdometry::process(const Channel& channel, const cv::Mat& frame) {
-  FrameResult result = process_channel(channel, frame);
-  poses_.push_back(result.world_from_camera);
-  return result;
-}
-
-FrameResult ChannelOdometry::process_channel(const Channel& channel, const cv::Mat& frame) {
-  FrameResult result;
-  Stopwatch watch;
-  image_ = stretch_.apply(channel);
-  result.times.stem_ms = watch.lap_ms();
-  matches_ = front_end_->process(image_);
-  result.times.features_ms = watch.lap_ms();
-
-  if (!chain_.has_picture()) {
-    chain_.start();
-    if (map_.has_value()) {
-      map_->restart(frame_number(), image_);
-    }
-    add_road(result);
-    result.world_from_camera = chain_.world_from_camera();
-    return result;
-  }
-  measure(frame);
-  result.state = chain_.add(motion_);
-  result.times.pose_ms = watch.lap_ms();
-
-  result.world_from_camera = chain_.world_from_camera();
-  result.num_matches = static_cast<int>(matches_.cur_uv.size());
-  result.num_inliers = motion_.num_inliers;
-  result.homography_score = motion_.homography_score;
-  result.fundamental_score = motion_.fundamental_score;
-  result.homography_ratio = motion_.homography_ratio;
-  result.model = motion_.model;
-  add_road(result);
-  return result;
-}
-
-void ChannelOdometry::measure(const cv::Mat& frame) {
-  motion_ = estimator_.measure(matches_.prev_uv, matches_.cur_uv, chain_.is_initializing(), seed_);
-  if (map_.has_value()) {
-    motion_ = map_->refine(frame_number(), image_, matches_, chain_.world_from_picture(),
-                           std::move(motion_));
-    map_->look(frame);
-  }
-  front_end_->keep(motion_.inlier_mask);
+  push(prepare(channel, frame));
+  return finish().value();
 }
 
 FrameResult ChannelOdometry::process_missing() {
+  push({});
+  return finish().value();
+}
+
+PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& frame) {
+  PreparedFrame prepared;
+  prepared.pixels = frame;
+  Stopwatch watch;
+  const ChannelImage image = stretch_.apply(channel);
+  prepared.stem_ms = watch.lap_ms();
+  prepared.picture = front_end_->prepare(image);
+  if (asks_road_) {
+    prepared.road = std::make_shared<RoadPicture>(make_road_picture(image, camera_));
+  }
+  return prepared;
+}
+
+std::optional<FrameResult> ChannelOdometry::push(PreparedFrame frame) {
+  FrameInWork work;
+  work.frame = std::move(frame);
+  std::optional<FrameResult> before;
+  if (pending_.has_value()) {
+    tbb::parallel_invoke([&] { before = finish(); }, [&] { follow(work); });
+  } else {
+    follow(work);
+  }
+  place(work);
+  pending_ = std::move(work);
+  return before;
+}
+
+void ChannelOdometry::follow(FrameInWork& work) {
+  if (work.frame.picture != nullptr) {
+    Stopwatch watch;
+    work.matches = front_end_->process(work.frame.picture);
+    work.result.times.stem_ms = work.frame.stem_ms;
+    work.result.times.features_ms = watch.lap_ms();
+  }
+}
+
+void ChannelOdometry::place(FrameInWork& work) {
+  if (work.frame.picture == nullptr) {
+    return;
+  }
+  work.is_first = !chain_.has_picture();
+  if (work.is_first) {
+    chain_.start();
+    return;
+  }
+  Stopwatch watch;
+  work.motion = estimator_.measure(work.matches.prev_uv, work.matches.cur_uv,
+                                   chain_.is_initializing(), seed_);
+  if (map_.has_value()) {
+    map_->place(frame_number(), chain_.world_from_picture(), work.matches, work.motion);
+  }
+  front_end_->keep(work.motion.inlier_mask);
+  work.result.times.pose_ms = watch.lap_ms();
+}
+
+/// Uses all but the front end.
+std::optional<FrameResult> ChannelOdometry::finish() {
+  if (!pending_.has_value()) {
+    return std::nullopt;
+  }
+  FrameInWork work = *std::exchange(pending_, std::nullopt);
+  if (work.frame.picture == nullptr) {
+    skip(work);
+  } else {
+    refine(work);
+  }
+  work.result.world_from_camera = chain_.world_from_camera();
+  poses_.push_back(work.result.world_from_camera);
+  if (work.frame.picture == nullptr) {  // pictures go on showing the last one there was
+    work.frame.picture = finished_.frame.picture;
+  }
+  finished_ = std::move(work);
+  return finished_.result;
+}
+
+void ChannelOdometry::refine(FrameInWork& work) {
+  const RoadPicture no_road;
+  const RoadPicture& road = work.frame.road != nullptr ? *work.frame.road : no_road;
+  FrameResult& result = work.result;
+  if (work.is_first) {
+    if (map_.has_value()) {
+      map_->restart(frame_number(), road);
+    }
+    add_road(result);
+    return;
+  }
+  Stopwatch watch;
+  if (map_.has_value()) {
+    map_->refine(road, work.matches, work.motion);
+    map_->look(work.frame.pixels);
+  }
+  result.state = chain_.add(work.motion);
+  result.times.pose_ms += watch.lap_ms();
+  result.num_matches = static_cast<int>(work.matches.cur_uv.size());
+  result.num_inliers = work.motion.num_inliers;
+  result.homography_score = work.motion.homography_score;
+  result.fundamental_score = work.motion.fundamental_score;
+  result.homography_ratio = work.motion.homography_ratio;
+  result.model = work.motion.model;
+  add_road(result);
+}
+
+void ChannelOdometry::skip(FrameInWork& work) {
   chain_.extrapolate(/*has_picture=*/false);
-  matches_ = {};
-  motion_ = {};
-  FrameResult result;
+  FrameResult& result = work.result;
   result.state = FrameState::kBroken;
-  result.world_from_camera = chain_.world_from_camera();
+  result.problem = work.frame.problem;
   add_road(result);
   if (result.road == RoadState::kMeasured) {
     result.road = RoadState::kHeld;
@@ -91,8 +158,6 @@ FrameResult ChannelOdometry::process_missing() {
   if (result.road != RoadState::kNotAsked) {
     result.road_reason = "no picture";
   }
-  poses_.push_back(result.world_from_camera);
-  return result;
 }
 
 void ChannelOdometry::add_road(FrameResult& result) const {
@@ -115,6 +180,12 @@ std::vector<MapLandmark> ChannelOdometry::landmarks() const {
 
 std::vector<Rigid3> ChannelOdometry::refined_trajectory() const {
   return map_.has_value() ? refined_poses(poses_, map_->history().motions()) : poses_;
+}
+
+const ChannelImage& ChannelOdometry::image() const {
+  static const ChannelImage no_image;
+  const auto& picture = finished_.frame.picture;
+  return picture != nullptr ? picture->image : no_image;
 }
 
 }  // namespace stemvo

@@ -40,40 +40,45 @@ MapOdometry::MapOdometry(const Config& config, const Camera& camera)
   }
 }
 
-void MapOdometry::restart(int frame, const ChannelImage& image) {
+void MapOdometry::restart(int frame, const RoadPicture& road) {
   tracker_.restart(frame);
   if (road_.has_value()) {
     road_->restart();
-    ask_road(image, {});
+    ask_road(road, {});
   }
 }
 
-MeasuredMotion MapOdometry::refine(int frame,
-                                   const ChannelImage& image,
-                                   const Matches& matches,
-                                   const Rigid3& world_from_prev,
-                                   MeasuredMotion motion) {
-  if (!tracker_.add(frame, world_from_prev, matches, motion)) {
-    restart(frame, image);
-    return motion;
+void MapOdometry::place(int frame,
+                        const Rigid3& world_from_prev,
+                        const Matches& matches,
+                        MeasuredMotion& motion) {
+  frame_ = frame;
+  world_from_prev_ = world_from_prev;
+  is_placed_ = tracker_.place(frame, world_from_prev, matches, motion);
+}
+
+void MapOdometry::refine(const RoadPicture& road, const Matches& matches, MeasuredMotion& motion) {
+  if (!is_placed_) {
+    restart(frame_, road);
+    return;
   }
+  tracker_.extend(matches, motion);
   if (road_.has_value() && !tracker_.keeps_unit()) {
     road_->start_new_unit();
   }
-  const Rigid3 cur_from_prev = tracker_.world_from_camera().inverse() * world_from_prev;
+  const Rigid3 cur_from_prev = tracker_.world_from_camera().inverse() * world_from_prev_;
   if (road_.has_value()) {
-    make_metric(image, cur_from_prev, world_from_prev.translation);
+    make_metric(road, cur_from_prev, world_from_prev_.translation);
   }
-  const Rigid3 metric = tracker_.world_from_camera().inverse() * world_from_prev;
+  const Rigid3 metric = tracker_.world_from_camera().inverse() * world_from_prev_;
   motion.step = metric.translation.norm();
   if (motion.step > 0.0) {
     motion.cur_from_prev = Rigid3(metric.rotation, metric.translation / motion.step);
   }
-  return motion;
 }
 
-RoadScaleEstimate MapOdometry::ask_road(const ChannelImage& image, const Rigid3& cur_from_prev) {
-  const RoadScaleEstimate estimate = road_->update(image, cur_from_prev);
+RoadScaleEstimate MapOdometry::ask_road(const RoadPicture& road, const Rigid3& cur_from_prev) {
+  const RoadScaleEstimate estimate = road_->update(road, cur_from_prev);
   scale_sigma_ = estimate.sigma;
   road_state_ = estimate.is_measured      ? RoadState::kMeasured
                 : estimate.is_initialized ? RoadState::kHeld
@@ -82,10 +87,10 @@ RoadScaleEstimate MapOdometry::ask_road(const ChannelImage& image, const Rigid3&
   return estimate;
 }
 
-void MapOdometry::make_metric(const ChannelImage& image,
+void MapOdometry::make_metric(const RoadPicture& road,
                               const Rigid3& cur_from_prev,
                               const Eigen::Vector3d& center) {
-  const RoadScaleEstimate estimate = ask_road(image, cur_from_prev);
+  const RoadScaleEstimate estimate = ask_road(road, cur_from_prev);
   if (estimate.is_initialized) {
     tracker_.rescale(estimate.metres_per_unit, center);
     road_->rescale(estimate.metres_per_unit);

@@ -11,7 +11,6 @@
 #include "stemvo/features/front_end.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/odometry/odometry.hpp"
-#include "stemvo/stem/channel.hpp"
 
 namespace stemvo {
 
@@ -22,15 +21,16 @@ class MapOdometry {
   MapOdometry(const Config& config, const Camera& camera);
 
   /// The first picture, or one whose motion was not measured: nothing connects it with the past.
-  void restart(int frame, const ChannelImage& image);
-  /// A frame with matches from the last one given here, of pose `world_from_prev`. Returns the
-  /// motion with what the map and the road add: R and direction of T refined, and the length of the
-  /// step.
-  [[nodiscard]] MeasuredMotion refine(int frame,
-                                      const ChannelImage& image,
-                                      const Matches& matches,
-                                      const Rigid3& world_from_prev,
-                                      MeasuredMotion motion);
+  void restart(int frame, const RoadPicture& road);
+  /// First half, a frame with matches from the last one given here, of pose `world_from_prev`: its
+  /// place among the landmarks. Afterwards the inliers of `motion` are final.
+  void place(int frame,
+             const Rigid3& world_from_prev,
+             const Matches& matches,
+             MeasuredMotion& motion);
+  /// Second half, the same frame, the slower one: refines the map and asks the road. Gives the
+  /// motion what they add: R and direction of T refined, and the length of the step.
+  void refine(const RoadPicture& road, const Matches& matches, MeasuredMotion& motion);
   void keep_landmarks() { tracker_.keep_landmarks(); }
   /// The input picture of the last frame given to refine, for the landmarks' colours.
   void look(const cv::Mat& picture) { tracker_.look(picture); }
@@ -44,13 +44,16 @@ class MapOdometry {
 
  private:
   /// Asks the road, and keeps what it says of the frame.
-  RoadScaleEstimate ask_road(const ChannelImage& image, const Rigid3& cur_from_prev);
+  RoadScaleEstimate ask_road(const RoadPicture& road, const Rigid3& cur_from_prev);
   /// Multiplies the map so that one unit is a metre; `center` stays.
-  void make_metric(const ChannelImage& image,
+  void make_metric(const RoadPicture& road,
                    const Rigid3& cur_from_prev,
                    const Eigen::Vector3d& center);
 
   MapTracker tracker_;
+  Rigid3 world_from_prev_;  ///< of the last frame given to place
+  int frame_ = 0;           ///< the same
+  bool is_placed_ = false;  ///< the same
   std::optional<RoadScale> road_;
   std::optional<double> scale_sigma_;
   RoadState road_state_ = RoadState::kNotAsked;

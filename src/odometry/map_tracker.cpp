@@ -46,6 +46,17 @@ bool MapTracker::add(int frame,
                      const Rigid3& world_from_prev,
                      const Matches& matches,
                      MeasuredMotion& motion) {
+  if (!place(frame, world_from_prev, matches, motion)) {
+    return false;
+  }
+  extend(matches, motion);
+  return true;
+}
+
+bool MapTracker::place(int frame,
+                       const Rigid3& world_from_prev,
+                       const Matches& matches,
+                       MeasuredMotion& motion) {
   // The caller chains relative motions: the same pose but for rounding.
   const Rigid3 moved = world_from_camera_.inverse() * world_from_prev;
   const bool is_where_we_left =
@@ -55,7 +66,7 @@ bool MapTracker::add(int frame,
     start_anew(/*is_last_pose_kept=*/false);
     world_from_camera_ = world_from_prev;
   }
-  const std::optional<Rigid3> placed = place(matches, motion);
+  const std::optional<Rigid3> placed = place_by_landmarks(matches, motion);
   if (!placed.has_value() && !is_believable(matches, motion)) {
     motion.state = FrameState::kLost;
     motion.cur_from_prev = {};
@@ -75,9 +86,6 @@ bool MapTracker::add(int frame,
   const double step = (world_from_camera_.translation - world_from_prev.translation).norm();
   if (motion.state == FrameState::kTracking && step > 0.0) {
     last_step_ = step;
-  }
-  if (is_new_keyframe(motion)) {
-    extend_map(matches, motion.inlier_mask);
   }
   return true;
 }
@@ -109,7 +117,8 @@ Rigid3 MapTracker::guess_pose(const MeasuredMotion& motion) const {
   return world_from_camera_ * Rigid3(prev_from_cur.rotation, step * prev_from_cur.translation);
 }
 
-std::optional<Rigid3> MapTracker::place(const Matches& matches, MeasuredMotion& motion) const {
+std::optional<Rigid3> MapTracker::place_by_landmarks(const Matches& matches,
+                                                     MeasuredMotion& motion) const {
   if (motion.state == FrameState::kStanding || motion.state == FrameState::kRotating) {
     return guess_pose(motion);
   }
@@ -169,10 +178,13 @@ bool MapTracker::is_new_keyframe(const MeasuredMotion& motion) const {
   return options_.use_landmarks && motion.state == FrameState::kTracking;
 }
 
-void MapTracker::extend_map(const Matches& matches, const std::vector<char>& is_inlier) {
+void MapTracker::extend(const Matches& matches, const MeasuredMotion& motion) {
+  if (!is_new_keyframe(motion)) {
+    return;
+  }
   Keyframe keyframe{frame_, world_from_camera_, {}};
   for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
-    if (is_inlier[i] != 0) {
+    if (motion.inlier_mask[i] != 0) {
       keyframe.observations.push_back({matches.track_ids[i], matches.cur_uv[i]});
     }
   }

@@ -44,6 +44,14 @@ class MapTracker {
   /// moved it) the map starts anew from it, as it does where the landmarks are out of view. Returns
   /// false where neither tells how the camera moved: `motion` is lost, nothing was added; to go on,
   /// `restart`.
+  bool place(int frame,
+             const Rigid3& world_from_prev,
+             const Matches& matches,
+             MeasuredMotion& motion);
+  /// Second half, after place returned true for the same frame: it becomes a keyframe if it was
+  /// tracked with parallax, and the window is refined; world_from_camera() changes with it.
+  void extend(const Matches& matches, const MeasuredMotion& motion);
+  /// Both halves.
   bool add(int frame,
            const Rigid3& world_from_prev,
            const Matches& matches,
@@ -68,7 +76,8 @@ class MapTracker {
   /// By the two-frame motion and the length of the last step.
   [[nodiscard]] Rigid3 guess_pose(const MeasuredMotion& motion) const;
   /// By the landmarks; corrects the motion where they agree on another. nullopt: they do not tell.
-  [[nodiscard]] std::optional<Rigid3> place(const Matches& matches, MeasuredMotion& motion) const;
+  [[nodiscard]] std::optional<Rigid3> place_by_landmarks(const Matches& matches,
+                                                         MeasuredMotion& motion) const;
   void correct_motion(const Rigid3& world_from_camera,
                       const Matches& matches,
                       MeasuredMotion& motion) const;
@@ -79,7 +88,6 @@ class MapTracker {
   void add_to_window(Keyframe keyframe);
   void open_map(const Matches& matches, const std::vector<char>& is_inlier);
   [[nodiscard]] bool is_new_keyframe(const MeasuredMotion& motion) const;
-  void extend_map(const Matches& matches, const std::vector<char>& is_inlier);
 
   Camera camera_;
   MapTrackerOptions options_;

@@ -41,22 +41,33 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 FrameResult Odometry::process(const cv::Mat& frame) {
+  static_cast<void>(push(prepare(frame)));
+  return finish().value();
+}
+
+FrameResult Odometry::process_missing() { return impl_->channel_odometry.process_missing(); }
+
+PreparedFrame Odometry::prepare(const cv::Mat& frame) {
   STEMVO_CHECK(frame.cols == impl_->camera.width_px && frame.rows == impl_->camera.height_px,
                "the frame has the camera's size");
   Stopwatch watch;
   const Expected<Channel> channel = impl_->stem.apply(frame);
   const double stem_ms = watch.lap_ms();
+  PreparedFrame prepared;
   if (!channel.has_value()) {
-    FrameResult result = process_missing();
-    result.problem = channel.error().message;
-    return result;
+    prepared.problem = channel.error().message;
+    return prepared;
   }
-  FrameResult result = impl_->channel_odometry.process(channel.value(), frame);
-  result.times.stem_ms += stem_ms;
-  return result;
+  prepared = impl_->channel_odometry.prepare(channel.value(), frame);
+  prepared.stem_ms += stem_ms;
+  return prepared;
 }
 
-FrameResult Odometry::process_missing() { return impl_->channel_odometry.process_missing(); }
+std::optional<FrameResult> Odometry::push(PreparedFrame frame) {
+  return impl_->channel_odometry.push(std::move(frame));
+}
+
+std::optional<FrameResult> Odometry::finish() { return impl_->channel_odometry.finish(); }
 
 std::vector<Rigid3> Odometry::refined_trajectory() const {
   return impl_->channel_odometry.refined_trajectory();

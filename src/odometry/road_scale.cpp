@@ -123,13 +123,12 @@ bool RoadScale::measure(const Past& past, const RoadPicture& picture, RoadScaleE
   return true;
 }
 
-RoadScaleEstimate RoadScale::update(const ChannelImage& image, const Rigid3& cur_from_prev) {
+RoadScaleEstimate RoadScale::update(RoadPicture picture, const Rigid3& cur_from_prev) {
   if (!cur_from_prev.matrix().allFinite()) {
     restart();
   } else if (!past_.empty()) {
     path_.move(cur_from_prev);
   }
-  RoadPicture picture = make_road_picture(image, camera_);
   for (Past& past : past_) {
     past.now_from_past = cur_from_prev * past.now_from_past;
   }

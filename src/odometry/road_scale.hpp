@@ -12,7 +12,6 @@
 #include "odometry/road_types.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/stem/channel.hpp"
 
 namespace stemvo {
 
@@ -32,9 +31,9 @@ class RoadScale {
  public:
   RoadScale(const RoadOptions& options, const Camera& camera);
 
-  /// One call per frame with a picture. `cur_from_prev`: the motion since the last call, in units
+  /// One call per frame with a picture, made for this camera. `cur_from_prev`: the motion since the last call, in units
   /// of the map (ignored at the first call and after restart()).
-  RoadScaleEstimate update(const ChannelImage& image, const Rigid3& cur_from_prev);
+  RoadScaleEstimate update(RoadPicture picture, const Rigid3& cur_from_prev);
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);
   /// The next motion comes in a unit of its own, but from the last picture: what is known of the

@@ -24,6 +24,10 @@ constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5};
 /// frame. The slowest steps that can be seen have 10 and more.
 constexpr double kNoiseParallax = 5.0;
 
+/// Once initialised, S_H is only written down: few points of a street lie on one plane, and the
+/// estimator would always use all its iterations.
+constexpr int kRecordIterations = 100;
+
 double median(std::vector<double> values) {
   if (values.empty()) {
     return 0.0;
@@ -148,7 +152,11 @@ TwoViewEstimator::Models TwoViewEstimator::score_models(std::span<const Eigen::V
                                                         std::uint64_t seed,
                                                         MeasuredMotion& result) const {
   Models models;
-  models.homography = estimate_homography(prev_uv, cur_uv, options_, seed);
+  TwoViewOptions homography_options = options_;
+  if (!is_initializing) {
+    homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
+  }
+  models.homography = estimate_homography(prev_uv, cur_uv, homography_options, seed);
   std::optional<Eigen::Matrix3d> fundamental;
   if (is_initializing) {
     fundamental = estimate_fundamental(prev_uv, cur_uv, options_, seed);

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/frame_reader.hpp"
+#include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/thread_scope.hpp"
@@ -72,14 +72,11 @@ Drive drive(const RunRequest& request,
             FramesCsv& csv,
             const RunProgress& progress) {
   Drive result;
-  pipeline::FrameReader reader(sequence);
-  for (std::size_t i = 0; i < sequence.size() && !result.interrupted; ++i) {
+  const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
     const std::size_t number = sequence.range().begin + i;
-    const Expected<cv::Mat> frame = reader.next();
     if (!frame) {
       result.warnings.push_back(frame.error().message);
     }
-    const FrameResult pose = frame ? odometry.process(*frame) : odometry.process_missing();
     if (!pose.problem.empty()) {
       result.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
     }
@@ -92,7 +89,9 @@ Drive drive(const RunRequest& request,
                  write_frame_picture(request, odometry, frame.value_or(cv::Mat()), number, pose));
     }
     result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
-  }
+    return !result.interrupted;
+  };
+  pipeline::run_frames(sequence, odometry, visit);
   keep_first(result.written, csv.close());
   return result;
 }

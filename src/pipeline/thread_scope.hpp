@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <opencv2/core/utility.hpp>
+#include <tbb/global_control.h>
 
 namespace stemvo::pipeline {
 
-/// OpenCV's number of threads belongs to the process: it is given back. 0: all cores.
+/// While it lives, the process works on `num_threads` threads (0: one per core), OpenCV's included.
 class ThreadScope {
  public:
-  explicit ThreadScope(int num_threads) : before_(cv::getNumThreads()) {
-    cv::setNumThreads(num_threads > 0 ? num_threads : cv::getNumberOfCPUs());
-  }
-  ~ThreadScope() { cv::setNumThreads(before_); }
+  explicit ThreadScope(int num_threads);
+  ~ThreadScope();
   ThreadScope(const ThreadScope&) = delete;
   ThreadScope& operator=(const ThreadScope&) = delete;
 
  private:
-  int before_;
+  tbb::global_control limit_;
+  int opencv_before_;
 };
 
 }  // namespace stemvo::pipeline

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "odometry/map_odometry.hpp"
+#include "odometry/road_picture.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "support/road_scene.hpp"
 #include "support/synthetic_scene.hpp"
@@ -43,9 +44,11 @@ struct RoadDrive {
     }
     return result;
   }
-  [[nodiscard]] ChannelImage picture(int frame) const {
+  [[nodiscard]] RoadPicture road_picture(int frame) const {
     const Rigid3 camera_from_start(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame});
-    return {testing::render_road(scene, camera_from_start, static_cast<std::uint64_t>(frame)), {}};
+    const cv::Mat pixels =
+        testing::render_road(scene, camera_from_start, static_cast<std::uint64_t>(frame));
+    return make_road_picture({pixels, {}}, scene.camera);
   }
 };
 
@@ -62,7 +65,7 @@ TEST(MapOdometry, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
   const Config config = metric_config();
   const TwoViewEstimator estimator(config, drive.scene.camera);
   MapOdometry map(config, drive.scene.camera);
-  map.restart(0, drive.picture(0));
+  map.restart(0, drive.road_picture(0));
   EXPECT_EQ(map.road_state(), RoadState::kNone);
   EXPECT_EQ(map.road_reason(), "first frame");
   const double unknown = map.scale_sigma().value();
@@ -73,9 +76,9 @@ TEST(MapOdometry, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
   for (int i = 1; i < 20; ++i) {
     drive.scene.has_road = i < num_seen;
     const Matches matches = drive.matches(i);
-    const MeasuredMotion motion =
-        map.refine(i, drive.picture(i), matches, pose,
-                   estimator.measure(matches.prev_uv, matches.cur_uv, i == 1, 1));
+    MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, i == 1, 1);
+    map.place(i, pose, matches, motion);
+    map.refine(drive.road_picture(i), matches, motion);
     const Rigid3 step = motion.cur_from_prev.inverse();
     pose = pose * Rigid3(step.rotation, motion.step * step.translation);
     if (i < num_seen) {
@@ -97,7 +100,7 @@ TEST(MapOdometry, ARoadThatIsNotAskedHasNoState) {
   Config config = metric_config();
   config.scale.source = "constant";
   MapOdometry map(config, drive.scene.camera);
-  map.restart(0, drive.picture(0));
+  map.restart(0, drive.road_picture(0));
   EXPECT_EQ(map.road_state(), RoadState::kNotAsked);
   EXPECT_FALSE(map.scale_sigma().has_value());
 }

@@ -135,14 +135,15 @@ class Drive {
     const cv::Mat picture =
         testing::render_road(scene_, camera_from_first, static_cast<std::uint64_t>(frame_));
     ++frame_;
-    return scale.update({picture, {}}, step());
+    return scale.update(make_road_picture({picture, {}}, scene_.camera), step());
   }
   /// A frame that shows the last place again.
   RoadScaleEstimate stand(RoadScale& scale) {
     --frame_;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     ++frame_;
-    return scale.update({testing::render_road(scene_, camera_from_first, 5), {}}, Rigid3{});
+    const cv::Mat picture = testing::render_road(scene_, camera_from_first, 5);
+    return scale.update(make_road_picture({picture, {}}, scene_.camera), Rigid3{});
   }
   [[nodiscard]] const Camera& camera() const { return scene_.camera; }
   double metres_per_unit = kMetresPerUnit;
@@ -214,7 +215,8 @@ double error_on_a_crest(const RoadOptions& options) {
     const Rigid3 camera_from_first = first_from_camera(frame).inverse();
     const cv::Mat picture =
         testing::render_road(scene, camera_from_first, static_cast<std::uint64_t>(frame));
-    estimate = scale.update({picture, {}}, camera_from_first * first_from_camera(frame - 1));
+    estimate = scale.update(make_road_picture({picture, {}}, scene.camera),
+                            camera_from_first * first_from_camera(frame - 1));
   }
   EXPECT_TRUE(estimate.is_measured) << estimate.reason;
   return std::log(estimate.metres_per_unit);

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,13 +19,13 @@ struct FeatureOptions {
   int max_features = 1000;     ///< keypoints aimed at per frame
   int grid_columns = 16;       ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
-  double corner_quality = 0.005;         ///< klt: least corner response over the strongest
-  double min_distance_px = 8.0;          ///< klt: between keypoints, in input pixels
-  int klt_window = 11;                   ///< klt: pixels of the tracked picture, odd
-  int klt_levels = 4;                    ///< klt: pyramid levels
-  double max_forward_backward_px = 0.5;  ///< klt: input pixels
-  int fast_threshold = 10;               ///< orb
-  double ratio = 0.8;                    ///< sift: best over second-best descriptor distance
+  double corner_quality = 0.005;          ///< klt: least corner response over the strongest
+  double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
+  int klt_window = 11;                    ///< klt: pixels of the tracked picture, odd
+  int klt_levels = 4;                     ///< klt: pyramid levels
+  double max_forward_backward_px = 0.25;  ///< klt: input pixels
+  int fast_threshold = 10;                ///< orb
+  double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
 };
 
 /// Correspondences of two frames, in input pixels.
@@ -35,13 +36,26 @@ struct Matches {
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
+/// What a front end makes of a picture on its own, without those before it.
+struct PreparedPicture {
+  explicit PreparedPicture(ChannelImage channel_image) : image(std::move(channel_image)) {}
+  virtual ~PreparedPicture() = default;
+  ChannelImage image;
+};
+
 /// Finds correspondences between the last picture it was given and the next one. Stateful (it holds
 /// the last picture); the same pictures give the same matches, whatever the number of threads.
 class FrontEnd {
  public:
   virtual ~FrontEnd() = default;
+  /// The part of process() that needs only the picture: it may run ahead, in another thread than
+  /// the rest, one call at a time.
+  [[nodiscard]] virtual std::shared_ptr<const PreparedPicture> prepare(
+      const ChannelImage& image) const = 0;
   /// Matches from the previous picture (none on the first). A picture of another size starts over.
-  [[nodiscard]] virtual Matches process(const ChannelImage& image) = 0;
+  /// `picture` was prepared by this front end.
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedPicture> picture) = 0;
+  [[nodiscard]] Matches process(const ChannelImage& image) { return process(prepare(image)); }
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
   /// not followed further.
   virtual void keep(const std::vector<char>& is_good) = 0;

@@ -55,6 +55,18 @@ struct StageTimes {
   double pose_ms = 0.0;
 };
 
+struct RoadPicture;
+
+/// A frame as far as it can be made without a pose: seen through the channel. Without a picture it
+/// stands for a frame that could not be read.
+struct PreparedFrame {
+  cv::Mat pixels;                                  ///< as given
+  std::shared_ptr<const PreparedPicture> picture;  ///< null: could not be read, or see problem
+  std::shared_ptr<const RoadPicture> road;         ///< null: the road is not asked
+  std::string problem;                             ///< why the stem gave no channel, else empty
+  double stem_ms = 0.0;
+};
+
 /// One row of frames.csv.
 struct FrameResult {
   FrameState state = FrameState::kFirst;
@@ -97,6 +109,16 @@ class Odometry {
   /// A frame that could not be read: keeps the clock running.
   [[nodiscard]] FrameResult process_missing();
 
+  /// What process() does, in three parts that can work on three frames at a time; the results are
+  /// the same. Frames are prepared in their order, one call at a time, which may run ahead of the
+  /// others in another thread.
+  [[nodiscard]] PreparedFrame prepare(const cv::Mat& frame);
+  /// Follows the points to this frame and places it, while the frame before is refined; returns
+  /// the result of the frame before, if there is one that was not returned yet.
+  [[nodiscard]] std::optional<FrameResult> push(PreparedFrame frame);
+  /// The result of the last frame pushed, if it was not returned yet.
+  [[nodiscard]] std::optional<FrameResult> finish();
+
   /// One pose per frame so far, as the local map last knew them: with the look-ahead of its window.
   /// Mode two_frame refines nothing: the poses as they came.
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
@@ -107,7 +129,7 @@ class Odometry {
   /// when they left the window, or are now. Empty without keep_landmarks().
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
-  /// Of the last frame processed, for pictures.
+  /// Of the last frame whose result was returned, for pictures.
   [[nodiscard]] const ChannelImage& channel_image() const;
   [[nodiscard]] const Matches& matches() const;
   [[nodiscard]] const std::vector<char>& inlier_mask() const;

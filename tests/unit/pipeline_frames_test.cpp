@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <unistd.h>
+
+#include "pipeline/frame_pipeline.hpp"
+#include "pipeline/thread_scope.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A textured wall that comes nearer; frame 4 is no picture.
+class FramePipeline : public ::testing::Test {
+ protected:
+  static constexpr int kNumFrames = 9;
+  static constexpr int kBroken = 4;
+
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", ::getpid(), info->name());
+    const fs::path sequence = folder_ / "sequences/08";
+    fs::create_directories(sequence / "image_0");
+    std::ofstream(sequence / "calib.txt") << "P0: 200 0 159.5 0 0 200 79.5 0 0 0 1 0\n";
+    std::ofstream times(sequence / "times.txt");
+    cv::Mat wall(480, 960, CV_8UC1);
+    cv::theRNG().state = 3;
+    cv::randu(wall, 0, 256);
+    cv::GaussianBlur(wall, wall, {}, 2.0);
+    cv::normalize(wall, wall, 0, 255, cv::NORM_MINMAX);
+    for (int i = 0; i < kNumFrames; ++i) {
+      times << 0.1 * i << "\n";
+      const fs::path file = sequence / fmt::format("image_0/{:06}.png", i);
+      if (i == kBroken) {
+        std::ofstream(file) << "no picture";
+        continue;
+      }
+      const double scale = 0.5 + 0.02 * i;
+      const cv::Matx23d map(scale, 0.02 * i, 159.5 - 479.5 * scale, 0, scale, 79.5 - 239.5 * scale);
+      cv::Mat frame;
+      cv::warpAffine(wall, frame, map, {320, 160}, cv::INTER_LINEAR);
+      cv::imwrite(file.string(), frame);
+    }
+    times.close();
+    config_.stem.model = "gray";
+    sequence_.emplace(KittiSequence::open(sequence, {}).value());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] Odometry odometry() const {
+    return Odometry::create(config_, sequence_->camera(), STEMVO_SOURCE_DIR "/models").value();
+  }
+
+  Config config_;
+  fs::path folder_;
+  std::optional<KittiSequence> sequence_;
+};
+
+TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThreads) {
+  std::vector<FrameResult> expected;
+  Odometry plain = odometry();
+  for (std::size_t i = 0; i < sequence_->size(); ++i) {
+    const Expected<cv::Mat> frame = sequence_->read(i);
+    expected.push_back(frame ? plain.process(*frame) : plain.process_missing());
+  }
+  EXPECT_EQ(expected[kBroken].state, FrameState::kBroken);
+  EXPECT_GT(expected.back().num_inliers, 50);
+  for (const int num_threads : {1, 2, 4}) {
+    const pipeline::ThreadScope threads(num_threads);
+    Odometry piped = odometry();
+    std::size_t num_visited = 0;
+    pipeline::run_frames(
+        *sequence_, piped,
+        [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
+          EXPECT_EQ(i, num_visited++);
+          EXPECT_EQ(frame.has_value(), i != kBroken);
+          EXPECT_EQ(result.state, expected[i].state) << i;
+          EXPECT_EQ(result.num_inliers, expected[i].num_inliers) << i;
+          EXPECT_EQ(result.world_from_camera.matrix(), expected[i].world_from_camera.matrix()) << i;
+          EXPECT_EQ(piped.matches().cur_uv.size(), static_cast<std::size_t>(result.num_matches));
+          EXPECT_FALSE(piped.channel_image().pixels.empty());
+          return true;
+        });
+    EXPECT_EQ(num_visited, sequence_->size()) << num_threads << " threads";
+  }
+}
+
+TEST_F(FramePipeline, StopsAtTheFrameWhoseVisitorSaysSo) {
+  Odometry piped = odometry();
+  std::vector<std::size_t> visited;
+  pipeline::run_frames(*sequence_, piped,
+                       [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
+                         visited.push_back(i);
+                         return i < 2;
+                       });
+  EXPECT_EQ(visited, (std::vector<std::size_t>{0, 1, 2}));
+}
+
+TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
+  Odometry piped = odometry();
+  const auto visit = [](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
+    if (i == 3) {
+      throw std::runtime_error("disk on fire");
+    }
+    return true;
+  };
+  EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
+}
+
+TEST_F(FramePipeline, PushReturnsTheFrameBeforeAndFinishTheLast) {
+  Odometry odometry = this->odometry();
+  EXPECT_FALSE(odometry.finish().has_value());
+  EXPECT_FALSE(odometry.push(odometry.prepare(sequence_->read(0).value())).has_value());
+  const auto first = odometry.push(odometry.prepare(sequence_->read(1).value()));
+  ASSERT_TRUE(first.has_value());
+  EXPECT_EQ(first->state, FrameState::kFirst);
+  const auto second = odometry.finish();
+  ASSERT_TRUE(second.has_value());
+  EXPECT_GT(second->num_matches, 50);
+  EXPECT_FALSE(odometry.finish().has_value());
+}
+
+}  // namespace
+}  // namespace stemvo
