@@ -31,8 +31,8 @@ class RoadScale {
  public:
   RoadScale(const RoadOptions& options, const Camera& camera);
 
-  /// One call per frame with a picture, made for this camera. `cur_from_prev`: the motion since the last call, in units
-  /// of the map (ignored at the first call and after restart()).
+  /// One call per frame with a picture, made for this camera. `cur_from_prev`: the motion since the
+  /// last call, in units of the map (ignored at the first call and after restart()).
   RoadScaleEstimate update(RoadPicture picture, const Rigid3& cur_from_prev);
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);

@@ -23,9 +23,7 @@ using FramePtr = std::shared_ptr<Frame>;  // TBB copies what stages hand on
 
 }  // namespace
 
-void run_frames(const KittiSequence& sequence,
-                Odometry& odometry,
-                const FrameVisitor& visit) {
+void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
   std::size_t num_started = 0;
   std::atomic<bool> is_over = false;
   const auto start = [&](tbb::flow_control& control) {
@@ -62,10 +60,11 @@ void run_frames(const KittiSequence& sequence,
 
   using tbb::filter_mode;
   tbb::parallel_pipeline(
-      kMaxInFlight, tbb::make_filter<void, FramePtr>(filter_mode::serial_in_order, start) &
-                        tbb::make_filter<FramePtr, FramePtr>(filter_mode::parallel, read) &
-                        tbb::make_filter<FramePtr, FramePtr>(filter_mode::serial_in_order, prepare) &
-                        tbb::make_filter<FramePtr, void>(filter_mode::serial_in_order, push));
+      kMaxInFlight,
+      tbb::make_filter<void, FramePtr>(filter_mode::serial_in_order, start) &
+          tbb::make_filter<FramePtr, FramePtr>(filter_mode::parallel, read) &
+          tbb::make_filter<FramePtr, FramePtr>(filter_mode::serial_in_order, prepare) &
+          tbb::make_filter<FramePtr, void>(filter_mode::serial_in_order, push));
   if (!is_over) {
     hand_over(odometry.finish());
   }
