@@ -45,6 +45,11 @@ struct SearchPlan {
   [[nodiscard]] std::size_t num_frames(bool held_out) const;
 };
 
+/// Loads the model's layers, those asked for, and the baselines. Errors: unknown model or layer
+/// (lists the known ones), filters outside, a file that is not that of the manifest.
+[[nodiscard]] Expected<std::vector<PlanLayer>> plan_layers(const SearchRequest& request);
+
+/// Errors: those of plan_layers and run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
 }  // namespace stemvo::search

@@ -89,6 +89,15 @@ MeanScore mean_score(const std::vector<DriveScore>& drives) {
   return mean;
 }
 
+std::string reason_of(const FilterRow& row) {
+  for (const DriveScore& drive : row.drives) {
+    if (!drive.is_detected) {
+      return row.drives.size() > 1 ? drive.sequence + ": " + drive.reason : drive.reason;
+    }
+  }
+  return {};
+}
+
 bool comes_before(const FilterKey& a, const FilterKey& b) {
   return std::tie(a.model, a.layer, a.features, a.filter) <
          std::tie(b.model, b.layer, b.features, b.filter);

@@ -24,6 +24,9 @@ struct MeanScore {
 };
 [[nodiscard]] MeanScore mean_score(const std::vector<DriveScore>& drives);
 
+/// Why a pose was not detected: of the first sequence that the filter failed on; else empty.
+[[nodiscard]] std::string reason_of(const FilterRow& row);
+
 /// By model, layer, features and filter: what decides where numbers do not.
 [[nodiscard]] bool comes_before(const FilterKey& a, const FilterKey& b);
 
