@@ -79,6 +79,10 @@ int run(Arguments& arguments) {
     print_warning(fmt::format("interrupted; the results hold the first {} frames",
                               summary->report.num_frames));
   }
+  if (!summary->written) {
+    print_error(summary->written.error().message);
+    return kExitFailed;
+  }
   print_summary(arguments, *summary);
   return summary->interrupted ? kExitInterrupted : kExitDone;
 }

@@ -56,6 +56,9 @@ void run_now(const RunRequest& request,
   if (!summary) {
     return finish(run, BenchmarkState::kFailed, summary.error().message);
   }
+  if (!summary->written) {
+    return finish(run, BenchmarkState::kFailed, summary->written.error().message);
+  }
   if (summary->interrupted) {
     return;
   }

@@ -214,10 +214,8 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   }
   keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
   keep_first(written, pipeline::write_map(request.out_dir, *sequence, done.trajectory, report));
-  if (!written) {
-    return tl::unexpected(written.error());
-  }
-  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted};
+  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted,
+                    std::move(written)};
 }
 
 }  // namespace stemvo

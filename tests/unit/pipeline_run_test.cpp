@@ -106,10 +106,10 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
 TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
   request_.config.odometry.mode = "two_frame";
   request_.config.scale.source = "constant";
-  ASSERT_TRUE(run_sequence(request_));
+  ASSERT_TRUE(run_sequence(request_).value().written);
   const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   request_.config.scale.source = "ground_truth";
-  ASSERT_TRUE(run_sequence(request_));
+  ASSERT_TRUE(run_sequence(request_).value().written);
   const auto rescaled = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   ASSERT_TRUE(constant && rescaled);
   for (std::size_t i = 0; i < constant->size(); ++i) {
@@ -187,7 +187,7 @@ TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
 
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
   request_.config.seed = 42;
-  ASSERT_TRUE(run_sequence(request_));
+  ASSERT_TRUE(run_sequence(request_).value().written);
   EXPECT_THAT(read_file(request_.out_dir / "config.yaml"), HasSubstr("# frames 0:6 of 07\n"));
   const Expected<Config> config = load_config(request_.out_dir / "config.yaml");
   ASSERT_TRUE(config) << config.error().message;
@@ -247,7 +247,12 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
 TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
   fs::create_directories(request_.out_dir / "trajectory_tum.txt");
   fs::create_directories(request_.out_dir / "config.yaml");
-  EXPECT_THAT(error_of(request_), HasSubstr("trajectory_tum.txt"));
+  fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  ASSERT_FALSE(summary->written);
+  EXPECT_THAT(summary->written.error().message, HasSubstr("trajectory_tum.txt"));
+  EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
   EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 6U);
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "metrics.json"));
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "trajectory.png"));

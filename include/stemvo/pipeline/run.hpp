@@ -39,6 +39,7 @@ struct RunSummary {
   StemInfo stem;
   std::vector<std::string> warnings;  ///< broken frames and the like, one line each
   bool interrupted = false;           ///< stopped early; results hold what was computed
+  Status written;                     ///< the first result that could not be written, if any
 };
 
 /// Called after each frame: frames done, frames in all; false stops the run (results are written).
@@ -50,7 +51,7 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request (configuration,
 /// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
 /// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
-/// result cannot be written the others still are, and the first failure is the error.
+/// result cannot be written the others still are; `written` says so.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 
