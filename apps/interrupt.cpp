@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "interrupt.hpp"
 
+#include <atomic>
 #include <csignal>
 
 #include <signal.h>
@@ -8,9 +9,11 @@
 namespace stemvo::apps {
 namespace {
 
-volatile std::sig_atomic_t interrupted = 0;
+// Lock-free, so a signal handler may set it; read by whichever thread shows the progress.
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
 
-void on_signal(int /*number*/) { interrupted = 1; }
+void on_signal(int /*number*/) { interrupted = true; }
 
 }  // namespace
 
@@ -23,6 +26,6 @@ void catch_interrupts() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool is_interrupted() { return interrupted != 0; }
+bool is_interrupted() { return interrupted; }
 
 }  // namespace stemvo::apps

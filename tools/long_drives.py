@@ -9,7 +9,7 @@ CACHE keeps the rendered frames (some 0.2 MB each at 620x188), so that the next 
 The defaults of the program are run, with what --set changes. Errors are those of `stemvo run`, no
 alignment. Memory is the largest resident set in the first half of the frames / in the second / after
 the last (writing the results); the ratio is that of the halves. Time is per frame in each quarter of
-the drive, without reading the files; processor time is that of all threads, which other programs on
+the drive, by the clock; processor time is that of all threads, which other programs on
 the machine do not stretch; length is the estimated length of each quarter over the true one.
 docs/accuracy.md shows a table.
 """

@@ -5,19 +5,10 @@
 #include <map>
 #include <utility>
 
+#include "geometry/median.hpp"
 #include "stemvo/geometry/triangulation.hpp"
 
 namespace stemvo::calibration {
-namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-}  // namespace
-
 void SegmentBuilder::sort_points(Keyframe& keyframe) {
   std::sort(keyframe.points.begin(), keyframe.points.end(),
             [](const TrackPoint& a, const TrackPoint& b) { return a.track_id < b.track_id; });

@@ -8,6 +8,7 @@
 #include "odometry/map_history.hpp"
 #include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
+#include "stemvo/check.hpp"
 
 namespace stemvo {
 
@@ -35,11 +36,13 @@ ChannelOdometry::ChannelOdometry(const Config& config,
 }
 
 FrameResult ChannelOdometry::process(const Channel& channel, const cv::Mat& frame) {
+  STEMVO_CHECK(!pending_.has_value(), "process() is not called between push() and finish()");
   push(prepare(channel, frame));
   return finish().value();
 }
 
 FrameResult ChannelOdometry::process_missing() {
+  STEMVO_CHECK(!pending_.has_value(), "process() is not called between push() and finish()");
   push({});
   return finish().value();
 }

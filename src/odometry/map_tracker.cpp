@@ -42,17 +42,6 @@ MapHistory MapTracker::history() const {
   return history;
 }
 
-bool MapTracker::add(int frame,
-                     const Rigid3& world_from_prev,
-                     const Matches& matches,
-                     MeasuredMotion& motion) {
-  if (!place(frame, world_from_prev, matches, motion)) {
-    return false;
-  }
-  extend(matches, motion);
-  return true;
-}
-
 bool MapTracker::place(int frame,
                        const Rigid3& world_from_prev,
                        const Matches& matches,

@@ -25,10 +25,6 @@ struct MapTrackerOptions {
   int refine_every = 1;            ///< keyframes between refinements, the paper's m; 0: never
   double first_step = 1.0;         ///< length of the first step, map units
   double epipolar_bound_px = 1.0;  ///< of the inliers of a motion that the map has corrected
-  /// Of the landmarks in view that agree with a pose: fewer, and a pose is searched among all of
-  /// them without the two-frame motion.
-  double min_agreement = 0.5;
-  std::uint64_t seed = 1;  ///< of that search
 };
 
 /// Poses from a local map: each frame is placed against the landmarks, becomes a keyframe when it
@@ -51,11 +47,6 @@ class MapTracker {
   /// Second half, after place returned true for the same frame: it becomes a keyframe if it was
   /// tracked with parallax, and the window is refined; world_from_camera() changes with it.
   void extend(const Matches& matches, const MeasuredMotion& motion);
-  /// Both halves.
-  bool add(int frame,
-           const Rigid3& world_from_prev,
-           const Matches& matches,
-           MeasuredMotion& motion);
   /// False: a map was left behind, and the last frame's step is as long as the one before by guess;
   /// what was known of the unit no longer holds.
   [[nodiscard]] bool keeps_unit() const { return keeps_unit_; }

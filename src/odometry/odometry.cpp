@@ -41,7 +41,8 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 FrameResult Odometry::process(const cv::Mat& frame) {
-  static_cast<void>(push(prepare(frame)));
+  const std::optional<FrameResult> before = push(prepare(frame));
+  STEMVO_CHECK(!before.has_value(), "process() is not called between push() and finish()");
   return finish().value();
 }
 

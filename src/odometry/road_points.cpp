@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "geometry/median.hpp"
 #include "odometry/road_normal.hpp"
 #include "odometry/road_region.hpp"
 
@@ -156,12 +157,6 @@ std::vector<Track> track_corners(const RoadPicture& prev,
     }
   }
   return tracks;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 void discount(const std::map<int, Eigen::Vector3d>& cells, RoadNormal& normal) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/median.hpp"
 #include "odometry/robust_models.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/geometry/decomposition.hpp"
@@ -27,15 +28,6 @@ constexpr double kNoiseParallax = 5.0;
 /// Once initialised, S_H is only written down: few points of a street lie on one plane, and the
 /// estimator would always use all its iterations.
 constexpr int kRecordIterations = 100;
-
-double median(std::vector<double> values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double median_flow_px(std::span<const Eigen::Vector2d> prev_uv,
                       std::span<const Eigen::Vector2d> cur_uv) {

@@ -19,8 +19,9 @@ using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
 /// Takes the frames of a sequence through an odometry. Reading, the stem and the rest work on
-/// different frames at the same time, on as many threads as ThreadScope allows, a few frames ahead
-/// at most; the poses do not depend on it. What a stage or the visitor throws leaves this function.
+/// different frames at the same time, on as many threads as ThreadScope allows (without one: a
+/// thread per core), a few frames ahead at most; the poses do not depend on it. What a stage or the
+/// visitor throws leaves this function.
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

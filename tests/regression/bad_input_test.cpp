@@ -167,7 +167,7 @@ TEST_F(BadInput, ModelOtherThanTheManifestSays) {
 
 TEST_F(BadInput, Configuration) {
   expect_error(run_with_config("stem:\n  filtre: 3\n"), 1,
-               {"my.yaml:2: stem.filtre: unknown key; known keys of stem: model, filter"});
+               {"my.yaml:2: stem.filtre: unknown key; known keys of stem: model, layer, filter"});
   expect_error(run_with_config("stem:\n  filter: 3\n  filter: 4\n"), 1,
                {"my.yaml:3: stem.filter: duplicated key", "line 2"});
   expect_error(run_with_config("stem:\n  filter: three\n"), 1,

@@ -75,6 +75,15 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
   EXPECT_THAT(result.err, HasSubstr("60/60 frames"));
 }
 
+TEST_F(Run, NothingLooksAhead) {
+  ASSERT_EQ(run_drive(sequence_, out_ + "long", {"--frames", "0:40"}).exit_code, 0);
+  ASSERT_EQ(run_drive(sequence_, out_ + "short", {"--frames", "0:25"}).exit_code, 0);
+  const std::string longer = read_file(out_ + "long/trajectory_kitti.txt");
+  const std::string shorter = read_file(out_ + "short/trajectory_kitti.txt");
+  EXPECT_EQ(count_lines(shorter), 25);
+  EXPECT_EQ(longer.substr(0, shorter.size()), shorter);
+}
+
 TEST_F(Run, PicturesAreOfThisRunOnly) {
   fs::create_directories(out_ + "/pictures");
   for (const char* name : {"000001.png", "000777.png", "holiday.png", "1.png", "000003.txt"}) {

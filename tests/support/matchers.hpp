@@ -25,12 +25,6 @@ inline double direction_error_rad(const Eigen::Vector3d& a, const Eigen::Vector3
   return 2.0 * std::atan2((u - v).norm(), (u + v).norm());
 }
 
-inline double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Largest difference of an entry; NaN fails. For vectors and matrices of the same size.
 MATCHER_P2(IsNear, expected, tolerance, "is near the expected matrix") {
   const double error = (arg - expected).cwiseAbs().maxCoeff();

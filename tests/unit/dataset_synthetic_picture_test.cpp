@@ -11,6 +11,7 @@
 #include "dataset/synth/hash.hpp"
 #include "dataset/synth/materials.hpp"
 #include "dataset/synth/renderer.hpp"
+#include "geometry/median.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -29,12 +30,6 @@ cv::Mat gray_of(const RenderedFrame& frame) {
   cv::Mat gray;
   cv::cvtColor(frame.bgr, gray, cv::COLOR_BGR2GRAY);
   return gray;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Where the pixels of frame a are in frame b, by depth and poses; outside where they are hidden.

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "geometry/median.hpp"
 #include "stemvo/geometry/decomposition.hpp"
 #include "stemvo/geometry/relative_pose_refinement.hpp"
 #include "support/matchers.hpp"
@@ -17,7 +18,6 @@ namespace {
 using testing::direction_error_rad;
 using testing::IsNearMotion;
 using testing::make_scene;
-using testing::median;
 using testing::rotation_error_rad;
 using testing::Scene;
 using testing::SceneOptions;

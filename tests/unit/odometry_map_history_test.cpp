@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "odometry/map_history.hpp"
-#include "odometry/map_tracker.hpp"
 #include "odometry/two_view_estimator.hpp"
+#include "support/map_tracker.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -50,7 +50,7 @@ void drive_on(
   for (int i = from; i < to; ++i) {
     const Matches matches = drive.matches(i);
     MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
-    tracker.add(i, online.back(), matches, motion);
+    testing::add_frame(tracker, i, online.back(), matches, motion);
     online.push_back(tracker.world_from_camera());
   }
 }
@@ -113,7 +113,7 @@ TEST(MapHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   for (int i = 1; i < num_frames; ++i) {
     const Matches matches = drive.matches(i);
     MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
-    tracker.add(i, online.back(), matches, motion);
+    testing::add_frame(tracker, i, online.back(), matches, motion);
     online.push_back(tracker.world_from_camera());
     picture.setTo(cv::Scalar(i, 2 * i, 3 * i));
     tracker.look(picture);

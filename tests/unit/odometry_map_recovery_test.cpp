@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "odometry/map_tracker.hpp"
 #include "odometry/two_view_estimator.hpp"
+#include "support/map_tracker.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -37,7 +37,7 @@ struct Driven {
   void go_on(int i) {
     const Matches matches = drive.matches(i);
     MeasuredMotion motion = measure(matches);
-    ASSERT_TRUE(tracker.add(i, pose, matches, motion)) << i;
+    ASSERT_TRUE(testing::add_frame(tracker, i, pose, matches, motion)) << i;
     EXPECT_TRUE(tracker.keeps_unit()) << i;
     pose = tracker.world_from_camera();
   }
@@ -61,7 +61,7 @@ TEST(MapRecovery, AWrongTwoFrameMotionDoesNotTakeTheMapDown) {
     motion.inlier_mask[i] = i % 4 == 0 ? 1 : 0;
   }
   motion.num_inliers = right.num_inliers / 4;
-  ASSERT_TRUE(d.tracker.add(kBadFrame, d.pose, matches, motion));
+  ASSERT_TRUE(testing::add_frame(d.tracker, kBadFrame, d.pose, matches, motion));
   EXPECT_TRUE(d.tracker.keeps_unit());
   d.expect_true_step(kBadFrame);
   EXPECT_EQ(motion.state, FrameState::kTracking);
@@ -77,7 +77,7 @@ TEST(MapRecovery, ALostTwoFrameMotionIsFoundAmongTheLandmarks) {
   MeasuredMotion motion;
   motion.inlier_mask.assign(matches.cur_uv.size(), 0);
   ASSERT_EQ(motion.state, FrameState::kLost);
-  ASSERT_TRUE(d.tracker.add(kBadFrame, d.pose, matches, motion));
+  ASSERT_TRUE(testing::add_frame(d.tracker, kBadFrame, d.pose, matches, motion));
   EXPECT_EQ(motion.state, FrameState::kTracking);
   d.expect_true_step(kBadFrame);
 }
@@ -93,7 +93,7 @@ TEST(MapRecovery, ManyWrongTracksAreOutvoted) {
   }
   MeasuredMotion motion;
   motion.inlier_mask.assign(matches.cur_uv.size(), 0);
-  ASSERT_TRUE(d.tracker.add(kBadFrame, d.pose, matches, motion));
+  ASSERT_TRUE(testing::add_frame(d.tracker, kBadFrame, d.pose, matches, motion));
   d.expect_true_step(kBadFrame);
   for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
     if (i % 10 >= 6) {
@@ -116,7 +116,7 @@ TEST(MapRecovery, TracksThatEndAnywhereAreLostWhateverTheMotionSays) {
       epipolar_inliers(motion.cur_from_prev, matches.prev_uv, matches.cur_uv, d.drive.camera, 5.0);
   motion.num_inliers =
       static_cast<int>(std::count(motion.inlier_mask.begin(), motion.inlier_mask.end(), char{1}));
-  EXPECT_FALSE(d.tracker.add(kBadFrame, d.pose, matches, motion));
+  EXPECT_FALSE(testing::add_frame(d.tracker, kBadFrame, d.pose, matches, motion));
   EXPECT_EQ(motion.state, FrameState::kLost);
   d.tracker.restart(kBadFrame);
   EXPECT_TRUE(d.tracker.map().keyframes.empty());
@@ -131,7 +131,7 @@ TEST(MapRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewInAUnitOfItsOwn) 
     id += 100000;  // the same views of other things
   }
   MeasuredMotion motion = d.measure(matches);
-  ASSERT_TRUE(d.tracker.add(kBadFrame, d.pose, matches, motion));
+  ASSERT_TRUE(testing::add_frame(d.tracker, kBadFrame, d.pose, matches, motion));
   EXPECT_FALSE(d.tracker.keeps_unit());
   EXPECT_EQ(d.tracker.map().keyframes.size(), 2U);
   EXPECT_NEAR((d.tracker.world_from_camera().translation - d.pose.translation).norm(),
@@ -142,7 +142,7 @@ TEST(MapRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewInAUnitOfItsOwn) 
     id += 100000;
   }
   motion = d.measure(matches);
-  ASSERT_TRUE(d.tracker.add(kBadFrame + 1, d.pose, matches, motion));
+  ASSERT_TRUE(testing::add_frame(d.tracker, kBadFrame + 1, d.pose, matches, motion));
   EXPECT_TRUE(d.tracker.keeps_unit());
   d.expect_true_step(kBadFrame + 1);
 }

@@ -5,9 +5,9 @@
 
 #include "odometry/bundle_adjustment.hpp"
 #include "odometry/landmarks.hpp"
-#include "odometry/map_tracker.hpp"
 #include "odometry/reprojection_cost.hpp"
 #include "odometry/two_view_estimator.hpp"
+#include "support/map_tracker.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -152,7 +152,7 @@ Rigid3 drive_tracker(MapTracker& tracker, const DriveTracks& drive, int from, in
   for (int i = from; i < to; ++i) {
     const Matches matches = drive.matches(i);
     MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
-    tracker.add(i, pose, matches, motion);
+    testing::add_frame(tracker, i, pose, matches, motion);
     pose = tracker.world_from_camera();
   }
   return pose;
@@ -197,7 +197,7 @@ TEST(MapTracker, StandingStillKeepsMapAndScale) {
   motion.inlier_mask.assign(still.cur_uv.size(), 1);
   for (int i = 0; i < 40; ++i) {
     pose.translation.x() += 1e-15 * (i % 3);
-    tracker.add(9 + i, pose, still, motion);
+    testing::add_frame(tracker, 9 + i, pose, still, motion);
     pose = tracker.world_from_camera();
   }
   EXPECT_GT(tracker.map().keyframes.size(), 2U);
@@ -217,7 +217,7 @@ TEST(MapTracker, StartsAnewWhereTheCallerMovedThePose) {
   const Matches matches = drive.matches(6);
   const Rigid3 elsewhere(Eigen::Quaterniond::Identity(), {100.0, 0.0, 0.0});
   MeasuredMotion motion = estimator.measure(matches.prev_uv, matches.cur_uv, false, 1);
-  tracker.add(6, elsewhere, matches, motion);
+  testing::add_frame(tracker, 6, elsewhere, matches, motion);
   EXPECT_EQ(tracker.map().keyframes.size(), 2U);
   EXPECT_LT((tracker.world_from_camera().translation - elsewhere.translation).norm(), 3.0);
 }

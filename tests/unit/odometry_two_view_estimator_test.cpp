@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "geometry/median.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -33,11 +34,6 @@ Scene drive_scene(const Rigid3& prev_from_cur,
 MeasuredMotion measure(const Scene& scene, bool is_initializing = false) {
   const TwoViewEstimator estimator({}, scene.camera);
   return estimator.measure(scene.prev_uv, scene.cur_uv, is_initializing, 1);
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 TEST(TwoViewEstimator, ExactForwardDriveTurningRight) {

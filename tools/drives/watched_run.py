@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """One run of the program, its memory sampled while it works, its numbers read afterwards."""
 
-import csv
 import dataclasses
 import json
 import os
@@ -10,7 +9,6 @@ import subprocess
 import time
 
 SAMPLE_S = 0.02
-STAGES = ("stem_ms", "features_ms", "pose_ms")
 
 
 class RunError(Exception):
@@ -21,7 +19,7 @@ class RunError(Exception):
 class Result:
     metrics: dict  # metrics.json
     memory_mb: tuple  # largest resident set in the first half of the frames, in the second, and after the last
-    quarters_ms: list  # mean time per frame of each quarter, without reading the files
+    quarters_ms: list  # mean time per frame of each quarter, by the clock
     quarters_cpu_ms: list  # mean processor time per frame of each quarter, of all threads
 
     @property
@@ -76,18 +74,18 @@ class Watched:
     """Samples of a running process."""
 
     memory_mb: list = dataclasses.field(default_factory=lambda: [0.0, 0.0, 0.0])
-    marks: list = dataclasses.field(default_factory=list)  # (frames, processor seconds) at the quarters
+    marks: list = dataclasses.field(default_factory=list)  # (frames, seconds, processor seconds) at the quarters
 
     def add(self, pid, rows, num_frames):
         part = 2 if rows >= num_frames else 1 if 2 * rows >= num_frames else 0
         self.memory_mb[part] = max(self.memory_mb[part], resident_mb(pid))
         if len(self.marks) < 5 and (rows > 0 or self.marks) and 4 * rows >= len(self.marks) * num_frames:
-            self.marks.append((rows, processor_s(pid)))
+            self.marks.append((rows, time.monotonic(), processor_s(pid)))
 
-    def quarters_cpu_ms(self):
-        """None where the run was too short to tell."""
-        pairs = list(zip(self.marks, self.marks[1:]))
-        return [1000.0 * (t1 - t0) / (n1 - n0) if n1 > n0 and t1 > t0 else None for (n0, t0), (n1, t1) in pairs]
+    def quarters_ms(self, clock):
+        """Per frame; `clock` 1: of the wall, 2: of the processor. None where the run was too short to tell."""
+        spans = [(b[0] - a[0], b[clock] - a[clock]) for a, b in zip(self.marks, self.marks[1:])]
+        return [1000.0 * seconds / frames if frames > 0 and seconds > 0.0 else None for frames, seconds in spans]
 
 
 def watch(process, frames_csv, num_frames):
@@ -100,13 +98,6 @@ def watch(process, frames_csv, num_frames):
         time.sleep(SAMPLE_S)
     counter.close()
     return watched
-
-
-def quarters_of(frames_csv):
-    with open(frames_csv, encoding="utf-8", newline="") as stream:
-        times = [sum(float(row[stage]) for stage in STAGES) for row in csv.DictReader(stream)]
-    ends = [len(times) * quarter // 4 for quarter in range(5)]
-    return [sum(times[a:b]) / max(b - a, 1) for a, b in zip(ends, ends[1:])]
 
 
 def run(program, sequence, out, num_frames, options):
@@ -130,7 +121,7 @@ def run(program, sequence, out, num_frames, options):
     if not watched.memory_mb[0] or not watched.memory_mb[1]:
         raise RunError(f"{out}: the run was too short to sample its memory")
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
-    return Result(metrics, tuple(watched.memory_mb), quarters_of(out / "frames.csv"), watched.quarters_cpu_ms())
+    return Result(metrics, tuple(watched.memory_mb), watched.quarters_ms(1), watched.quarters_ms(2))
 
 
 def lengths_ratio(estimate, truth):

@@ -48,7 +48,8 @@ enum class RoadState {
 /// `-`, `none`, `held`, `measured`.
 [[nodiscard]] std::string_view to_string(RoadState state);
 
-/// Milliseconds per stage of one frame.
+/// Milliseconds per stage of one frame. Stages of different frames overlap: their sum is no frame's
+/// time.
 struct StageTimes {
   double stem_ms = 0.0;
   double features_ms = 0.0;
