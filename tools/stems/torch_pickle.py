@@ -9,6 +9,7 @@ Source of the layouts: torch/serialization.py (_load, _legacy_load).
 """
 
 import collections
+import math
 import pickle
 import struct
 import zipfile
@@ -19,6 +20,8 @@ _DTYPES = {"FloatStorage": "<f4", "DoubleStorage": "<f8", "HalfStorage": "<f2", 
            "IntStorage": "<i4", "ShortStorage": "<i2", "CharStorage": "<i1", "ByteStorage": "<u1", "BoolStorage": "?"}
 _LEGACY_MAGIC = 0x1950A86A20F9469CFC6C
 _LARGEST_FILE = 8 << 30
+_LONGEST_NAMES = 1 << 26  # characters of all names together, each at least _SHORTEST_NAME
+_SHORTEST_NAME = 64
 
 
 class _Other:
@@ -72,6 +75,9 @@ class Tensor:
         last = self._offset + sum((size - 1) * stride for size, stride in zip(self.shape, self._strides))
         if 0 not in self.shape and last >= values.size:
             raise ValueError("a tensor outside its storage")
+        count = math.prod(self.shape)
+        if count > values.size:  # strides of 0 make any size out of one number
+            raise ValueError(f"a tensor of {count} numbers in a storage of {values.size}")
         bytes_per = values.itemsize
         return np.lib.stride_tricks.as_strided(values[self._offset:], self.shape,
                                                [stride * bytes_per for stride in self._strides]).copy()
@@ -149,19 +155,33 @@ def _read_legacy(path):
         return document
 
 
-def _flatten(document, prefix, found, depth=0):
-    if isinstance(document, Tensor):
-        found[prefix] = document
-    elif isinstance(document, dict) and depth < 8:
-        for key, value in document.items():
-            if isinstance(key, str):
-                _flatten(value, f"{prefix}.{key}" if prefix else key, found, depth + 1)
+class _Names:
+    """All tensors of nested dictionaries by their dotted names. A dictionary inside itself is left out; dictionaries
+    that hold each other by many names, which would give more names than there is memory, are an error."""
+
+    def __init__(self):
+        self.found = {}
+        self._inside = set()  # ids of the dictionaries on the way down
+        self._length = 0
+
+    def add(self, document, prefix=""):
+        self._length += max(len(prefix), _SHORTEST_NAME)
+        if self._length > _LONGEST_NAMES:
+            raise ValueError("dictionaries that give too many names")
+        if isinstance(document, Tensor):
+            self.found[prefix] = document
+        elif isinstance(document, dict) and len(self._inside) < 8 and id(document) not in self._inside:
+            self._inside.add(id(document))
+            for key, value in document.items():
+                if isinstance(key, str):
+                    self.add(value, f"{prefix}.{key}" if prefix else key)
+            self._inside.remove(id(document))
 
 
 def read(path):
     """Name -> Tensor, of all nested dictionaries ("model.conv1.weight"). Raises what pickle, zipfile and
     numpy raise on a broken file."""
     document = _read_zip(path) if zipfile.is_zipfile(path) else _read_legacy(path)
-    found = {}
-    _flatten(document, "", found)
-    return found
+    names = _Names()
+    names.add(document)
+    return names.found
