@@ -98,6 +98,13 @@ def model_files(models):
     return found
 
 
+def inputs_of(options):
+    """Hashes of the program and the configuration, and what tells whether a sequence has changed."""
+    files = [options.program] + ([options.config] if options.config else [])
+    sequences = options.sequences + ([options.held_out] if options.held_out else [])
+    return [[hash_of(file.read_bytes()) for file in files], [plan.sequence_contents(sequence) for sequence in sequences]]
+
+
 class Parts:
     """OUT/parts: a folder per task that is done, and plan.json, which says what the tasks are."""
 
@@ -108,12 +115,21 @@ class Parts:
         if self._plan_file.exists() and any(self.folder.glob("part*")):
             if not resume:
                 raise ClusterError(f"{out}: expected an empty folder, found a search (--resume goes on with it)")
-            if json.loads(self._plan_file.read_text(encoding="utf-8")).get("fingerprint") != fingerprint:
-                raise ClusterError(f"{out}: --resume: expected the same program, models, filters, sequences and options, found others")
+            if self._fingerprint_before() != fingerprint:
+                raise ClusterError(f"{out}: --resume: expected the same program, models, filters, sequences (frames, calibration, poses), "
+                                   "configuration and options, found others")
+
+    def _fingerprint_before(self):
+        try:
+            return json.loads(self._plan_file.read_text(encoding="utf-8"))["fingerprint"]
+        except (ValueError, KeyError, TypeError) as error:  # no JSON, no UTF-8, another document
+            raise ClusterError(f"{self._plan_file}: expected the plan of a search, found: {' '.join(str(error).split())}") from error
 
     def begin(self):
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._plan_file.write_text(json.dumps(self._content, indent=1) + "\n", encoding="utf-8")
+        partial = self._plan_file.with_suffix(".partial")
+        partial.write_text(json.dumps(self._content, indent=1) + "\n", encoding="utf-8")
+        partial.replace(self._plan_file)
 
     def path(self, task):
         return self.folder / task.name
@@ -153,7 +169,7 @@ def search(options):
     common = common_arguments(options)
     files = model_files(models)
     contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]
-    parts = Parts(options.out, tasks, plan.fingerprint(tasks, [common, contents, hash_of(options.program.read_bytes())]), options.resume)
+    parts = Parts(options.out, tasks, plan.fingerprint(tasks, [common, contents, inputs_of(options)]), options.resume)
     waiting = [task for task in tasks if not parts.is_done(task)]
     outcome = driver.Outcome()
     if waiting:

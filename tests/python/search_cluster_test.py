@@ -129,6 +129,21 @@ class SearchCluster(unittest.TestCase):
             done = subprocess.run(self.cluster("--out", out, *options), capture_output=True, text=True, check=False)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
             self.assertIn(message, done.stderr)
+        self.changed_inputs_are_refused_before_any_work(out)
+
+    def changed_inputs_are_refused_before_any_work(self, out):
+        sequence = self.folder / "drive/sequences/00"
+        image = next(sequence.glob("image_2/*7.png"))
+        for file in (sequence / "calib.txt", self.folder / "drive/poses/00.txt", image, out / "plan.json"):
+            content = file.read_bytes()
+            file.write_bytes(content[:-9])
+            done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--resume"), capture_output=True, text=True, check=False)
+            file.write_bytes(content)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
+            self.assertIn("expected the plan of a search" if file.name == "plan.json" else "found others", done.stderr)
+        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--resume", "--quiet"), capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("9 from before", done.stdout)
 
     def test_errors(self):
         (self.folder / "text.onnx").write_text("text")

@@ -36,12 +36,11 @@ class Outcome:
 
 
 def _arguments(task, options):
-    files = options.model_files.get(task.model, {})
-    onnx = next((name for name in files if name.endswith(".onnx")), None)
+    onnx = next((name for name in options.model_files.get(task.model, {}) if name.endswith(".onnx")), None)
     words = task.arguments()
     if onnx:
         words[1] = "{folder}/" + onnx
-    return [*options.common, *words], files
+    return [*options.common, *words]
 
 
 class _Queue:
@@ -64,8 +63,7 @@ class _Queue:
         while self._waiting or self._running:
             self._submit()
             ready, _ = ray.wait(list(self._running), timeout=1.0) if self._running else (time.sleep(0.5) or [], [])
-            for reference in ready:
-                self._collect(reference, self._running.pop(reference))
+            self._collect_all(ready)
             self.outcome.seconds = time.monotonic() - start
         return self.outcome
 
@@ -82,10 +80,22 @@ class _Queue:
                                f"{self._options.patience_s:.0f} s; what is done is kept, --resume goes on")
         while self._waiting and len(self._running) < slots:
             task = self._waiting.popleft()
-            arguments, _ = _arguments(task, self._options)
+            arguments = _arguments(task, self._options)
             files = self._sent.get(task.model, {})
             reference = self._remote.remote(self._options.program, arguments, files, self._options.threads)
             self._running[reference] = task
+
+    def _collect_all(self, ready):
+        """Keeps every result that is there, also those beside one that ends the search."""
+        errors = []
+        done, _ = ray.wait(list(self._running), num_returns=len(self._running), timeout=0) if ready else ([], [])
+        for reference in done:
+            try:
+                self._collect(reference, self._running.pop(reference))
+            except ClusterError as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]
 
     def _collect(self, reference, task):
         try:

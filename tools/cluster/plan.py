@@ -6,7 +6,7 @@ import hashlib
 import json
 import pathlib
 
-import yaml
+from stems import manifest
 
 
 class ClusterError(Exception):
@@ -33,12 +33,15 @@ class Task:
         return words if self.baselines else [*words, "--no-baselines"]
 
 
-def _entries(manifest):
+def _entries(path):
+    if not path.is_file():
+        raise ClusterError(f"{path}: expected a manifest of models, found no file")
     try:
-        models = yaml.safe_load(manifest.read_text(encoding="utf-8"))["models"]
-        return [(entry["name"], entry["file"], entry["layer"], int(entry["filters"])) for entry in models]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
-        raise ClusterError(f"{manifest}: expected a manifest of models, found: {' '.join(str(error).split())}") from error
+        return [(entry["name"], entry["file"], entry["layer"], int(entry["filters"])) for entry in manifest.load(path)]
+    except manifest.ManifestError as error:
+        raise ClusterError(str(error)) from error
+    except (TypeError, ValueError) as error:
+        raise ClusterError(f"{path}: expected numbers of filters, found: {' '.join(str(error).split())}") from error
 
 
 def layers_of(model, models_dir):
@@ -77,6 +80,21 @@ def tasks_of(models, models_dir, layers=None, filters=None, per_task=32):
             for start in range(first, last, per_task):
                 tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last), not tasks))
     return tasks
+
+
+def _hash_of(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+
+
+def sequence_contents(sequence):
+    """What tells whether a sequence has changed, without reading its frames: calib.txt, times.txt and the pose file by
+    hash, the frames by name and size. A frame changed in place to the same size is noticed by the merge, which compares
+    the program's own hashes."""
+    folder = sequence.resolve()
+    frames = [[file.parent.name, file.name, file.stat().st_size] for file in sorted(folder.glob("image_*/*")) if file.is_file()]
+    texts = [folder / "calib.txt", folder / "times.txt"]
+    poses = [base.parent.parent / "poses" / f"{base.name}.txt" for base in (sequence.absolute(), folder)]
+    return [[_hash_of(path) for path in texts + poses], frames]
 
 
 def fingerprint(tasks, arguments):

@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 
 # What a part is; the rest of a search's folder is made again by the merge.
-PART_FILES = ("records.jsonl", "config.yaml")
+PART_FILES = ("records.jsonl",)
 
 
 class TaskFailed(Exception):
