@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -132,8 +133,10 @@ void add_options(CLI::App& command, Arguments& arguments) {
                   "Join parts of one exhaustive search (folders --out) into --out")
       ->type_name("DIR..");
   command
-      .add_option("--block", request.block,
-                  "Filters in flight: what a kill may lose; memory grows with it; default: 64")
+      .add_option(
+          "--block", request.block,
+          "Filters in flight: what a kill may lose. One pass of the stem serves a block: a\n"
+          "wide, slow stem wants a larger one, which takes more memory; default: 16")
       ->type_name("N")
       ->check(in_range(1, 100000));
   command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")

@@ -2,15 +2,14 @@
 #include "stemvo/evaluation/metrics.hpp"
 
 #include <cmath>
-#include <numbers>
 
+#include "evaluation/degrees.hpp"
 #include "stemvo/check.hpp"
 
 namespace stemvo {
 
 namespace {
 
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
 constexpr double kShortPath_m = 100.0;       // below it no devkit segment fits
 constexpr double kDevkitLengths_m[] = {100, 200, 300, 400, 500, 600, 700, 800};

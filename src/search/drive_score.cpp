@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "evaluation/degrees.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/evaluation/metrics.hpp"
 #include "stemvo/evaluation/trajectory.hpp"
@@ -21,8 +21,6 @@ constexpr std::size_t kMostPathPoints = 400;
 /// Of the path so far; chosen among prefixes of clips (docs/search.md).
 constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
 
-double to_deg(double angle_rad) { return angle_rad * 180.0 / std::numbers::pi; }
-
 /// E_t and E_r of the paper's Table 2, means over consecutive poses.
 void add_changes(std::span<const Rigid3> trajectory, DriveScore& score) {
   double translation_m = 0.0;
@@ -34,7 +32,7 @@ void add_changes(std::span<const Rigid3> trajectory, DriveScore& score) {
   }
   const auto num_steps = static_cast<double>(std::max<std::size_t>(trajectory.size(), 2) - 1);
   score.translation_change_m = translation_m / num_steps;
-  score.rotation_change_deg = to_deg(rotation_rad) / num_steps;
+  score.rotation_change_deg = kDegPerRad * rotation_rad / num_steps;
 }
 
 /// Evenly spaced, first and last included, to the centimetre.

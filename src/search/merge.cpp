@@ -24,12 +24,7 @@ using search::Record;
 using search::RecordFileContent;
 using search::SearchIdentity;
 
-struct KeyOrder {
-  bool operator()(const FilterKey& a, const FilterKey& b) const {
-    return search::comes_before(a, b);
-  }
-};
-using Records = std::map<FilterKey, Record, KeyOrder>;
+using Records = std::map<FilterKey, Record, search::KeyOrder>;
 
 Expected<RecordFileContent> read_part(const fs::path& folder) {
   const fs::path file = folder / search::kRecordsFile;

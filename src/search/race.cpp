@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "search/ranking.hpp"
@@ -11,8 +12,16 @@
 namespace stemvo::search {
 namespace {
 
-/// Odometries kept from rung to rung, some 2 MB each; beyond it they start again, which counts.
+/// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
+/// go on, they start again, which counts.
 constexpr std::size_t kMostKept = 512;
+
+using KeySet = std::set<FilterKey, KeyOrder>;
+
+KeySet survivors_of(std::vector<const Record*> records, std::size_t count) {
+  const std::vector<FilterKey> keys = choose_survivors(std::move(records), count);
+  return {keys.begin(), keys.end()};
+}
 
 }  // namespace
 
@@ -25,11 +34,16 @@ Race::Race(const SearchPlan& plan,
       evaluation_(request.config.evaluation),
       block_size_(static_cast<std::size_t>(std::max(1, request.block))),
       progress_(std::move(progress)),
-      writer_(std::move(writer)),
-      records_(std::move(records)) {
-  for (const Record& record : records_) {
+      writer_(std::move(writer)) {
+  for (Record& record : records) {
     frames_done_ += record.filter_frames + record.held_out_filter_frames;
+    add_record(std::move(record));
   }
+}
+
+void Race::add_record(Record record) {
+  record_of_[record.rung].try_emplace(record.key, records_.size());
+  records_.push_back(std::move(record));
 }
 
 Status Race::run() {
@@ -64,11 +78,12 @@ std::size_t Race::frames_planned() const {
 }
 
 const Record* Race::find(std::size_t candidate, std::size_t rung) const {
-  const FilterKey& key = plan_.candidates[candidate].key;
-  const auto found = std::find_if(records_.begin(), records_.end(), [&](const Record& record) {
-    return record.rung == static_cast<int>(rung) && record.key == key;
-  });
-  return found == records_.end() ? nullptr : &*found;
+  const auto of_rung = record_of_.find(static_cast<int>(rung));
+  if (of_rung == record_of_.end()) {
+    return nullptr;
+  }
+  const auto found = of_rung->second.find(plan_.candidates[candidate].key);
+  return found == of_rung->second.end() ? nullptr : &records_[found->second];
 }
 
 Race::Block Race::survivors(const Block& alive, std::size_t rung) {
@@ -77,10 +92,10 @@ Race::Block Race::survivors(const Block& alive, std::size_t rung) {
     done.push_back(find(candidate, rung - 1));
     STEMVO_CHECK(done.back() != nullptr, "a rung is complete before the next");
   }
-  const auto keys = choose_survivors(done, plan_.identity.schedule[rung].num_filters);
+  const KeySet keys = survivors_of(done, plan_.identity.schedule[rung].num_filters);
   Block chosen;
   for (const std::size_t candidate : alive) {
-    if (std::find(keys.begin(), keys.end(), plan_.candidates[candidate].key) != keys.end()) {
+    if (keys.contains(plan_.candidates[candidate].key)) {
       chosen.push_back(candidate);
     } else {
       kept_.erase(candidate);
@@ -132,11 +147,34 @@ Status Race::run_block_of(std::size_t rung, const Block& block) {
   if (Status status = writer_.append(done); !status) {
     return status;
   }
-  std::move(done.begin(), done.end(), std::back_inserter(records_));
-  for (std::size_t i = 0; i < block.size() && !is_last(rung) && kept_.size() < kMostKept; ++i) {
-    kept_.emplace(block[i], std::move(drives[i]));
+  for (Record& record : done) {
+    add_record(std::move(record));
+  }
+  if (!is_last(rung)) {
+    keep(rung, block, std::move(drives));
   }
   return {};
+}
+
+/// Of those that ran this rung the best; those that have not run it yet are still to go on.
+void Race::keep(std::size_t rung, const Block& block, std::vector<Drives> drives) {
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    kept_.emplace(block[i], std::move(drives[i]));
+  }
+  if (kept_.size() <= kMostKept) {
+    return;
+  }
+  std::vector<const Record*> done;
+  for (const auto& [candidate, ignored] : kept_) {
+    if (const Record* record = find(candidate, rung)) {
+      done.push_back(record);
+    }
+  }
+  const std::size_t num_waiting = kept_.size() - done.size();
+  const KeySet best = survivors_of(done, kMostKept - std::min(kMostKept, num_waiting));
+  std::erase_if(kept_, [&](const auto& one) {
+    return find(one.first, rung) != nullptr && !best.contains(plan_.candidates[one.first].key);
+  });
 }
 
 bool Race::run_sequence_of(std::size_t rung,

@@ -10,6 +10,7 @@
 #include "search/block_runner.hpp"
 #include "search/drive_score.hpp"
 #include "search/plan.hpp"
+#include "search/ranking.hpp"
 #include "search/record_file.hpp"
 #include "stemvo/search/search.hpp"
 
@@ -29,7 +30,6 @@ class Race {
   /// Error: the records cannot be written.
   [[nodiscard]] Status run();
 
-  [[nodiscard]] bool is_stopped() const { return is_stopped_; }
   [[nodiscard]] const std::vector<Record>& records() const { return records_; }
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -41,6 +41,8 @@ class Race {
   [[nodiscard]] bool is_last(std::size_t rung) const;
   [[nodiscard]] std::size_t frames_planned() const;
   [[nodiscard]] const Record* find(std::size_t candidate, std::size_t rung) const;
+  void add_record(Record record);
+  void keep(std::size_t rung, const Block& block, std::vector<Drives> drives);
   [[nodiscard]] Block survivors(const Block& alive, std::size_t rung);
   Status run_rung(std::size_t rung, const Block& alive);
   Status run_block_of(std::size_t rung, const Block& block);
@@ -63,6 +65,8 @@ class Race {
   SearchProgress progress_;
   RecordWriter writer_;
   std::vector<Record> records_;
+  /// Per rung of records_, the first of each filter.
+  std::map<int, std::map<FilterKey, std::size_t, KeyOrder>> record_of_;
   std::map<std::size_t, Drives> kept_;  ///< of candidates that may go on to the next rung
   std::vector<std::string> warnings_;
   std::size_t frames_done_ = 0;

@@ -29,6 +29,10 @@ struct MeanScore {
 
 /// By model, layer, features and filter: what decides where numbers do not.
 [[nodiscard]] bool comes_before(const FilterKey& a, const FilterKey& b);
+/// The same, of maps and sets.
+struct KeyOrder {
+  bool operator()(const FilterKey& a, const FilterKey& b) const { return comes_before(a, b); }
+};
 
 /// One row per filter from its last rung, ranked: by t_rel, ties by r_rel; then those that were
 /// stopped, the later the better; not detected last. Does not depend on the records' order.

@@ -2,16 +2,13 @@
 #include "search/record_json.hpp"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
+
+#include "search/json.hpp"
 
 namespace stemvo::search {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr int kFormat = 1;
-
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 std::optional<double> optional_number(const Json& json) {
   return json.is_null() ? std::nullopt : std::optional(json.get<double>());

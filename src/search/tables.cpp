@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 #include "report/metrics_keys.hpp"
+#include "search/json.hpp"
 #include "search/ranking.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/version.hpp"
@@ -16,8 +16,6 @@
 
 namespace stemvo::search {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// RFC 4180: quoted where it must be.
 std::string csv_cell(const std::string& text) {
@@ -106,8 +104,6 @@ std::vector<std::string> csv_row(const SearchIdentity& identity, const FilterRow
   cells.push_back(reason_of(row));
   return cells;
 }
-
-Json optional_json(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 Json drive_json(const DriveScore& drive) {
   Json json;

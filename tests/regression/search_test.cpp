@@ -81,6 +81,28 @@ TEST_F(Search, KilledAndResumedGivesTheSameBytes) {
   EXPECT_EQ(table("killed"), table("whole"));
 }
 
+/// 16 filters and 4 baselines are two blocks of the default size.
+TEST_F(Search, KilledWithTheDefaultBlockKeepsTheBlocksThatEnded) {
+  const Words asked = {"--exhaustive", "--threads", "1"};
+  ASSERT_EQ(search("whole", asked).exit_code, 0);
+  test::RunningProgram program(STEMVO_PROGRAM, command("killed", asked));
+  const fs::path records = folder_ / "killed/records.jsonl";
+  for (int i = 0; i < 15000 && count_lines(records) < 2; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  program.send(SIGKILL);
+  ASSERT_EQ(program.wait().exit_code, 128 + SIGKILL) << "the search was over before it was killed";
+  const std::string kept = read_file(records);
+  ASSERT_EQ(std::count(kept.begin(), kept.end(), '\n'), 17);  // what searched, and one block
+  Words resumed = asked;
+  resumed.emplace_back("--resume");
+  const ProgramResult result = search("killed", resumed);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(read_file(records), StartsWith(kept));
+  EXPECT_EQ(count_lines(records), 21U);  // nothing was run again
+  EXPECT_EQ(table("killed"), table("whole"));
+}
+
 TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   ASSERT_EQ(search("whole", {"--exhaustive", "--filters", "0:3"}).exit_code, 0);
   ASSERT_EQ(search("a", {"--exhaustive", "--filters", "0:1"}).exit_code, 0);

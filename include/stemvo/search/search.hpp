@@ -36,7 +36,7 @@ struct SearchRequest {
   bool exhaustive = false;                   ///< every filter over every frame; else halving
   bool resume = false;                       ///< go on from what out_dir holds
   int num_threads = 0;                       ///< 0: all cores
-  int block = 64;                            ///< filters in flight: what a kill may lose
+  int block = 16;                            ///< filters in flight: what a kill may lose
 };
 
 /// One row's identity: a filter of a layer of a model, and what finds matches on its channel.
