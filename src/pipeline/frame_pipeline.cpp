@@ -2,7 +2,9 @@
 #include "pipeline/frame_pipeline.hpp"
 
 #include <atomic>
+#include <exception>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -21,13 +23,44 @@ struct Frame {
 };
 using FramePtr = std::shared_ptr<Frame>;  // TBB copies what stages hand on
 
+/// Ends the run at the first exception of a stage. TBB itself must see none: a pipeline that it
+/// cancels never frees the frames on their way.
+class Guard {
+ public:
+  [[nodiscard]] bool is_over() const { return is_over_; }
+  void end() { is_over_ = true; }
+  template <typename Work>
+  void run(const Work& work) {
+    if (is_over_) {
+      return;
+    }
+    try {
+      work();
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      first_ = first_ == nullptr ? std::current_exception() : first_;
+      is_over_ = true;
+    }
+  }
+  void rethrow() const {
+    if (first_ != nullptr) {
+      std::rethrow_exception(first_);
+    }
+  }
+
+ private:
+  std::atomic<bool> is_over_ = false;
+  std::mutex mutex_;
+  std::exception_ptr first_;
+};
+
 }  // namespace
 
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
   std::size_t num_started = 0;
-  std::atomic<bool> is_over = false;
+  Guard guard;
   const auto start = [&](tbb::flow_control& control) {
-    if (is_over || num_started == sequence.size()) {
+    if (guard.is_over() || num_started == sequence.size()) {
       control.stop();
       return FramePtr();
     }
@@ -36,26 +69,28 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
     return frame;
   };
   const auto read = [&](const FramePtr& frame) {
-    frame->pixels = sequence.read(frame->index);
+    guard.run([&] { frame->pixels = sequence.read(frame->index); });
     return frame;
   };
   const auto prepare = [&](const FramePtr& frame) {
-    if (frame->pixels) {
-      frame->prepared = odometry.prepare(*frame->pixels);
-    }
+    guard.run([&] {
+      if (frame->pixels) {
+        frame->prepared = odometry.prepare(*frame->pixels);
+      }
+    });
     return frame;
   };
   FramePtr before;  // whose result the next call brings
   const auto hand_over = [&](const std::optional<FrameResult>& result) {
-    if (result && before) {
-      is_over = !visit(before->index, before->pixels, *result);
+    if (result && before && !visit(before->index, before->pixels, *result)) {
+      guard.end();
     }
   };
   const auto push = [&](const FramePtr& frame) {
-    if (!is_over) {
+    guard.run([&] {
       hand_over(odometry.push(std::move(frame->prepared)));
       before = frame;
-    }
+    });
   };
 
   using tbb::filter_mode;
@@ -65,9 +100,8 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
           tbb::make_filter<FramePtr, FramePtr>(filter_mode::parallel, read) &
           tbb::make_filter<FramePtr, FramePtr>(filter_mode::serial_in_order, prepare) &
           tbb::make_filter<FramePtr, void>(filter_mode::serial_in_order, push));
-  if (!is_over) {
-    hand_over(odometry.finish());
-  }
+  guard.run([&] { hand_over(odometry.finish()); });
+  guard.rethrow();
 }
 
 }  // namespace stemvo::pipeline
