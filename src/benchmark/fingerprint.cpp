@@ -56,9 +56,9 @@ Expected<std::string> model_identity(const Config& config, const fs::path& model
   }
   return internal::find_model(model, config.stem.layer, models_dir)
       .map([](const ModelEntry& entry) {
-        return fmt::format("{} {} {} {} {} {} {}", entry.sha256, entry.layer, entry.num_filters,
-                           entry.kernel_px, entry.stride_px, entry.padding_px,
-                           entry.default_filter);
+        return fmt::format("{} {} {} {} {} {} {} {}", entry.sha256, entry.layer, entry.num_filters,
+                           entry.kernel_px, entry.stride_px, entry.padding_px, entry.default_filter,
+                           entry.native_sampling_only ? "native" : "any");
       });
 }
 

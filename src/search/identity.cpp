@@ -49,6 +49,9 @@ void compare_layers(const SearchIdentity& before,
       }
     } else if (other->hash != layer.hash) {
       changed.push_back(fmt::format("the model {}", name_of(layer)));
+    } else if (other->sampling_px != layer.sampling_px) {
+      changed.push_back(fmt::format("the sampling of {} ({} px, now {} px)", name_of(layer),
+                                    other->sampling_px, layer.sampling_px));
     } else if (!as_parts && (other->first != layer.first || other->last != layer.last)) {
       changed.push_back(fmt::format("the filters of {} ({}:{}, now {}:{})", name_of(layer),
                                     other->first, other->last, layer.first, layer.last));

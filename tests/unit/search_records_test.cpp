@@ -132,6 +132,9 @@ TEST_F(Records, ChangesAreNamed) {
   now = before;
   now.layers[0].hash = "other";
   EXPECT_EQ(describe_change(before, now, true), "the model net stem changed");
+  now = before;
+  now.layers[0].sampling_px = 4;
+  EXPECT_THAT(describe_change(before, now, true), HasSubstr("the sampling of net stem"));
   now = identity(0, 4);
   EXPECT_THAT(describe_change(before, now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
   EXPECT_EQ(describe_change(before, now, true), "");
