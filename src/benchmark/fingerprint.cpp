@@ -38,6 +38,8 @@ constexpr std::array<Part, 6> kParts = {{
     {"ground_truth", "the pose file", &Fingerprint::ground_truth},
 }};
 
+std::string sha256_of(const std::string& text) { return sha256_hex(text); }
+
 /// A build without a clean commit has a version that does not change with its code.
 Expected<std::string> program_identity() {
   const std::string text(version());
@@ -62,14 +64,23 @@ Expected<std::string> model_identity(const Config& config, const fs::path& model
       });
 }
 
-Expected<std::string> frames_identity(const KittiSequence& sequence) {
+std::string size_of(const fs::path& file) {
+  std::error_code code;
+  const auto size = fs::file_size(file, code);
+  return code ? std::string("unreadable") : std::to_string(size);
+}
+
+std::string hash_of(const fs::path& file) {
+  const auto bytes = read_bytes(file);
+  return bytes ? sha256_hex(*bytes) : std::string("unreadable");
+}
+
+std::string frames_identity(const KittiSequence& sequence, FrameIdentity identity) {
   std::string text;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
-    std::error_code code;
-    const auto size = fs::file_size(sequence.file(i), code);
-    const fs::path folder = sequence.file(i).parent_path().filename();
-    text += fmt::format("{} {}\n", (folder / sequence.file(i).filename()).string(),
-                        code ? std::string("unreadable") : std::to_string(size));
+    const fs::path& file = sequence.file(i);
+    text += fmt::format("{} {}\n", (file.parent_path().filename() / file.filename()).string(),
+                        identity == FrameIdentity::kContents ? hash_of(file) : size_of(file));
   }
   return text;
 }
@@ -92,29 +103,53 @@ bool operator==(const Fingerprint& a, const Fingerprint& b) {
   return describe_change(a, b).empty();
 }
 
-Expected<Fingerprint> make_fingerprint(const Config& config,
-                                       const KittiSequence& sequence,
+Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
                                        const fs::path& sequence_dir,
-                                       const fs::path& models_dir) {
+                                       FrameIdentity frames) {
   std::vector<fs::path> truth;
   if (sequence.ground_truth_file()) {
     truth.push_back(*sequence.ground_truth_file());
   }
-  std::array<Expected<std::string>, kParts.size()> texts = {
-      dump_config(config),
-      program_identity(),
-      model_identity(config, models_dir),
-      frames_identity(sequence),
-      files_identity({sequence_dir / "calib.txt", sequence_dir / "times.txt"}),
-      files_identity(truth)};
-  Fingerprint result;
-  for (std::size_t i = 0; i < kParts.size(); ++i) {
-    if (!texts[i]) {
-      return tl::unexpected(texts[i].error());
-    }
-    result.*kParts[i].value = sha256_hex(*texts[i]);
+  const auto calibration = files_identity({sequence_dir / "calib.txt", sequence_dir / "times.txt"});
+  if (!calibration) {
+    return tl::unexpected(calibration.error());
   }
-  return result;
+  const auto ground_truth = files_identity(truth);
+  if (!ground_truth) {
+    return tl::unexpected(ground_truth.error());
+  }
+  return SequenceHashes{sha256_hex(frames_identity(sequence, frames)), sha256_hex(*calibration),
+                        sha256_hex(*ground_truth)};
+}
+
+Expected<std::string> hash_model(const Config& config, const fs::path& models_dir) {
+  return model_identity(config, models_dir).map(sha256_of);
+}
+
+Expected<std::string> hash_program() { return program_identity().map(sha256_of); }
+
+Expected<Fingerprint> make_fingerprint(const Config& config,
+                                       const KittiSequence& sequence,
+                                       const fs::path& sequence_dir,
+                                       const fs::path& models_dir) {
+  const auto program = hash_program();
+  if (!program) {
+    return tl::unexpected(program.error());
+  }
+  const auto model = hash_model(config, models_dir);
+  if (!model) {
+    return tl::unexpected(model.error());
+  }
+  const auto inputs = hash_sequence(sequence, sequence_dir, FrameIdentity::kNamesAndSizes);
+  if (!inputs) {
+    return tl::unexpected(inputs.error());
+  }
+  return Fingerprint{.configuration = sha256_hex(dump_config(config)),
+                     .program = *program,
+                     .model = *model,
+                     .frames = inputs->frames,
+                     .calibration = inputs->calibration,
+                     .ground_truth = inputs->ground_truth};
 }
 
 Status write_fingerprint(const fs::path& run_dir, const Fingerprint& of) {

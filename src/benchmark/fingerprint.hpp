@@ -21,7 +21,29 @@ struct Fingerprint {
 };
 bool operator==(const Fingerprint& a, const Fingerprint& b);
 
-/// Error: a file that cannot be read, a model that is not there.
+/// What tells whether the frames are those of before.
+enum class FrameIdentity {
+  kNamesAndSizes,  ///< at once; a frame replaced by another one of the same size is not noticed
+  kContents,       ///< reads every frame: some 0.3 s per GB that is in memory
+};
+
+/// The parts of a fingerprint that belong to a sequence.
+struct SequenceHashes {
+  std::string frames;
+  std::string calibration;
+  std::string ground_truth;
+};
+
+/// Errors: a file that cannot be read. A frame that cannot is none: a run skips it too.
+[[nodiscard]] Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
+                                                     const std::filesystem::path& sequence_dir,
+                                                     FrameIdentity frames);
+/// Of the model's file and entry. Error: a model that is not there.
+[[nodiscard]] Expected<std::string> hash_model(const Config& config,
+                                               const std::filesystem::path& models_dir);
+[[nodiscard]] Expected<std::string> hash_program();
+
+/// Of all parts, the frames by name and size. Errors: those of the above.
 [[nodiscard]] Expected<Fingerprint> make_fingerprint(const Config& config,
                                                      const KittiSequence& sequence,
                                                      const std::filesystem::path& sequence_dir,

@@ -73,18 +73,14 @@ Status add_sequence(const SearchRequest& request,
   identity.num_frames = sequence->size();
   std::error_code ignored;
   identity.directory = fs::absolute(directory, ignored).lexically_normal().string();
-  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-    const auto hashes = benchmark::make_fingerprint(plan.layers[i].config, *sequence, directory,
-                                                    request.models_dir);
-    if (!hashes) {
-      return tl::unexpected(hashes.error());
-    }
-    plan.identity.program = hashes->program;
-    plan.identity.layers[i].hash = hashes->model;
-    identity.frames = hashes->frames;
-    identity.calibration = hashes->calibration;
-    identity.ground_truth = hashes->ground_truth;
+  const auto hashes =
+      benchmark::hash_sequence(*sequence, directory, benchmark::FrameIdentity::kContents);
+  if (!hashes) {
+    return tl::unexpected(hashes.error());
   }
+  identity.frames = hashes->frames;
+  identity.calibration = hashes->calibration;
+  identity.ground_truth = hashes->ground_truth;
   plan.identity.sequences.push_back(std::move(identity));
   PlanSequence planned{std::move(*sequence), is_held_out, {}};
   for (const PlanLayer& layer : plan.layers) {
@@ -110,6 +106,23 @@ void add_candidates(SearchPlan& plan) {
       plan.candidates.push_back({{layer.model, layer.layer, filter, features}, i});
     }
   }
+}
+
+/// Those of the program and of each layer's model.
+Status add_hashes(const SearchRequest& request, SearchPlan& plan) {
+  const auto program = benchmark::hash_program();
+  if (!program) {
+    return tl::unexpected(program.error());
+  }
+  plan.identity.program = *program;
+  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+    const auto model = benchmark::hash_model(plan.layers[i].config, request.models_dir);
+    if (!model) {
+      return tl::unexpected(model.error());
+    }
+    plan.identity.layers[i].hash = *model;
+  }
+  return {};
 }
 
 Status check_request(const SearchRequest& request) {
@@ -147,6 +160,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   SearchPlan plan;
   plan.layers = std::move(*layers);
   add_candidates(plan);
+  status = add_hashes(request, plan);
   for (const fs::path& directory : request.sequence_dirs) {
     if (status) {
       status = add_sequence(request, directory, false, plan);

@@ -2,6 +2,7 @@
 #include "stem/model_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <iterator>
@@ -77,8 +78,13 @@ Expected<std::string> read_bytes(const std::filesystem::path& file) {
     return fail(fmt::format("{}: expected a file, found a folder", file.string()));
   }
   std::ifstream stream(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) {
+  std::string bytes;
+  std::array<char, 1 << 16> buffer;
+  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
+         stream.gcount() > 0) {
+    bytes.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
+  }
+  if (!stream.eof()) {  // not opened, or broken in the middle
     return fail(
         fmt::format("{}: cannot read: {}", file.string(), std::generic_category().message(errno)));
   }

@@ -1,107 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <thread>
-#include <vector>
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "support/drives.hpp"
-#include "support/run_program.hpp"
+#include "support/search_program.hpp"
 #include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
-using test::run_stemvo;
-using test::TemporaryFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
-
-std::size_t count_lines(const fs::path& file) {
-  const std::string text = read_file(file);
-  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
-}
-
-class Search : public ::testing::Test {
- protected:
-  using Words = std::vector<std::string>;
-
-  [[nodiscard]] Words command(const std::string& out, const Words& more) const {
-    Words words = {"search", sequence_.string(), "--out", folder_ / out, "--quiet"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
-  }
-  [[nodiscard]] ProgramResult search(const std::string& out, const Words& more) const {
-    return run_stemvo(command(out, more));
-  }
-  [[nodiscard]] std::string table(const std::string& out) const {
-    return read_file(folder_ / (out + "/filters.csv"));
-  }
-
-  TemporaryFolder folder_;
-  fs::path sequence_ =
-      test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94}) / "sequences/00";
-};
-
-TEST_F(Search, KilledAndResumedGivesTheSameBytes) {
-  const Words asked = {"--exhaustive", "--filters", "0:4", "--threads", "1", "--block", "100"};
-  ASSERT_EQ(search("whole", asked).exit_code, 0);
-  const Words other = {"--exhaustive", "--filters", "0:4", "--threads", "2", "--block", "1"};
-  test::RunningProgram program(STEMVO_PROGRAM, command("killed", other));
-  const fs::path records = folder_ / "killed/records.jsonl";
-  for (int i = 0; i < 6000 && count_lines(records) < 3; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  program.send(SIGKILL);
-  ASSERT_EQ(program.wait().exit_code, 128 + SIGKILL);
-  const std::size_t done = count_lines(records);
-  ASSERT_GE(done, 3U);
-  ASSERT_LT(done, 9U) << "the search was over before it was killed";
-  std::ofstream(records, std::ios::app) << "{\"model\":\"default\",\"la";  // as a kill may leave it
-  EXPECT_THAT(search("killed", other).err, HasSubstr("--resume goes on with it"));
-  const Words changed = {"--exhaustive", "--filters", "0:4", "--resume", "--set", "seed=2"};
-  EXPECT_THAT(search("killed", changed).err, HasSubstr("seed: 1, now seed: 2"));
-  Words resumed = other;
-  resumed.emplace_back("--resume");
-  const ProgramResult result = search("killed", resumed);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(count_lines(records), 9U);  // what searched, and 8 filters once
-  EXPECT_EQ(table("killed"), table("whole"));
-}
-
-/// 16 filters and 4 baselines are two blocks of the default size.
-TEST_F(Search, KilledWithTheDefaultBlockKeepsTheBlocksThatEnded) {
-  const Words asked = {"--exhaustive", "--threads", "1"};
-  ASSERT_EQ(search("whole", asked).exit_code, 0);
-  test::RunningProgram program(STEMVO_PROGRAM, command("killed", asked));
-  const fs::path records = folder_ / "killed/records.jsonl";
-  for (int i = 0; i < 15000 && count_lines(records) < 2; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  program.send(SIGKILL);
-  ASSERT_EQ(program.wait().exit_code, 128 + SIGKILL) << "the search was over before it was killed";
-  const std::string kept = read_file(records);
-  ASSERT_EQ(std::count(kept.begin(), kept.end(), '\n'), 17);  // what searched, and one block
-  Words resumed = asked;
-  resumed.emplace_back("--resume");
-  const ProgramResult result = search("killed", resumed);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(read_file(records), StartsWith(kept));
-  EXPECT_EQ(count_lines(records), 21U);  // nothing was run again
-  EXPECT_EQ(table("killed"), table("whole"));
-}
 
 TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   ASSERT_EQ(search("whole", {"--exhaustive", "--filters", "0:3"}).exit_code, 0);

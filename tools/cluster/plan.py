@@ -87,11 +87,9 @@ def _hash_of(path):
 
 
 def sequence_contents(sequence):
-    """What tells whether a sequence has changed, without reading its frames: calib.txt, times.txt and the pose file by
-    hash, the frames by name and size. A frame changed in place to the same size is noticed by the merge, which compares
-    the program's own hashes."""
+    """What tells whether a sequence has changed, by hash: frames, calib.txt, times.txt and the pose file."""
     folder = sequence.resolve()
-    frames = [[file.parent.name, file.name, file.stat().st_size] for file in sorted(folder.glob("image_*/*")) if file.is_file()]
+    frames = [[file.parent.name, file.name, _hash_of(file)] for file in sorted(folder.glob("image_*/*")) if file.is_file()]
     texts = [folder / "calib.txt", folder / "times.txt"]
     poses = [base.parent.parent / "poses" / f"{base.name}.txt" for base in (sequence.absolute(), folder)]
     return [[_hash_of(path) for path in texts + poses], frames]
