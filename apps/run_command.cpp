@@ -42,6 +42,9 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
     return;
   }
   print(format_metrics_table(summary.report));
+  if (summary.report.timing) {
+    print('\n' + format_timing_table(*summary.report.timing) + '\n');
+  }
   print(fmt::format("picture: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
   if (arguments.request.write_map) {
     print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
@@ -115,6 +118,8 @@ CLI::App* add_run(CLI::App& app, Action& action) {
       ->check(in_range(1, 1000000));
   command->add_flag("--map", request.write_map,
                     "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
+  command->add_flag("--timing", request.measure_times,
+                    "Also where the time went: a table, and the key timing in metrics.json");
   command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
   command->footer(kFooter);
   command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });

@@ -6,6 +6,7 @@
 
 #include "features/grid_quota.hpp"
 #include "stemvo/check.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -40,7 +41,7 @@ std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
     const ChannelImage& image) const {
   auto described = std::make_shared<Described>(image);
   std::vector<cv::KeyPoint> found;
-  feature_->detect(image.pixels, found);
+  timed(Stage::kDetection, [&] { feature_->detect(image.pixels, found); });
   std::sort(found.begin(), found.end(), is_stronger);
   GridQuota quota(options_, image.pixels.size());
   std::vector<cv::KeyPoint> kept;
@@ -52,7 +53,8 @@ std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
   if (kept.empty()) {
     return described;
   }
-  feature_->compute(image.pixels, kept, described->descriptors);
+  timed(Stage::kDescription,
+        [&] { feature_->compute(image.pixels, kept, described->descriptors); });
   described->uv.reserve(kept.size());
   for (const cv::KeyPoint& keypoint : kept) {
     described->uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
@@ -93,6 +95,7 @@ void DescriptorFrontEnd::keep(const std::vector<char>& is_good) {
 
 std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,
                                                   const Described& cur) const {
+  const StageTimer timer(Stage::kTracking);
   if (prev.descriptors.empty() || cur.descriptors.empty()) {
     return {};
   }

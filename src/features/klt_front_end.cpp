@@ -9,6 +9,7 @@
 
 #include "features/grid_quota.hpp"
 #include "stemvo/check.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -40,6 +41,7 @@ struct KltFrontEnd::Picture : PreparedPicture {
 };
 
 std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& image) const {
+  const StageTimer timer(Stage::kPyramid);
   auto picture = std::make_shared<Picture>(image);
   const cv::Size window(options_.klt_window, options_.klt_window);
   cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, window, options_.klt_levels - 1,
@@ -76,6 +78,7 @@ void KltFrontEnd::keep(const std::vector<char>& is_good) {
 }
 
 Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
+  const StageTimer timer(Stage::kTracking);
   Matches matches;
   matches.num_keypoints = static_cast<int>(points_.size());
   if (points_.empty()) {
@@ -121,6 +124,7 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
 /// Corners are looked for one level up, at half the size: the window that follows them is several
 /// pixels wide, and any pixel of a corner will do.
 void KltFrontEnd::replenish(const Picture& picture) {
+  const StageTimer timer(Stage::kDetection);
   const bool is_halved = options_.klt_levels > 1 && picture.pyramid.size() > kNextLevel;
   const cv::Mat& pixels = picture.pyramid[is_halved ? kNextLevel : 0];
   const float to_pixels = is_halved ? 2.0F : 1.0F;

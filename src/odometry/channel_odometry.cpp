@@ -9,6 +9,7 @@
 #include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
 #include "stemvo/check.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 
@@ -51,10 +52,11 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   PreparedFrame prepared;
   prepared.pixels = frame;
   Stopwatch watch;
-  const ChannelImage image = stretch_.apply(channel);
+  const ChannelImage image = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
   prepared.stem_ms = watch.lap_ms();
   prepared.picture = front_end_->prepare(image);
   if (asks_road_) {
+    const StageTimer timer(Stage::kRoadPicture);
     prepared.road = std::make_shared<RoadPicture>(make_road_picture(image, camera_));
   }
   return prepared;
@@ -96,6 +98,7 @@ void ChannelOdometry::place(FrameInWork& work) {
   work.motion = estimator_.measure(work.matches.prev_uv, work.matches.cur_uv,
                                    chain_.is_initializing(), seed_);
   if (map_.has_value()) {
+    const StageTimer timer(Stage::kPlacement);
     map_->place(frame_number(), chain_.world_from_picture(), work.matches, work.motion);
   }
   front_end_->keep(work.motion.inlier_mask);

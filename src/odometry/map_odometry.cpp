@@ -2,6 +2,7 @@
 #include "odometry/map_odometry.hpp"
 
 #include "odometry/motion_chain.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -62,7 +63,7 @@ void MapOdometry::refine(const RoadPicture& road, const Matches& matches, Measur
     restart(frame_, road);
     return;
   }
-  tracker_.extend(matches, motion);
+  timed(Stage::kMapRefinement, [&] { tracker_.extend(matches, motion); });
   if (road_.has_value() && !tracker_.keeps_unit()) {
     road_->start_new_unit();
   }
@@ -78,7 +79,8 @@ void MapOdometry::refine(const RoadPicture& road, const Matches& matches, Measur
 }
 
 RoadScaleEstimate MapOdometry::ask_road(const RoadPicture& road, const Rigid3& cur_from_prev) {
-  const RoadScaleEstimate estimate = road_->update(road, cur_from_prev);
+  const RoadScaleEstimate estimate =
+      timed(Stage::kRoadScale, [&] { return road_->update(road, cur_from_prev); });
   scale_sigma_ = estimate.sigma;
   road_state_ = estimate.is_measured      ? RoadState::kMeasured
                 : estimate.is_initialized ? RoadState::kHeld

@@ -6,6 +6,7 @@
 #include "odometry/channel_odometry.hpp"
 #include "odometry/stopwatch.hpp"
 #include "stemvo/check.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 
@@ -52,7 +53,7 @@ PreparedFrame Odometry::prepare(const cv::Mat& frame) {
   STEMVO_CHECK(frame.cols == impl_->camera.width_px && frame.rows == impl_->camera.height_px,
                "the frame has the camera's size");
   Stopwatch watch;
-  const Expected<Channel> channel = impl_->stem.apply(frame);
+  const Expected<Channel> channel = timed(Stage::kStem, [&] { return impl_->stem.apply(frame); });
   const double stem_ms = watch.lap_ms();
   PreparedFrame prepared;
   if (!channel.has_value()) {

@@ -6,6 +6,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
+#include "timing/stage_timer.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -71,6 +73,7 @@ std::optional<Eigen::Matrix3d> estimate_homography(std::span<const Eigen::Vector
                                                    std::span<const Eigen::Vector2d> cur_uv,
                                                    const TwoViewOptions& options,
                                                    std::uint64_t seed) {
+  const StageTimer timer(Stage::kHomography);
   return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
     return cv::findHomography(prev, cur, cv::noArray(), usac_params(options, seed));
   });
@@ -80,6 +83,7 @@ std::optional<Eigen::Matrix3d> estimate_fundamental(std::span<const Eigen::Vecto
                                                     std::span<const Eigen::Vector2d> cur_uv,
                                                     const TwoViewOptions& options,
                                                     std::uint64_t seed) {
+  const StageTimer timer(Stage::kEpipolar);
   return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
     return cv::findFundamentalMat(prev, cur, cv::noArray(), usac_params(options, seed));
   });
@@ -90,6 +94,7 @@ std::optional<Eigen::Matrix3d> estimate_essential(std::span<const Eigen::Vector2
                                                   const Camera& camera,
                                                   const TwoViewOptions& options,
                                                   std::uint64_t seed) {
+  const StageTimer timer(Stage::kEpipolar);
   cv::Mat intrinsics;
   cv::eigen2cv(camera.matrix(), intrinsics);
   return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {

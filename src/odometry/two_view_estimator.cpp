@@ -11,6 +11,7 @@
 #include "stemvo/geometry/relative_pose_refinement.hpp"
 #include "stemvo/geometry/two_view_motion.hpp"
 #include "stemvo/geometry/two_view_scores.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -176,6 +177,7 @@ TwoViewEstimator::Models TwoViewEstimator::score_models(std::span<const Eigen::V
 void TwoViewEstimator::refine(std::span<const Eigen::Vector2d> prev_uv,
                               std::span<const Eigen::Vector2d> cur_uv,
                               MeasuredMotion& result) const {
+  const StageTimer timer(Stage::kTwoViewRefinement);
   const RelativePoseRefinementOptions refinement{.loss_scale_px = options_.refine_loss_px};
   for (int round = 0; options_.refine && round < 2; ++round) {
     const Points prev = select(prev_uv, result.inlier_mask);

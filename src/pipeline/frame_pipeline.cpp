@@ -2,6 +2,7 @@
 #include "pipeline/frame_pipeline.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -9,6 +10,8 @@
 #include <utility>
 
 #include <tbb/parallel_pipeline.h>
+
+#include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
 namespace {
@@ -18,6 +21,7 @@ constexpr std::size_t kMaxInFlight = 4;
 
 struct Frame {
   std::size_t index = 0;
+  std::chrono::steady_clock::time_point started;
   Expected<cv::Mat> pixels;
   PreparedFrame prepared;
 };
@@ -66,10 +70,12 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
     }
     auto frame = std::make_shared<Frame>();
     frame->index = num_started++;
+    frame->started = std::chrono::steady_clock::now();
     return frame;
   };
   const auto read = [&](const FramePtr& frame) {
-    guard.run([&] { frame->pixels = sequence.read(frame->index); });
+    guard.run(
+        [&] { frame->pixels = timed(Stage::kRead, [&] { return sequence.read(frame->index); }); });
     return frame;
   };
   const auto prepare = [&](const FramePtr& frame) {
@@ -82,8 +88,14 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
   };
   FramePtr before;  // whose result the next call brings
   const auto hand_over = [&](const std::optional<FrameResult>& result) {
-    if (result && before && !visit(before->index, before->pixels, *result)) {
+    if (!result || !before) {
+      return;
+    }
+    if (!visit(before->index, before->pixels, *result)) {
       guard.end();
+    }
+    if (StageRecorder* recorder = StageRecorder::active()) {
+      recorder->add_frame(before->started);
     }
   };
   const auto push = [&](const FramePtr& frame) {

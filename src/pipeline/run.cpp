@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
 
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
@@ -18,6 +19,7 @@
 #include "stemvo/report/frame_picture.hpp"
 #include "stemvo/report/frames_csv.hpp"
 #include "stemvo/version.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -83,6 +85,7 @@ Drive drive(const RunRequest& request,
     result.trajectory.push_back(pose.world_from_camera);
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
+    const StageTimer timer(Stage::kFrameFiles);
     csv.write(number, sequence.timestamps_s()[i], pose);
     if (request.picture_every > 0 && i % static_cast<std::size_t>(request.picture_every) == 0) {
       keep_first(result.written,
@@ -152,6 +155,34 @@ MetricsReport make_report(const RunRequest& request,
   return report;
 }
 
+/// All but metrics.json, for which it makes the report.
+Status write_results(const RunRequest& request,
+                     const KittiSequence& sequence,
+                     const Odometry& odometry,
+                     Drive& done,
+                     MetricsReport& report) {
+  if (request.config.scale.source == "ground_truth") {
+    done.trajectory = rescale_steps(done.trajectory, *truth_of(sequence, done.trajectory.size()));
+  }
+  Status written = pipeline::write_trajectories(request.out_dir, sequence, done.trajectory);
+  if (request.config.odometry.mode == "map") {
+    done.refined = refined_trajectory(request, sequence, odometry);
+  }
+  keep_first(written, pipeline::write_refined_trajectory(request.out_dir, done.refined));
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - request.started;
+
+  report = make_report(request, sequence, odometry.stem_info(), done, elapsed.count());
+  keep_first(written, done.written);
+  keep_first(written, pipeline::write_config(request.out_dir, request.config, sequence,
+                                             odometry.stem_info()));
+  if (request.write_map) {
+    keep_first(written, pipeline::write_point_map(request.out_dir, odometry.landmarks(),
+                                                  odometry.refined_trajectory(), *done.refined));
+  }
+  keep_first(written, pipeline::write_map(request.out_dir, sequence, done.trajectory, report));
+  return written;
+}
+
 }  // namespace
 
 Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
@@ -192,28 +223,21 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (request.write_map) {
     odometry->keep_landmarks();
   }
+  std::optional<StageRecorder> recorder;
+  if (request.measure_times) {
+    recorder.emplace();
+  }
   Drive done = drive(request, *sequence, *odometry, *csv, progress);
-  if (request.config.scale.source == "ground_truth") {
-    done.trajectory = rescale_steps(done.trajectory, *truth_of(*sequence, done.trajectory.size()));
-  }
-  Status written = pipeline::write_trajectories(request.out_dir, *sequence, done.trajectory);
-  if (request.config.odometry.mode == "map") {
-    done.refined = refined_trajectory(request, *sequence, *odometry);
-  }
-  keep_first(written, pipeline::write_refined_trajectory(request.out_dir, done.refined));
-  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - request.started;
-
-  const MetricsReport report =
-      make_report(request, *sequence, odometry->stem_info(), done, elapsed.count());
-  keep_first(written, done.written);
-  keep_first(written, pipeline::write_config(request.out_dir, request.config, *sequence,
-                                             odometry->stem_info()));
-  if (request.write_map) {
-    keep_first(written, pipeline::write_point_map(request.out_dir, odometry->landmarks(),
-                                                  odometry->refined_trajectory(), *done.refined));
+  MetricsReport report;
+  Status written = timed(Stage::kResultFiles, [&] {
+    return write_results(request, *sequence, *odometry, done, report);
+  });
+  if (recorder) {
+    report.timing = recorder->report();
+    report.timing->fps = report.fps;
+    report.timing->num_threads = cv::getNumThreads();
   }
   keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
-  keep_first(written, pipeline::write_map(request.out_dir, *sequence, done.trajectory, report));
   return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted,
                     std::move(written)};
 }

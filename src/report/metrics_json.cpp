@@ -9,6 +9,7 @@
 
 #include "report/metrics_keys.hpp"
 #include "report/text_table.hpp"
+#include "report/timing_json.hpp"
 #include "stemvo/report/evaluate_report.hpp"
 #include "text/text_file.hpp"
 
@@ -152,6 +153,9 @@ Status write_metrics_json(const std::filesystem::path& file, const MetricsReport
                                      : nlohmann::ordered_json();
   add_metrics(json, report.metrics ? &*report.metrics : nullptr);
   json["refined"] = report.refined ? refined_json(*report.refined) : nlohmann::ordered_json();
+  if (report.timing) {
+    json["timing"] = timing_json(*report.timing);
+  }
   return write_text_file(file, to_text(json));
 }
 

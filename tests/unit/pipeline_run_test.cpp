@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <unistd.h>
@@ -121,6 +122,37 @@ TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
       EXPECT_TRUE(before == 0.0 || std::abs(step - kStep_m) < 1e-6) << i << ": " << step;
     }
   }
+}
+
+TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
+  const auto plain = run_sequence(request_);
+  ASSERT_TRUE(plain) << plain.error().message;
+  EXPECT_FALSE(plain->report.timing.has_value());
+  const std::string poses = read_file(request_.out_dir / "trajectory_kitti.txt");
+  auto keys = nlohmann::ordered_json::parse(read_file(request_.out_dir / "metrics.json"));
+  EXPECT_FALSE(keys.contains("timing"));
+
+  request_.measure_times = true;
+  const auto measured = run_sequence(request_);
+  ASSERT_TRUE(measured) << measured.error().message;
+  EXPECT_EQ(read_file(request_.out_dir / "trajectory_kitti.txt"), poses);
+  auto json = nlohmann::ordered_json::parse(read_file(request_.out_dir / "metrics.json"));
+  const auto timing = json["timing"];
+  for (const char* name : {"read and decode", "stem", "stretch", "pyramid"}) {
+    EXPECT_EQ(timing["stages"][name]["calls"], 6) << name;
+  }
+  for (const char* name :
+       {"detection", "tracking", "homography", "epipolar geometry", "placement"}) {
+    EXPECT_EQ(timing["stages"][name]["calls"], 5) << name;
+  }
+  EXPECT_FALSE(timing["stages"].contains("description")) << "klt describes nothing";
+  EXPECT_EQ(timing["stages"]["result files"]["calls"], 1);
+  EXPECT_EQ(timing["threads"], 1);
+  EXPECT_EQ(measured->report.timing->num_frames, 6U);
+  EXPECT_GT(timing["peak_memory_mib"].get<double>(), 1.0);
+  json.erase("timing");
+  json["fps"] = keys["fps"] = 0;  // the one value of the others that depends on the clock
+  EXPECT_EQ(json.dump(), keys.dump());
 }
 
 TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {

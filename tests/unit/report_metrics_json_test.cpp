@@ -41,7 +41,8 @@ MetricsReport example() {
           .tracked_fraction = 0.995,
           .road_measured_fraction = 0.75,
           .metrics = metrics,
-          .refined = refined};
+          .refined = refined,
+          .timing = {}};
 }
 
 nlohmann::json written(const MetricsReport& report) {

@@ -29,6 +29,7 @@ struct RunRequest {
   int num_threads = 0;                               ///< 0: all cores
   int picture_every = 0;                             ///< 0: no per-frame pictures
   bool write_map = false;                            ///< map.ply; needs odometry.mode map
+  bool measure_times = false;                        ///< RunSummary::report.timing
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
@@ -52,6 +53,7 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
 /// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
 /// result cannot be written the others still are; `written` says so.
+/// One run with measure_times at a time in a process.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

@@ -8,6 +8,7 @@
 
 #include "stemvo/error.hpp"
 #include "stemvo/evaluation/metrics.hpp"
+#include "stemvo/report/timing.hpp"
 
 namespace stemvo {
 
@@ -24,7 +25,8 @@ struct MetricsReport {
   double tracked_fraction = 0.0;                 ///< frames whose pose was measured, over all
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;
-  std::optional<Metrics> refined;  ///< of trajectory_refined_kitti.txt
+  std::optional<Metrics> refined;      ///< of trajectory_refined_kitti.txt
+  std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
@@ -33,14 +35,16 @@ struct MetricsReport {
 /// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
 /// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
 /// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
-/// refined trajectory is written). Numbers round-trip; a number that is not finite becomes null.
-/// Error: the file cannot be written.
+/// refined trajectory is written) and, only where it was asked for, timing{threads fps loop_fps
+/// interval{median_ms,p95_ms} latency{median_ms,p95_ms} peak_memory_mib cpu_s start_cpu_s
+/// other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s,share_percent}}}. Numbers round-trip; a
+/// number that is not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
 
-/// What write_metrics_json wrote, bit for bit (of `refined` the four errors); a null number that
-/// has no nullopt is NaN. Errors: the file cannot be read, is not JSON, lacks a key or has another
-/// type there.
+/// What write_metrics_json wrote, bit for bit (of `refined` the four errors, of `timing` nothing);
+/// a null number that has no nullopt is NaN. Errors: the file cannot be read, is not JSON, lacks a
+/// key or has another type there.
 [[nodiscard]] Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file);
 
 /// The same numbers as an aligned table; each row names its alignment, the trajectory that never

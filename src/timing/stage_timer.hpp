@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "stemvo/report/timing.hpp"
+
+namespace stemvo {
+
+/// What a frame goes through, in this order. Each is done at most once per frame.
+enum class Stage {
+  kRead,         ///< file and PNG decoder
+  kStem,         ///< the filter
+  kStretch,      ///< channel to 8-bit picture
+  kPyramid,      ///< klt
+  kDescription,  ///< orb, sift: descriptors
+  kRoadPicture,
+  kDetection,   ///< corners or keypoints
+  kTracking,    ///< klt both ways, or matching of descriptors
+  kHomography,  ///< robust estimate
+  kEpipolar,    ///< fundamental or essential matrix, robust estimate
+  kTwoViewRefinement,
+  kPlacement,      ///< among the landmarks
+  kMapRefinement,  ///< triangulation and bundle adjustment
+  kRoadScale,
+  kFrameFiles,   ///< frames.csv, pictures
+  kResultFiles,  ///< everything that is written at the end
+};
+inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;
+
+/// Collects what StageTimers measure, in any thread, while it lives. One at a time (checked).
+class StageRecorder {
+ public:
+  /// Processor time of the process until now is the report's row `start`.
+  StageRecorder();
+  ~StageRecorder();
+  StageRecorder(const StageRecorder&) = delete;
+  StageRecorder& operator=(const StageRecorder&) = delete;
+
+  /// The living one, or null.
+  [[nodiscard]] static StageRecorder* active() { return active_.load(std::memory_order_acquire); }
+
+  void add(Stage stage, double wall_ms, double cpu_ms);
+  /// A frame's result is there; `started`: when it was asked for.
+  void add_frame(std::chrono::steady_clock::time_point started);
+  /// Of everything so far.
+  [[nodiscard]] TimingReport report() const;
+
+ private:
+  struct Samples {
+    std::vector<double> wall_ms;
+    double cpu_ms = 0.0;
+  };
+
+  static std::atomic<StageRecorder*> active_;
+
+  mutable std::mutex mutex_;
+  double start_cpu_ms_;
+  std::chrono::steady_clock::time_point start_;
+  std::chrono::steady_clock::time_point last_frame_;
+  std::vector<Samples> stages_;
+  std::vector<double> intervals_ms_;
+  std::vector<double> latencies_ms_;
+};
+
+/// Measures a stage from here to the end of the block; without a StageRecorder it does nothing. It
+/// sees the calling thread only, not what OpenCV hands to other threads.
+class StageTimer {
+ public:
+  explicit StageTimer(Stage stage);
+  ~StageTimer();
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  StageRecorder* recorder_;
+  Stage stage_;
+  std::chrono::steady_clock::time_point wall_;
+  double cpu_ms_ = 0.0;
+};
+
+/// What `work` returns, measured.
+template <typename Work>
+decltype(auto) timed(Stage stage, Work&& work) {
+  const StageTimer timer(stage);
+  return std::forward<Work>(work)();
+}
+
+}  // namespace stemvo

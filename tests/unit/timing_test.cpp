@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/report/timing.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <numeric>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "report/timing_json.hpp"
+#include "timing/peak_memory.hpp"
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Uses the processor until this thread has had it for so long.
+void work_for(std::chrono::milliseconds time) {
+  const std::clock_t start = std::clock();
+  const auto begin = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - begin < time ||
+         std::clock() - start < time.count() * CLOCKS_PER_SEC / 1000) {
+  }
+}
+
+const StageTiming* find(const TimingReport& report, const std::string& name) {
+  for (const StageTiming& stage : report.stages) {
+    if (stage.name == name) {
+      return &stage;
+    }
+  }
+  return nullptr;
+}
+
+TEST(Timing, SummaryIsOfTheValuesByNearestRank) {
+  std::vector<double> values(100);
+  std::iota(values.rbegin(), values.rend(), 1.0);
+  EXPECT_EQ(summarize_ms(values).median_ms, 50.0);
+  EXPECT_EQ(summarize_ms(values).p95_ms, 95.0);
+  EXPECT_EQ(summarize_ms(std::vector{7.0}).median_ms, 7.0);
+  EXPECT_EQ(summarize_ms(std::vector{7.0}).p95_ms, 7.0);
+  EXPECT_EQ(summarize_ms(std::vector{3.0, 1.0, 2.0}).median_ms, 2.0);
+  EXPECT_TRUE(std::isnan(summarize_ms({}).median_ms));
+}
+
+TEST(Timing, WithoutARecorderNothingIsKept) {
+  ASSERT_EQ(StageRecorder::active(), nullptr);
+  EXPECT_EQ(timed(Stage::kStem, [] { return 3; }), 3);
+  const StageRecorder recorder;
+  EXPECT_EQ(StageRecorder::active(), &recorder);
+  EXPECT_TRUE(recorder.report().stages.empty());
+}
+
+TEST(Timing, AStageHasItsCallsItsWallTimeAndItsProcessorTime) {
+  StageRecorder recorder;
+  for (int i = 0; i < 3; ++i) {
+    timed(Stage::kStem, [] { work_for(10ms); });
+  }
+  timed(Stage::kRead, [] { std::this_thread::sleep_for(30ms); });
+  const TimingReport report = recorder.report();
+  ASSERT_EQ(report.stages.size(), 2U);
+  EXPECT_EQ(report.stages.front().name, "read and decode") << "in the order of a frame's way";
+  const StageTiming* stem = find(report, "stem");
+  const StageTiming* read = find(report, "read and decode");
+  ASSERT_TRUE(stem != nullptr && read != nullptr);
+  EXPECT_EQ(stem->calls, 3U);
+  EXPECT_GE(stem->wall.median_ms, 10.0);
+  EXPECT_GE(stem->cpu_s, 0.029);
+  EXPECT_GE(read->wall.median_ms, 30.0);
+  EXPECT_LT(read->cpu_s, 0.01) << "sleeping is no work";
+}
+
+TEST(Timing, ThreadsAreSeenAndSharesAddUp) {
+  StageRecorder recorder;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([] {
+      for (int k = 0; k < 50; ++k) {
+        const StageTimer timer(Stage::kTracking);
+        work_for(1ms);
+      }
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  const TimingReport report = recorder.report();
+  ASSERT_EQ(report.stages.size(), 1U);
+  EXPECT_EQ(report.stages[0].calls, 200U);
+  EXPECT_NEAR(report.start_cpu_s + report.rest_cpu_s + report.stages[0].cpu_s, report.cpu_s, 1e-9);
+  EXPECT_NEAR(report.stages[0].share_percent, 100.0 * report.stages[0].cpu_s / report.cpu_s, 1e-9);
+  EXPECT_GE(report.rest_cpu_s, -1e-3) << "the stages have more time than the program";
+}
+
+TEST(Timing, FramesHaveIntervalsAndLatencies) {
+  StageRecorder recorder;
+  for (int i = 0; i < 3; ++i) {
+    const auto started = std::chrono::steady_clock::now() - 100ms;
+    std::this_thread::sleep_for(5ms);
+    recorder.add_frame(started);
+  }
+  const TimingReport report = recorder.report();
+  EXPECT_EQ(report.num_frames, 3U);
+  EXPECT_GE(report.interval.median_ms, 5.0);
+  EXPECT_GE(report.latency.median_ms, 105.0);
+  EXPECT_GE(report.loop_s, 0.015);
+  EXPECT_LE(report.interval.median_ms, report.interval.p95_ms);
+}
+
+TEST(Timing, OneRecorderAtATime) {
+  const StageRecorder first;
+  EXPECT_ANY_THROW(StageRecorder());
+  EXPECT_EQ(StageRecorder::active(), &first);
+}
+
+TEST(Timing, PeakMemoryGrowsWithWhatIsUsed) {
+  const double before = peak_memory_mib();
+  ASSERT_GT(before, 1.0);
+  constexpr std::size_t kSize = std::size_t{1} << 28U;
+  const std::vector<char> much(kSize, 1);
+  EXPECT_GE(peak_memory_mib(), 256.0) << much[kSize / 2];
+  EXPECT_GE(peak_memory_mib(), before);
+}
+
+TimingReport example() {
+  TimingReport report;
+  report.stages = {{"stem", 400, {3.25, 4.5}, 1.5, 37.5}, {"tracking", 399, {5.0, 7.0}, 2.0, 50.0}};
+  report.start_cpu_s = 0.2;
+  report.rest_cpu_s = 0.3;
+  report.cpu_s = 4.0;
+  report.num_frames = 400;
+  report.loop_s = 2.0;
+  report.interval = {5.1, 6.2};
+  report.latency = {20.0, 30.0};
+  report.fps = 180.0;
+  report.num_threads = 2;
+  report.peak_memory_mib = 222.4;
+  return report;
+}
+
+TEST(Timing, TableHasARowPerStageAndTheWhole) {
+  const std::string table = format_timing_table(example());
+  EXPECT_THAT(table, ContainsRegex("stem +400 +3\\.250 +4\\.500 +3\\.750 +37\\.5\n"));
+  EXPECT_THAT(table, ContainsRegex("tracking +399 +5\\.000 +7\\.000 +5\\.000 +50\\.0\n"));
+  EXPECT_THAT(table, ContainsRegex("processor time +10\\.000 +100\\.0\n"));
+  EXPECT_THAT(table, ContainsRegex("whole program +180\\.0 frames/s +400 frames, 2 threads"));
+  EXPECT_THAT(table, ContainsRegex("loop over frames +200\\.0 frames/s"));
+  EXPECT_THAT(table, ContainsRegex("peak memory +222 MiB"));
+  EXPECT_THAT(table, Not(HasSubstr(" \n"))) << "blanks at the end of a line";
+}
+
+TEST(Timing, JsonHasTheSameNumbers) {
+  const nlohmann::ordered_json json = timing_json(example());
+  EXPECT_EQ(json["stages"]["stem"]["calls"], 400);
+  EXPECT_EQ(json["stages"]["stem"]["median_ms"], 3.25);
+  EXPECT_EQ(json["stages"]["tracking"]["p95_ms"], 7.0);
+  EXPECT_EQ(json["stages"]["tracking"]["cpu_s"], 2.0);
+  EXPECT_EQ(json["stages"]["tracking"]["share_percent"], 50.0);
+  EXPECT_EQ(json["interval"]["median_ms"], 5.1);
+  EXPECT_EQ(json["latency"]["p95_ms"], 30.0);
+  EXPECT_EQ(json["loop_fps"], 200.0);
+  EXPECT_EQ(json["fps"], 180.0);
+  EXPECT_EQ(json["threads"], 2);
+  EXPECT_EQ(json["peak_memory_mib"], 222.4);
+  EXPECT_EQ(json["start_cpu_s"], 0.2);
+  EXPECT_EQ(json["other_cpu_s"], 0.3);
+  EXPECT_EQ(json["cpu_s"], 4.0);
+}
+
+}  // namespace
+}  // namespace stemvo
