@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -41,11 +42,30 @@ struct Arguments {
   bool is_quiet = false;
 };
 
+/// Keys of the configuration that are options of their own here.
+Status check_overrides(const ConfigArguments& config) {
+  for (const auto& [key, option] :
+       {std::pair("stem.model", "--model"), std::pair("stem.layer", "--layers"),
+        std::pair("stem.filter", "--filters")}) {
+    for (const std::string& assignment : config.overrides) {
+      if (assignment.substr(0, assignment.find('=')) == key) {
+        return tl::unexpected(
+            Error{fmt::format("--set {}: expected {}, which says what a search runs, found '{}'",
+                              key, option, assignment)});
+      }
+    }
+  }
+  return {};
+}
+
 Expected<SearchReport> search(Arguments& arguments) {
   SearchRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   if (!arguments.merge.empty()) {
     return merge_searches(arguments.merge, request.out_dir, request.models_dir);
+  }
+  if (const Status overrides = check_overrides(arguments.config); !overrides) {
+    return tl::unexpected(overrides.error());
   }
   const Expected<Config> config = read_config(arguments.config, search_defaults());
   if (!config) {
@@ -100,6 +120,18 @@ int run(Arguments& arguments) {
   return kExitDone;
 }
 
+/// A merge takes everything but --out from the parts.
+void exclude_from_merge(CLI::App& command) {
+  CLI::Option* merge = command.get_option("--merge");
+  for (CLI::Option* option : command.get_options()) {
+    const std::string name = option->get_name();
+    if (option != merge && name != "--help" && name != "--version" && name != "--out" &&
+        name != "--quiet") {
+      merge->excludes(option);
+    }
+  }
+}
+
 void add_options(CLI::App& command, Arguments& arguments) {
   SearchRequest& request = arguments.request;
   command
@@ -144,6 +176,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
       ->check(in_range(0, 1024));
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
   add_config_options(command, arguments.config);
+  exclude_from_merge(command);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "benchmark/fingerprint.hpp"
+#include "search/check_request.hpp"
 #include "stemvo/evaluation/metrics.hpp"
 
 namespace stemvo::search {
@@ -125,19 +126,6 @@ Status add_hashes(const SearchRequest& request, SearchPlan& plan) {
   return {};
 }
 
-Status check_request(const SearchRequest& request) {
-  if (const Status valid = validate(request.config); !valid) {
-    return valid;
-  }
-  if (request.config.scale.source != "ground_truth") {
-    return fail(fmt::format(
-        "scale.source: expected ground_truth for a search, which ranks by t_rel with steps of the "
-        "true length, found {}",
-        request.config.scale.source));
-  }
-  return {};
-}
-
 }  // namespace
 
 std::size_t SearchPlan::num_frames(bool held_out) const {
@@ -168,6 +156,9 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   }
   if (status && request.held_out_dir) {
     status = add_sequence(request, *request.held_out_dir, true, plan);
+  }
+  if (status) {
+    status = check_sequences(plan.identity);
   }
   if (!status) {
     return tl::unexpected(status.error());

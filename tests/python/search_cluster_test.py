@@ -147,7 +147,9 @@ class SearchCluster(unittest.TestCase):
 
     def test_errors(self):
         (self.folder / "text.onnx").write_text("text")
-        cases = ((("--layers", "coarse,top"), "--layers: expected coarse, fine of"), (("--filters", "0:5"), "inside 0:4 of"),
+        cases = ((("--layers", "fine,fine"), "--layers: expected each once, found 'fine' again"),
+                 (("--model", self.model), "--model: expected each once"),
+                 (("--layers", "coarse,top"), "--layers: expected coarse, fine of"), (("--filters", "0:5"), "inside 0:4 of"),
                  (("--model", "nope"), "--model: expected default or the path of an .onnx, found 'nope'"),
                  (("--model", self.folder / "text.onnx"), "expected an entry with 'file: text.onnx'"),
                  (("--program", self.folder / "none"), "expected the program stemvo"),

@@ -61,8 +61,15 @@ def layers_of(model, models_dir):
     return found
 
 
+def _once(option, values):
+    for value in values:
+        if values.count(value) > 1:
+            raise ClusterError(f"{option}: expected each once, found '{value}' again")
+
+
 def _chosen(model, layers, wanted):
     known = [layer for layer, _ in layers]
+    _once("--layers", wanted or [])
     for layer in wanted or []:
         if layer not in known:
             raise ClusterError(f"--layers: expected {', '.join(known)} of {model}, found '{layer}'")
@@ -72,6 +79,7 @@ def _chosen(model, layers, wanted):
 def tasks_of(models, models_dir, layers=None, filters=None, per_task=32):
     """All tasks, in order. filters: (A, B) of each layer, or None. Errors: unknown model or layer, filters outside."""
     tasks = []
+    _once("--model", models)
     for model in models:
         for layer, count in _chosen(model, layers_of(model, models_dir), layers):
             first, last = filters or (0, count)
