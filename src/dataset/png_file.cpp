@@ -5,13 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
-#include <iterator>
-#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "dataset/png_chunks.hpp"
+#include "dataset/png_plain.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -19,15 +20,9 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-constexpr std::size_t kChunkFrame = 12;  // length, type and CRC, 4 bytes each
+static_assert(kSignature.size() == kPngSignatureSize);
 
-std::uint64_t big_endian_32(const Bytes& bytes, std::size_t at) {
-  return (std::uint64_t{bytes[at]} << 24) | (std::uint64_t{bytes[at + 1]} << 16) |
-         (std::uint64_t{bytes[at + 2]} << 8) | std::uint64_t{bytes[at + 3]};
-}
-
-/// Walks the chunks (PNG specification, section 5): each must lie inside the file, the last is
-/// IEND.
+/// Each chunk must lie inside the file, the last is IEND.
 Status check_complete(const Bytes& bytes, const std::string& name) {
   if (bytes.empty()) {
     return fail(fmt::format("{}: expected a PNG image, found an empty file", name));
@@ -36,16 +31,11 @@ Status check_complete(const Bytes& bytes, const std::string& name) {
       !std::equal(kSignature.begin(), kSignature.end(), bytes.begin())) {
     return fail(fmt::format("{}: expected a PNG image, found another kind of file", name));
   }
-  for (std::size_t at = kSignature.size(); at + kChunkFrame <= bytes.size();) {
-    const std::uint64_t length = big_endian_32(bytes, at);
-    const std::string_view type(reinterpret_cast<const char*>(bytes.data()) + at + 4, 4);
-    if (length > bytes.size() - at - kChunkFrame) {
-      break;
-    }
-    if (type == "IEND") {
+  PngChunks chunks(bytes);
+  for (PngChunk chunk = chunks.next(); !chunk.type.empty(); chunk = chunks.next()) {
+    if (chunk.type == "IEND") {
       return {};
     }
-    at += kChunkFrame + length;
   }
   return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
                           name, bytes.size()));
@@ -57,10 +47,25 @@ Expected<Bytes> read_bytes(const std::filesystem::path& file) {
   if (!stream || std::filesystem::is_directory(file, code)) {
     return fail(fmt::format("{}: expected a readable PNG image, cannot open it", file.string()));
   }
-  Bytes bytes;
-  bytes.reserve(std::filesystem::file_size(file, code));
-  bytes.assign(std::istreambuf_iterator<char>(stream), {});
+  const std::uintmax_t size = std::filesystem::file_size(file, code);
+  Bytes bytes(code ? 0 : size);
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
   return bytes;
+}
+
+/// Every kind of PNG.
+cv::Mat decode_any_png(const Bytes& bytes, bool as_color) {
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes, as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+  if (as_color && !image.empty()) {
+    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  }
+  return image;
 }
 
 }  // namespace
@@ -73,17 +78,12 @@ Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color) {
   if (const Status complete = check_complete(*bytes, file.string()); !complete) {
     return fail(complete.error().message);
   }
-  cv::Mat image;
-  try {
-    image = cv::imdecode(*bytes, as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {
-    image.release();  // the one message below says what is known
+  cv::Mat image = decode_plain_png(*bytes, as_color);
+  if (image.empty()) {
+    image = decode_any_png(*bytes, as_color);
   }
   if (image.empty()) {
     return fail(fmt::format("{}: expected a sound PNG image, found damaged data", file.string()));
-  }
-  if (as_color) {
-    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
   }
   return image;
 }
