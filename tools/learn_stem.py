@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Learns the default stem from a rendered drive and writes OUT/NAME.onnx and its entry in
-OUT/manifest.yaml. The same drive and options give the same bytes. docs/default_model.md explains it.
+"""Learns the default stem from a rendered drive and writes OUT/NAME.onnx, its default filter alone
+(OUT/NAME_filter_K.onnx: the same values at a fifth of the cost) and their entry in OUT/manifest.yaml. The same drive and options give the same bytes. docs/default_model.md explains it.
 
 DRIVE: made by `stemvo synth DRIVE --depth` (pictures, exact depth and poses).
 """
@@ -9,6 +9,7 @@ DRIVE: made by `stemvo synth DRIVE --depth` (pictures, exact depth and poses).
 import _environment  # noqa: F401  starts this tool again in the environment of `make build`
 
 import argparse
+import dataclasses
 import pathlib
 import sys
 
@@ -69,12 +70,19 @@ def learn(scatter, nuisance, floor):
     # The layer norm subtracts the mean over the channels. A last filter that makes all of them sum to
     # zero leaves the others as they were learned.
     filters = np.vstack([filters, -filters.sum(axis=0)]) * step
-    # One gray filter serves gray cameras (R = G = B) and colour ones alike. Filters with free colours
-    # mostly learn differences of colours, to which a gray camera is blind.
-    weights = drive.LUMA.reshape(1, 3, 1, 1) * filters.reshape(FILTERS, 1, KERNEL, KERNEL)
+    # One gray plane serves gray cameras and colour ones alike. Filters with free colours mostly learn
+    # differences of colours, to which a gray camera is blind.
+    weights = filters.reshape(FILTERS, 1, KERNEL, KERNEL)
     bias = -filters.sum(axis=1) * np.rint(scatter.mean().mean())
     layer_norm = stem_module.LayerNorm(np.ones(FILTERS), np.zeros(FILTERS), floor**2)
-    return stem_module.Stem(weights, bias, stride=KERNEL, layer_norm=layer_norm), ratios
+    return stem_module.Stem(weights, bias, stride=KERNEL, mean=np.zeros(1), layer_norm=layer_norm), ratios
+
+
+def write_folded(stem, options):
+    """The default filter alone, sampled as it is meant to be: one pass, one output."""
+    file = options.out / f"{options.name}_filter_{options.default_filter}.onnx"
+    onnx_writer.write(dataclasses.replace(stem, stride=options.sampling), file, pick=options.default_filter)
+    return manifest.folded(file, options.default_filter, options.sampling)
 
 
 def command_line(options):
@@ -98,6 +106,8 @@ def run(options):
     entry = manifest.entry(options.name, onnx_file, stem, network="stemvo, learned on a rendered drive",
                            layer="stem", licence="MIT", default_filter=options.default_filter,
                            command=command_line(options))
+    if KERNEL % options.sampling == 0:
+        entry["folded"] = write_folded(stem, options)
     manifest.add(options.out / "manifest.yaml", entry)
     return scatter, stem, ratios, entry
 

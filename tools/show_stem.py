@@ -77,7 +77,8 @@ def correlations(session, weights, stride, images):
     found, deviations = [], []
     for path in images:
         gray = read_gray(path)
-        channels = session.run([onnx_writer.OUTPUT], {onnx_writer.INPUT: np.tile(gray, (1, 3, 1, 1))})[0][0]
+        image = np.tile(gray, (1, weights.shape[1], 1, 1))
+        channels = session.run([onnx_writer.OUTPUT], {onnx_writer.INPUT: image})[0][0]
         patches = np.lib.stride_tricks.sliding_window_view(gray, (rows, columns))[::stride, ::stride]
         middle = patches[:, :, (rows - 1) // 2:rows // 2 + 1, (columns - 1) // 2:columns // 2 + 1].mean(axis=(2, 3))
         deviations.append(channels.std(axis=(1, 2)))

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <span>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -21,24 +22,31 @@ constexpr int kLargestNumber = 100000;
 constexpr std::array<std::string_view, 12> kKeys = {
     "name",   "file",   "sha256",  "network",        "layer",   "filters",
     "kernel", "stride", "padding", "default_filter", "licence", "command"};
-constexpr std::string_view kSampling = "sampling";  // optional
+constexpr std::string_view kSampling = "sampling";
+constexpr std::string_view kFolded = "folded";
+constexpr std::array<std::string_view, 2> kOptionalKeys = {kSampling, kFolded};
+constexpr std::array<std::string_view, 4> kFoldedKeys = {"filter", "sampling", "file", "sha256"};
 
 /// An empty document has no mark.
 int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
 
-/// Reads one entry; keeps the first thing that is wrong, and where.
+using Keys = std::span<const std::string_view>;
+
+/// Reads the keys of one map; keeps the first thing that is wrong, and where.
 class EntryReader {
  public:
-  EntryReader(const std::filesystem::path& source, const YAML::Node& node) : source_(source) {
+  EntryReader(const std::filesystem::path& source, const YAML::Node& node, Keys keys, Keys optional)
+      : source_(source), keys_(keys), optional_(optional) {
     line_ = line_of(node);
     if (!node.IsMap()) {
-      error(line_, "expected a model's keys with values, found something else");
+      error(line_, fmt::format("expected the keys {} with values, found something else",
+                               fmt::join(keys_, ", ")));
       return;
     }
     for (const auto& item : node) {
       add(item.first, item.second);
     }
-    for (const std::string_view key : kKeys) {
+    for (const std::string_view key : keys_) {
       if (values_.find(key) == values_.end()) {
         error(line_, fmt::format("missing key '{}'", key));
       }
@@ -55,6 +63,7 @@ class EntryReader {
       error_ = fmt::format("{}:{}: {}", source_.string(), line, message);
     }
   }
+  void take_error(const EntryReader& part) { error_ = error_.empty() ? part.error_ : error_; }
 
   std::string text(std::string_view key) {
     const YAML::Node node = find(key);
@@ -65,9 +74,36 @@ class EntryReader {
     return value;
   }
 
+  [[nodiscard]] bool has(std::string_view key) const { return values_.contains(key); }
+  [[nodiscard]] YAML::Node find(std::string_view key) const {
+    const auto found = values_.find(key);
+    return found == values_.end() ? YAML::Node() : found->second.node;
+  }
+
+  /// A name beside the manifest, as an absolute path.
+  std::filesystem::path file() {
+    const std::filesystem::path name = text("file");
+    if (name.has_parent_path()) {
+      error(line("file"),
+            fmt::format("file: expected a name beside the manifest, found '{}'", name.string()));
+    }
+    return std::filesystem::absolute(source_).parent_path() / name;
+  }
+
+  std::string sha256() {
+    const auto is_hex = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
+    const std::string value = text("sha256");
+    if (value.size() != 64 || !std::all_of(value.begin(), value.end(), is_hex)) {
+      error(
+          line("sha256"),
+          fmt::format("sha256: expected 64 digits 0-9 and a-f, found {} characters", value.size()));
+    }
+    return value;
+  }
+
   /// False where the key is missing or says `any`.
   bool native_sampling() {
-    if (values_.find(kSampling) == values_.end()) {
+    if (!has(kSampling)) {
       return false;
     }
     const std::string value = text(kSampling);
@@ -102,21 +138,18 @@ class EntryReader {
 
   void add(const YAML::Node& key, const YAML::Node& value) {
     const std::string name = key.IsScalar() ? key.Scalar() : "?";
-    const auto* const known = std::find(kKeys.begin(), kKeys.end(), name);
-    if (known == kKeys.end() && name != kSampling) {
-      error(line_of(key), fmt::format("unknown key '{}'; known keys: {}, {}", name.substr(0, 40),
-                                      fmt::join(kKeys, ", "), kSampling));
-      return;
+    for (const Keys keys : {keys_, optional_}) {
+      const auto known = std::find(keys.begin(), keys.end(), name);
+      if (known != keys.end()) {
+        if (!values_.emplace(*known, Value{line_of(key), value}).second) {
+          error(line_of(key), fmt::format("duplicated key '{}'", name));
+        }
+        return;
+      }
     }
-    const std::string_view own = known == kKeys.end() ? kSampling : *known;
-    if (!values_.emplace(own, Value{line_of(key), value}).second) {
-      error(line_of(key), fmt::format("duplicated key '{}'", name));
-    }
-  }
-
-  YAML::Node find(std::string_view key) const {
-    const auto found = values_.find(key);
-    return found == values_.end() ? YAML::Node() : found->second.node;
+    error(line_of(key), fmt::format("unknown key '{}'; known keys: {}{}{}", name.substr(0, 40),
+                                    fmt::join(keys_, ", "), optional_.empty() ? "" : ", ",
+                                    fmt::join(optional_, ", ")));
   }
 
   int number(std::string_view key, const YAML::Node& node, int min) {
@@ -133,18 +166,14 @@ class EntryReader {
   }
 
   const std::filesystem::path& source_;
+  Keys keys_;
+  Keys optional_;
   int line_ = 0;
   std::map<std::string_view, Value> values_;
   std::string error_;
 };
 
 void check_values(const ModelEntry& entry, EntryReader& reader) {
-  const auto is_hex = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
-  if (entry.sha256.size() != 64 || !std::all_of(entry.sha256.begin(), entry.sha256.end(), is_hex)) {
-    reader.error(reader.line("sha256"),
-                 fmt::format("sha256: expected 64 digits 0-9 and a-f, found {} characters",
-                             entry.sha256.size()));
-  }
   if (entry.name == "gray" || entry.name == "input_layer" || entry.name.ends_with(".onnx")) {
     reader.error(reader.line("name"),
                  fmt::format("name: '{}' means something else in stem.model", entry.name));
@@ -167,17 +196,40 @@ void check_values(const ModelEntry& entry, EntryReader& reader) {
   }
 }
 
+/// The key `folded`, where there is one; what is wrong in it becomes the entry's error.
+std::optional<FoldedFilter> read_folded(const std::filesystem::path& source,
+                                        const ModelEntry& entry,
+                                        EntryReader& reader) {
+  if (!reader.has(kFolded)) {
+    return std::nullopt;
+  }
+  EntryReader folded(source, reader.find(kFolded), kFoldedKeys, {});
+  if (!folded.error().empty()) {
+    reader.take_error(folded);
+    return std::nullopt;
+  }
+  const FoldedFilter result{.filter = folded.number("filter", 0),
+                            .sampling_px = folded.number("sampling", 1),
+                            .file = folded.file(),
+                            .sha256 = folded.sha256()};
+  if (result.filter >= entry.num_filters) {
+    folded.error(folded.line("filter"), fmt::format("filter: expected 0 to {}, found {}",
+                                                    entry.num_filters - 1, result.filter));
+  }
+  if (entry.stride_px > 0 && entry.stride_px % result.sampling_px != 0) {
+    folded.error(folded.line("sampling"),
+                 fmt::format("sampling: expected a divisor of the stride {}, found {}",
+                             entry.stride_px, result.sampling_px));
+  }
+  reader.take_error(folded);
+  return result;
+}
+
 ModelEntry read_entry(const std::filesystem::path& source, EntryReader& reader) {
   ModelEntry entry;
   entry.name = reader.text("name");
-  const std::filesystem::path file = reader.text("file");
-  if (file.has_parent_path()) {
-    reader.error(
-        reader.line("file"),
-        fmt::format("file: expected a name beside the manifest, found '{}'", file.string()));
-  }
-  entry.file = std::filesystem::absolute(source).parent_path() / file;
-  entry.sha256 = reader.text("sha256");
+  entry.file = reader.file();
+  entry.sha256 = reader.sha256();
   entry.network = reader.text("network");
   entry.layer = reader.text("layer");
   entry.num_filters = reader.number("filters", 1);
@@ -186,6 +238,7 @@ ModelEntry read_entry(const std::filesystem::path& source, EntryReader& reader) 
   entry.padding_px = reader.numbers<4>("padding", 0);
   entry.native_sampling_only = reader.native_sampling();
   entry.default_filter = reader.number("default_filter", 0);
+  entry.folded = read_folded(source, entry, reader);
   entry.licence = reader.text("licence");
   entry.command = reader.text("command");
   check_values(entry, reader);
@@ -245,7 +298,7 @@ Expected<std::vector<ModelEntry>> load_manifest(const std::filesystem::path& fil
   }
   std::vector<ModelEntry> entries;
   for (const YAML::Node& node : *models) {
-    EntryReader reader(file, node);
+    EntryReader reader(file, node, kKeys, kOptionalKeys);
     ModelEntry entry = reader.error().empty() ? read_entry(file, reader) : ModelEntry();
     if (reader.error().empty()) {
       check_against(entries, entry, reader);

@@ -109,6 +109,20 @@ Expected<ModelEntry> find_model(const std::string& model,
                           fmt::join(known, ", "), layer));
 }
 
+std::optional<ModelEntry> folded_entry(const ModelEntry& entry) {
+  if (!entry.folded) {
+    return std::nullopt;
+  }
+  ModelEntry folded = entry;
+  folded.file = entry.folded->file;
+  folded.sha256 = entry.folded->sha256;
+  folded.num_filters = 1;
+  folded.default_filter = 0;
+  folded.stride_px = entry.folded->sampling_px;
+  folded.folded.reset();
+  return folded;
+}
+
 Expected<OnnxSession> open_model(const ModelEntry& entry) {
   const std::string file = entry.file.string();
   const auto bytes = read_bytes(entry.file);
@@ -147,7 +161,10 @@ Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
 }
 
 Status check_model(const ModelEntry& entry) {
-  const auto session = internal::open_model(entry);
+  auto session = internal::open_model(entry);
+  if (const auto folded = internal::folded_entry(entry); session && folded) {
+    session = internal::open_model(*folded);
+  }
   return session ? Status() : tl::unexpected<Error>(session.error());
 }
 

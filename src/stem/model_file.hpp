@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,9 @@ namespace stemvo::internal {
 [[nodiscard]] Expected<ModelEntry> find_model(const std::string& model,
                                               const std::string& layer,
                                               const std::filesystem::path& models_dir);
+
+/// The file of one filter as a model of its own, where the entry has one.
+[[nodiscard]] std::optional<ModelEntry> folded_entry(const ModelEntry& entry);
 
 /// Reads, hashes and loads the file, and holds the graph against the entry: hash, number of
 /// filters, kernel, stride and padding (window_check.hpp).

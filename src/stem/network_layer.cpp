@@ -16,8 +16,9 @@ namespace {
 /// Buffers kept from frame to frame.
 struct Workspace {
   cv::Size frame;    ///< that the sizes below are for
-  cv::Mat1f planes;  ///< three planes of the buffer, one below the other, and the slack after them
+  cv::Mat1f planes;  ///< planes of the buffer, one below the other, and the slack after them
   cv::Mat bordered;  ///< the frame with its margin
+  cv::Mat3f floats;  ///< a colour frame for a graph that takes gray
   std::array<cv::Mat, 3> colours;
   std::vector<cv::Mat1f> outputs;  ///< all channels of one pass, one below the other
 };
@@ -83,10 +84,10 @@ void NetworkLayer::fit_workspace(const cv::Mat& frame) const {
   }
   const cv::Size buffer = plan_.buffer_size(frame.size());
   const cv::Size pass = plan_.pass_size(frame.size());
-  // A pass reads three whole planes from its start on, so the last one reads past the last plane.
+  // A pass reads whole planes from its start on, so the last one reads past the last plane.
   const cv::Point last = plan_.shift(plan_.num_passes() - 1);
   const int slack_rows = last.y + last.x / buffer.width + 1;
-  workspace_.planes.create(3 * buffer.height + slack_rows, buffer.width);
+  workspace_.planes.create(session_.num_planes() * buffer.height + slack_rows, buffer.width);
   workspace_.planes.setTo(0);
   workspace_.outputs.assign(static_cast<std::size_t>(plan_.num_passes()), cv::Mat1f());
   for (cv::Mat1f& output : workspace_.outputs) {
@@ -95,7 +96,7 @@ void NetworkLayer::fit_workspace(const cv::Mat& frame) const {
   workspace_.frame = frame.size();
 }
 
-/// The frame as three float planes, R, G, B, with their margins. Every pass reads these same
+/// The frame as float planes, R, G, B or gray, with their margins. Every pass reads these same
 /// planes from its own start: a shift costs no copy. Where a shifted row runs over into the next,
 /// no output that is kept looks.
 void NetworkLayer::fill_planes(const cv::Mat& frame) const {
@@ -107,15 +108,20 @@ void NetworkLayer::fill_planes(const cv::Mat& frame) const {
                        plan_.x.margin_before(), plan_.x.margin_after(), cv::BORDER_REPLICATE);
     source = workspace_.bordered;
   }
-  std::array<cv::Mat, 3> planes;
-  for (int i = 0; i < 3; ++i) {
-    planes.at(static_cast<std::size_t>(i)) =
-        workspace_.planes.rowRange(i * buffer.height, (i + 1) * buffer.height);
+  std::vector<cv::Mat> planes;
+  for (int i = 0; i < session_.num_planes(); ++i) {
+    planes.push_back(workspace_.planes.rowRange(i * buffer.height, (i + 1) * buffer.height));
   }
   if (frame.channels() == 1) {
     source.convertTo(planes[0], CV_32F);
-    planes[0].copyTo(planes[1]);
-    planes[0].copyTo(planes[2]);
+    for (std::size_t i = 1; i < planes.size(); ++i) {
+      planes[0].copyTo(planes[i]);
+    }
+    return;
+  }
+  if (planes.size() == 1) {
+    source.convertTo(workspace_.floats, CV_32F);  // first: gray is not rounded
+    cv::cvtColor(workspace_.floats, planes[0], cv::COLOR_RGB2GRAY);
     return;
   }
   cv::split(source, workspace_.colours.data());

@@ -199,10 +199,12 @@ Status OnnxSession::check_input() {
   if (!input) {
     return tl::unexpected<Error>(input.error());
   }
-  if (!fits(*input, kInputName, {1, 3, -1, -1})) {
-    return fail(fmt::format("{}: expected input '{} float 1x3xHxW', found '{}'", label_, kInputName,
-                            describe(*input)));
+  const bool is_gray = fits(*input, kInputName, {1, 1, -1, -1});
+  if (!is_gray && !fits(*input, kInputName, {1, 3, -1, -1})) {
+    return fail(fmt::format("{}: expected input '{} float 1x3xHxW' or 1x1xHxW, found '{}'", label_,
+                            kInputName, describe(*input)));
   }
+  num_planes_ = is_gray ? 1 : 3;
   fixed_size_ = {static_cast<int>(std::max<std::int64_t>(input->shape[3], 0)),
                  static_cast<int>(std::max<std::int64_t>(input->shape[2], 0))};
   return {};
@@ -235,8 +237,8 @@ Status OnnxSession::choose_output(const std::string& layer) {
 }
 
 Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
-  std::vector<float> zeros(3 * static_cast<std::size_t>(image_size.area()));
-  const std::array<std::int64_t, 4> shape = {1, 3, image_size.height, image_size.width};
+  std::vector<float> zeros(static_cast<std::size_t>(num_planes_ * image_size.area()));
+  const std::array<std::int64_t, 4> shape = {1, num_planes_, image_size.height, image_size.width};
   OrtValue* raw_input = nullptr;
   STEMVO_ORT_TRY(*api_, label_,
                  api_->CreateTensorWithDataAsOrtValue(
@@ -264,10 +266,12 @@ Status OnnxSession::run(const float* image,
                         cv::Size image_size,
                         float* channels,
                         cv::Size channel_size) const {
-  const std::array<std::int64_t, 4> in_shape = {1, 3, image_size.height, image_size.width};
+  const std::array<std::int64_t, 4> in_shape = {1, num_planes_, image_size.height,
+                                                image_size.width};
   const std::array<std::int64_t, 4> out_shape = {1, num_filters_, channel_size.height,
                                                  channel_size.width};
-  const std::size_t in_bytes = 3 * static_cast<std::size_t>(image_size.area()) * sizeof(float);
+  const std::size_t in_bytes =
+      static_cast<std::size_t>(num_planes_ * image_size.area()) * sizeof(float);
   const std::size_t out_bytes = static_cast<std::size_t>(num_filters_) *
                                 static_cast<std::size_t>(channel_size.area()) * sizeof(float);
   OrtValue* raw_input = nullptr;

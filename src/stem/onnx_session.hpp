@@ -22,8 +22,9 @@ namespace stemvo::internal {
 template <typename T>
 using OnnxHandle = std::unique_ptr<T, void (*)(T*)>;
 
-/// A layer of a model, loaded: `image` 1x3xHxW float -> 1xCxhxw float. The only class that
-/// sees ONNX Runtime. Single-threaded inside; `run` may be called from several threads at once.
+/// A layer of a model, loaded: `image` 1xPxHxW float -> 1xCxhxw float, P = 3 (R, G, B) or 1 (gray).
+/// The only class that sees ONNX Runtime. Single-threaded inside; `run` may be called from several
+/// threads at once.
 class OnnxSession {
  public:
   /// `model` holds the bytes of the .onnx file, `label` is what messages call it (its path).
@@ -34,6 +35,8 @@ class OnnxSession {
                                                     std::string_view model,
                                                     const std::string& layer);
 
+  /// Of the image: 3 or 1.
+  [[nodiscard]] int num_planes() const { return num_planes_; }
   [[nodiscard]] int num_filters() const { return num_filters_; }
   /// The only size of image the graph takes; 0 where an axis is free.
   [[nodiscard]] cv::Size fixed_size() const { return fixed_size_; }
@@ -41,8 +44,8 @@ class OnnxSession {
   /// Size of each channel for an image of this size, by asking the graph. Error: it refused.
   [[nodiscard]] Expected<cv::Size> channel_size(cv::Size image_size) const;
 
-  /// One pass. `image`: 3 planes of image_size; `channels`: num_filters() planes of channel_size.
-  /// Both are used where they are, without a copy. Error: the runtime refused.
+  /// One pass. `image`: num_planes() planes of image_size; `channels`: num_filters() planes of
+  /// channel_size. Both are used where they are, without a copy. Error: the runtime refused.
   [[nodiscard]] Status run(const float* image,
                            cv::Size image_size,
                            float* channels,
@@ -63,6 +66,7 @@ class OnnxSession {
   OnnxHandle<OrtMemoryInfo> memory_;
   OnnxHandle<OrtSession> session_;
   std::string output_;
+  int num_planes_ = 3;
   int num_filters_ = 0;
   cv::Size fixed_size_;
 };

@@ -15,7 +15,8 @@ namespace stemvo {
 
 struct Stem::Impl {
   StemInfo info;
-  std::unique_ptr<internal::FilterLayer> layer;
+  std::unique_ptr<internal::FilterLayer> layer;   ///< all filters
+  std::unique_ptr<internal::FilterLayer> folded;  ///< the one chosen alone; null: it has no file
 };
 
 namespace {
@@ -24,9 +25,21 @@ using internal::FilterLayer;
 
 struct LoadedLayer {
   StemInfo info;
-  int default_filter = 0;
   std::unique_ptr<FilterLayer> layer;
+  std::unique_ptr<FilterLayer> folded;
 };
+
+/// -1 stands for the default. Error: outside the layer.
+Expected<int> choose_filter(const StemOptions& options, int num_filters, int default_filter) {
+  const int filter = options.filter == -1 ? default_filter : options.filter;
+  if (filter >= 0 && filter < num_filters) {
+    return filter;
+  }
+  return fail(fmt::format(
+      "stem.filter: expected 0 to {} for {}, found {}", num_filters - 1,
+      options.layer == "first" ? options.model : options.model + " layer " + options.layer,
+      filter));
+}
 
 /// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
 /// worth too many pixels. Error: not a divisor.
@@ -61,6 +74,22 @@ Expected<int> choose_sampling(int asked, const ModelEntry& entry) {
       entry.stride_px, entry.layer, entry.file.string(), asked));
 }
 
+/// Null where the filter, sampled like this, has no file of its own.
+Expected<std::unique_ptr<FilterLayer>> load_folded(const ModelEntry& entry,
+                                                   int filter,
+                                                   int sampling) {
+  const auto folded = internal::folded_entry(entry);
+  if (!folded || entry.folded->filter != filter || entry.folded->sampling_px != sampling) {
+    return nullptr;
+  }
+  auto session = internal::open_model(*folded);
+  if (!session) {
+    return tl::unexpected<Error>(std::move(session).error());
+  }
+  return internal::make_network_layer(folded->file.string(), *std::move(session),
+                                      internal::SamplingPlan(*folded, sampling));
+}
+
 Expected<LoadedLayer> load_network(const StemOptions& options,
                                    const std::filesystem::path& models_dir) {
   const auto entry = internal::find_model(options.model, options.layer, models_dir);
@@ -71,9 +100,17 @@ Expected<LoadedLayer> load_network(const StemOptions& options,
   if (!sampling) {
     return tl::unexpected<Error>(sampling.error());
   }
+  const auto filter = choose_filter(options, entry->num_filters, entry->default_filter);
+  if (!filter) {
+    return tl::unexpected<Error>(filter.error());
+  }
   auto session = internal::open_model(*entry);
   if (!session) {
     return tl::unexpected<Error>(std::move(session).error());
+  }
+  auto folded = load_folded(*entry, *filter, *sampling);
+  if (!folded) {
+    return tl::unexpected<Error>(std::move(folded).error());
   }
   const internal::SamplingPlan plan(*entry, *sampling);
   if (plan.needs_margin() && !session->fixed_size().empty()) {
@@ -86,11 +123,12 @@ Expected<LoadedLayer> load_network(const StemOptions& options,
   loaded.info = {.model = options.model,
                  .layer = entry->layer,
                  .sha256 = entry->sha256,
+                 .filter = *filter,
                  .num_filters = entry->num_filters,
                  .native_stride_px = entry->stride_px,
                  .sampling_px = *sampling};
-  loaded.default_filter = entry->default_filter;
   loaded.layer = internal::make_network_layer(entry->file.string(), *std::move(session), plan);
+  loaded.folded = *std::move(folded);
   return loaded;
 }
 
@@ -110,6 +148,11 @@ Expected<LoadedLayer> load_layer(const StemOptions& options,
   LoadedLayer loaded;
   loaded.info.model = options.model;
   loaded.info.num_filters = is_gray ? 1 : 3;
+  const auto filter = choose_filter(options, loaded.info.num_filters, 0);
+  if (!filter) {
+    return tl::unexpected<Error>(filter.error());
+  }
+  loaded.info.filter = *filter;
   loaded.layer = is_gray ? internal::make_gray_layer() : internal::make_input_layer();
   return loaded;
 }
@@ -126,17 +169,10 @@ Expected<Stem> Stem::create(const StemOptions& options, const std::filesystem::p
   if (!loaded) {
     return tl::unexpected<Error>(std::move(loaded).error());
   }
-  const int filter = options.filter == -1 ? loaded->default_filter : options.filter;
-  if (filter < 0 || filter >= loaded->info.num_filters) {
-    return fail(fmt::format(
-        "stem.filter: expected 0 to {} for {}, found {}", loaded->info.num_filters - 1,
-        options.layer == "first" ? options.model : options.model + " layer " + options.layer,
-        filter));
-  }
-  loaded->info.filter = filter;
   auto impl = std::make_unique<Impl>();
   impl->info = std::move(loaded->info);
   impl->layer = std::move(loaded->layer);
+  impl->folded = std::move(loaded->folded);
   return Stem(std::move(impl));
 }
 
@@ -144,7 +180,9 @@ const StemInfo& Stem::info() const { return impl_->info; }
 
 Expected<Channel> Stem::apply(const cv::Mat& frame) const {
   STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
-  auto channels = impl_->layer->apply(frame, impl_->info.filter, impl_->info.filter + 1);
+  auto channels = impl_->folded != nullptr
+                      ? impl_->folded->apply(frame, 0, 1)
+                      : impl_->layer->apply(frame, impl_->info.filter, impl_->info.filter + 1);
   if (!channels) {
     return tl::unexpected<Error>(std::move(channels).error());
   }

@@ -50,7 +50,7 @@ class Probe {
 
   [[nodiscard]] Expected<std::vector<float>> run(const cv::Mat1f& picture) const {
     std::vector<float> planes;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < session_.num_planes(); ++i) {
       planes.insert(planes.end(), picture.begin(), picture.end());
     }
     const auto area = static_cast<std::size_t>(channel_.area());

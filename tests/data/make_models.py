@@ -24,6 +24,23 @@ def weights(filters, kernel):
     return w.astype(np.float32)
 
 
+def gray_stem(name, stride, pick=None):
+    """norm_k4s4's weights of the first colour on one gray plane; pick: that filter alone."""
+    constants = [numpy_helper.from_array(weights(6, 4)[:, :1], "weights"),
+                 numpy_helper.from_array(np.full((1, 1, 1, 1), 9.0, np.float32), "epsilon")]
+    nodes = [helper.make_node("Conv", ["image", "weights"], ["z"], kernel_shape=[4, 4], strides=[stride] * 2),
+             helper.make_node("ReduceSumSquare", ["z"], ["power"], axes=[1]),
+             helper.make_node("Add", ["power", "epsilon"], ["floored"]),
+             helper.make_node("Sqrt", ["floored"], ["length"])]
+    if pick is not None:
+        constants += [numpy_helper.from_array(np.array([number]), key)
+                      for key, number in (("from", pick), ("to", pick + 1), ("axis", 1))]
+        nodes += [helper.make_node("Slice", ["z", "from", "to", "axis"], ["own"])]
+    nodes += [helper.make_node("Div", ["z" if pick is None else "own", "length"], ["channels"])]
+    write(name, nodes, [value("image", [1, 1, "H", "W"])],
+          [value("channels", [1, 6 if pick is None else 1, "h", "w"])], constants)
+
+
 def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W")):
     constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
                  numpy_helper.from_array(weights(filters, kernel), "weights")]
@@ -86,12 +103,14 @@ def main():
     stem("plain_k7s2p3", 3, 7, 2, [3, 3, 3, 3])
     stem("fixed_k4s4", 3, 4, 4, none, size=(32, 48))
 
+    gray_stem("gray_k4s4", 4)
+    gray_stem("gray_k4s4_filter_1", 2, pick=1)
     two_layers("two_layers")
     picture, shape = ["H", "W"], [1, 3, "H", "W"]
     identity("wrong_input_name", [value("x", shape)], [value("channels", shape)])
     identity("wrong_output_name", [value("image", shape)], [value("y", shape)])
     identity("wrong_rank", [value("image", [3, *picture])], [value("channels", [3, *picture])])
-    identity("wrong_planes", [value("image", [1, 1, *picture])], [value("channels", [1, 1, *picture])])
+    identity("wrong_planes", [value("image", [1, 2, *picture])], [value("channels", [1, 2, *picture])])
     identity("wrong_type", [value("image", shape, TensorProto.UINT8)], [value("channels", shape, TensorProto.UINT8)])
     write("wrong_free_filters", [helper.make_node("Compress", ["image", "which"], ["channels"], axis=1)],
           [value("image", shape)], [value("channels", [1, "C", *picture])],

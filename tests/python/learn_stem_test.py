@@ -68,10 +68,9 @@ class PlantedDrive(unittest.TestCase):
             code = learn_stem.main([str(self.folder / "drive"), "--out", str(self.folder / out), "--pairs", "3000", *options])
         return code, printed.getvalue()
 
-    def channels(self, out, gray):
-        session = onnxruntime.InferenceSession(str(self.folder / out / "default.onnx"))
-        image = np.repeat(gray[None, None].astype(np.float32), 3, axis=1)
-        return session.run(["channels"], {"image": image})[0][0]
+    def channels(self, out, gray, file="default.onnx"):
+        session = onnxruntime.InferenceSession(str(self.folder / out / file))
+        return session.run(["channels"], {"image": gray[None, None].astype(np.float32)})[0][0]
 
 
 class Correspondences(PlantedDrive):
@@ -123,6 +122,16 @@ class Learning(PlantedDrive):
         got = self.channels("out", gray)
         self.assertTrue(np.abs(got - want).max() < 1e-3, np.abs(got - want).max())
         self.assertTrue(np.all(got.std(axis=(1, 2)) > 0.01), "a filter is dead on gray")
+
+    def test_the_default_filter_alone_has_the_same_values(self):
+        self.learn("out", "--default-filter", "5")
+        gray = drive.Drive(self.folder / "drive").gray(1)
+        alone = self.channels("out", gray, "default_filter_5.onnx")
+        with_others = self.channels("out", gray)
+        self.assertEqual(len(alone), 1)
+        self.assertTrue(np.abs(alone[0][::2, ::2] - with_others[5]).max() <= 1e-6)
+        entry = yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text())["models"][0]
+        self.assertEqual((entry["folded"]["filter"], entry["folded"]["sampling"]), (5, 2))
 
     def test_first_filter_rises_with_gray(self):
         self.learn("out")

@@ -66,6 +66,18 @@ inline void write_models(const TempFolder& folder, const TinyStem& stem) {
   (void)folder.file("manifest.yaml", "models:\n" + manifest_entry(stem));
 }
 
+/// gray_k4s4 and its filter 1 alone, sampled every 2 pixels.
+inline void write_folded(const TempFolder& folder) {
+  const TinyStem gray{.name = "gray_k4s4", .filters = 6};
+  write_models(folder, gray);
+  const std::string file = "gray_k4s4_filter_1.onnx";
+  std::filesystem::copy_file(tiny_stems() / file, folder / file);
+  (void)folder.file(
+      "manifest.yaml",
+      fmt::format("models:\n{}    folded: {{filter: 1, sampling: 2, file: {}, sha256: {}}}\n",
+                  manifest_entry(gray), file, internal::sha256_hex(read_all(tiny_stems() / file))));
+}
+
 /// Both layers of two_layers.onnx, as make_models.py writes them: `stem` is kPlain4, `deep` a
 /// padded 3x3 box over its first two filters; of the second the mean over the frame is taken off.
 inline void write_two_layers(const TempFolder& folder) {

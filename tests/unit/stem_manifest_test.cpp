@@ -33,6 +33,10 @@ const char* const kEntry =
     "    licence: MIT\n"
     "    command: make it\n";
 
+const char* const kFoldedKey =
+    "    folded: {filter: 3, sampling: 1, file: three.onnx, "
+    "sha256: 0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef}\n";
+
 class Manifest : public ::testing::Test {
  protected:
   std::string error_of(const std::string& text) {
@@ -54,6 +58,33 @@ class Manifest : public ::testing::Test {
   }
   testing::TempFolder folder;
 };
+
+TEST_F(Manifest, ReadsTheFileOfOneFilter) {
+  const std::string text = std::string(kEntry) + kFoldedKey;
+  const auto entries = load_manifest(folder.file("manifest.yaml", text));
+  ASSERT_TRUE(entries) << entries.error().message;
+  const auto& folded = entries->front().folded;
+  ASSERT_TRUE(folded.has_value());
+  EXPECT_EQ(folded->filter, 3);
+  EXPECT_EQ(folded->sampling_px, 1);
+  EXPECT_EQ(folded->file, folder / "three.onnx");
+  EXPECT_EQ(folded->sha256.size(), 64U);
+  const auto error_with_folded = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    return error_of(changed.replace(changed.rfind(from), from.size(), to));
+  };
+  EXPECT_EQ(error_with_folded("filter: 3", "filter: 16"),
+            ":14: filter: expected 0 to 15, found 16");
+  EXPECT_EQ(error_with_folded("sampling: 1", "sampling: 3"),
+            ":14: sampling: expected a divisor of the stride 2, found 3");
+  EXPECT_EQ(error_with_folded("three.onnx", "../three.onnx"),
+            ":14: file: expected a name beside the manifest, found '../three.onnx'");
+  EXPECT_EQ(error_with_folded("sampling: 1, ", ""), ":14: missing key 'sampling'");
+  EXPECT_EQ(error_with_folded("sha256: 01", "sha256: "),
+            ":14: sha256: expected 64 digits 0-9 and a-f, found 62 characters");
+  EXPECT_EQ(error_with_folded("filter: 3", "filters: 3"),
+            ":14: unknown key 'filters'; known keys: filter, sampling, file, sha256");
+}
 
 TEST_F(Manifest, ReadsEveryKey) {
   const auto entries = load_manifest(folder.file("manifest.yaml", kEntry));
@@ -137,8 +168,10 @@ TEST_F(Manifest, OtherDocumentsAreRefused) {
   EXPECT_EQ(error_of("- 1\n"), ":1: expected the one key 'models'");
   EXPECT_EQ(error_of("models: 3\n"), ":1: models: expected a list of models");
   EXPECT_THAT(error_of("models:\n  - name: [\n"), HasSubstr("not YAML"));
-  EXPECT_EQ(error_of("models:\n  - 3\n"),
-            ":2: expected a model's keys with values, found something else");
+  EXPECT_EQ(
+      error_of("models:\n  - 3\n"),
+      ":2: expected the keys name, file, sha256, network, layer, filters, kernel, stride, padding, "
+      "default_filter, licence, command with values, found something else");
   EXPECT_EQ(load_manifest(folder / "absent.yaml").error().message,
             (folder / "absent.yaml").string() + ": cannot read: No such file or directory");
   EXPECT_THAT(load_manifest(folder.path()).error().message, HasSubstr("found a folder"));

@@ -83,11 +83,14 @@ TEST(OnnxSession, RefusesWhatIsNoModel) {
 
 TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
   const std::vector<std::pair<std::string, std::string>> cases = {
-      {"wrong_input_name", "expected input 'image float 1x3xHxW', found 'x float 1x3x?x?'"},
+      {"wrong_input_name",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'x float 1x3x?x?'"},
       {"wrong_output_name", "expected an output 'stem' or 'channels', found 'y float 1x3x?x?'"},
-      {"wrong_rank", "expected input 'image float 1x3xHxW', found 'image float 3x?x?'"},
-      {"wrong_planes", "expected input 'image float 1x3xHxW', found 'image float 1x1x?x?'"},
-      {"wrong_type", "expected input 'image float 1x3xHxW', found 'image uint8 1x3x?x?'"},
+      {"wrong_rank", "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 3x?x?'"},
+      {"wrong_planes",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 1x2x?x?'"},
+      {"wrong_type",
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image uint8 1x3x?x?'"},
       {"wrong_free_filters",
        "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
       {"wrong_two_inputs", "expected 1 input, found 2"},

@@ -9,7 +9,8 @@ import yaml
 # In this order in the file.
 KEYS = ("name", "file", "sha256", "network", "layer", "filters", "kernel", "stride", "padding",
         "default_filter", "licence", "command")
-OPTIONAL = ("sampling",)  # any (where it is missing) or native
+OPTIONAL = ("sampling",  # any (where it is missing) or native
+            "folded")  # see folded()
 _COMMENTS = {"kernel": "y, x", "padding": "top, left, bottom, right, inside the graph"}
 
 
@@ -29,6 +30,12 @@ def entry(name, onnx_file, stem, *, network, layer, licence, command, default_fi
         "stride": int(stem.stride), "padding": [int(pixels) for pixels in stem.padding],
         "default_filter": int(default_filter), "licence": licence, "command": command,
     } | ({} if sampling == "any" else {"sampling": sampling})
+
+
+def folded(onnx_file, filter_index, sampling):
+    """For the key `folded` of an entry: a file of one filter alone, sampled every `sampling` pixels."""
+    return {"filter": int(filter_index), "sampling": int(sampling), "file": pathlib.Path(onnx_file).name,
+            "sha256": sha256(onnx_file)}
 
 
 def load(path):

@@ -3,6 +3,8 @@
 
     image 1x3xHxW float, RGB, 0..255  ->  channels 1xCxhxw float      (H, W, h, w are free)
 
+A stem whose weights have one plane takes gray instead, 1x1xHxW.
+
 Preprocessing is inside the graph: folded into the convolution where nothing is padded, otherwise a
 subtraction before it. Padding is written as numbers, never as "same": that depends on the parity
 of the size, and shifts by a pixel when the picture is cropped.
@@ -45,20 +47,31 @@ class _Graph:
         self.last = output
 
 
-def _add_layer_norm(graph, layer_norm):
+def _add_layer_norm(graph, layer_norm, pick):
     """On channels whose mean is already zero at every pixel. Plain operators: ONNX Runtime's fused
-    LayerNormalization wants the channels last, and two transposes cost more than it saves."""
+    LayerNormalization wants the channels last, and two transposes cost more than it saves.
+    pick: this filter only, if not None; the others are needed for the division alone."""
     column = (1, -1, 1, 1)
     channels = layer_norm.gamma.size
     graph.add("ReduceSumSquare", "power", axes=[1], keepdims=1)
     graph.add("Mul", "variance", graph.constant("one_over_channels", np.full((1, 1, 1, 1), 1.0 / channels)))
     graph.add("Add", "variance_and_epsilon", graph.constant("epsilon", np.full((1, 1, 1, 1), layer_norm.epsilon)))
     graph.add("Sqrt", "deviation")
-    graph.add("Div", "normalised", inputs=["convolution", "deviation"])
+    own = slice(None)
+    if pick is not None:
+        own = slice(pick, pick + 1)
+        _add_slice(graph, "own", pick, inputs=["convolution"])
+    graph.add("Div", "normalised", inputs=["convolution" if pick is None else "own", "deviation"])
     if not np.all(layer_norm.gamma == 1.0):
-        graph.add("Mul", "scaled", graph.constant("gamma", layer_norm.gamma.reshape(column)))
+        graph.add("Mul", "scaled", graph.constant("gamma", layer_norm.gamma[own].reshape(column)))
     if not np.all(layer_norm.beta == 0.0):
-        graph.add("Add", "shifted", graph.constant("beta", layer_norm.beta.reshape(column)))
+        graph.add("Add", "shifted", graph.constant("beta", layer_norm.beta[own].reshape(column)))
+
+
+def _add_slice(graph, output, channel, inputs=None):
+    """One channel."""
+    graph.add("Slice", output, *(graph.integers(name, [value]) for name, value in
+                                 (("from", channel), ("to", channel + 1), ("axis", 1))), inputs=inputs)
 
 
 def _add_folded(graph, stem):
@@ -68,14 +81,13 @@ def _add_folded(graph, stem):
     graph.add("ReduceSumSquare", "power", axes=[1], keepdims=1)
     graph.add("Add", "power_and_floor", graph.constant("floor", np.full((1, 1, 1, 1), stem.floor)))
     graph.add("Sqrt", "length")
-    graph.add("Slice", "own", *(graph.integers(name, [value]) for name, value in
-                                (("from", 0), ("to", 1), ("axis", 1))), inputs=["rows"])
+    _add_slice(graph, "own", 0, inputs=["rows"])
     graph.add("Div", "normalised", inputs=["own", "length"])
     graph.add("Mul", "scaled", graph.constant("gain", np.full((1, 1, 1, 1), stem.gain)))
     graph.add("Add", "shifted", graph.constant("shift", np.full((1, 1, 1, 1), stem.shift)))
 
 
-def _add_stem(graph, stem):
+def _add_stem(graph, stem, pick):
     if stem.layer_norm is not None:
         stem = stem_module.fold_layer_norm_mean(stem)
     if not any(stem.padding):
@@ -85,7 +97,9 @@ def _add_stem(graph, stem):
     graph.add("Conv", "convolution", graph.constant("weights", stem.weights), graph.constant("bias", stem.bias),
               kernel_shape=list(stem.kernel), strides=[stem.stride, stem.stride], pads=list(stem.padding))
     if stem.layer_norm is not None:
-        _add_layer_norm(graph, stem.layer_norm)
+        _add_layer_norm(graph, stem.layer_norm, pick)
+    elif pick is not None:
+        _add_slice(graph, "picked", pick)
 
 
 def build(stem, pick=None):
@@ -98,15 +112,19 @@ def build_layers(stems, pick=None):
     nodes, constants, outputs = [], [], []
     for name, stem in stems.items():
         graph = _Graph(prefix="" if len(stems) == 1 else f"{name}/")
-        (_add_folded if isinstance(stem, fold.FoldedStem) else _add_stem)(graph, stem)
-        if pick is not None:
-            graph.add("Gather", "picked", graph.integers("filter", [pick]), axis=1)
+        if isinstance(stem, fold.FoldedStem):
+            _add_folded(graph, stem)
+        else:
+            _add_stem(graph, stem, pick)
         graph.nodes[-1].output[0] = name
         nodes, constants = nodes + graph.nodes, constants + graph.constants
         filters = stem.filters if pick is None else 1
         outputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, filters, "h", "w"]))
 
-    image = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, [1, 3, "H", "W"])
+    planes = {stem.weights.shape[1] for stem in stems.values()}
+    if len(planes) > 1:
+        raise ValueError("layers of one graph take one image")
+    image = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, [1, *planes, "H", "W"])
     model = helper.make_model(helper.make_graph(nodes, "stem", [image], outputs, constants),
                               opset_imports=[helper.make_opsetid("", OPSET)], producer_name="stemvo")
     model.ir_version = IR_VERSION
@@ -119,6 +137,6 @@ def to_bytes(model):
     return model.SerializeToString(deterministic=True)
 
 
-def write(stem, path):
+def write(stem, path, pick=None):
     with open(path, "wb") as file:
-        file.write(to_bytes(build(stem)))
+        file.write(to_bytes(build(stem, pick)))

@@ -19,11 +19,11 @@ class LayerNorm:
 class Stem:
     """y = weights (*) pad(image - mean) + bias, then the layer norm if there is one.
 
-    image: RGB, 0..255. Padding adds zeros to (image - mean), as the networks do after their
+    image: RGB, 0..255, or gray where the weights have one plane. Padding adds zeros to (image - mean), as the networks do after their
     normalisation; the division by their standard deviation is already inside the weights.
     """
 
-    weights: np.ndarray  # C x 3 x kh x kw
+    weights: np.ndarray  # C x 3 x kh x kw, or C x 1 x kh x kw
     bias: np.ndarray  # C
     stride: int
     mean: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # gray levels, RGB

@@ -3,12 +3,22 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "stemvo/error.hpp"
 
 namespace stemvo {
+
+/// A file of one filter alone: the same values as the model's, at less cost. Its graph has the
+/// model's kernel and padding, and stride `sampling_px`.
+struct FoldedFilter {
+  int filter = 0;
+  int sampling_px = 1;
+  std::filesystem::path file;  ///< absolute
+  std::string sha256;
+};
 
 /// One entry of models/manifest.yaml: a layer of a model. The layers of one model have the same
 /// name and file; the graph's outputs are called like them (a model of one layer: also `channels`).
@@ -27,6 +37,8 @@ struct ModelEntry {
   /// are those of one convolution with the same centre and the same sizes of channels.
   bool native_sampling_only = false;
   int default_filter = 0;
+  /// Key `folded: {filter, sampling, file, sha256}`, where there is one.
+  std::optional<FoldedFilter> folded;
   std::string licence;
   std::string command;  ///< that produced the file
 };

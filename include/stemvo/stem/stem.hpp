@@ -52,7 +52,8 @@ class Stem {
   ~Stem();
 
   [[nodiscard]] const StemInfo& info() const;
-  /// Frame: CV_8UC3 in RGB order or CV_8UC1 (replicated to three planes). The one filter chosen.
+  /// Frame: CV_8UC3 in RGB order or CV_8UC1 (replicated to three planes). The one filter chosen,
+  /// from its own file where the manifest has one (`folded`).
   /// Error: the frame is smaller than the kernel, or the runtime refused it.
   [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
   /// All filters of the layer from one pass, in order.
