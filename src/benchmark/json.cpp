@@ -5,6 +5,7 @@
 #include "benchmark/names.hpp"
 #include "benchmark/published.hpp"
 #include "report/metrics_keys.hpp"
+#include "report/optional_number.hpp"
 
 namespace stemvo::benchmark {
 namespace {
@@ -27,7 +28,6 @@ std::string_view word_for(BenchmarkState state) {
 }
 
 Json text_or_null(std::string_view text) { return text.empty() ? Json() : Json(text); }
-Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 Json run_json(const BenchmarkRun& run) {
   Json json;

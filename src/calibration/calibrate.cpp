@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <system_error>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include "calibration/calibration_file.hpp"
 #include "calibration/refine_camera.hpp"
 #include "calibration/segment_builder.hpp"
+#include "geometry/degrees.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "stemvo/odometry/odometry.hpp"
 
@@ -92,7 +92,7 @@ std::vector<Segment> track(const KittiSequence& sequence,
 void describe(const std::vector<Segment>& segments, CalibrationReport& report) {
   report.num_segments = segments.size();
   for (const Segment& segment : segments) {
-    report.turned_deg += calibration::turned_rad(segment) * 180.0 / std::numbers::pi;
+    report.turned_deg += kDegPerRad * calibration::turned_rad(segment);
     report.num_landmarks += segment.landmarks.size();
     for (const calibration::Landmark& landmark : segment.landmarks) {
       report.num_observations += landmark.observations.size();

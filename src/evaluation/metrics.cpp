@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "evaluation/degrees.hpp"
+#include "geometry/degrees.hpp"
 #include "stemvo/check.hpp"
 
 namespace stemvo {

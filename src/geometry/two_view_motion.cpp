@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <numbers>
 
 #include <Eigen/LU>
 
+#include "degrees.hpp"
 #include "optimal_triangulator.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/geometry/decomposition.hpp"
@@ -75,7 +75,7 @@ double robust_parallax_deg(std::vector<double>& cosines) {
   const std::size_t index = std::min<std::size_t>(50, cosines.size() - 1);
   const auto nth = cosines.begin() + static_cast<std::ptrdiff_t>(index);
   std::nth_element(cosines.begin(), nth, cosines.end());
-  return std::acos(std::clamp(*nth, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+  return kDegPerRad * std::acos(std::clamp(*nth, -1.0, 1.0));
 }
 
 /// A plane leaves two motions that (nearly) all its points accept. Between two frames of a drive

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "report/metrics_keys.hpp"
+#include "report/optional_number.hpp"
 #include "report/text_table.hpp"
 #include "report/timing_json.hpp"
 #include "stemvo/report/evaluate_report.hpp"
@@ -16,10 +17,6 @@
 namespace stemvo {
 
 namespace {
-
-nlohmann::ordered_json number_or_null(const std::optional<double>& value) {
-  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
-}
 
 std::string number_or_dash(const std::optional<double>& value, int decimals) {
   return value ? fmt::format("{:.{}f}", *value, decimals) : "-";

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "report/optional_number.hpp"
 #include "stemvo/report/evaluate_report.hpp"
 #include "stemvo/report/metrics_json.hpp"
 #include "text/text_file.hpp"
@@ -12,8 +13,7 @@ namespace stemvo {
 namespace {
 
 std::optional<double> number_at(const nlohmann::json& json, const char* key) {
-  const nlohmann::json& value = json.at(key);
-  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+  return optional_number(json.at(key));
 }
 
 double finite_or_nan(const nlohmann::json& json, const char* key) {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "evaluation/degrees.hpp"
+#include "geometry/degrees.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/evaluation/metrics.hpp"
 #include "stemvo/evaluation/trajectory.hpp"

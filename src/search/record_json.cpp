@@ -3,31 +3,16 @@
 
 #include <fmt/format.h>
 
-#include "search/json.hpp"
+#include "search/json_fields.hpp"
 
 namespace stemvo::search {
 namespace {
 
 constexpr int kFormat = 1;
 
-std::optional<double> optional_number(const Json& json) {
-  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
-}
-
 Json score_json(const DriveScore& score) {
   Json json;
-  json["sequence"] = score.sequence;
-  json["frames"] = score.num_frames;
-  json["detected"] = score.is_detected;
-  json["reason"] = score.reason;
-  json["t_rel_percent"] = optional_json(score.t_rel_percent);
-  json["r_rel_deg_per_100m"] = optional_json(score.r_rel_deg_per_100m);
-  json["average_offset_m"] = score.average_offset_m;
-  json["E_t_m"] = score.translation_change_m;
-  json["E_r_deg"] = score.rotation_change_deg;
-  json["inliers"] = score.mean_inliers;
-  json["tracked"] = score.tracked_fraction;
-  json["early_error_percent"] = score.early_error_percent;
+  visit_score(score, JsonWriter(json));
   json["path_xz_m"] = Json::array();
   for (const PathPoint& point : score.path) {
     json["path_xz_m"].push_back({point.x_m, point.z_m});
@@ -37,93 +22,38 @@ Json score_json(const DriveScore& score) {
 
 DriveScore read_score(const Json& json) {
   DriveScore score;
-  score.sequence = json.at("sequence").get<std::string>();
-  score.num_frames = json.at("frames").get<std::size_t>();
-  score.is_detected = json.at("detected").get<bool>();
-  score.reason = json.at("reason").get<std::string>();
-  score.t_rel_percent = optional_number(json.at("t_rel_percent"));
-  score.r_rel_deg_per_100m = optional_number(json.at("r_rel_deg_per_100m"));
-  score.average_offset_m = json.at("average_offset_m").get<double>();
-  score.translation_change_m = json.at("E_t_m").get<double>();
-  score.rotation_change_deg = json.at("E_r_deg").get<double>();
-  score.mean_inliers = json.at("inliers").get<double>();
-  score.tracked_fraction = json.at("tracked").get<double>();
-  score.early_error_percent = json.at("early_error_percent").get<double>();
+  visit_score(score, JsonReader(json));
   for (const Json& point : json.at("path_xz_m")) {
     score.path.push_back({point.at(0).get<double>(), point.at(1).get<double>()});
   }
   return score;
 }
 
-Json layer_json(const LayerIdentity& layer) {
-  Json json;
-  json["model"] = layer.model;
-  json["layer"] = layer.layer;
-  json["features"] = layer.features;
-  json["first"] = layer.first;
-  json["last"] = layer.last;
-  json["hash"] = layer.hash;
-  json["sampling_px"] = layer.sampling_px;
-  json["stem_model"] = layer.stem_model;
-  return json;
-}
-
-LayerIdentity read_layer(const Json& json) {
-  return {.model = json.at("model").get<std::string>(),
-          .layer = json.at("layer").get<std::string>(),
-          .features = json.at("features").get<std::string>(),
-          .first = json.at("first").get<int>(),
-          .last = json.at("last").get<int>(),
-          .hash = json.at("hash").get<std::string>(),
-          .sampling_px = json.at("sampling_px").get<int>(),
-          .stem_model = json.at("stem_model").get<std::string>()};
-}
-
-Json sequence_json(const SequenceIdentity& sequence) {
-  Json json;
-  json["name"] = sequence.name;
-  json["held_out"] = sequence.is_held_out;
-  json["first_frame"] = sequence.first_frame;
-  json["num_frames"] = sequence.num_frames;
-  json["frames"] = sequence.frames;
-  json["calibration"] = sequence.calibration;
-  json["ground_truth"] = sequence.ground_truth;
-  json["directory"] = sequence.directory;
-  return json;
-}
-
-SequenceIdentity read_sequence(const Json& json) {
-  return {.name = json.at("name").get<std::string>(),
-          .is_held_out = json.at("held_out").get<bool>(),
-          .first_frame = json.at("first_frame").get<std::size_t>(),
-          .num_frames = json.at("num_frames").get<std::size_t>(),
-          .frames = json.at("frames").get<std::string>(),
-          .calibration = json.at("calibration").get<std::string>(),
-          .ground_truth = json.at("ground_truth").get<std::string>(),
-          .directory = json.at("directory").get<std::string>()};
+/// One element per object of an array, read by `read(element, reader)`.
+template <typename Element, typename Read>
+std::vector<Element> read_array(const Json& array, const Read& read) {
+  std::vector<Element> elements;
+  for (const Json& json : array) {
+    read(elements.emplace_back(), JsonReader(json));
+  }
+  return elements;
 }
 
 SearchIdentity read_identity(const Json& json) {
   SearchIdentity identity;
   identity.program = json.at("program").get<std::string>();
   identity.configuration = json.at("configuration").get<std::string>();
-  for (const Json& rung : json.at("rungs")) {
-    identity.schedule.push_back(
-        {rung.at("frame_share").get<double>(), rung.at("filters").get<std::size_t>()});
-  }
-  for (const Json& layer : json.at("layers")) {
-    identity.layers.push_back(read_layer(layer));
-  }
-  for (const Json& sequence : json.at("sequences")) {
-    identity.sequences.push_back(read_sequence(sequence));
-  }
+  identity.schedule = read_array<Rung>(json.at("rungs"), visit_rung<Rung, JsonReader>);
+  identity.layers =
+      read_array<LayerIdentity>(json.at("layers"), visit_layer<LayerIdentity, JsonReader>);
+  identity.sequences = read_array<SequenceIdentity>(json.at("sequences"),
+                                                    visit_sequence<SequenceIdentity, JsonReader>);
   return identity;
 }
 
 Record read_record(const Json& json) {
   Record record;
-  record.key = {json.at("model").get<std::string>(), json.at("layer").get<std::string>(),
-                json.at("filter").get<int>(), json.at("features").get<std::string>()};
+  visit_key(record.key, JsonReader(json));
   record.rung = json.at("rung").get<int>();
   record.filter_frames = json.at("filter_frames").get<std::size_t>();
   record.held_out_filter_frames = json.at("held_out_filter_frames").get<std::size_t>();
@@ -148,27 +78,16 @@ std::string identity_line(const SearchIdentity& identity) {
   json["stemvo_search"] = kFormat;
   json["program"] = identity.program;
   json["configuration"] = identity.configuration;
-  json["rungs"] = Json::array();
-  for (const Rung& rung : identity.schedule) {
-    json["rungs"].push_back({{"frame_share", rung.frame_share}, {"filters", rung.num_filters}});
-  }
-  json["layers"] = Json::array();
-  for (const LayerIdentity& layer : identity.layers) {
-    json["layers"].push_back(layer_json(layer));
-  }
-  json["sequences"] = Json::array();
-  for (const SequenceIdentity& sequence : identity.sequences) {
-    json["sequences"].push_back(sequence_json(sequence));
-  }
+  json["rungs"] = rungs_json(identity.schedule);
+  json["layers"] = json_array(identity.layers, visit_layer<const LayerIdentity, JsonWriter>);
+  json["sequences"] =
+      json_array(identity.sequences, visit_sequence<const SequenceIdentity, JsonWriter>);
   return one_line(json);
 }
 
 std::string record_line(const Record& record) {
   Json json;
-  json["model"] = record.key.model;
-  json["layer"] = record.key.layer;
-  json["filter"] = record.key.filter;
-  json["features"] = record.key.features;
+  visit_key(record.key, JsonWriter(json));
   json["rung"] = record.rung;
   json["filter_frames"] = record.filter_frames;
   json["held_out_filter_frames"] = record.held_out_filter_frames;

@@ -8,22 +8,11 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include "support/drives.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
-using test::run_stemvo;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 void write_file(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;

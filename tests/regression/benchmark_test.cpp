@@ -6,23 +6,12 @@
 #include <thread>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "support/drives.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
-using test::run_stemvo;
-using test::TemporaryFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// Two rendered sequences, one of them broken on demand.
 class Benchmark : public ::testing::Test {

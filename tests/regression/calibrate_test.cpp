@@ -9,23 +9,13 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include "support/drives.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
 using test::rendered_drive;
-using test::run_stemvo;
-using test::TemporaryFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 struct Intrinsics {
   double f = 0.0;

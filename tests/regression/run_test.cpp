@@ -9,26 +9,15 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "support/drives.hpp"
 #include "support/ply_reader.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
 using test::rendered_drive;
-using test::run_stemvo;
-using test::TemporaryFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 
 constexpr const char* kTrueScale = "scale.source=ground_truth";
 
