@@ -49,4 +49,4 @@ lint: setup
 	@tools/lint.sh
 
 clean:
-	@rm -rf build/release build/dev build/asan build/tidy build/demo
+	@rm -rf build/release build/dev build/asan build/bench build/tidy build/demo

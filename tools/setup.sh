@@ -14,7 +14,7 @@ readonly PACKAGES=(
   build-essential cmake ninja-build pkg-config ccache git ca-certificates
   libopencv-dev libeigen3-dev libceres-dev libtbb-dev libyaml-cpp-dev libcli11-dev libfmt-dev
   nlohmann-json3-dev libexpected-dev libcairo2-dev libdeflate-dev libssl-dev fonts-dejavu-core
-  libgtest-dev libgmock-dev python3 python3-venv
+  libgtest-dev libgmock-dev libbenchmark-dev python3 python3-venv
 )
 
 say() { printf '==> %s\n' "$*"; }

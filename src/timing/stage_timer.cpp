@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <numeric>
 #include <string_view>
 
 #include "stemvo/check.hpp"
@@ -57,6 +58,12 @@ void StageRecorder::add_frame(std::chrono::steady_clock::time_point started) {
   intervals_ms_.push_back(ms_between(last_frame_, now));
   latencies_ms_.push_back(ms_between(started, now));
   last_frame_ = now;
+}
+
+double StageRecorder::wall_ms(Stage stage) const {
+  const std::lock_guard lock(mutex_);
+  const std::vector<double>& calls = stages_[static_cast<std::size_t>(stage)].wall_ms;
+  return std::accumulate(calls.begin(), calls.end(), 0.0);
 }
 
 TimingReport StageRecorder::report() const {

@@ -1,0 +1,28 @@
+cmake_minimum_required(VERSION 3.25)
+# Runs every micro-benchmark briefly; one that could not run, a stage without a benchmark or a time that is no
+# positive number is a failure.
+execute_process(COMMAND ${PROGRAM} --benchmark_min_time=0.001 --benchmark_format=json
+                OUTPUT_VARIABLE json RESULT_VARIABLE code)
+if(NOT code EQUAL 0)
+  message(FATAL_ERROR "${PROGRAM}: exit code ${code}")
+endif()
+string(JSON count LENGTH "${json}" benchmarks)
+set(names)
+math(EXPR last "${count} - 1")
+foreach(i RANGE ${last})
+  string(JSON name GET "${json}" benchmarks ${i} name)
+  string(JSON failed ERROR_VARIABLE no_error GET "${json}" benchmarks ${i} error_occurred)
+  string(JSON time GET "${json}" benchmarks ${i} real_time)
+  if(failed STREQUAL "ON" OR failed STREQUAL "true" OR NOT time GREATER 0)
+    string(JSON message ERROR_VARIABLE none GET "${json}" benchmarks ${i} error_message)
+    message(SEND_ERROR "${name}: time ${time}, ${message}")
+  endif()
+  string(REGEX REPLACE "/.*" "" stage "${name}")
+  list(APPEND names ${stage})
+endforeach()
+foreach(stage decode stem stretch pyramid road_picture detection klt orb homography fundamental essential
+              two_view_refinement two_view placement map_refinement road_scale)
+  if(NOT stage IN_LIST names)
+    message(SEND_ERROR "no benchmark of ${stage}")
+  endif()
+endforeach()

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include "stages/drive.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "odometry/motion_chain.hpp"
+#include "stemvo/dataset/synthetic_drive.hpp"
+
+namespace stemvo::bench {
+namespace {
+
+/// More than the window of keyframes: the map is as large as it gets.
+constexpr int kNumFrames = 14;
+
+template <typename T>
+T value_of(Expected<T> result) {
+  if (!result) {
+    throw std::runtime_error(result.error().message);
+  }
+  return std::move(*result);
+}
+
+/// A folder that is removed when the program ends.
+class Folder {
+ public:
+  Folder()
+      : path_(std::filesystem::temp_directory_path() / fmt::format("stemvo_bench_{}", ::getpid())) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+Frames load_frames() {
+  static const Folder folder;
+  const char* given = std::getenv("STEMVO_BENCH_SEQUENCE");
+  std::filesystem::path sequence = given != nullptr ? given : "";
+  if (sequence.empty()) {
+    SyntheticDriveOptions options;
+    options.num_frames = kNumFrames;
+    if (const Status rendered = render_synthetic_drive(folder.path() / "drive", options);
+        !rendered) {
+      throw std::runtime_error(rendered.error().message);
+    }
+    sequence = folder.path() / "drive/sequences/00";
+  }
+  SequenceOptions options;
+  options.frames = FrameRangeRequest{0, kNumFrames};
+  Frames frames{folder.path(), value_of(KittiSequence::open(sequence, options)), {}, false};
+  for (std::size_t i = 0; i < frames.sequence.size(); ++i) {
+    frames.pixels.push_back(value_of(frames.sequence.read(i)));
+  }
+  frames.is_color = frames.pixels.front().channels() == 3;
+  return frames;
+}
+
+/// As ChannelOdometry does it; the last frame is left before its place.
+Chain run_chain() {
+  Chain result;
+  result.camera = frames().sequence.camera();
+  const Config& config = result.config;
+  const Stem stem = load_stem(config.stem);
+  ChannelStretch stretch(config.stem);
+  const auto front_end = value_of(create_front_end(config.features));
+  const TwoViewEstimator estimator(config, result.camera);
+  MotionChain motions(config.odometry, config.scale);
+  result.map = std::make_unique<MapOdometry>(config, result.camera);
+  const int last = static_cast<int>(frames().pixels.size()) - 1;
+  for (int i = 0; i <= last; ++i) {
+    const cv::Mat& pixels = frames().pixels[static_cast<std::size_t>(i)];
+    result.channel = value_of(stem.apply(pixels));
+    result.images.push_back(stretch.apply(result.channel));
+    result.road =
+        std::make_shared<RoadPicture>(make_road_picture(result.images.back(), result.camera));
+    result.matches = front_end->process(result.images.back());
+    if (i == 0) {
+      motions.start();
+      result.map->restart(i, *result.road);
+      continue;
+    }
+    result.motion = estimator.measure(result.matches.prev_uv, result.matches.cur_uv,
+                                      motions.is_initializing(), config.seed);
+    result.world_from_prev = motions.world_from_picture();
+    if (i == last) {
+      break;
+    }
+    MeasuredMotion motion = result.motion;
+    result.map->place(i, result.world_from_prev, result.matches, motion);
+    front_end->keep(motion.inlier_mask);
+    result.map->refine(*result.road, result.matches, motion);
+    motions.add(motion);
+  }
+  return result;
+}
+
+}  // namespace
+
+Stem load_stem(const StemOptions& options) {
+  return value_of(Stem::create(options, STEMVO_MODELS_DIR));
+}
+
+const Frames& frames() {
+  static const Frames result = load_frames();
+  return result;
+}
+
+const Chain& chain() {
+  static const Chain result = run_chain();
+  return result;
+}
+
+}  // namespace stemvo::bench

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "odometry/map_odometry.hpp"
+#include "odometry/road_picture.hpp"
+#include "odometry/two_view_estimator.hpp"
+#include "stemvo/config.hpp"
+#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/stem/stem.hpp"
+
+namespace stemvo::bench {
+
+/// What the stages are measured on: the first frames of $STEMVO_BENCH_SEQUENCE, a KITTI folder, or
+/// of a drive rendered for this run, at KITTI's size.
+struct Frames {
+  std::filesystem::path folder;  ///< room for files, removed at the end
+  KittiSequence sequence;
+  std::vector<cv::Mat> pixels;
+  bool is_color = false;
+};
+[[nodiscard]] const Frames& frames();
+
+/// The defaults, taken through the frames up to the last one, stage by stage.
+struct Chain {
+  Config config;
+  Camera camera;
+  Channel channel;                    ///< of the last frame
+  std::vector<ChannelImage> images;   ///< of all frames
+  std::shared_ptr<RoadPicture> road;  ///< of the last frame
+  Matches matches;                    ///< to the last frame
+  MeasuredMotion motion;              ///< of the last frame, by the two-view estimator
+  Rigid3 world_from_prev;             ///< pose of the frame before
+  std::unique_ptr<MapOdometry> map;   ///< after the frame before
+};
+[[nodiscard]] const Chain& chain();
+
+/// A model by name or path with the defaults; throws with the library's message.
+[[nodiscard]] Stem load_stem(const StemOptions& options);
+
+}  // namespace stemvo::bench

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// From matches to a metric pose: the two-view pieces, placement, map refinement, road scale.
+#include <algorithm>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include "odometry/robust_models.hpp"
+#include "stages/drive.hpp"
+#include "stages/run_stage.hpp"
+#include "stemvo/geometry/relative_pose_refinement.hpp"
+
+namespace stemvo::bench {
+namespace {
+
+using benchmark::State;
+
+void homography(State& state) {
+  const Chain& c = chain();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        estimate_homography(c.matches.prev_uv, c.matches.cur_uv, c.config.two_view, c.config.seed));
+  }
+}
+
+void fundamental(State& state) {
+  const Chain& c = chain();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(estimate_fundamental(c.matches.prev_uv, c.matches.cur_uv,
+                                                  c.config.two_view, c.config.seed));
+  }
+}
+
+void essential(State& state) {
+  const Chain& c = chain();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(estimate_essential(c.matches.prev_uv, c.matches.cur_uv, c.camera,
+                                                c.config.two_view, c.config.seed));
+  }
+}
+
+void two_view_refinement(State& state) {
+  const Chain& c = chain();
+  const TwoViewEstimator estimator(c.config, c.camera);
+  run_stage(state, Stage::kTwoViewRefinement, [&] {
+    benchmark::DoNotOptimize(estimator.measure(c.matches.prev_uv, c.matches.cur_uv,
+                                               /*is_initializing=*/false, c.config.seed));
+  });
+}
+
+void two_view(State& state, bool is_initializing) {
+  const Chain& c = chain();
+  const TwoViewEstimator estimator(c.config, c.camera);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        estimator.measure(c.matches.prev_uv, c.matches.cur_uv, is_initializing, c.config.seed));
+  }
+}
+
+/// The last frame, from the map as it was before it.
+void run_last_frame(State& state, Stage stage) {
+  const Chain& c = chain();
+  run_stage(state, stage, [&] {
+    MapOdometry map = *c.map;
+    MeasuredMotion motion = c.motion;
+    map.place(static_cast<int>(c.images.size()) - 1, c.world_from_prev, c.matches, motion);
+    map.refine(*c.road, c.matches, motion);
+  });
+}
+
+void placement(State& state) {
+  const Chain& c = chain();
+  for (auto _ : state) {
+    state.PauseTiming();
+    MapOdometry map = *c.map;
+    MeasuredMotion motion = c.motion;
+    state.ResumeTiming();
+    map.place(static_cast<int>(c.images.size()) - 1, c.world_from_prev, c.matches, motion);
+    benchmark::DoNotOptimize(motion.num_inliers);
+  }
+}
+
+void map_refinement(State& state) { run_last_frame(state, Stage::kMapRefinement); }
+void road_scale(State& state) { run_last_frame(state, Stage::kRoadScale); }
+
+BENCHMARK(homography)->Unit(benchmark::kMillisecond);
+BENCHMARK(fundamental)->Unit(benchmark::kMillisecond);
+BENCHMARK(essential)->Unit(benchmark::kMillisecond);
+BENCHMARK(two_view_refinement)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(two_view, initializing, true)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(two_view, tracking, false)->Unit(benchmark::kMillisecond);
+BENCHMARK(placement)->Unit(benchmark::kMillisecond);
+BENCHMARK(map_refinement)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(road_scale)->UseManualTime()->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace stemvo::bench

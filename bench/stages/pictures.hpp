@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+
+namespace stemvo::bench {
+
+/// The default model at its samplings, gray, and every .onnx of a folder (with its manifest.yaml).
+void register_stems(const std::filesystem::path& models);
+
+}  // namespace stemvo::bench
