@@ -2,18 +2,19 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build demo test test-frameworks cluster format check-format lint clean
+.PHONY: help setup build demo test bench test-frameworks cluster format check-format lint clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
 	@echo "make test          install what is missing, build, run all tests"
+	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
 	@echo "make cluster       install Ray, for tools/search_cluster.py (make test does too)"
 	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
 	@echo "make format        rewrite the C++ sources in the project's format"
 	@echo "make check-format  fail where a source is not in that format or names no licence"
 	@echo "make lint          run clang-tidy over the library and the program"
-	@echo "make clean         remove what was built (build/venv and ONNX Runtime stay)"
+	@echo "make clean         remove what was built (build/venv* and ONNX Runtime stay)"
 
 setup:
 	@tools/setup.sh
@@ -28,10 +29,17 @@ demo: build
 
 test: build
 	@tools/setup.sh cluster || echo "==> Without Ray: the test of the cluster is skipped"
+	@tools/setup.sh peers || echo "==> Without OpenCV's Python package: the test of what the benchmark compares with is skipped"
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running all tests"
 	@ctest --preset release --parallel $(JOBS)
+
+SEQUENCE ?=
+BENCH ?=
+bench: build
+	@tools/setup.sh peers
+	@bench/run.py $(SEQUENCE) $(BENCH)
 
 cluster: setup
 	@tools/setup.sh cluster
@@ -49,4 +57,4 @@ lint: setup
 	@tools/lint.sh
 
 clean:
-	@rm -rf build/release build/dev build/asan build/bench build/tidy build/demo
+	@rm -rf build/release build/dev build/asan build/bench build/bench-run build/tidy build/demo

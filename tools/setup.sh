@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, a Python environment.
-# Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray.
+# Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
+# `setup.sh peers` what `make bench` compares with.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -162,6 +163,12 @@ install_onnxruntime() {
 if [[ "${1:-}" == cluster ]]; then
   mkdir -p "$LOGS"
   make_venv build/venv-ray "$LOGS/venv-ray.log" tools/requirements-ray.txt
+  exit
+fi
+# OpenCV's Python package, for the program that the benchmark compares with.
+if [[ "${1:-}" == peers ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-peers "$LOGS/venv-peers.log" tools/requirements-peers.txt
   exit
 fi
 

@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Writes OUT/full.onnx and OUT/folded.onnx: a stem of ConvNeXt-XLarge's shape (256 filters 4x4, stride 4, layer norm,
+random weights), and filter 10 of it folded into a network of its own (docs/search.md). Same values, other cost.
+
+    bench/random_stems.py OUT
+"""
+
+import argparse
+import pathlib
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tools"))
+import _environment  # noqa: E402,F401  starts this tool again in the environment of `make build`
+
+import fold_bench  # noqa: E402
+from stems import fold, manifest, onnx_writer  # noqa: E402
+
+FILTERS, FILTER = 256, 10
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=pathlib.Path, help="folder, created")
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "manifest.yaml").unlink(missing_ok=True)
+    full = fold_bench.random_stem(FILTERS, seed=1)
+    for name, stem, chosen in (("full", full, FILTER), ("folded", fold.layer_norm_filter(full, FILTER), 0)):
+        file = out / f"{name}.onnx"
+        onnx_writer.write(stem, file)
+        manifest.add(out / "manifest.yaml", manifest.entry(name, file, stem, network="random, ConvNeXt-XLarge's shape", layer="stem",
+                                                           licence="MIT", default_filter=chosen, command="bench/random_stems.py"))
+
+
+if __name__ == "__main__":
+    main()
