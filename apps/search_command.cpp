@@ -83,6 +83,13 @@ Expected<SearchReport> search(Arguments& arguments) {
 }
 
 void print_summary(const SearchReport& report, const std::filesystem::path& out_dir) {
+  if (report.is_part) {
+    print(
+        fmt::format("part: {} filters on one sequence; 'stemvo search --merge' joins it with the "
+                    "others\n",
+                    report.num_filters));
+    return;
+  }
   print(format_search_table(report));
   const SearchWork& work = report.work;
   print(fmt::format(
@@ -158,6 +165,11 @@ void add_options(CLI::App& command, Arguments& arguments) {
   add_range_option(command, "--held-out-frames", request.held_out_frames,
                    "Frames A to B-1 of the held-out sequence");
   command.add_flag("--exhaustive", request.exhaustive, "Every filter over every frame");
+  command
+      .add_option("--only-sequence", request.only_sequence,
+                  "Run the K-th sequence only (from 0, the held-out one last): a part for --merge")
+      ->type_name("K")
+      ->check(in_range(0, 100000));
   command.add_flag("--resume", request.resume, "Go on with the search in --out, if there is one");
   command.add_flag("--no-baselines", arguments.no_baselines, "Only the model's filters");
   command

@@ -165,7 +165,8 @@ def search(options):
     if not os.access(options.program, os.X_OK):
         raise ClusterError(f"--program: expected the program stemvo (make build), found none at {options.program}")
     models_dir = ROOT / "models"
-    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task)
+    num_sequences = len(options.sequences) + (1 if options.held_out else 0)
+    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task, num_sequences)
     common = common_arguments(options)
     files = model_files(models)
     contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]

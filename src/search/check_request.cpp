@@ -57,6 +57,16 @@ Status check_request(const SearchRequest& request) {
         "true length, found {}",
         request.config.scale.source));
   }
+  const std::size_t num_sequences = request.sequence_dirs.size() + (request.held_out_dir ? 1 : 0);
+  if (request.only_sequence && *request.only_sequence >= num_sequences) {
+    return fail(fmt::format("--only-sequence: expected 0 to {}, the held-out one last, found {}",
+                            num_sequences - 1, *request.only_sequence));
+  }
+  if (request.only_sequence && !request.exhaustive) {
+    return fail(
+        "--only-sequence: expected --exhaustive with it (halving goes by the mean over all "
+        "sequences), found none");
+  }
   for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
     if (std::find(request.layers.begin(), layer, *layer) != layer) {
       return fail(fmt::format("--layers: expected each once, found '{}' again", *layer));

@@ -35,6 +35,10 @@ bool same_layer(const LayerIdentity& a, const LayerIdentity& b) {
 
 std::string name_of(const LayerIdentity& layer) { return layer.model + " " + layer.layer; }
 
+std::string name_of(const std::optional<std::size_t>& only_sequence) {
+  return only_sequence ? std::to_string(*only_sequence) : "not given";
+}
+
 void compare_layers(const SearchIdentity& before,
                     const SearchIdentity& now,
                     bool as_parts,
@@ -62,8 +66,13 @@ void compare_layers(const SearchIdentity& before,
   }
 }
 
+bool same_frames(const SequenceIdentity& a, const SequenceIdentity& b, bool as_parts) {
+  return a.frames == b.frames || (as_parts && (a.frames.empty() || b.frames.empty()));
+}
+
 void compare_sequences(const SearchIdentity& before,
                        const SearchIdentity& now,
+                       bool as_parts,
                        std::vector<std::string>& changed) {
   if (before.sequences.size() != now.sequences.size()) {
     changed.push_back(
@@ -79,7 +88,7 @@ void compare_sequences(const SearchIdentity& before,
       changed.push_back(fmt::format("the frames of {} ({}:{}, now {}:{})", a.name, a.first_frame,
                                     a.first_frame + a.num_frames, b.first_frame,
                                     b.first_frame + b.num_frames));
-    } else if (a.frames != b.frames) {
+    } else if (!same_frames(a, b, as_parts)) {
       changed.push_back(fmt::format("the frames of {}", a.name));
     } else if (a.calibration != b.calibration) {
       changed.push_back(fmt::format("calib.txt or times.txt of {}", a.name));
@@ -111,7 +120,12 @@ std::string describe_change(const SearchIdentity& before,
     changed.emplace_back("the program");
   }
   compare_layers(before, now, as_parts, changed);
-  compare_sequences(before, now, changed);
+  if (!as_parts && before.only_sequence != now.only_sequence) {
+    changed.push_back(fmt::format("--only-sequence ({}, now {})", name_of(before.only_sequence),
+                                  name_of(now.only_sequence)));
+  } else {
+    compare_sequences(before, now, as_parts, changed);
+  }
   if (!as_parts && changed.empty() && before.schedule != now.schedule) {
     changed.emplace_back(now.schedule.size() == 1 ? "--exhaustive (now given)"
                                                   : "the plan of halving or --exhaustive");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,7 @@ struct SequenceIdentity {
   bool is_held_out = false;
   std::size_t first_frame = 0;
   std::size_t num_frames = 0;
-  std::string frames;  ///< hashes, as those of benchmark::Fingerprint
+  std::string frames;  ///< hashes, as those of benchmark::SequenceHashes; empty: not run here
   std::string calibration;
   std::string ground_truth;
   std::string directory;  ///< where it was found; not compared
@@ -43,12 +44,14 @@ struct SearchIdentity {
   Schedule schedule;
   std::vector<LayerIdentity> layers;
   std::vector<SequenceIdentity> sequences;
+  std::optional<std::size_t> only_sequence;  ///< a part that runs this one of them
 };
 
 [[nodiscard]] std::size_t num_filters(const SearchIdentity& identity);
 
 /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty where
-/// nothing did. With `as_parts` other layers, models and filters are no change.
+/// nothing did. With `as_parts` other layers, models and filters are no change, nor are frames that
+/// a part did not run.
 [[nodiscard]] std::string describe_change(const SearchIdentity& before,
                                           const SearchIdentity& now,
                                           bool as_parts);

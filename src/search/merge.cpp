@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <map>
 #include <system_error>
 #include <tuple>
 #include <utility>
@@ -9,9 +8,8 @@
 
 #include "pipeline/out_folder.hpp"
 #include "search/identity.hpp"
-#include "search/ranking.hpp"
+#include "search/joined_records.hpp"
 #include "search/record_file.hpp"
-#include "search/record_json.hpp"
 #include "search/report.hpp"
 #include "stemvo/search/search.hpp"
 
@@ -23,8 +21,6 @@ using search::LayerIdentity;
 using search::Record;
 using search::RecordFileContent;
 using search::SearchIdentity;
-
-using Records = std::map<FilterKey, Record, search::KeyOrder>;
 
 Expected<RecordFileContent> read_part(const fs::path& folder) {
   const fs::path file = folder / search::kRecordsFile;
@@ -71,16 +67,13 @@ std::vector<LayerIdentity> join_layers(std::vector<LayerIdentity> layers) {
   return joined;
 }
 
-/// A filter that two parts hold is no trouble where they agree.
-Status add_records(const fs::path& part, std::vector<Record> found, Records& records) {
-  for (Record& record : found) {
-    const auto [place, is_new] = records.try_emplace(record.key, record);
-    if (!is_new && search::record_line(place->second) != search::record_line(record)) {
-      return fail(fmt::format("{}: expected the result of another part for {}, found another one",
-                              part.string(), to_string(record.key)));
+/// What the parts did not run another one knows.
+void add_frames(const SearchIdentity& part, SearchIdentity& identity) {
+  for (std::size_t i = 0; i < identity.sequences.size(); ++i) {
+    if (identity.sequences[i].frames.empty()) {
+      identity.sequences[i].frames = part.sequences[i].frames;
     }
   }
-  return {};
 }
 
 Status write_records(const fs::path& out_dir,
@@ -102,7 +95,7 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
                                       const fs::path& models_dir) {
   SearchIdentity identity;
   std::vector<LayerIdentity> layers;
-  Records by_key;
+  search::JoinedRecords joined;
   for (const fs::path& part : parts) {
     auto content = read_part(part);
     if (!content) {
@@ -118,24 +111,26 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
                               part.string(), parts.front().string(), change));
     }
     layers.insert(layers.end(), content->identity.layers.begin(), content->identity.layers.end());
-    if (const Status added = add_records(part, std::move(content->records), by_key); !added) {
+    add_frames(content->identity, identity);
+    if (const Status added = joined.add(part, content->records); !added) {
       return tl::unexpected(added.error());
     }
   }
-  identity.layers = join_layers(std::move(layers));
-  identity.schedule = search::exhaustive_schedule(by_key.size());
-  std::vector<Record> records;
-  for (auto& [key, record] : by_key) {
-    records.push_back(std::move(record));
+  auto records = joined.all(identity);
+  if (!records) {
+    return tl::unexpected(records.error());
   }
+  identity.layers = join_layers(std::move(layers));
+  identity.schedule = search::exhaustive_schedule(records->size());
+  identity.only_sequence.reset();
   Status status = pipeline::create_out_folder(out_dir);
   if (status) {
-    status = write_records(out_dir, identity, records);
+    status = write_records(out_dir, identity, *records);
   }
   if (!status) {
     return tl::unexpected(status.error());
   }
-  return search::finish({out_dir, models_dir}, identity, records, {});
+  return search::finish({out_dir, models_dir}, identity, *records, {});
 }
 
 }  // namespace stemvo

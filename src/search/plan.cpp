@@ -74,15 +74,21 @@ Status add_sequence(const SearchRequest& request,
   identity.num_frames = sequence->size();
   std::error_code ignored;
   identity.directory = fs::absolute(directory, ignored).lexically_normal().string();
-  const auto hashes =
-      benchmark::hash_sequence(*sequence, directory, benchmark::FrameIdentity::kContents);
+  const bool is_run = request.only_sequence.value_or(plan.identity.sequences.size()) ==
+                      plan.identity.sequences.size();
+  const auto hashes = benchmark::hash_sequence(
+      *sequence, directory,
+      is_run ? benchmark::FrameIdentity::kContents : benchmark::FrameIdentity::kNamesAndSizes);
   if (!hashes) {
     return tl::unexpected(hashes.error());
   }
-  identity.frames = hashes->frames;
+  identity.frames = is_run ? hashes->frames : std::string();
   identity.calibration = hashes->calibration;
   identity.ground_truth = hashes->ground_truth;
   plan.identity.sequences.push_back(std::move(identity));
+  if (!is_run) {
+    return {};
+  }
   PlanSequence planned{std::move(*sequence), is_held_out, {}};
   for (const PlanLayer& layer : plan.layers) {
     planned.unusable.push_back(unusable_reason(layer, planned.sequence.camera()));
@@ -163,6 +169,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   if (!status) {
     return tl::unexpected(status.error());
   }
+  plan.identity.only_sequence = request.only_sequence;
   Config common = request.config;
   common.stem.model = "default";  // the layers say which
   common.stem.layer = StemOptions().layer;

@@ -38,8 +38,8 @@ struct PlanSequence {
 /// A search that was found to be possible.
 struct SearchPlan {
   std::vector<PlanLayer> layers;
-  std::vector<Candidate> candidates;  ///< in the order of layers and filters
-  std::vector<PlanSequence> sequences;
+  std::vector<Candidate> candidates;    ///< in the order of layers and filters
+  std::vector<PlanSequence> sequences;  ///< those to run
   SearchIdentity identity;
 
   [[nodiscard]] std::size_t num_frames(bool held_out) const;

@@ -12,10 +12,6 @@
 namespace stemvo::search {
 namespace {
 
-/// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
-/// go on, they start again, which counts.
-constexpr std::size_t kMostKept = 512;
-
 using KeySet = std::set<FilterKey, KeyOrder>;
 
 KeySet survivors_of(std::vector<const Record*> records, std::size_t count) {
@@ -29,10 +25,12 @@ Race::Race(const SearchPlan& plan,
            const SearchRequest& request,
            SearchProgress progress,
            RecordWriter writer,
-           std::vector<Record> records)
+           std::vector<Record> records,
+           std::size_t most_kept)
     : plan_(plan),
       evaluation_(request.config.evaluation),
       block_size_(static_cast<std::size_t>(std::max(1, request.block))),
+      most_kept_(most_kept),
       progress_(std::move(progress)),
       writer_(std::move(writer)) {
   for (Record& record : records) {
@@ -161,7 +159,7 @@ void Race::keep(std::size_t rung, const Block& block, std::vector<Drives> drives
   for (std::size_t i = 0; i < block.size(); ++i) {
     kept_.emplace(block[i], std::move(drives[i]));
   }
-  if (kept_.size() <= kMostKept) {
+  if (kept_.size() <= most_kept_) {
     return;
   }
   std::vector<const Record*> done;
@@ -171,7 +169,7 @@ void Race::keep(std::size_t rung, const Block& block, std::vector<Drives> drives
     }
   }
   const std::size_t num_waiting = kept_.size() - done.size();
-  const KeySet best = survivors_of(done, kMostKept - std::min(kMostKept, num_waiting));
+  const KeySet best = survivors_of(done, most_kept_ - std::min(most_kept_, num_waiting));
   std::erase_if(kept_, [&](const auto& one) {
     return find(one.first, rung) != nullptr && !best.contains(plan_.candidates[one.first].key);
   });

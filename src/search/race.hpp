@@ -16,6 +16,10 @@
 
 namespace stemvo::search {
 
+/// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
+/// go on, they start again, which counts.
+inline constexpr std::size_t kMostKept = 512;
+
 /// Runs the rungs of a plan's schedule, in blocks of filters; each block's records are appended as
 /// it ends. Records of an earlier call are not repeated.
 class Race {
@@ -25,7 +29,8 @@ class Race {
        const SearchRequest& request,
        SearchProgress progress,
        RecordWriter writer,
-       std::vector<Record> records);
+       std::vector<Record> records,
+       std::size_t most_kept = kMostKept);
 
   /// Error: the records cannot be written.
   [[nodiscard]] Status run();
@@ -62,6 +67,7 @@ class Race {
   const SearchPlan& plan_;
   EvaluationOptions evaluation_;
   std::size_t block_size_;
+  std::size_t most_kept_;
   SearchProgress progress_;
   RecordWriter writer_;
   std::vector<Record> records_;

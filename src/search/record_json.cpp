@@ -8,7 +8,7 @@
 namespace stemvo::search {
 namespace {
 
-constexpr int kFormat = 1;
+constexpr int kFormat = 2;
 
 Json score_json(const DriveScore& score) {
   Json json;
@@ -48,6 +48,9 @@ SearchIdentity read_identity(const Json& json) {
       read_array<LayerIdentity>(json.at("layers"), visit_layer<LayerIdentity, JsonReader>);
   identity.sequences = read_array<SequenceIdentity>(json.at("sequences"),
                                                     visit_sequence<SequenceIdentity, JsonReader>);
+  if (const Json& only = json.at("only_sequence"); !only.is_null()) {
+    identity.only_sequence = only.get<std::size_t>();
+  }
   return identity;
 }
 
@@ -82,6 +85,7 @@ std::string identity_line(const SearchIdentity& identity) {
   json["layers"] = json_array(identity.layers, visit_layer<const LayerIdentity, JsonWriter>);
   json["sequences"] =
       json_array(identity.sequences, visit_sequence<const SequenceIdentity, JsonWriter>);
+  json["only_sequence"] = identity.only_sequence ? Json(*identity.only_sequence) : Json();
   return one_line(json);
 }
 

@@ -38,11 +38,15 @@ Expected<SearchReport> finish(const Folders& folders,
                               const std::vector<Record>& records,
                               std::vector<std::string> warnings) {
   SearchReport report;
-  report.rows = rank_filters(records, identity.schedule.size());
+  report.is_part = identity.only_sequence.has_value();
   report.num_filters = num_filters(identity);
   report.work = work_of(identity, records);
   report.warnings = std::move(warnings);
   report.interrupted = !is_complete(identity, records);
+  if (report.is_part) {  // ranks nothing
+    return report;
+  }
+  report.rows = rank_filters(records, identity.schedule.size());
   if (const Status status = write_tables(folders.out_dir, identity, report); !status) {
     return tl::unexpected(status.error());
   }

@@ -15,7 +15,8 @@ namespace stemvo::search {
 inline constexpr const char* kRecordsFile = "records.jsonl";
 
 /// Ranks the records and writes the tables and the sheet (a warning where that cannot be drawn).
-/// Where records are missing the search was interrupted.
+/// Where records are missing the search was interrupted. Of a part with one sequence only the work
+/// is reported.
 [[nodiscard]] Expected<SearchReport> finish(const Folders& folders,
                                             const SearchIdentity& identity,
                                             const std::vector<Record>& records,

@@ -75,8 +75,12 @@ class SearchCluster(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         cls.model = write_model(cls.folder)
-        subprocess.run([PROGRAM, "synth", cls.folder / "drive", "--frames", "14", "--width", "620", "--height", "188"], check=True, capture_output=True)
-        cls.what = [str(cls.folder / "drive/sequences/00"), "--model", str(cls.model)]
+        for name, seed in (("drive", 1), ("other", 7)):
+            subprocess.run([PROGRAM, "synth", cls.folder / name, "--frames", "14", "--width", "620", "--height", "188", "--seed", str(seed)],
+                           check=True, capture_output=True)
+        for kind, name in (("sequences", "01"), ("poses", "01.txt")):
+            (cls.folder / "other" / kind / name.replace("01", "00")).rename(cls.folder / "drive" / kind / name)
+        cls.what = [str(cls.folder / "drive/sequences/00"), str(cls.folder / "drive/sequences/01"), "--model", str(cls.model)]
 
     def cluster(self, *options):
         return [RAY, ROOT / "tools/search_cluster.py", *self.what, "--program", PROGRAM, *map(str, options)]
@@ -86,7 +90,7 @@ class SearchCluster(unittest.TestCase):
         out = self.folder / "cluster"
         with Nodes() as nodes:
             self.assertRegex(nodes.address, r":\d+$")
-            search = subprocess.Popen(self.cluster("--out", out, "--address", nodes.address, "--filters-per-task", 1, "--quiet"),
+            search = subprocess.Popen(self.cluster("--out", out, "--address", nodes.address, "--filters-per-task", 2, "--quiet"),
                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
             deadline = time.monotonic() + 120
             while not list((out / "parts").glob("part*")):
@@ -97,12 +101,13 @@ class SearchCluster(unittest.TestCase):
             said, complaints = search.communicate(timeout=300)
         self.assertEqual(search.returncode, 0, complaints)
         tasks, repeated = re.search(r"tasks: (\d+) run on \d+ nodes in \S+ s, (\d+) repeated, 0 from before", said).groups()
-        self.assertEqual(int(tasks), 9)
+        self.assertEqual(int(tasks), 10)  # 3 ranges of 5 filters and 2 of 4, on two sequences
         self.assertGreaterEqual(int(repeated), 1, "the killed node was idle")
         single, merged = (self.folder / "single/filters.csv").read_bytes(), (out / "result/filters.csv").read_bytes()
         self.assertEqual(single, merged)
         self.assertEqual(len(single.splitlines()), 1 + 9 + 4)
         self.assertIn(b",ranked,", single)
+        self.assertIn(b",t_rel_percent_01,", single)
         self.check_that_records_name_the_model_here(out)
         self.go_on(out)
 
@@ -120,12 +125,12 @@ class SearchCluster(unittest.TestCase):
             for file in (out / "parts" / part).iterdir():
                 file.unlink()
             (out / "parts" / part).rmdir()
-        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--quiet", "--resume"), capture_output=True, text=True, check=False)
+        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 2, "--quiet", "--resume"), capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("tasks: 2 run on 1 nodes", done.stdout)
         self.assertEqual((out / "result/filters.csv").read_bytes(), before)
-        for options, message in ((("--filters-per-task", 1), "found a search (--resume goes on with it)"),
-                                 (("--filters-per-task", 1, "--frames", "0:12", "--resume"), "found others")):
+        for options, message in ((("--filters-per-task", 2), "found a search (--resume goes on with it)"),
+                                 (("--filters-per-task", 2, "--frames", "0:12", "--resume"), "found others")):
             done = subprocess.run(self.cluster("--out", out, *options), capture_output=True, text=True, check=False)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
             self.assertIn(message, done.stderr)
@@ -137,13 +142,13 @@ class SearchCluster(unittest.TestCase):
         for file in (sequence / "calib.txt", self.folder / "drive/poses/00.txt", image, out / "plan.json"):
             content = file.read_bytes()
             file.write_bytes(content[:-9] if file.name == "plan.json" else content[:-9] + b"replaced\n")  # of the same size
-            done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--resume"), capture_output=True, text=True, check=False)
+            done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 2, "--resume"), capture_output=True, text=True, check=False)
             file.write_bytes(content)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (1, 1), done.stderr)
             self.assertIn("expected the plan of a search" if file.name == "plan.json" else "found others", done.stderr)
-        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 1, "--resume", "--quiet"), capture_output=True, text=True, check=False)
+        done = subprocess.run(self.cluster("--out", out, "--filters-per-task", 2, "--resume", "--quiet"), capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("9 from before", done.stdout)
+        self.assertIn("10 from before", done.stdout)
 
     def test_errors(self):
         (self.folder / "text.onnx").write_text("text")

@@ -36,6 +36,53 @@ TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   EXPECT_EQ(filters["work"]["filter_frames"], 7 * 30);
 }
 
+/// Filters 0:1 and 1:3, each on two sequences that rank and one that is held out.
+TEST_F(Search, PartsByFilterAndSequenceMergedAreTheWhole) {
+  const std::string first = sequence_.string();
+  copy_sequence("second");
+  const Words asked = {first,   "--frames",
+                       "0:20",  "--held-out",
+                       first,   "--held-out-frames",
+                       "20:30", "--exhaustive",
+                       "--set", "evaluation.segment_lengths_m=[5]"};
+  const auto search_part = [&](const std::string& out, const Words& more) {
+    Words words = asked;
+    words.insert(words.end(), more.begin(), more.end());
+    return search(out, words);
+  };
+  ASSERT_EQ(search_part("whole", {"--filters", "0:3"}).exit_code, 0);
+  Words merge = {"search", "--out", folder_ / "merged", "--merge"};
+  for (const std::string sequence : {"2", "0", "1"}) {
+    const ProgramResult one = search_part(
+        "a" + sequence, {"--filters", "0:1", "--only-sequence", sequence, "--no-baselines"});
+    ASSERT_EQ(one.exit_code, 0) << one.err;
+    ASSERT_EQ(
+        search_part("b" + sequence, {"--filters", "1:3", "--only-sequence", sequence}).exit_code,
+        0);
+    EXPECT_FALSE(fs::exists(folder_ / ("a" + sequence + "/filters.csv")));  // a part ranks nothing
+    merge.insert(merge.end(), {folder_ / ("b" + sequence), folder_ / ("a" + sequence)});
+  }
+  const ProgramResult merged = run_stemvo(merge);
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_THAT(table("merged"),
+              HasSubstr(",t_rel_percent_second,r_rel_deg_per_100m_second,t_rel_percent_00,"));
+  EXPECT_THAT(table("merged"), HasSubstr(",held_out_t_rel_percent,"));
+  EXPECT_EQ(table("merged"), table("whole"));
+  EXPECT_EQ(read_file(folder_ / "merged/filters.json"), read_file(folder_ / "whole/filters.json"));
+
+  merge[2] = folder_ / "less";
+  merge.pop_back();
+  EXPECT_THAT(run_stemvo(merge).err,
+              HasSubstr("expected a part with default stem 0 on 00, found none"));
+  EXPECT_THAT(
+      search_part("a0", {"--filters", "0:1", "--only-sequence", "1", "--no-baselines", "--resume"})
+          .err,
+      HasSubstr("--only-sequence (0, now 1) changed"));
+  EXPECT_THAT(search_part("wrong", {"--only-sequence", "3"}).err,
+              HasSubstr("--only-sequence: expected 0 to 2, the held-out one last, found 3"));
+  EXPECT_THAT(search("wrong", {"--only-sequence", "0"}).err, HasSubstr("expected --exhaustive"));
+}
+
 TEST_F(Search, LayersAndTheHeldOutSequence) {
   const testing::TempFolder models;
   testing::write_two_layers(models);

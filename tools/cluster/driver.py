@@ -30,7 +30,7 @@ class Options:
 class Outcome:
     tasks: int = 0
     repeated: int = 0
-    filters: int = 0
+    drives: int = 0  # filters times sequences
     nodes: set = dataclasses.field(default_factory=set)
     seconds: float = 0.0
 
@@ -110,16 +110,16 @@ class _Queue:
         here = json.dumps(os.path.abspath(os.path.dirname(task.model)), ensure_ascii=False)[1:-1].encode()
         self._keep(task, {name: content.replace(b"{folder}", here) for name, content in files.items()})
         self.outcome.tasks += 1
-        self.outcome.filters += task.filters
+        self.outcome.drives += task.filters
         self.outcome.nodes.add(node)
-        return self._say(f"{task.name}: {task.layer} {task.first}:{task.last} done on {node}")
+        return self._say(f"{task.name}: {task} done on {node}")
 
     def _again(self, task, why):
         self._tries[task.name] += 1
         self.outcome.repeated += 1
         reason = (" ".join(str(why).split()) or type(why).__name__)[:120]
         if self._tries[task.name] > self._options.retries:
-            raise ClusterError(f"{task.name} ({task.layer} {task.first}:{task.last}): lost {self._tries[task.name]} times, at last: "
+            raise ClusterError(f"{task.name} ({task}): lost {self._tries[task.name]} times, at last: "
                                f"{reason}; what is done is kept, --resume goes on")
         self._waiting.appendleft(task)
         return self._say(f"{task.name}: lost ({reason}), again")
@@ -127,8 +127,8 @@ class _Queue:
     def _say(self, text):
         if not self._options.quiet:
             done = self.outcome
-            rate = done.filters / done.seconds if done.seconds > 0 else 0.0
-            print(f"[{done.tasks}/{self._total}] {text}; {rate:.2f} filters/s", file=sys.stderr, flush=True)
+            rate = done.drives / done.seconds if done.seconds > 0 else 0.0
+            print(f"[{done.tasks}/{self._total}] {text}; {rate:.2f} drives/s", file=sys.stderr, flush=True)
 
 
 def _run_here(program, arguments, files, threads):

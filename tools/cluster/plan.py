@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cuts a search into tasks: a layer's filters A to B-1 over all sequences."""
+"""Cuts a search into tasks: a layer's filters A to B-1 on one sequence."""
 
 import dataclasses
 import hashlib
@@ -21,6 +21,7 @@ class Task:
     first: int
     last: int  # behind the last one
     baselines: bool  # the rows of ORB on gray and of R, G, B come with this task
+    sequence: int | None = None  # index, the held-out one last; None: there is one only
 
     @property
     def filters(self):
@@ -30,7 +31,13 @@ class Task:
         """For `stemvo search`."""
         words = ["--model", self.model, "--layers", self.layer, "--filters", f"{self.first}:{self.last}", "--exhaustive",
                  "--block", str(self.filters)]  # one pass of the network per frame for the whole task
+        if self.sequence is not None:
+            words += ["--only-sequence", str(self.sequence)]
         return words if self.baselines else [*words, "--no-baselines"]
+
+    def __str__(self):
+        where = "" if self.sequence is None else f" on sequence {self.sequence}"
+        return f"{self.layer} {self.first}:{self.last}{where}"
 
 
 def _entries(path):
@@ -76,8 +83,9 @@ def _chosen(model, layers, wanted):
     return [(layer, filters) for layer, filters in layers if not wanted or layer in wanted]
 
 
-def tasks_of(models, models_dir, layers=None, filters=None, per_task=32):
-    """All tasks, in order. filters: (A, B) of each layer, or None. Errors: unknown model or layer, filters outside."""
+def tasks_of(models, models_dir, layers=None, filters=None, per_task=32, num_sequences=1):
+    """All tasks, in order. filters: (A, B) of each layer, or None. num_sequences: with the held-out one. Errors: unknown
+    model or layer, filters outside."""
     tasks = []
     _once("--model", models)
     for model in models:
@@ -86,7 +94,9 @@ def tasks_of(models, models_dir, layers=None, filters=None, per_task=32):
             if not 0 <= first < last <= count:
                 raise ClusterError(f"--filters: expected filters inside 0:{count} of {model} layer {layer}, found {first}:{last}")
             for start in range(first, last, per_task):
-                tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last), not tasks))
+                for sequence in range(num_sequences):
+                    tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last), len(tasks) < num_sequences,
+                                      sequence if num_sequences > 1 else None))
     return tasks
 
 

@@ -34,9 +34,12 @@ struct SearchRequest {
   bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B
   Config config = search_defaults();         ///< stem.model, .layer and .filter are not looked at
   bool exhaustive = false;                   ///< every filter over every frame; else halving
-  bool resume = false;                       ///< go on from what out_dir holds
-  int num_threads = 0;                       ///< 0: all cores
-  int block = 16;                            ///< filters in flight: what a kill may lose
+  /// Runs one sequence only, a part for merge_searches: index in sequence_dirs, the held-out one is
+  /// behind them. Needs `exhaustive`; writes records.jsonl and no tables.
+  std::optional<std::size_t> only_sequence;
+  bool resume = false;  ///< go on from what out_dir holds
+  int num_threads = 0;  ///< 0: all cores
+  int block = 16;       ///< filters in flight: what a kill may lose
 };
 
 /// One row's identity: a filter of a layer of a model, and what finds matches on its channel.
@@ -97,11 +100,12 @@ struct SearchWork {
 };
 
 struct SearchReport {
-  std::vector<FilterRow> rows;  ///< by rank
+  std::vector<FilterRow> rows;  ///< by rank; none of a part (only_sequence)
   std::size_t num_filters = 0;  ///< asked for; more than rows where it was interrupted
   SearchWork work;
   std::vector<std::string> warnings;
   bool interrupted = false;
+  bool is_part = false;  ///< of SearchRequest::only_sequence
 };
 
 /// Called after each frame of a block: filter-frames done, and in all as far as known; false stops.
@@ -117,10 +121,10 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 [[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
                                                 const SearchProgress& progress = {});
 
-/// Joins parts of an exhaustive search (other filters, layers or models, the same sequences and
-/// configuration) into out_dir, whose filters.csv is that of one search over all of them. Errors:
-/// a folder without records, parts that differ in more than filters, a filter with two different
-/// results.
+/// Joins parts of an exhaustive search (other filters, layers or models, or one sequence only; the
+/// same sequences and configuration) into out_dir, whose filters.csv is that of one search over all
+/// of them. Errors: a folder without records, parts that differ in more than filters, a filter with
+/// two different results or none on a sequence.
 [[nodiscard]] Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                                     const std::filesystem::path& out_dir,
                                                     const std::filesystem::path& models_dir);

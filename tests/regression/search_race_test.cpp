@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "search/race.hpp"
+#include "search/report.hpp"
+#include "search/tables.hpp"
+#include "support/search_program.hpp"
+
+namespace stemvo::search {
+namespace {
+
+/// The default model's 16 filters on a small drive, halved.
+class SearchRace : public Search {
+ protected:
+  struct Outcome {
+    std::string table;
+    std::size_t filter_frames = 0;
+    bool was_stopped = false;
+  };
+
+  SearchRace() {
+    request_.sequence_dirs = {sequence_};
+    request_.models_dir = fs::path(STEMVO_SOURCE_DIR) / "models";
+    request_.baselines = false;
+    request_.block = 3;
+  }
+
+  /// Goes on from what `out` holds. Stops after so many filter-frames of this call.
+  [[nodiscard]] Outcome race(const std::string& out,
+                             std::size_t most_kept,
+                             std::size_t most_frames = SIZE_MAX) const {
+    const auto plan = make_plan(request_);
+    EXPECT_TRUE(plan) << plan.error().message;
+    const fs::path file = folder_ / (out + ".jsonl");
+    std::vector<Record> before;
+    if (fs::exists(file)) {
+      before = read_records(file).value().records;
+    }
+    auto writer = before.empty() ? RecordWriter::create(file, plan->identity)
+                                 : RecordWriter::go_on(file, fs::file_size(file));
+    std::size_t done_before = SIZE_MAX;
+    const auto progress = [&](std::size_t done, std::size_t) {
+      done_before = std::min(done_before, done);
+      return done - done_before < most_frames;
+    };
+    Race race(*plan, request_, progress, std::move(*writer), std::move(before), most_kept);
+    EXPECT_TRUE(race.run());
+    SearchReport report;
+    report.rows = rank_filters(race.records(), plan->identity.schedule.size());
+    Outcome outcome;
+    outcome.table = format_csv(plan->identity, report);
+    for (const Record& record : race.records()) {
+      outcome.filter_frames += record.filter_frames;
+    }
+    const int last = static_cast<int>(plan->identity.schedule.size()) - 1;
+    outcome.was_stopped =
+        std::none_of(race.records().begin(), race.records().end(),
+                     [last](const Record& record) { return record.rung == last; });
+    return outcome;
+  }
+
+  SearchRequest request_;
+};
+
+TEST_F(SearchRace, OnlyTheBestAreKeptInMemoryAndTheTableIsTheSame) {
+  const Outcome all = race("all", kMostKept);
+  ASSERT_NE(all.table.find(",stopped,"), std::string::npos);
+  std::size_t more_work = all.filter_frames;
+  // The fewer are kept the more start again.
+  for (const std::size_t most_kept : {5U, 2U, 0U}) {
+    const Outcome some = race("kept" + std::to_string(most_kept), most_kept);
+    EXPECT_EQ(some.table, all.table) << most_kept;
+    EXPECT_GT(some.filter_frames, more_work) << most_kept;
+    more_work = some.filter_frames;
+  }
+}
+
+TEST_F(SearchRace, StoppedAndGoneOnWithHalvingGivesTheSameTable) {
+  const Outcome whole = race("whole", kMostKept);
+  for (const std::size_t most_kept : {kMostKept, std::size_t{2}}) {
+    const std::string name = "stopped" + std::to_string(most_kept);
+    EXPECT_TRUE(race(name, most_kept, 70).was_stopped);  // in the third of five rungs
+    EXPECT_TRUE(race(name, most_kept, 20).was_stopped);
+    const Outcome gone_on = race(name, most_kept);
+    EXPECT_EQ(gone_on.table, whole.table);
+    EXPECT_GT(gone_on.filter_frames, whole.filter_frames);  // what was in memory ran again
+  }
+}
+
+}  // namespace
+}  // namespace stemvo::search
