@@ -16,12 +16,13 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(Writes OUT_DIR/sequences/00 and OUT_DIR/poses/00.txt in KITTI's layout, with exact poses. The same
+    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses. The same
 options give the same files.
 
 Examples:
   stemvo synth drive --frames 200
-  stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7)";
+  stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
+  stemvo synth drives --name street7 --seed 7              several drives in one folder)";
 
 struct Arguments {
   std::filesystem::path out_dir;
@@ -45,7 +46,8 @@ int render(Arguments& arguments) {
     print_error(status.error().message);
     return kExitFailed;
   }
-  print(fmt::format("sequence: {}\n", (arguments.out_dir / "sequences" / "00").string()));
+  print(fmt::format("sequence: {}\n",
+                    (arguments.out_dir / "sequences" / arguments.options.name).string()));
   return kExitDone;
 }
 
@@ -62,6 +64,13 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
       ->add_option("--trajectory", arguments->trajectory,
                    "Drive along these KITTI poses; default: a curve of its own")
       ->type_name("POSES");
+  command->add_option("--name", options.name, "Of the sequence; default 00")
+      ->type_name("NAME")
+      ->check([](const std::string& text) {
+        const bool is_name =
+            !text.empty() && text != "." && text != ".." && text.find('/') == std::string::npos;
+        return is_name ? std::string() : "expected the name of a folder, found '" + text + "'";
+      });
   command->add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")
       ->check(in_range(1, 1000000));

@@ -76,7 +76,7 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
   if (!drive) {
     return fail(drive.error().message);
   }
-  const auto writer = synth::DriveWriter::create(out_dir, options.write_depth);
+  const auto writer = synth::DriveWriter::create(out_dir, options.name, options.write_depth);
   if (!writer) {
     return fail(writer.error().message);
   }

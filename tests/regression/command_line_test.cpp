@@ -80,6 +80,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"channel", "x", "--out", "o", "--filters", "4:4"}, "A < B"},
       {{"synth", "x", "--frames", "0"}, "--frames"},
       {{"synth", "x", "--seed", "-3"}, "--seed"},
+      {{"synth", "x", "--name", "../x"}, "--name"},
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
       {{"check", "metrics.json"}, "--against"},

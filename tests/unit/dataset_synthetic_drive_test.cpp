@@ -77,6 +77,19 @@ TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
   EXPECT_GE(word.find('e') - word.find('.'), 13U) << "12 digits or more: " << word;
 }
 
+TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
+  SyntheticDriveOptions options = small(2);
+  options.name = "street";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  for (const auto& [name, frames] : {std::pair("00", 3U), std::pair("street", 2U)}) {
+    const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / name);
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    EXPECT_EQ(sequence->size(), frames);
+    EXPECT_TRUE(sequence->ground_truth());
+  }
+}
+
 TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
   SyntheticDriveOptions options = small(3);
   cv::setNumThreads(1);

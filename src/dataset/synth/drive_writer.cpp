@@ -62,10 +62,12 @@ Status write_text(const fs::path& file, const std::string& text) {
 
 }  // namespace
 
-Expected<DriveWriter> DriveWriter::create(const fs::path& out_dir, bool with_depth) {
+Expected<DriveWriter> DriveWriter::create(const fs::path& out_dir,
+                                          const std::string& name,
+                                          bool with_depth) {
   DriveWriter writer;
-  writer.sequence_dir_ = out_dir / "sequences" / "00";
-  writer.pose_file_ = out_dir / "poses" / "00.txt";
+  writer.sequence_dir_ = out_dir / "sequences" / name;
+  writer.pose_file_ = out_dir / "poses" / (name + ".txt");
   const fs::path images = writer.sequence_dir_ / "image_2";
   const fs::path depth = writer.sequence_dir_ / "depth";
   std::vector<fs::path> folders = {images, out_dir / "poses"};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <opencv2/core.hpp>
 
@@ -11,12 +12,13 @@
 
 namespace stemvo::synth {
 
-/// OUT/sequences/00 and OUT/poses in KITTI's layout. Every Error names the file.
+/// OUT/sequences/NAME and OUT/poses in KITTI's layout. Every Error names the file.
 class DriveWriter {
  public:
   /// Makes the folders and removes the frames of an earlier drive: a longer one would leave images
   /// without times and poses behind.
   [[nodiscard]] static Expected<DriveWriter> create(const std::filesystem::path& out_dir,
+                                                    const std::string& name,
                                                     bool with_depth);
 
   /// image_2/%06d.png. May be called from several threads for different frames.
@@ -25,7 +27,7 @@ class DriveWriter {
   [[nodiscard]] Status write_depth(std::size_t index, const cv::Mat& depth_m) const;
   /// calib.txt with the same intrinsics in P0 to P3, no baseline.
   [[nodiscard]] Status write_calibration(const Camera& camera) const;
-  /// times.txt (10 Hz) and poses/00.txt, moved so that the first pose is the identity; 17 digits.
+  /// times.txt (10 Hz) and poses/NAME.txt, moved so that the first pose is the identity; 17 digits.
   [[nodiscard]] Status write_truth(std::span<const Rigid3> world_from_camera) const;
 
  private:
