@@ -51,7 +51,7 @@ def search_rate(options, folder, stride):
     """Filter-frames per second of processor time, MiB at most of all searches so far, mean share of tracked frames."""
     model, out = write_model(folder, stride, options.filters), folder / f"out{stride}"
     command = [options.program, "search", options.sequence, "--frames", f"0:{options.frames}", "--model", model, "--exhaustive", "--no-baselines",
-               "--threads", "1", "--quiet", "--out", out]
+               "--block", options.block, "--threads", "1", "--quiet", "--out", out]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -85,12 +85,14 @@ def main(arguments=None):
     parser.add_argument("sequence", metavar="SEQUENCE_DIR", type=pathlib.Path)
     parser.add_argument("--filters", type=int, default=16, help="of each layer (default: %(default)s)")
     parser.add_argument("--frames", type=int, default=60, help="(default: %(default)s)")
+    parser.add_argument("--block", type=int, default=16, help="filters in flight, as of stemvo search (default: %(default)s)")
+    parser.add_argument("--strides", type=int, nargs="+", default=STRIDES, help="(default: 2 4 8 16)")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/stemvo", help="(default: %(default)s)")
     options = parser.parse_args(arguments)
     print("stride  filter-frames per core-second  motions measured  memory so far MiB")
     try:
         with tempfile.TemporaryDirectory() as folder:
-            for stride in STRIDES:
+            for stride in options.strides:
                 rate, memory, tracked = search_rate(options, pathlib.Path(folder), stride)
                 print(f"{stride:6} {rate:30.0f} {100 * tracked:15.0f} % {memory:17.0f}", flush=True)
     except (OSError, subprocess.CalledProcessError) as error:

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "search/race.hpp"
 #include "search/ranking.hpp"
 #include "search/schedule.hpp"
 
@@ -126,7 +127,14 @@ TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
   }
 }
 
+/// Of more filters than docs/search.md says more go on to a rung than odometries are kept.
+TEST(HalvingSchedule, HowManyFiltersFitIntoMemory) {
+  EXPECT_LE(halving_schedule(892)[1].num_filters, kMostKept);
+  EXPECT_GT(halving_schedule(893)[1].num_filters, kMostKept);
+}
+
 TEST(HalvingSchedule, FewFilters) {
+  EXPECT_NEAR(cost_share(halving_schedule(8)), 0.30, 0.005);
   EXPECT_EQ(halving_schedule(1).back().num_filters, 1U);
   EXPECT_EQ(halving_schedule(3).front().num_filters, 3U);
   EXPECT_EQ(cost_share(exhaustive_schedule(7)), 1.0);
