@@ -57,4 +57,4 @@ lint: setup
 	@tools/lint.sh
 
 clean:
-	@rm -rf build/release build/dev build/asan build/bench build/bench-run build/tidy build/demo
+	@rm -rf build/release build/dev build/asan build/tsan build/bench build/bench-run build/tidy build/demo

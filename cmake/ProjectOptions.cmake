@@ -1,6 +1,7 @@
 # Warnings and sanitizers as one target that is never exported.
 option(STEMVO_WARNINGS_AS_ERRORS "Treat warnings as errors (set by the presets)" OFF)
 option(STEMVO_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
+option(STEMVO_SANITIZE_THREAD "Thread sanitizer; of the tests only those of work in several threads are built" OFF)
 
 add_library(stemvo_options INTERFACE)
 target_compile_options(stemvo_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -14,6 +15,11 @@ if(STEMVO_SANITIZE)
   target_compile_options(stemvo_options INTERFACE -fsanitize=address,undefined
                                                   -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(stemvo_options INTERFACE -fsanitize=address,undefined)
+endif()
+if(STEMVO_SANITIZE_THREAD)
+  # GCC: fences are not seen by this sanitizer; TBB's headers have some.
+  target_compile_options(stemvo_options INTERFACE -fsanitize=thread -fno-omit-frame-pointer -Wno-tsan)
+  target_link_options(stemvo_options INTERFACE -fsanitize=thread)
 endif()
 
 find_program(CCACHE_PROGRAM ccache)

@@ -3,12 +3,11 @@
 
 #include <utility>
 
-#include <tbb/parallel_invoke.h>
-
 #include "odometry/map_history.hpp"
 #include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
 #include "stemvo/check.hpp"
+#include "threads/side_by_side.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -67,7 +66,7 @@ std::optional<FrameResult> ChannelOdometry::push(PreparedFrame frame) {
   work.frame = std::move(frame);
   std::optional<FrameResult> before;
   if (pending_.has_value()) {
-    tbb::parallel_invoke([&] { before = finish(); }, [&] { follow(work); });
+    run_side_by_side([&] { before = finish(); }, [&] { follow(work); });
   } else {
     follow(work);
   }

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/frame_pipeline.hpp"
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <exception>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
 
 #include <tbb/parallel_pipeline.h>
 
+#include "threads/hand_over.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
@@ -24,8 +25,10 @@ struct Frame {
   std::chrono::steady_clock::time_point started;
   Expected<cv::Mat> pixels;
   PreparedFrame prepared;
+  HandOver between_stages;
 };
-using FramePtr = std::shared_ptr<Frame>;  // TBB copies what stages hand on
+/// Those on their way, and the last one that came through.
+using Frames = std::array<Frame, kMaxInFlight + 1>;
 
 /// Ends the run at the first exception of a stage. TBB itself must see none: a pipeline that it
 /// cancels never frees the frames on their way.
@@ -63,22 +66,34 @@ class Guard {
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
   std::size_t num_started = 0;
   Guard guard;
-  const auto start = [&](tbb::flow_control& control) {
+  Frames frames;
+  HandOver begin;
+  HandOver end;
+  HandOver between_starts;
+  HandOver between_prepares;
+  HandOver between_pushes;
+  const auto start = [&](tbb::flow_control& control) -> Frame* {
+    const Turn turn(between_starts);
     if (guard.is_over() || num_started == sequence.size()) {
       control.stop();
-      return FramePtr();
+      return nullptr;
     }
-    auto frame = std::make_shared<Frame>();
+    Frame* frame = &frames.at(num_started % frames.size());
+    const Turn stage(frame->between_stages);  // of the frame that was here
     frame->index = num_started++;
     frame->started = std::chrono::steady_clock::now();
+    frame->prepared = {};
     return frame;
   };
-  const auto read = [&](const FramePtr& frame) {
+  const auto read = [&](Frame* frame) {
+    const Turn stage(frame->between_stages);
     guard.run(
         [&] { frame->pixels = timed(Stage::kRead, [&] { return sequence.read(frame->index); }); });
     return frame;
   };
-  const auto prepare = [&](const FramePtr& frame) {
+  const auto prepare = [&](Frame* frame) {
+    const Turn turn(between_prepares);
+    const Turn stage(frame->between_stages);
     guard.run([&] {
       if (frame->pixels) {
         frame->prepared = odometry.prepare(*frame->pixels);
@@ -86,11 +101,12 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
     });
     return frame;
   };
-  FramePtr before;  // whose result the next call brings
+  Frame* before = nullptr;  // whose result the next call brings
   const auto hand_over = [&](const std::optional<FrameResult>& result) {
-    if (!result || !before) {
+    if (!result || before == nullptr) {
       return;
     }
+    const Turn stage(before->between_stages);
     if (!visit(before->index, before->pixels, *result)) {
       guard.end();
     }
@@ -98,20 +114,26 @@ void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVi
       recorder->add_frame(before->started);
     }
   };
-  const auto push = [&](const FramePtr& frame) {
+  const auto push = [&](Frame* frame) {
+    const Turn turn(between_pushes);
+    const Turn stage(frame->between_stages);
     guard.run([&] {
       hand_over(odometry.push(std::move(frame->prepared)));
       before = frame;
     });
   };
 
+  begin.give();
   using tbb::filter_mode;
   tbb::parallel_pipeline(
       kMaxInFlight,
-      tbb::make_filter<void, FramePtr>(filter_mode::serial_in_order, start) &
-          tbb::make_filter<FramePtr, FramePtr>(filter_mode::parallel, read) &
-          tbb::make_filter<FramePtr, FramePtr>(filter_mode::serial_in_order, prepare) &
-          tbb::make_filter<FramePtr, void>(filter_mode::serial_in_order, push));
+      tbb::make_filter<void, Frame*>(filter_mode::serial_in_order, HandedOver(begin, end, start)) &
+          tbb::make_filter<Frame*, Frame*>(filter_mode::parallel, HandedOver(begin, end, read)) &
+          tbb::make_filter<Frame*, Frame*>(filter_mode::serial_in_order,
+                                           HandedOver(begin, end, prepare)) &
+          tbb::make_filter<Frame*, void>(filter_mode::serial_in_order,
+                                         HandedOver(begin, end, push)));
+  end.take();
   guard.run([&] { hand_over(odometry.finish()); });
   guard.rethrow();
 }
