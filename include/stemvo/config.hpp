@@ -78,6 +78,9 @@ struct Config {
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 /// Ranges and choices of every key; written so that NaN fails.
 [[nodiscard]] Status validate(const Config& config);
+/// With what stem.upsample: auto stands for. KLT finds subpixel places on the channel as it is; orb
+/// and sift lose their keypoints on a smaller picture.
+[[nodiscard]] Config with_chosen_upsample(Config config);
 /// YAML with every key, exact (numbers round-trip).
 [[nodiscard]] std::string dump_config(const Config& config);
 

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 using calibration::Segment;
 
 constexpr int kTrackWindow = 15;  ///< of KLT, px
+constexpr int kNumTracks = 1000;
 /// Bounds the time of the solver on long drives.
 constexpr std::size_t kMaxSegments = 30;
 /// Fewer do not tell how well they agree.
@@ -134,6 +135,8 @@ Expected<Odometry> create_odometry(const CalibrationRequest& request, const Came
   config.scale.source = "constant";
   // Long tracks count here, and their bias does not: every observation is aligned anew.
   config.features.klt_window = std::max(config.features.klt_window, kTrackWindow);
+  config.features.max_features = std::max(config.features.max_features, kNumTracks);
+  config.stem.upsample = "bicubic";
   return Odometry::create(config, camera, request.models_dir);
 }
 

@@ -116,4 +116,11 @@ std::string dump_config(const Config& config) {
   return text;
 }
 
+Config with_chosen_upsample(Config config) {
+  if (config.stem.upsample == "auto") {
+    config.stem.upsample = config.features.method == "klt" ? "native" : "bicubic";
+  }
+  return config;
+}
+
 }  // namespace stemvo

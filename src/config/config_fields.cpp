@@ -59,8 +59,9 @@ std::vector<Field> stem_fields(StemOptions& o) {
       {"stem", "sampling_px", &o.sampling_px, at_least(0),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
-      {"stem", "upsample", &o.upsample, one_of({"bicubic", "native"}),
-       "size of the picture to track on: bicubic (the input's) or native (the channel's)"},
+      {"stem", "upsample", &o.upsample, one_of({"auto", "bicubic", "native"}),
+       "size of the picture to track on: bicubic (the input's), native (the channel's), or auto: "
+       "native for klt, bicubic for orb and sift"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),
        "percentile of the response that becomes black"},
       {"stem", "stretch_high_percent", &o.stretch_high_percent, between(0, 100),
@@ -84,8 +85,9 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
       {"features", "min_distance_px", &o.min_distance_px, at_least(0),
        "klt: between keypoints, input pixels"},
       {"features", "klt_window", &o.klt_window, odd_between(3, 201),
-       "klt: side of the window, pixels of the tracked picture, odd"},
-      {"features", "klt_levels", &o.klt_levels, between(1, 10), "klt: levels of the pyramid"},
+       "klt: side of the window, input pixels, odd"},
+      {"features", "klt_levels", &o.klt_levels, between(1, 10),
+       "klt: levels of the pyramid, from the input's size on"},
       {"features", "max_forward_backward_px", &o.max_forward_backward_px, above(0),
        "klt: a point tracked there and back must return this close, input pixels"},
       {"features", "fast_threshold", &o.fast_threshold, between(1, 254),

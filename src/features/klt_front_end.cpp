@@ -2,6 +2,7 @@
 #include "features/klt_front_end.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -15,6 +16,8 @@ namespace stemvo {
 namespace {
 
 constexpr int kBackLevels = 2;
+/// A gradient needs a pixel to either side, a window more than its middle.
+constexpr int kMinReach_px = 2;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
 
@@ -37,14 +40,20 @@ bool is_inside(const cv::Point2f& uv, cv::Size size) {
 
 struct KltFrontEnd::Picture : PreparedPicture {
   using PreparedPicture::PreparedPicture;
+  [[nodiscard]] int last_level() const { return static_cast<int>(pyramid.size() / kNextLevel) - 1; }
   std::vector<cv::Mat> pyramid;
+  cv::Size window;
 };
 
 std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& image) const {
   const StageTimer timer(Stage::kPyramid);
   auto picture = std::make_shared<Picture>(image);
-  const cv::Size window(options_.klt_window, options_.klt_window);
-  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, window, options_.klt_levels - 1,
+  const double scale = image.map.scale.minCoeff();
+  const int reach = std::max(kMinReach_px, static_cast<int>(options_.klt_window / 2 / scale));
+  picture->window = cv::Size(2 * reach + 1, 2 * reach + 1);
+  // A picture of half the input's size is its pyramid's second level.
+  const int last_level = std::max(0, options_.klt_levels - 1 - std::ilogb(scale));
+  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, picture->window, last_level,
                               /*withDerivatives=*/true);
   return picture;
 }
@@ -89,18 +98,17 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
   for (const Point& point : points_) {
     prev_uv.push_back(point.uv);
   }
-  const cv::Size window(options_.klt_window, options_.klt_window);
   const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01);
   std::vector<cv::Point2f> cur_uv;
   std::vector<cv::Point2f> back_uv = prev_uv;
   std::vector<unsigned char> found;
   std::vector<unsigned char> found_back;
-  cv::calcOpticalFlowPyrLK(prev.pyramid, cur.pyramid, prev_uv, cur_uv, found, cv::noArray(), window,
-                           options_.klt_levels - 1, criteria);
+  cv::calcOpticalFlowPyrLK(prev.pyramid, cur.pyramid, prev_uv, cur_uv, found, cv::noArray(),
+                           cur.window, cur.last_level(), criteria);
   // The way back starts where the way there started: two levels are enough to leave a wrong place.
-  const int back_levels = std::min(options_.klt_levels, kBackLevels);
   cv::calcOpticalFlowPyrLK(cur.pyramid, prev.pyramid, cur_uv, back_uv, found_back, cv::noArray(),
-                           window, back_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
+                           cur.window, std::min(cur.last_level(), kBackLevels - 1), criteria,
+                           cv::OPTFLOW_USE_INITIAL_FLOW);
 
   std::vector<Point> followed;
   followed.reserve(points_.size());
@@ -125,7 +133,7 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
 /// pixels wide, and any pixel of a corner will do.
 void KltFrontEnd::replenish(const Picture& picture) {
   const StageTimer timer(Stage::kDetection);
-  const bool is_halved = options_.klt_levels > 1 && picture.pyramid.size() > kNextLevel;
+  const bool is_halved = picture.last_level() > 0;
   const cv::Mat& pixels = picture.pyramid[is_halved ? kNextLevel : 0];
   const float to_pixels = is_halved ? 2.0F : 1.0F;
   const double min_distance =

@@ -10,6 +10,9 @@ namespace stemvo {
 
 namespace {
 
+/// Reach of the local contrast, input pixels (level 1: its own, twice as wide).
+constexpr double kContrast_px = 8.0;
+
 /// The camera in the pixels of a picture that is `map` away from the camera's own pixels.
 Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size) {
   const Eigen::Vector2d centre = map.from_input({camera.cx_px, camera.cy_px});
@@ -70,12 +73,15 @@ RoadPicture make_road_picture(const ChannelImage& image, const Camera& camera) {
   RoadPicture picture;
   picture.pixels = image.pixels;
   picture.camera = camera_in(camera, image.map, image.pixels.size());
-  picture.levels.push_back(make_level(image.pixels, picture.camera, 8));
+  picture.scale = image.map.scale.x();
+  const int contrast_px = std::max(4, cvRound(kContrast_px / picture.scale));
+  picture.levels.push_back(make_level(image.pixels, picture.camera, contrast_px));
   cv::Mat half;
   cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
   // The centre of a pixel of the half picture lies between two of the full one.
   const PixelMap map{{2.0, 2.0}, {0.5, 0.5}};
-  picture.levels.push_back(make_level(half, camera_in(picture.camera, map, half.size()), 8));
+  picture.levels.push_back(
+      make_level(half, camera_in(picture.camera, map, half.size()), contrast_px));
   return picture;
 }
 

@@ -18,8 +18,9 @@ struct RoadPicture {
     int first_row = 0;
     cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, local contrast; row 0 is `first_row`
   };
-  cv::Mat pixels;  ///< CV_8U, the picture itself
-  Camera camera;   ///< in its pixels
+  cv::Mat pixels;      ///< CV_8U, the picture itself
+  Camera camera;       ///< in its pixels
+  double scale = 1.0;  ///< input pixels per pixel of it
   std::vector<Level> levels;
 };
 

@@ -21,9 +21,9 @@ namespace {
 constexpr int kMinPoints = 12;
 constexpr int kFitIterations = 8;
 constexpr double kTukey = 4.0;         ///< standard deviations
-constexpr double kMinNoise_px = 0.05;  ///< no track is better than this
+constexpr double kMinNoise_px = 0.05;  ///< no track is better than this; input pixels
 /// Wide and flat: texture on the road is stretched across the picture.
-const cv::Size kWindow(31, 15);
+const cv::Size kWindowReach(15, 7);  ///< to either side; input pixels, as all lengths here
 const cv::Size kCell(48, 24);
 constexpr int kCellsAcross = 1000;
 constexpr int kPyramidLevel = 0;  ///< the predicted plane has taken most of the motion away
@@ -33,6 +33,12 @@ constexpr double kMinInlierShare = 0.3;
 constexpr double kMinTrackedShare = 0.25;
 constexpr double kMaxSigma = 0.2;
 constexpr int kBorder_px = 24;  ///< room for the tracker's window around the strip
+
+/// Input pixels -> the picture's.
+cv::Size in_pixels_of(const RoadPicture& picture, cv::Size size) {
+  return {static_cast<int>(size.width / picture.scale),
+          static_cast<int>(size.height / picture.scale)};
+}
 
 /// Where the strip of road is in the current picture, and the corners in it.
 struct Strip {
@@ -59,7 +65,8 @@ Strip find_strip(const RoadPicture& cur, const RoadRegion& region, const RoadOpt
     return {};
   }
   cv::goodFeaturesToTrack(cur.pixels(strip.box), strip.corners, options.max_points,
-                          options.corner_quality, options.corner_distance_px, mask(strip.box));
+                          options.corner_quality, options.corner_distance_px / cur.scale,
+                          mask(strip.box));
   return strip;
 }
 
@@ -129,11 +136,14 @@ std::vector<Track> track_corners(const RoadPicture& prev,
   std::vector<cv::Point2f> back = strip.corners;
   std::vector<std::uint8_t> found;
   std::vector<std::uint8_t> found_back;
-  const auto follow = [](const cv::Mat& from, const cv::Mat& to, const auto& points, auto& ends,
-                         auto& ok) {
+  const cv::Size reach = in_pixels_of(cur, kWindowReach);
+  const cv::Size window = reach + reach + cv::Size(1, 1);
+  const cv::Size cell = in_pixels_of(cur, kCell);
+  const auto follow = [&](const cv::Mat& from, const cv::Mat& to, const auto& points, auto& ends,
+                          auto& ok) {
     const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 12, 0.01);
-    cv::calcOpticalFlowPyrLK(from, to, points, ends, ok, cv::noArray(), kWindow, kPyramidLevel,
-                             stop, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+    cv::calcOpticalFlowPyrLK(from, to, points, ends, ok, cv::noArray(), window, kPyramidLevel, stop,
+                             cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   };
   follow(picture, warped, strip.corners, there, found);
   follow(warped, picture, there, back, found_back);
@@ -143,16 +153,16 @@ std::vector<Track> track_corners(const RoadPicture& prev,
     const cv::Point2f loop = back[i] - corner;
     const cv::Vec3d in_prev = map * cv::Vec3d(there[i].x, there[i].y, 1.0);
     if (found[i] == 0 || found_back[i] == 0 || !(in_prev[2] > 1e-6) ||
-        !(std::hypot(loop.x, loop.y) <= options.max_loop_px)) {
+        !(std::hypot(loop.x, loop.y) <= options.max_loop_px / cur.scale)) {
       continue;
     }
     const Track track{
         cur.camera.normalize({corner.x + strip.box.x, corner.y + strip.box.y}).homogeneous(),
         {in_prev[0] / in_prev[2], in_prev[1] / in_prev[2]},
-        static_cast<int>(corner.y) / kCell.height * kCellsAcross +
-            static_cast<int>(corner.x) / kCell.width};
+        static_cast<int>(corner.y) / cell.height * kCellsAcross +
+            static_cast<int>(corner.x) / cell.width};
     const Residual residual = residual_of(track, warp, cur.camera);
-    if (residual.is_valid && std::abs(residual.across_px) <= options.max_off_line_px) {
+    if (residual.is_valid && std::abs(residual.across_px) <= options.max_off_line_px / cur.scale) {
       tracks.push_back(track);
     }
   }
@@ -176,7 +186,7 @@ struct Fit {
 /// Reweighted Gauss-Newton from the predicted plane: Tukey's weights, their width from the median
 /// residual (it shrinks as the fit improves).
 Fit fit_road(const std::vector<Track>& tracks,
-             const Camera& camera,
+             const RoadPicture& cur,
              const RoadPrior& prior,
              const RoadOptions& options,
              RoadWarp& warp) {
@@ -185,10 +195,10 @@ Fit fit_road(const std::vector<Track>& tracks,
   std::vector<double> sizes(tracks.size());
   for (int iteration = 0; iteration < kFitIterations; ++iteration) {
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      residuals[i] = residual_of(tracks[i], warp, camera);
+      residuals[i] = residual_of(tracks[i], warp, cur.camera);
       sizes[i] = residuals[i].is_valid ? std::abs(residuals[i].along_px) : 1e6;
     }
-    const double noise_px = std::max(kMinNoise_px, 1.4826 * median(sizes));
+    const double noise_px = std::max(kMinNoise_px / cur.scale, 1.4826 * median(sizes));
     RoadNormal normal;
     std::map<int, Eigen::Vector3d> cells;
     fit.num_inliers = 0;
@@ -242,7 +252,7 @@ RoadMeasurement RoadPoints::measure(const RoadPicture& prev,
           kMinTrackedShare * static_cast<double>(strip.corners.size())) {
     return no_road("no tracks on the road");
   }
-  const Fit fit = fit_road(tracks, cur.camera, prior, options_, warp);
+  const Fit fit = fit_road(tracks, cur, prior, options_, warp);
   if (!fit.is_valid) {
     return no_road("no plane through the points");
   }

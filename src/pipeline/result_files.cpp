@@ -85,7 +85,8 @@ Status write_config(const std::filesystem::path& out_dir,
     out << fmt::format("# calibration {}\n", one_line(calibration->string()));
   }
   out << "\n";
-  Config effective = config;  // with what -1 and 0 stand for, which may change with the manifest
+  // With what auto, -1 and 0 stand for, which may change with the manifest.
+  Config effective = with_chosen_upsample(config);
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;
   out << dump_config(effective);

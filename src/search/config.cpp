@@ -7,9 +7,8 @@ Config search_defaults() {
   Config config;
   config.odometry.mode = "two_frame";
   config.scale.source = "ground_truth";
-  config.stem.upsample = "native";  // a quarter of the pixels at sampling 2
   config.features.max_features = 400;
-  config.features.klt_levels = 3;
+  config.features.klt_window = 23;
   // The refinement behind it forgets which estimator brought the first guess.
   config.two_view.estimator = "ransac";
   config.two_view.max_iterations = 200;

@@ -19,7 +19,9 @@ struct StemOptions {
   std::string layer = "first";  ///< of a model that has several, by name
   int filter = -1;              ///< -1: the manifest's default_filter (gray, input_layer: 0)
   int sampling_px = 0;          ///< divisor of the native stride; 0: 2 if it divides it, else 1
-  std::string upsample = "bicubic";  ///< `bicubic` (to the input's size) or `native`
+  /// `bicubic` (to the input's size), `native`, or `auto`: with_chosen_upsample() of config.hpp
+  /// says which (here: bicubic).
+  std::string upsample = "auto";
   double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
   double stretch_high_percent = 99.5;
   double stretch_memory = 0.95;  ///< share of the last limits kept at each frame
