@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
-#include <numeric>
 #include <string_view>
 
 #include "stemvo/check.hpp"
@@ -19,7 +18,7 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "two-view refinement", "placement", "map refinement", "road scale", "frame files",
     "result files"};
 
-double cpu_ms(clockid_t clock) {
+double read_ms(clockid_t clock) {
   timespec time{};
   clock_gettime(clock, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
@@ -35,7 +34,7 @@ double ms_between(std::chrono::steady_clock::time_point from,
 std::atomic<StageRecorder*> StageRecorder::active_ = nullptr;
 
 StageRecorder::StageRecorder()
-    : start_cpu_ms_(cpu_ms(CLOCK_PROCESS_CPUTIME_ID)),
+    : start_cpu_ms_(read_ms(CLOCK_PROCESS_CPUTIME_ID)),
       start_(std::chrono::steady_clock::now()),
       last_frame_(start_),
       stages_(kNumStages) {
@@ -60,14 +59,13 @@ void StageRecorder::add_frame(std::chrono::steady_clock::time_point started) {
   last_frame_ = now;
 }
 
-double StageRecorder::wall_ms(Stage stage) const {
+double StageRecorder::cpu_ms(Stage stage) const {
   const std::lock_guard lock(mutex_);
-  const std::vector<double>& calls = stages_[static_cast<std::size_t>(stage)].wall_ms;
-  return std::accumulate(calls.begin(), calls.end(), 0.0);
+  return stages_[static_cast<std::size_t>(stage)].cpu_ms;
 }
 
 TimingReport StageRecorder::report() const {
-  const double total_ms = cpu_ms(CLOCK_PROCESS_CPUTIME_ID);
+  const double total_ms = read_ms(CLOCK_PROCESS_CPUTIME_ID);
   const std::lock_guard lock(mutex_);
   TimingReport report;
   double rest_ms = total_ms - start_cpu_ms_;
@@ -95,13 +93,13 @@ TimingReport StageRecorder::report() const {
 StageTimer::StageTimer(Stage stage) : recorder_(StageRecorder::active()), stage_(stage) {
   if (recorder_ != nullptr) {
     wall_ = std::chrono::steady_clock::now();
-    cpu_ms_ = cpu_ms(CLOCK_THREAD_CPUTIME_ID);
+    cpu_ms_ = read_ms(CLOCK_THREAD_CPUTIME_ID);
   }
 }
 
 StageTimer::~StageTimer() {
   if (recorder_ != nullptr) {
-    const double spent_ms = cpu_ms(CLOCK_THREAD_CPUTIME_ID) - cpu_ms_;
+    const double spent_ms = read_ms(CLOCK_THREAD_CPUTIME_ID) - cpu_ms_;
     recorder_->add(stage_, ms_between(wall_, std::chrono::steady_clock::now()), spent_ms);
   }
 }

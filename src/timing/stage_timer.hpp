@@ -47,8 +47,8 @@ class StageRecorder {
   void add(Stage stage, double wall_ms, double cpu_ms);
   /// A frame's result is there; `started`: when it was asked for.
   void add_frame(std::chrono::steady_clock::time_point started);
-  /// Of all calls of a stage so far.
-  [[nodiscard]] double wall_ms(Stage stage) const;
+  /// Processor time of all calls of a stage so far.
+  [[nodiscard]] double cpu_ms(Stage stage) const;
   /// Of everything so far.
   [[nodiscard]] TimingReport report() const;
 
