@@ -16,6 +16,8 @@ namespace stemvo {
 namespace {
 
 constexpr int kBackLevels = 2;
+constexpr int kMaxIterations = 15;       ///< per level
+constexpr double kConverged_px = 0.015;  ///< an iteration's step, picture pixels
 /// A gradient needs a pixel to either side, a window more than its middle.
 constexpr int kMinReach_px = 2;
 /// In a pyramid each level is followed by its derivatives.
@@ -98,7 +100,8 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
   for (const Point& point : points_) {
     prev_uv.push_back(point.uv);
   }
-  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01);
+  const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kMaxIterations,
+                                  kConverged_px);
   std::vector<cv::Point2f> cur_uv;
   std::vector<cv::Point2f> back_uv = prev_uv;
   std::vector<unsigned char> found;

@@ -27,8 +27,9 @@ constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5};
 constexpr double kNoiseParallax = 5.0;
 
 /// Once initialised, S_H is only written down: few points of a street lie on one plane, and the
-/// estimator would always use all its iterations.
+/// estimator would always use all its iterations, and polish each of them.
 constexpr int kRecordIterations = 100;
+constexpr const char* kRecordEstimator = "ransac";
 
 double median_flow_px(std::span<const Eigen::Vector2d> prev_uv,
                       std::span<const Eigen::Vector2d> cur_uv) {
@@ -148,6 +149,7 @@ TwoViewEstimator::Models TwoViewEstimator::score_models(std::span<const Eigen::V
   TwoViewOptions homography_options = options_;
   if (!is_initializing) {
     homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
+    homography_options.estimator = kRecordEstimator;
   }
   models.homography = estimate_homography(prev_uv, cur_uv, homography_options, seed);
   std::optional<Eigen::Matrix3d> fundamental;

@@ -57,6 +57,11 @@ class NetworkLayer final : public FilterLayer {
                                 cv::Mat1f& output,
                                 std::vector<Channel>& channels) const;
 
+  /// One filter, one pass: its output is the channel.
+  [[nodiscard]] bool is_written_in_place() const {
+    return session_.num_filters() == 1 && plan_.num_passes() == 1;
+  }
+
   std::string label_;
   OnnxSession session_;
   SamplingPlan plan_;
@@ -91,6 +96,9 @@ void NetworkLayer::fit_workspace(const cv::Mat& frame) const {
   workspace_.planes.setTo(0);
   workspace_.outputs.assign(static_cast<std::size_t>(plan_.num_passes()), cv::Mat1f());
   for (cv::Mat1f& output : workspace_.outputs) {
+    if (is_written_in_place()) {
+      break;
+    }
     output.create(session_.num_filters() * pass.height, pass.width);
   }
   workspace_.frame = frame.size();
@@ -156,6 +164,9 @@ Status NetworkLayer::run_pass(int index,
   const cv::Size pass = plan_.pass_size(workspace_.frame);
   const cv::Point start = plan_.shift(index);
   const float* const image = workspace_.planes[start.y] + start.x;
+  if (is_written_in_place()) {
+    return session_.run(image, buffer, channels.front().values.ptr<float>(), pass);
+  }
   if (Status status = session_.run(image, buffer, output.ptr<float>(), pass); !status) {
     return status;
   }
