@@ -14,8 +14,8 @@ namespace {
 
 using KeySet = std::set<FilterKey, KeyOrder>;
 
-KeySet survivors_of(std::vector<const Record*> records, std::size_t count) {
-  const std::vector<FilterKey> keys = choose_survivors(std::move(records), count);
+KeySet survivors_of(const std::vector<const Record*>& records, std::size_t count) {
+  const std::vector<FilterKey> keys = choose_survivors(records, count);
   return {keys.begin(), keys.end()};
 }
 

@@ -65,6 +65,20 @@ std::tuple<int, double, double> order_of(const FilterRow& row) {
   }
 }
 
+/// What survivors are chosen by: first detected or not and the early error; the other numbers tell
+/// whether two filters are one.
+struct Standing {
+  std::tuple<int, double, double, double, double> numbers;
+  const FilterKey* key = nullptr;
+};
+
+Standing standing_of(const Record& record) {
+  const MeanScore mean = mean_score(record.drives);
+  return {{all_detected(record.drives) ? 0 : 1, mean.early_error_percent, mean.rotation_change_deg,
+           mean.average_offset_m, mean.mean_inliers},
+          &record.key};
+}
+
 }  // namespace
 
 MeanScore mean_score(const std::vector<DriveScore>& drives) {
@@ -123,19 +137,26 @@ std::vector<FilterRow> rank_filters(std::span<const Record> records, std::size_t
   return rows;
 }
 
-std::vector<FilterKey> choose_survivors(std::vector<const Record*> records, std::size_t count) {
-  const auto order = [](const Record& record) {
-    return std::pair(all_detected(record.drives) ? 0 : 1,
-                     mean_score(record.drives).early_error_percent);
-  };
-  std::sort(records.begin(), records.end(), [&order](const Record* a, const Record* b) {
-    const auto first = order(*a);
-    const auto second = order(*b);
-    return first < second || (first == second && comes_before(a->key, b->key));
+std::vector<FilterKey> choose_survivors(const std::vector<const Record*>& records,
+                                        std::size_t count) {
+  std::vector<Standing> standings;
+  for (const Record* record : records) {
+    standings.push_back(standing_of(*record));
+  }
+  std::sort(standings.begin(), standings.end(), [](const Standing& a, const Standing& b) {
+    return a.numbers < b.numbers || (a.numbers == b.numbers && comes_before(*a.key, *b.key));
   });
+  // What gives the same numbers to the last bit is the same channel: one of them tells all.
+  std::vector<const FilterKey*> order;
+  std::vector<const FilterKey*> repeated;
+  for (std::size_t i = 0; i < standings.size(); ++i) {
+    const bool is_new = i == 0 || standings[i].numbers != standings[i - 1].numbers;
+    (is_new ? order : repeated).push_back(standings[i].key);
+  }
+  order.insert(order.end(), repeated.begin(), repeated.end());
   std::vector<FilterKey> chosen;
-  for (std::size_t i = 0; i < std::min(count, records.size()); ++i) {
-    chosen.push_back(records[i]->key);
+  for (std::size_t i = 0; i < std::min(count, order.size()); ++i) {
+    chosen.push_back(*order[i]);
   }
   return chosen;
 }

@@ -2,6 +2,7 @@
 #include "search/schedule.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stemvo::search {
@@ -15,6 +16,24 @@ constexpr double kLeastPower = 0.3;
 constexpr double kMostPower = 3.0;
 constexpr double kPowerStep = 0.05;
 
+/// Of fewer filters an even fall would leave too few where the order begins to be known, at a
+/// quarter of the frames: half go on to there, a sixth further, a twelfth to the end.
+constexpr std::size_t kFewFilters = 16;
+constexpr std::array<double, kNumRungs> kSharesOfFew = {1.0, 0.5, 0.5, 1.0 / 6.0, 1.0 / 12.0};
+
+double frame_share(int rung) { return std::pow(2.0, rung - (kNumRungs - 1)); }
+
+Schedule schedule_of_few(std::size_t num_filters) {
+  Schedule schedule;
+  for (int i = 0; i < kNumRungs; ++i) {
+    const double count =
+        static_cast<double>(num_filters) * kSharesOfFew[static_cast<std::size_t>(i)];
+    schedule.push_back(
+        {frame_share(i), std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(count)))});
+  }
+  return schedule;
+}
+
 Schedule schedule_of(std::size_t num_filters, double power) {
   Schedule schedule;
   for (int i = 0; i < kNumRungs; ++i) {
@@ -22,8 +41,7 @@ Schedule schedule_of(std::size_t num_filters, double power) {
     const auto count = static_cast<std::size_t>(
         std::lround(static_cast<double>(num_filters) * std::pow(growth, -power)));
     const std::size_t most = schedule.empty() ? num_filters : schedule.back().num_filters;
-    schedule.push_back(
-        {growth / std::pow(2.0, kNumRungs - 1), std::min(most, std::max(count, kLeastFinalists))});
+    schedule.push_back({frame_share(i), std::min(most, std::max(count, kLeastFinalists))});
   }
   return schedule;
 }
@@ -31,6 +49,9 @@ Schedule schedule_of(std::size_t num_filters, double power) {
 }  // namespace
 
 Schedule halving_schedule(std::size_t num_filters) {
+  if (num_filters < kFewFilters) {
+    return schedule_of_few(num_filters);
+  }
   double power = kLeastPower;
   while (power < kMostPower && cost_share(schedule_of(num_filters, power)) > kBudget) {
     power += kPowerStep;

@@ -26,7 +26,8 @@ using Schedule = std::vector<Rung>;
 /// Successive halving (Jamieson and Talwalkar, "Non-stochastic best arm identification and
 /// hyperparameter optimization", AISTATS 2016): rungs at 1/16, 1/8, 1/4, 1/2 and all of the frames.
 /// The number of filters falls as a power of the share, as slowly as a budget of 25 % of the
-/// exhaustive search's filter-frames allows, to 2; few filters take a little more than that.
+/// exhaustive search's filter-frames allows, to 2. Of fewer than 16 filters half go on to 1/4, then
+/// a sixth and a twelfth: about the same budget.
 [[nodiscard]] Schedule halving_schedule(std::size_t num_filters);
 /// Filter-frames over those of the exhaustive search, where odometries go on from rung to rung.
 [[nodiscard]] double cost_share(const Schedule& schedule);

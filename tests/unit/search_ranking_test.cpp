@@ -112,6 +112,24 @@ TEST(Ranking, SurvivorsAreTheLeastWrongOfThoseDetected) {
   EXPECT_EQ(choose_survivors(all, 9).size(), 4U);
 }
 
+TEST(Ranking, OfTheSameChannelOneSurvives) {
+  std::vector<Record> records;
+  for (int i = 0; i < 5; ++i) {
+    records.push_back(record(i, 0, {score(1.0, 1.0)}));
+    records.back().drives[0].early_error_percent = i < 3 ? 1.0 : i;
+    records.back().drives[0].mean_inliers = i == 2 ? 50.0 : 60.0;  // as wrong, and yet another one
+  }
+  std::vector<const Record*> all;
+  for (const Record& one : records) {
+    all.push_back(&one);
+  }
+  std::vector<int> chosen;
+  for (const FilterKey& key : choose_survivors(all, 5)) {
+    chosen.push_back(key.filter);
+  }
+  EXPECT_THAT(chosen, ElementsAre(2, 0, 3, 4, 1));
+}
+
 TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
   for (const std::size_t count : {12U, 20U, 36U, 68U, 260U, 4096U}) {
     const Schedule schedule = halving_schedule(count);
@@ -119,7 +137,7 @@ TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
     EXPECT_GE(cost_share(schedule), 0.20) << count;  // what is allowed is used
     EXPECT_EQ(schedule.front().num_filters, count);
     EXPECT_EQ(schedule.back().frame_share, 1.0);
-    EXPECT_GE(schedule.back().num_filters, 2U);
+    EXPECT_GE(schedule.back().num_filters, count < 16 ? 1U : 2U);
     for (std::size_t i = 1; i < schedule.size(); ++i) {
       EXPECT_LE(schedule[i].num_filters, schedule[i - 1].num_filters);
       EXPECT_GT(schedule[i].frame_share, schedule[i - 1].frame_share);
@@ -134,7 +152,9 @@ TEST(HalvingSchedule, HowManyFiltersFitIntoMemory) {
 }
 
 TEST(HalvingSchedule, FewFilters) {
-  EXPECT_NEAR(cost_share(halving_schedule(8)), 0.30, 0.005);
+  for (const std::size_t count : {8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
+    EXPECT_LE(cost_share(halving_schedule(count)), count < 12 ? 0.28 : 0.25) << count;
+  }
   EXPECT_EQ(halving_schedule(1).back().num_filters, 1U);
   EXPECT_EQ(halving_schedule(3).front().num_filters, 3U);
   EXPECT_EQ(cost_share(exhaustive_schedule(7)), 1.0);
