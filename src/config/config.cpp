@@ -17,6 +17,8 @@
 namespace stemvo {
 namespace {
 
+constexpr int kWideFrame_px = 1000;
+
 Expected<std::string> read_text(const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error)) {
@@ -116,9 +118,10 @@ std::string dump_config(const Config& config) {
   return text;
 }
 
-Config with_chosen_upsample(Config config) {
+Config with_chosen_upsample(Config config, int width_px) {
   if (config.stem.upsample == "auto") {
-    config.stem.upsample = config.features.method == "klt" ? "native" : "bicubic";
+    config.stem.upsample =
+        config.features.method == "klt" && width_px >= kWideFrame_px ? "native" : "bicubic";
   }
   return config;
 }

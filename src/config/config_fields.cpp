@@ -61,7 +61,7 @@ std::vector<Field> stem_fields(StemOptions& o) {
        "divides the stride, else 1"},
       {"stem", "upsample", &o.upsample, one_of({"auto", "bicubic", "native"}),
        "size of the picture to track on: bicubic (the input's), native (the channel's), or auto: "
-       "native for klt, bicubic for orb and sift"},
+       "native for klt on frames of 1000 columns and more, else bicubic"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),
        "percentile of the response that becomes black"},
       {"stem", "stretch_high_percent", &o.stretch_high_percent, between(0, 100),

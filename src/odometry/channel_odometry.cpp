@@ -26,7 +26,7 @@ ChannelOdometry::ChannelOdometry(const Config& config,
     : camera_(camera),
       seed_(config.seed),
       asks_road_(config.scale.source == "camera_height"),
-      stretch_(with_chosen_upsample(config).stem),
+      stretch_(with_chosen_upsample(config, camera.width_px).stem),
       front_end_(std::move(front_end)),
       estimator_(config, camera),
       chain_(config.odometry, config.scale) {

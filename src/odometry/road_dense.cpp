@@ -90,7 +90,7 @@ double total_correlation(const RoadTiles& tiles) {
 
 using LevelSamples = std::array<std::vector<RoadRegion::Sample>, 2>;
 
-/// Gauss-Newton at half size, then at full size.
+/// Gauss-Newton at half size where there are samples, then at full size.
 RoadMeasurement refine(const RoadPicture& prev,
                        const RoadPicture& cur,
                        const LevelSamples& samples,
@@ -101,7 +101,7 @@ RoadMeasurement refine(const RoadPicture& prev,
   double quality = 0.0;
   int num_tiles = 0;
   for (const std::size_t level : {std::size_t{1}, std::size_t{0}}) {
-    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    for (int iteration = 0; !samples[level].empty() && iteration < kMaxIterations; ++iteration) {
       const RoadTiles tiles =
           align_road(prev.levels[level], cur.levels[level], samples[level], warp);
       RoadNormal normal;
@@ -141,8 +141,10 @@ RoadMeasurement RoadDense::measure(const RoadPicture& prev,
     return no_road("the picture ends above the road");
   }
   const RoadRegion region(cur_from_prev, prior, options_);
+  // A scale that is known well starts within a pixel: half size is for the search.
+  const bool is_searched = prior.log_scale_sigma > kSearchSigma;
   LevelSamples samples;
-  for (std::size_t k = 0; k < 2; ++k) {
+  for (std::size_t k = 0; k < (is_searched ? 2 : 1); ++k) {
     const RoadPicture::Level& level = cur.levels[k];
     samples[k] = region.samples(level.camera, level.first_row, 2);
     if (samples[k].size() < kFewSamples) {
@@ -153,7 +155,7 @@ RoadMeasurement RoadDense::measure(const RoadPicture& prev,
     return no_road("too little road in sight");
   }
   RoadWarp warp(cur_from_prev, prior, options_.camera_height_m);
-  if (prior.log_scale_sigma > kSearchSigma) {
+  if (is_searched) {
     const double log_scale = search_log_scale(prev.levels[1], cur.levels[1], samples[1], prior,
                                               options_.camera_height_m, warp);
     warp.plane = road_plane(log_scale, prior.slope_rad, prior.roll_rad, options_.camera_height_m);

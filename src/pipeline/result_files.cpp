@@ -86,7 +86,7 @@ Status write_config(const std::filesystem::path& out_dir,
   }
   out << "\n";
   // With what auto, -1 and 0 stand for, which may change with the manifest.
-  Config effective = with_chosen_upsample(config);
+  Config effective = with_chosen_upsample(config, sequence.camera().width_px);
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;
   out << dump_config(effective);
