@@ -10,6 +10,16 @@ namespace {
 constexpr double kMaxAngle_rad = 1.0;  ///< beyond it nobody knows how the turn goes on
 constexpr int kBorder_px = 4;
 constexpr int kCoarse = 8;  ///< the ends of a row are looked for at every 8th sample
+/// atan2(ahead, beside), ahead >= 0; by its series, to 1e-6, where it is small as nearly always.
+double arc_angle(double ahead, double beside) {
+  const double t = ahead / beside;
+  if (!(beside > 0.0 && t < 0.3)) {
+    return std::atan2(ahead, beside);
+  }
+  const double tt = t * t;
+  return t * (1.0 - tt * (1.0 / 3.0 - tt * (1.0 / 5.0 - tt / 7.0)));
+}
+
 }  // namespace
 
 RoadRegion::RoadRegion(const Rigid3& cur_from_prev,
@@ -39,12 +49,16 @@ Eigen::Vector2d RoadRegion::on_ground(const Eigen::Vector2d& xy) const {
   if (std::abs(curvature_) < 1e-4) {
     return {x, z};
   }
-  const double radius = 1.0 / curvature_;
-  const double angle = std::atan2(z, std::abs(radius) - std::copysign(x, x * radius));
+  // The arc's centre lies at x = 1 / k; multiplied by k, nothing grows where it is nearly straight.
+  const double ahead = curvature_ * z;
+  const double beside = 1.0 - curvature_ * x;
+  const double angle = arc_angle(std::abs(ahead), beside);
   if (angle > kMaxAngle_rad) {
     return {0.0, -1.0};
   }
-  return {radius - std::copysign(std::hypot(radius - x, z), radius), std::abs(radius) * angle};
+  const double distance = std::sqrt(beside * beside + ahead * ahead);
+  return {(2.0 * x - curvature_ * (x * x + z * z)) / (1.0 + distance),
+          angle / std::abs(curvature_)};
 }
 
 std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,

@@ -180,8 +180,9 @@ TEST_F(Run, FramesInTheMiddleStartAtTheIdentity) {
 }
 
 TEST_F(Run, TheMapShowsTheStreetAndLeavesTheDrivenWayFree) {
-  const ProgramResult result =
-      run_drive(sequence_, out_, {"--map", "--set", "odometry.mode=map", "--set", kTrueScale});
+  const ProgramResult result = run_drive(sequence_, out_,
+                                         {"--map", "--set", "odometry.mode=map", "--set",
+                                          kTrueScale, "--set", "features.max_features=1000"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("map.ply"));
   EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_refined_kitti.txt")), 60);

@@ -16,7 +16,7 @@ namespace stemvo {
 /// Keys `features.*` of the configuration.
 struct FeatureOptions {
   std::string method = "klt";  ///< `klt`, `orb` or `sift`
-  int max_features = 600;      ///< keypoints aimed at per frame
+  int max_features = 400;      ///< keypoints aimed at per frame
   int grid_columns = 16;       ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
   double corner_quality = 0.005;          ///< klt: least corner response over the strongest
