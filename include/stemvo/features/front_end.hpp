@@ -23,7 +23,7 @@ struct FeatureOptions {
   double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
   int klt_window = 15;                    ///< klt: side, in input pixels, odd
   int klt_levels = 4;                     ///< klt: of the pyramid over the input's size
-  double max_forward_backward_px = 0.25;  ///< klt: input pixels
+  double max_forward_backward_px = 0.15;  ///< klt: input pixels
   int fast_threshold = 10;                ///< orb
   double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
 };
