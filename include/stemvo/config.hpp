@@ -41,7 +41,7 @@ struct OdometryOptions {
 
 /// Keys `refine.*`: bundle adjustment of the local map (odometry.mode: map).
 struct RefineOptions {
-  int every = 2;   ///< keyframes between refinements, the paper's m; 0: never
+  int every = 1;   ///< keyframes between refinements, the paper's m; 0: never
   int window = 8;  ///< keyframes refined together
   int max_iterations = 4;
   double loss_px = 0.2;  ///< Cauchy scale on the reprojection error

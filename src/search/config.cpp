@@ -7,6 +7,7 @@ Config search_defaults() {
   Config config;
   config.odometry.mode = "two_frame";
   config.scale.source = "ground_truth";
+  config.features.max_features = 400;
   config.features.klt_window = 23;
   // The refinement behind it forgets which estimator brought the first guess.
   config.two_view.estimator = "ransac";

@@ -16,14 +16,14 @@ namespace stemvo {
 /// Keys `features.*` of the configuration.
 struct FeatureOptions {
   std::string method = "klt";  ///< `klt`, `orb` or `sift`
-  int max_features = 400;      ///< keypoints aimed at per frame
+  int max_features = 500;      ///< keypoints aimed at per frame
   int grid_columns = 16;       ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
   double corner_quality = 0.005;          ///< klt: least corner response over the strongest
   double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
   int klt_window = 15;                    ///< klt: side, in input pixels, odd
   int klt_levels = 4;                     ///< klt: of the pyramid over the input's size
-  double max_forward_backward_px = 0.15;  ///< klt: input pixels
+  double max_forward_backward_px = 0.25;  ///< klt: input pixels
   int fast_threshold = 10;                ///< orb
   double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
 };
