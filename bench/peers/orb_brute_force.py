@@ -5,7 +5,7 @@
     build/venv-peers/bin/python bench/peers/orb_brute_force.py SEQUENCE --out FILE [--gt POSES] [--frames A:B]
 
 Reads a KITTI sequence (image_2 if there, else image_0), writes poses in KITTI's format. 1000 features, as
-many as stemvo's default, so that both do the work for as many points. Every step is 1 long; with --gt as long
+such programs commonly ask for. Every step is 1 long; with --gt as long
 as the true one (ground truth is used for nothing else). A step that cannot be measured repeats the last one.
 `tools/setup.sh peers` makes the environment.
 """

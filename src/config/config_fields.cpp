@@ -85,7 +85,7 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
       {"features", "min_distance_px", &o.min_distance_px, at_least(0),
        "klt: between keypoints, input pixels"},
       {"features", "klt_window", &o.klt_window, odd_between(3, 201),
-       "klt: side of the window, input pixels, odd"},
+       "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked picture"},
       {"features", "klt_levels", &o.klt_levels, between(1, 10),
        "klt: levels of the pyramid, from the input's size on"},
       {"features", "max_forward_backward_px", &o.max_forward_backward_px, above(0),

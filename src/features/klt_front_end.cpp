@@ -18,8 +18,9 @@ namespace {
 constexpr int kBackLevels = 2;
 constexpr int kMaxIterations = 15;       ///< per level
 constexpr double kConverged_px = 0.015;  ///< an iteration's step, picture pixels
-/// A gradient needs a pixel to either side, a window more than its middle.
-constexpr int kMinReach_px = 2;
+/// Windows of 5x5 pixels lose the road: t_rel 0.85 for 0.31 on a rendered drive, whatever their
+/// size in the input.
+constexpr int kMinReach_px = 3;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
 

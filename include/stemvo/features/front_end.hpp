@@ -21,7 +21,7 @@ struct FeatureOptions {
   int grid_rows = 6;
   double corner_quality = 0.005;          ///< klt: least corner response over the strongest
   double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
-  int klt_window = 15;                    ///< klt: side, in input pixels, odd
+  int klt_window = 11;                    ///< klt: input pixels, odd; at least 7 of the picture
   int klt_levels = 4;                     ///< klt: of the pyramid over the input's size
   double max_forward_backward_px = 0.25;  ///< klt: input pixels
   int fast_threshold = 10;                ///< orb
