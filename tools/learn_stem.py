@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Learns the default stem from a rendered drive and writes OUT/NAME.onnx, its default filter alone
-(OUT/NAME_filter_K.onnx: the same values at a fifth of the cost) and their entry in OUT/manifest.yaml. The same drive and options give the same bytes. docs/default_model.md explains it.
+(OUT/NAME_filter_K.onnx: the same values at less cost) and their entry in OUT/manifest.yaml. The same drive and options give the same bytes. docs/default_model.md explains it.
 
 DRIVE: made by `stemvo synth DRIVE --depth` (pictures, exact depth and poses).
 """
