@@ -124,6 +124,14 @@ class Cut(Files):
         self.assertIn("expected --preprocessing", self.error_of(self.path, "--layers", "front"))
         self.assertIn("--filter: expected 0 to 5, found 6", self.error_of(self.path, "--layers", "front", "--filter", "6", *options))
 
+    def test_the_file_is_read_before_more_is_asked_for(self):
+        for content, found in ((b"text", "expected an .onnx file, found:"), (None, "expected an .onnx file, found nothing")):
+            self.path.unlink(missing_ok=True)
+            if content is not None:
+                self.path.write_bytes(content)
+            for options in ((), ("--layers", "front")):
+                self.assertIn(found, self.error_of(self.path, *options))
+
     def test_list(self):
         network(self.path)
         text = export_stem.layer_list.text(export_stem.layer_list.of_graph(self.path, None))

@@ -103,6 +103,7 @@ def _of_stems(options):
 
 
 def _of_graph(options):
+    whole = graph_cut.read(options.weights)  # a broken file is said before what is missing beside it
     if not options.layers:
         raise WeightsError(f"{options.weights}: expected --layers (--list shows them), found none")
     if options.preprocessing is None:
@@ -111,7 +112,7 @@ def _of_graph(options):
     if options.padding != "none" or options.fold is not None:
         raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
     with graph_cut.refusing_unsound(options.weights):
-        model, layers = graph_cut.cut(options.weights, graph_cut.read(options.weights), options.layers,
+        model, layers = graph_cut.cut(options.weights, whole, options.layers,
                                       families.PREPROCESSING[options.preprocessing], options.size, options.filter)
     model = graph_check.checked(options.weights, model, layers, options.size)
     notes = tuple(f"{layer.name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
