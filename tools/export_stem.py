@@ -70,7 +70,8 @@ def parse_arguments(arguments):
     parser.add_argument("--preprocessing", choices=sorted(families.PREPROCESSING), help="what the network is fed (.onnx: needed)")
     parser.add_argument("--name", help="of the model (default: of the file)")
     parser.add_argument("--padding", type=parse_padding, default="none", help="none | same | T,L,B,R (default: none)")
-    parser.add_argument("--network", help="for the manifest (default: as found, else the name); a known one is held against the file")
+    parser.add_argument("--network", help="for the manifest (default: as found, else the name); a known one is held "
+                        "against the file (of .npz and .onnx: against the first convolution)")
     parser.add_argument("--layer", default="stem", help="of an .npz, for the manifest (default: stem)")
     parser.add_argument("--licence", default="unknown", help="of the weights, for the manifest (default: unknown)")
     parser.add_argument("--default-filter", type=int, default=0)

@@ -124,6 +124,13 @@ class Cut(Files):
         self.assertIn("expected --preprocessing", self.error_of(self.path, "--layers", "front"))
         self.assertIn("--filter: expected 0 to 5, found 6", self.error_of(self.path, "--layers", "front", "--filter", "6", *options))
 
+    def test_a_known_network_is_held_against_the_first_convolution(self):
+        network(self.path)
+        options = ("--layers", "front", "--preprocessing", "none")
+        self.assertIn("whole.onnx: --network: expected the stem of ResNet-18 (64 filters 7x7, stride 2, batch norm), found 6 filters 5x5, stride 2",
+                      self.error_of(self.path, *options, "--network", "ResNet-18"))
+        self.assertEqual(self.export(self.path, *options, "--network", "ours")[-1]["network"], "ours")
+
     def test_the_file_is_read_before_more_is_asked_for(self):
         for content, found in ((b"text", "expected an .onnx file, found:"), (None, "expected an .onnx file, found nothing")):
             self.path.unlink(missing_ok=True)

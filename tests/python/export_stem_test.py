@@ -142,9 +142,9 @@ class Manifest(Folder):
 
 
 class Errors(Folder):
-    def expect(self, weights, *words):
+    def expect(self, weights, *words, options=()):
         with self.assertRaises((export_stem.weights.WeightsError, manifest.ManifestError)) as caught:
-            export_stem.export(export_stem.parse_arguments([str(weights), "--out", str(self.folder / "out")]))
+            export_stem.export(export_stem.parse_arguments([str(weights), "--out", str(self.folder / "out"), *options]))
         message = str(caught.exception)
         self.assertNotIn("\n", message)
         for word in words:
@@ -160,6 +160,24 @@ class Errors(Folder):
         self.expect(self.save(good | {"stride": np.int32(0)}), "stride", "found 0")
         self.expect(self.save(good | {"extra": np.int32(0)}), "found extra")
         self.expect(self.save(good | {"conv_w": np.array(["a"])}), "conv_w")
+
+    def test_a_known_network_is_held_against_the_arrays(self):
+        def stem(filters, kernel, stride, norm, **more):
+            arrays = {key: np.resize(value, (filters, 3, kernel, kernel) if key == "conv_w" else filters) if np.ndim(value) and "input" not in key else value
+                      for key, value in random_arrays((kernel, kernel), stride, norm=norm).items()}
+            return self.save(arrays | more, f"{filters}.npz")
+
+        for arrays, network, found in (
+                ((64, 7, 2, "none"), "EfficientNetV2-B0", "found 64 filters 7x7, stride 2"), ((32, 3, 1, "batch"), "efficientnetv2-b0", "found 32 filters 3x3, stride 1"),
+                ((24, 3, 2, "batch"), "EfficientNetV2-B0", "found 24 filters 3x3, stride 2"), ((32, 3, 2, "layer"), "EfficientNetV2-B0", "layer norm")):
+            self.expect(stem(*arrays), ".npz: --network: expected the stem of EfficientNetV2-B0 (32 filters 3x3, stride 2, batch norm)", found,
+                        options=("--network", network))
+            self.assertFalse((self.folder / "out").exists())
+        self.expect(stem(96, 4, 4, "batch"), "ConvNeXt-Tiny (96 filters 4x4, stride 4, layer norm), found 96 filters 4x4, stride 4, batch norm",
+                    options=("--network", "ConvNeXt-Tiny"))
+        for arrays, network in (((64, 7, 2, "none"), "ResNet-18"), ((32, 3, 2, "batch"), "EfficientNetV2-B0"), ((96, 4, 4, "layer"), "convnext-tiny"),
+                                ((64, 7, 2, "none"), "my own network")):
+            self.assertIn(network, [entry["network"] for entry in self.export(stem(*arrays), "--network", network)])
 
     def test_damaged_files(self):
         whole = self.save(random_arrays((3, 3), 2, norm="batch")).read_bytes()

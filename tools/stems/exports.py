@@ -45,7 +45,7 @@ def _chosen(path, stems, wanted, default):
 def _stems_of(options):
     """Name -> stem, the default layer, the network's name, notes."""
     if options.weights.suffix == ".npz":
-        return {options.layer: weights.load(options.weights, options.padding)}, options.layer, None, ()
+        return {options.layer: weights.load(options.weights, options.padding, options.network)}, options.layer, None, ()
     size = options.size or (2, 2)
     found = pretrained.load(options.weights, options.padding, size, options.network, options.preprocessing)
     notes = ()
@@ -102,6 +102,19 @@ def _of_stems(options):
     return Export(onnx_writer.to_bytes(onnx_writer.build_layers(named, options.filter)), layers, network, notes)
 
 
+def _check_network(options, model):
+    """Error: another first convolution than that of the known network it should be."""
+    if families.find(options.network) is None:
+        return
+    first = graph_cut.first_convolution(options.weights, model)
+    if first is None:
+        raise WeightsError(f"{options.weights}: --network: expected the first convolution of {options.network}, found none whose "
+                           f"weights are in the file (leave --network out, or give another name)")
+    wrong = families.mismatch(options.network, *first)
+    if wrong:
+        raise WeightsError(f"{options.weights}: --network: {wrong}")
+
+
 def _of_graph(options):
     whole = graph_cut.read(options.weights)  # a broken file is said before what is missing beside it
     if not options.layers:
@@ -112,6 +125,7 @@ def _of_graph(options):
     if options.padding != "none" or options.fold is not None:
         raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
     with graph_cut.refusing_unsound(options.weights):
+        _check_network(options, whole)
         model, layers = graph_cut.cut(options.weights, whole, options.layers,
                                       families.PREPROCESSING[options.preprocessing], options.size, options.filter)
     model = graph_check.checked(options.weights, model, layers, options.size)

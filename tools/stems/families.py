@@ -109,3 +109,25 @@ NETWORKS = (
     Network("ResNet-50", 64, 16, _RESNET, bottleneck=True), Network("ResNet-101", 64, 33, _RESNET, bottleneck=True),
     Network("ResNet-152", 64, 50, _RESNET, bottleneck=True),
 )
+
+
+def find(name):
+    """The known network of that name, whatever its case; None if there is none."""
+    return next((network for network in NETWORKS if name and network.name.lower() == name.lower()), None)
+
+
+def mismatch(name, filters, kernel, stride, norm=None):
+    """What tells that a first convolution is not a known network's: "expected .., found ..", or None: it is like it, or no known
+    network has that name. kernel: height, width. norm: layer, batch, or None where it is folded, left out or not known."""
+    network = find(name)
+    if network is None:
+        return None
+    layout = LAYOUTS[next(iter(network.layouts))]  # the libraries agree on these
+
+    def described(count, height, width, step, kind):
+        return f"{count} filters {height}x{width}, stride {step}" + (f", {kind} norm" if kind else "")
+
+    if (filters, *kernel, stride, norm or layout.norm_kind) == (network.filters, layout.kernel, layout.kernel, layout.stride, layout.norm_kind):
+        return None
+    return (f"expected the stem of {network.name} ({described(network.filters, layout.kernel, layout.kernel, layout.stride, layout.norm_kind)}), "
+            f"found {described(filters, *kernel, stride, norm)}")

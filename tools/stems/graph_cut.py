@@ -139,6 +139,21 @@ def layers_at(path, model, size):
     return found
 
 
+def first_convolution(path, model):
+    """Filters, (height, width) of the kernel and stride of the first convolution of the picture; None where its weights are not in
+    the file."""
+    _image_input(path, model)
+    shapes = {item.name: list(item.dims) for item in model.graph.initializer}
+    for node in model.graph.node:
+        if node.op_type == "Constant":
+            shapes |= {node.output[0]: list(item.t.dims) for item in node.attribute if item.name == "value"}
+        if node.op_type == "Conv" and len(shapes.get(node.input[1], ())) == 4 and shapes[node.input[1]][1] == 3:
+            filters, _, *kernel = shapes[node.input[1]]
+            strides = next((list(item.ints) for item in node.attribute if item.name == "strides"), [1])
+            return filters, kernel, strides[0]
+    return None
+
+
 def _start(colours_last):
     return receptive_field.Field(axes=(1, 2) if colours_last else (2, 3))
 

@@ -140,9 +140,8 @@ def identify(file):
 
 def _check_network(file, networks, wanted):
     """wanted: a known network's name that the file should hold, or any other text."""
-    known = {network.name.lower(): network.name for network in families.NETWORKS}
-    if wanted and wanted.lower() in known and known[wanted.lower()] not in [network.name for network in networks]:
-        expected = next(network for network in families.NETWORKS if network.name.lower() == wanted.lower())
+    expected = families.find(wanted)
+    if expected is not None and expected not in networks:
         raise WeightsError(f"{file.path}: expected the weights of {expected.name} ({expected.filters} filters in the stem), "
                            f"found those of {' or '.join(network.name for network in networks)} "
                            f"({networks[0].filters} filters)")

@@ -12,6 +12,7 @@ import zlib
 
 import numpy as np
 
+from stems import families
 from stems import stem as stem_module
 
 _BATCH_NORM = ("bn_gamma", "bn_beta", "bn_mean", "bn_var", "bn_eps")
@@ -101,10 +102,21 @@ def own_padding(arrays):
     return (*before, total[0] - before[0], total[1] - before[1])
 
 
-def load(path, padding):
-    """The stem in a file. padding: (top, left, bottom, right), "none" or "same" (as trained)."""
+def _check_network(path, arrays, network):
+    """Error: arrays of another stem than a known network's."""
+    filters, _, *kernel = arrays["conv_w"].shape
+    norm = "batch" if "bn_eps" in arrays else "layer" if "ln_eps" in arrays else None
+    wrong = families.mismatch(network, filters, kernel, int(arrays["stride"]), norm)
+    if wrong:
+        raise WeightsError(f"{path}: --network: {wrong}")
+
+
+def load(path, padding, network=None):
+    """The stem in a file. padding: (top, left, bottom, right), "none" or "same" (as trained). network: what the file
+    should hold; a known one is held against the arrays."""
     arrays = _read_arrays(path)
     _check(path, arrays)
+    _check_network(path, arrays, network)
     mean, std = _preprocessing(arrays)
     weights = stem_module.fold_scale(arrays["conv_w"].astype(np.float64), std)
     bias = arrays.get("conv_b", np.zeros(weights.shape[0])).astype(np.float64)
