@@ -7,7 +7,6 @@
 #include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
 #include "stemvo/check.hpp"
-#include "threads/side_by_side.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -36,15 +35,15 @@ ChannelOdometry::ChannelOdometry(const Config& config,
 }
 
 FrameResult ChannelOdometry::process(const Channel& channel, const cv::Mat& frame) {
-  STEMVO_CHECK(!pending_.has_value(), "process() is not called between push() and finish()");
-  push(prepare(channel, frame));
-  return finish().value();
+  follow(prepare(channel, frame));
+  place();
+  return finish();
 }
 
 FrameResult ChannelOdometry::process_missing() {
-  STEMVO_CHECK(!pending_.has_value(), "process() is not called between push() and finish()");
-  push({});
-  return finish().value();
+  follow({});
+  place();
+  return finish();
 }
 
 PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& frame) {
@@ -61,21 +60,11 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   return prepared;
 }
 
-std::optional<FrameResult> ChannelOdometry::push(PreparedFrame frame) {
-  FrameInWork work;
+/// Uses the front end only: the frame before may be finished meanwhile.
+void ChannelOdometry::follow(PreparedFrame frame) {
+  STEMVO_CHECK(!followed_.has_value(), "the frame before is placed");
+  FrameInWork& work = followed_.emplace();
   work.frame = std::move(frame);
-  std::optional<FrameResult> before;
-  if (pending_.has_value()) {
-    run_side_by_side([&] { before = finish(); }, [&] { follow(work); });
-  } else {
-    follow(work);
-  }
-  place(work);
-  pending_ = std::move(work);
-  return before;
-}
-
-void ChannelOdometry::follow(FrameInWork& work) {
   if (work.frame.picture != nullptr) {
     Stopwatch watch;
     work.matches = front_end_->process(work.frame.picture);
@@ -84,7 +73,10 @@ void ChannelOdometry::follow(FrameInWork& work) {
   }
 }
 
-void ChannelOdometry::place(FrameInWork& work) {
+void ChannelOdometry::place() {
+  STEMVO_CHECK(followed_.has_value(), "a frame was followed");
+  STEMVO_CHECK(!placed_.has_value(), "the frame before is finished");
+  FrameInWork& work = placed_.emplace(*std::exchange(followed_, std::nullopt));
   if (work.frame.picture == nullptr) {
     return;
   }
@@ -105,11 +97,9 @@ void ChannelOdometry::place(FrameInWork& work) {
 }
 
 /// Uses all but the front end.
-std::optional<FrameResult> ChannelOdometry::finish() {
-  if (!pending_.has_value()) {
-    return std::nullopt;
-  }
-  FrameInWork work = *std::exchange(pending_, std::nullopt);
+FrameResult ChannelOdometry::finish() {
+  STEMVO_CHECK(placed_.has_value(), "a frame was placed");
+  FrameInWork work = *std::exchange(placed_, std::nullopt);
   if (work.frame.picture == nullptr) {
     skip(work);
   } else {

@@ -35,8 +35,9 @@ class ChannelOdometry {
 
   /// The parts of process(), as in Odometry.
   [[nodiscard]] PreparedFrame prepare(const Channel& channel, const cv::Mat& frame);
-  std::optional<FrameResult> push(PreparedFrame frame);
-  std::optional<FrameResult> finish();
+  void follow(PreparedFrame frame);
+  void place();
+  FrameResult finish();
 
   void keep_landmarks();
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
@@ -62,9 +63,6 @@ class ChannelOdometry {
   };
 
   ChannelOdometry(const Config& config, const Camera& camera, std::unique_ptr<FrontEnd> front_end);
-  /// Uses the front end only: the frame before is finished meanwhile.
-  void follow(FrameInWork& work);
-  void place(FrameInWork& work);
   void refine(FrameInWork& work);
   void skip(FrameInWork& work);
   void add_road(FrameResult& result) const;
@@ -80,8 +78,9 @@ class ChannelOdometry {
   MotionChain chain_;
   std::optional<MapOdometry> map_;
 
-  std::optional<FrameInWork> pending_;  ///< placed, not refined
-  FrameInWork finished_;                ///< the last one
+  std::optional<FrameInWork> followed_;  ///< not placed
+  std::optional<FrameInWork> placed_;    ///< not refined
+  FrameInWork finished_;                 ///< the last one
   std::vector<Rigid3> poses_;
 };
 

@@ -42,9 +42,9 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 FrameResult Odometry::process(const cv::Mat& frame) {
-  const std::optional<FrameResult> before = push(prepare(frame));
-  STEMVO_CHECK(!before.has_value(), "process() is not called between push() and finish()");
-  return finish().value();
+  follow(prepare(frame));
+  place();
+  return finish();
 }
 
 FrameResult Odometry::process_missing() { return impl_->channel_odometry.process_missing(); }
@@ -65,11 +65,11 @@ PreparedFrame Odometry::prepare(const cv::Mat& frame) {
   return prepared;
 }
 
-std::optional<FrameResult> Odometry::push(PreparedFrame frame) {
-  return impl_->channel_odometry.push(std::move(frame));
-}
+void Odometry::follow(PreparedFrame frame) { impl_->channel_odometry.follow(std::move(frame)); }
 
-std::optional<FrameResult> Odometry::finish() { return impl_->channel_odometry.finish(); }
+void Odometry::place() { impl_->channel_odometry.place(); }
+
+FrameResult Odometry::finish() { return impl_->channel_odometry.finish(); }
 
 std::vector<Rigid3> Odometry::refined_trajectory() const {
   return impl_->channel_odometry.refined_trajectory();

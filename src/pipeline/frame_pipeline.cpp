@@ -7,9 +7,10 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <tuple>
 #include <utility>
 
-#include <tbb/parallel_pipeline.h>
+#include <tbb/flow_graph.h>
 
 #include "threads/hand_over.hpp"
 #include "timing/stage_timer.hpp"
@@ -17,8 +18,11 @@
 namespace stemvo::pipeline {
 namespace {
 
-/// Frames between the reader and the pose: enough that no stage waits for another's slow frame.
-constexpr std::size_t kMaxInFlight = 4;
+/// Frames at work at a time, the one whose result is awaited among them: enough that no stage waits
+/// for another's slow frame.
+constexpr std::size_t kMaxInFlight = 6;
+/// What the next frame waits for goes before what only fills the queue.
+constexpr tbb::flow::node_priority_t kUrgent = 1;
 
 struct Frame {
   std::size_t index = 0;
@@ -27,8 +31,6 @@ struct Frame {
   PreparedFrame prepared;
   HandOver between_stages;
 };
-/// Those on their way, and the last one that came through.
-using Frames = std::array<Frame, kMaxInFlight + 1>;
 
 /// Ends the run at the first exception of a stage. TBB itself must see none: a pipeline that it
 /// cancels never frees the frames on their way.
@@ -61,81 +63,145 @@ class Guard {
   std::exception_ptr first_;
 };
 
+/// What the stages do; which of them may work at the same time is the graph's business.
+class Stages {
+ public:
+  Stages(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit)
+      : sequence_(sequence), odometry_(odometry), visit_(visit) {}
+
+  /// False: there are no more frames.
+  bool start(Frame& frame) {
+    const Turn turn(between_starts_);
+    if (guard_.is_over() || num_started_ == sequence_.size()) {
+      return false;
+    }
+    const Turn stage(frame.between_stages);  // of the frame that was here
+    frame.index = num_started_++;
+    frame.started = std::chrono::steady_clock::now();
+    frame.prepared = {};
+    return true;
+  }
+  void read(Frame& frame) {
+    const Turn stage(frame.between_stages);
+    guard_.run(
+        [&] { frame.pixels = timed(Stage::kRead, [&] { return sequence_.read(frame.index); }); });
+  }
+  void prepare(Frame& frame) {
+    const Turn turn(between_prepares_);
+    const Turn stage(frame.between_stages);
+    guard_.run([&] {
+      if (frame.pixels) {
+        frame.prepared = odometry_.prepare(*frame.pixels);
+      }
+    });
+  }
+  void follow(Frame& frame) {
+    const Turn turn(between_steps_);
+    const Turn stage(frame.between_stages);
+    guard_.run([&] { odometry_.follow(std::move(frame.prepared)); });
+  }
+  void finish(Frame& frame) {
+    const Turn turn(between_steps_);
+    const Turn stage(frame.between_stages);
+    guard_.run([&] {
+      const FrameResult result = odometry_.finish();
+      if (!visit_(frame.index, frame.pixels, result)) {
+        guard_.end();
+      }
+      if (StageRecorder* recorder = StageRecorder::active()) {
+        recorder->add_frame(frame.started);
+      }
+    });
+  }
+  void place() {
+    const Turn turn(between_steps_);
+    guard_.run([&] { odometry_.place(); });
+  }
+  void rethrow() const { guard_.rethrow(); }
+
+ private:
+  const KittiSequence& sequence_;
+  Odometry& odometry_;
+  const FrameVisitor& visit_;
+  std::size_t num_started_ = 0;
+  Guard guard_;
+  HandOver between_starts_;
+  HandOver between_prepares_;
+  HandOver between_steps_;  ///< of the odometry: follow, finish, place
+};
+
 }  // namespace
 
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
-  std::size_t num_started = 0;
-  Guard guard;
-  Frames frames;
-  HandOver begin;
-  HandOver end;
-  HandOver between_starts;
-  HandOver between_prepares;
-  HandOver between_pushes;
-  const auto start = [&](tbb::flow_control& control) -> Frame* {
-    const Turn turn(between_starts);
-    if (guard.is_over() || num_started == sequence.size()) {
-      control.stop();
-      return nullptr;
-    }
-    Frame* frame = &frames.at(num_started % frames.size());
-    const Turn stage(frame->between_stages);  // of the frame that was here
-    frame->index = num_started++;
-    frame->started = std::chrono::steady_clock::now();
-    frame->prepared = {};
-    return frame;
-  };
-  const auto read = [&](Frame* frame) {
-    const Turn stage(frame->between_stages);
-    guard.run(
-        [&] { frame->pixels = timed(Stage::kRead, [&] { return sequence.read(frame->index); }); });
-    return frame;
-  };
-  const auto prepare = [&](Frame* frame) {
-    const Turn turn(between_prepares);
-    const Turn stage(frame->between_stages);
-    guard.run([&] {
-      if (frame->pixels) {
-        frame->prepared = odometry.prepare(*frame->pixels);
-      }
-    });
-    return frame;
-  };
-  Frame* before = nullptr;  // whose result the next call brings
-  const auto hand_over = [&](const std::optional<FrameResult>& result) {
-    if (!result || before == nullptr) {
-      return;
-    }
-    const Turn stage(before->between_stages);
-    if (!visit(before->index, before->pixels, *result)) {
-      guard.end();
-    }
-    if (StageRecorder* recorder = StageRecorder::active()) {
-      recorder->add_frame(before->started);
+  namespace flow = tbb::flow;
+  using Pair = std::tuple<Frame*, Frame*>;  // a frame, and the one before (null: it is the first)
+  using Starts = flow::multifunction_node<Frame*, std::tuple<Frame*>>;
+
+  Stages stages(sequence, odometry, visit);
+  const auto start = [&](Frame* frame, Starts::output_ports_type& ports) {
+    if (frame != nullptr && stages.start(*frame)) {
+      std::get<0>(ports).try_put(frame);
     }
   };
-  const auto push = [&](Frame* frame) {
-    const Turn turn(between_pushes);
-    const Turn stage(frame->between_stages);
-    guard.run([&] {
-      hand_over(odometry.push(std::move(frame->prepared)));
-      before = frame;
-    });
+  const auto read = [&](Frame* frame) { return stages.read(*frame), frame; };
+  const auto prepare = [&](Frame* frame) { return stages.prepare(*frame), frame; };
+  const auto follow = [&](const Pair& pair) {
+    stages.follow(*std::get<0>(pair));
+    return std::get<0>(pair);
+  };
+  const auto finish = [&](const Pair& pair) {
+    Frame* const before = std::get<1>(pair);
+    if (before != nullptr) {
+      stages.finish(*before);
+    }
+    return before;
+  };
+  Frame* last = nullptr;
+  const auto place = [&](const Pair& pair) {
+    stages.place();
+    return last = std::get<0>(pair);
   };
 
+  HandOver begin;
+  HandOver end;
+  flow::graph graph;
+  Starts starts(graph, flow::serial, HandedOver(begin, end, start));
+  flow::function_node<Frame*, Frame*> reads(graph, flow::unlimited, HandedOver(begin, end, read));
+  flow::sequencer_node<Frame*> in_order(graph, [](Frame* frame) { return frame->index; });
+  flow::function_node<Frame*, Frame*> prepares(graph, flow::serial,
+                                               HandedOver(begin, end, prepare));
+  flow::join_node<Pair> steps(graph);
+  flow::function_node<Pair, Frame*> follows(graph, flow::serial, HandedOver(begin, end, follow),
+                                            kUrgent);
+  flow::function_node<Pair, Frame*> finishes(graph, flow::serial, HandedOver(begin, end, finish),
+                                             kUrgent);
+  flow::join_node<Pair> both(graph);
+  flow::function_node<Pair, Frame*> places(graph, flow::serial, HandedOver(begin, end, place),
+                                           kUrgent);
+  flow::make_edge(flow::output_port<0>(starts), reads);
+  flow::make_edge(reads, in_order);
+  flow::make_edge(in_order, prepares);
+  flow::make_edge(prepares, flow::input_port<0>(steps));
+  flow::make_edge(steps, follows);   // the frame ..
+  flow::make_edge(steps, finishes);  // .. beside the one before
+  flow::make_edge(follows, flow::input_port<0>(both));
+  flow::make_edge(finishes, flow::input_port<1>(both));
+  flow::make_edge(finishes, starts);  // its place is free for the next one to be read
+  flow::make_edge(both, places);
+  flow::make_edge(places, flow::input_port<1>(steps));
+
+  std::array<Frame, kMaxInFlight> frames;
   begin.give();
-  using tbb::filter_mode;
-  tbb::parallel_pipeline(
-      kMaxInFlight,
-      tbb::make_filter<void, Frame*>(filter_mode::serial_in_order, HandedOver(begin, end, start)) &
-          tbb::make_filter<Frame*, Frame*>(filter_mode::parallel, HandedOver(begin, end, read)) &
-          tbb::make_filter<Frame*, Frame*>(filter_mode::serial_in_order,
-                                           HandedOver(begin, end, prepare)) &
-          tbb::make_filter<Frame*, void>(filter_mode::serial_in_order,
-                                         HandedOver(begin, end, push)));
+  flow::input_port<1>(steps).try_put(nullptr);
+  for (Frame& frame : frames) {
+    starts.try_put(&frame);
+  }
+  graph.wait_for_all();
   end.take();
-  guard.run([&] { hand_over(odometry.finish()); });
-  guard.rethrow();
+  if (last != nullptr) {
+    stages.finish(*last);
+  }
+  stages.rethrow();
 }
 
 }  // namespace stemvo::pipeline

@@ -7,8 +7,8 @@ namespace stemvo::internal {
 
 SamplingPlan::SamplingPlan(const ModelEntry& entry, int sampling_px)
     : x{entry.kernel_px[1], entry.stride_px, sampling_px, entry.padding_px[1], entry.padding_px[3]},
-      y{entry.kernel_px[0], entry.stride_px, sampling_px, entry.padding_px[0],
-        entry.padding_px[2]} {
+      y{entry.kernel_px[0], entry.stride_px, sampling_px, entry.padding_px[0], entry.padding_px[2]},
+      sees_windows_only(!entry.native_sampling_only) {
   STEMVO_CHECK(sampling_px >= 1 && entry.stride_px % sampling_px == 0,
                "sampling divides the stride");
 }

@@ -52,6 +52,7 @@ struct SamplingPlan {
 
   SamplingAxis x;
   SamplingAxis y;
+  bool sees_windows_only = true;  ///< an output depends on its window: checked when it is loaded
 
   [[nodiscard]] int num_passes() const { return x.num_shifts() * y.num_shifts(); }
   /// Column and row where pass `index` starts in the buffer; row-major.

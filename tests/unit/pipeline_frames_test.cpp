@@ -117,17 +117,22 @@ TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
   EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
 }
 
-TEST_F(FramePipeline, PushReturnsTheFrameBeforeAndFinishTheLast) {
-  Odometry odometry = this->odometry();
-  EXPECT_FALSE(odometry.finish().has_value());
-  EXPECT_FALSE(odometry.push(odometry.prepare(sequence_->read(0).value())).has_value());
-  const auto first = odometry.push(odometry.prepare(sequence_->read(1).value()));
-  ASSERT_TRUE(first.has_value());
-  EXPECT_EQ(first->state, FrameState::kFirst);
-  const auto second = odometry.finish();
-  ASSERT_TRUE(second.has_value());
-  EXPECT_GT(second->num_matches, 50);
-  EXPECT_FALSE(odometry.finish().has_value());
+TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
+  Odometry whole = odometry();
+  Odometry parts = odometry();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const cv::Mat frame = sequence_->read(i).value();
+    parts.follow(parts.prepare(frame));
+    if (i > 0) {  // of the frame before
+      EXPECT_EQ(parts.finish().num_matches,
+                whole.process(sequence_->read(i - 1).value()).num_matches);
+    }
+    parts.place();
+  }
+  const FrameResult last = parts.finish();
+  EXPECT_GT(last.num_matches, 50);
+  EXPECT_EQ(last.world_from_camera.translation,
+            whole.process(sequence_->read(2).value()).world_from_camera.translation);
 }
 
 }  // namespace

@@ -110,15 +110,17 @@ class Odometry {
   /// A frame that could not be read: keeps the clock running.
   [[nodiscard]] FrameResult process_missing();
 
-  /// What process() does, in three parts that can work on three frames at a time; the results are
+  /// What process() does, in four parts that can work on three frames at a time; the results are
   /// the same. Frames are prepared in their order, one call at a time, which may run ahead of the
   /// others in another thread.
   [[nodiscard]] PreparedFrame prepare(const cv::Mat& frame);
-  /// Follows the points to this frame and places it, while the frame before is refined; returns
-  /// the result of the frame before, if there is one that was not returned yet.
-  [[nodiscard]] std::optional<FrameResult> push(PreparedFrame frame);
-  /// The result of the last frame pushed, if it was not returned yet.
-  [[nodiscard]] std::optional<FrameResult> finish();
+  /// Follows the points to this frame, once the one before is placed.
+  void follow(PreparedFrame frame);
+  /// Refines the frame placed last, and returns its result. May run beside follow() of the next
+  /// frame, in another thread.
+  [[nodiscard]] FrameResult finish();
+  /// Places the frame followed, once the one before is finished.
+  void place();
 
   /// One pose per frame so far, as the local map last knew them: with the look-ahead of its window.
   /// Mode two_frame refines nothing: the poses as they came.
