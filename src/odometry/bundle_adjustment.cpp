@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/bundle_adjustment.hpp"
 
+#include <deque>
 #include <memory>
 #include <vector>
 
@@ -76,22 +77,22 @@ Window open_window(const LocalMap& map, const BundleAdjustmentOptions& options) 
   return window;
 }
 
-/// Adds a residual per observation; every block's order is fixed, so the result is too.
-int add_residuals(const LocalMap& map,
-                  const Camera& camera,
-                  ceres::LossFunction* loss,
-                  Window& window,
-                  ceres::Problem& problem) {
-  int num_residuals = 0;
+/// Adds a residual per observation; every block's order is fixed, so the result is too. Returns the
+/// costs, which must outlive the problem: it would keep a tree of those it had to free.
+std::deque<ReprojectionCost> add_residuals(const LocalMap& map,
+                                            const Camera& camera,
+                                            ceres::LossFunction* loss,
+                                            Window& window,
+                                            ceres::Problem& problem) {
+  std::deque<ReprojectionCost> costs;
   for_each_observation(
       map, window.points,
       [&](std::size_t keyframe, const MapObservation& observation, PointBlock& point) {
         PoseBlock& pose = window.poses[keyframe];
-        problem.AddResidualBlock(new ReprojectionCost(camera, pose.rotation, observation.uv), loss,
-                                 pose.change.data(), point.point.data());  // it takes the cost
-        ++num_residuals;
+        problem.AddResidualBlock(&costs.emplace_back(camera, pose.rotation, observation.uv), loss,
+                                 pose.change.data(), point.point.data());
       });
-  return num_residuals;
+  return costs;
 }
 
 ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
@@ -103,6 +104,8 @@ ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
   solver.function_tolerance = 1e-5;
+  // Turns, shifts and points are of like size here, and it would pass twice over the Jacobian.
+  solver.jacobi_scaling = false;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (PointBlock& point : window.points) {
     ordering->AddElementToGroup(point.point.data(), 0);
@@ -141,10 +144,12 @@ BundleAdjustmentReport refine_window(LocalMap& map,
   Window window = open_window(map, options);
   ceres::CauchyLoss loss(options.loss_scale_px);
   ceres::Problem::Options problem_options;
+  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.disable_all_safety_checks = true;
   ceres::Problem problem(problem_options);
-  report.num_residuals = add_residuals(map, camera, &loss, window, problem);
+  const auto costs = add_residuals(map, camera, &loss, window, problem);
+  report.num_residuals = static_cast<int>(costs.size());
   if (report.num_residuals == 0) {
     return report;
   }
