@@ -80,10 +80,10 @@ Window open_window(const LocalMap& map, const BundleAdjustmentOptions& options) 
 /// Adds a residual per observation; every block's order is fixed, so the result is too. Returns the
 /// costs, which must outlive the problem: it would keep a tree of those it had to free.
 std::deque<ReprojectionCost> add_residuals(const LocalMap& map,
-                                            const Camera& camera,
-                                            ceres::LossFunction* loss,
-                                            Window& window,
-                                            ceres::Problem& problem) {
+                                           const Camera& camera,
+                                           ceres::LossFunction* loss,
+                                           Window& window,
+                                           ceres::Problem& problem) {
   std::deque<ReprojectionCost> costs;
   for_each_observation(
       map, window.points,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
@@ -41,29 +42,55 @@ TEST_P(Kitti, StaysInsideTheThresholdsFromTheCameraHeight) {
   hold("camera_height", "_camera_height.yaml");
 }
 
-// 25 frames a second on two cores is measured by hand on an idle machine (README); held here, where
-// machines are shared, is the processor time of the whole program.
-void expect_processor_ms_per_frame(const std::vector<std::string>& settings, double bound_ms) {
+// Frames a second are measured by hand on an idle machine (docs/performance.md); held here, where
+// machines are shared and their clocks vary, is the processor time of the whole program.
+void expect_processor_ms_per_frame(const std::vector<std::string>& settings,
+                                   const std::string& out,
+                                   double bound_ms) {
   const auto data = test::shared_data();
-  if (!data) {
-    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
-  }
-  const test::TemporaryFolder folder;
-  std::vector<std::string> arguments = {"run",      (*data / "kitti/sequences/03").string(),
-                                        "--out",    folder / "result",
-                                        "--frames", "0:150",
-                                        "--quiet"};
+  std::vector<std::string> arguments = {
+      "run", (*data / "kitti/sequences/03").string(), "--out", out, "--frames", "0:200", "--quiet"};
   arguments.insert(arguments.end(), settings.begin(), settings.end());
   const ProgramResult run = run_stemvo(arguments);
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_LE(1000.0 * run.cpu_s / 150, bound_ms);
+  const double found_ms = 1000.0 * run.cpu_s / 200;
+  std::cout << found_ms << " ms of processor time per frame\n";
+  EXPECT_LE(found_ms, bound_ms);
 }
 
-TEST(KittiSpeed, ProcessorTimePerFrameIsBounded) { expect_processor_ms_per_frame({}, 80.0); }
+class KittiSpeed : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!test::shared_data()) {
+      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+    }
+  }
+  static double t_rel_percent(const std::string& out) {
+    return nlohmann::json::parse(test::read_file(out + "/metrics.json")).at("t_rel_percent");
+  }
+  test::TemporaryFolder folder_;
+};
 
-TEST(KittiSpeed, ProcessorTimePerFrameOfPairsIsBounded) {
+// 14 ms on an idle machine with a fast clock.
+TEST_F(KittiSpeed, ProcessorTimePerFrameIsBounded) {
+  expect_processor_ms_per_frame({}, folder_ / "result", 40.0);
+}
+
+// 11 ms.
+TEST_F(KittiSpeed, ProcessorTimePerFrameOfPairsIsBounded) {
   expect_processor_ms_per_frame(
-      {"--set", "odometry.mode=two_frame", "--set", "scale.source=constant"}, 55.0);
+      {"--set", "odometry.mode=two_frame", "--set", "scale.source=constant"}, folder_ / "result",
+      30.0);
+}
+
+// 9 ms; t_rel of these frames at most 1.5 times the defaults'.
+TEST_F(KittiSpeed, FastYamlIsCheaperAndNearlyAsAccurate) {
+  const std::string whole = folder_ / "defaults";
+  const std::string fast = folder_ / "fast";
+  expect_processor_ms_per_frame({}, whole, 40.0);
+  expect_processor_ms_per_frame(
+      {"--threads", "1", "--config", STEMVO_SOURCE_DIR "/config/fast.yaml"}, fast, 25.0);
+  EXPECT_LE(t_rel_percent(fast), 1.5 * t_rel_percent(whole));
 }
 
 INSTANTIATE_TEST_SUITE_P(Clips,

@@ -161,4 +161,14 @@ inline std::vector<cv::Mat1d> reference_channels(const TinyStem& stem,
   return channels;
 }
 
+/// Largest difference over the standard deviation.
+inline double relative_error(const cv::Mat& found, const cv::Mat1d& expected) {
+  cv::Mat1d values;
+  found.convertTo(values, CV_64F);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(expected, mean, deviation);
+  return cv::norm(values, expected, cv::NORM_INF) / deviation[0];
+}
+
 }  // namespace stemvo::testing

@@ -49,16 +49,6 @@ cv::Rect inside(const TinyStem& tiny, cv::Size frame, int sampling) {
   return {x, y, end(tiny.padding[1], frame.width) - x, end(tiny.padding[0], frame.height) - y};
 }
 
-/// Largest difference over the standard deviation.
-double relative_error(const cv::Mat& found, const cv::Mat1d& expected) {
-  cv::Mat1d values;
-  found.convertTo(values, CV_64F);
-  cv::Scalar mean;
-  cv::Scalar deviation;
-  cv::meanStdDev(expected, mean, deviation);
-  return cv::norm(values, expected, cv::NORM_INF) / deviation[0];
-}
-
 struct Case {
   const TinyStem* stem;
   int sampling;
@@ -85,7 +75,7 @@ TEST_P(StemSampling, EqualsTheConvolutionWithTheSmallerStride) {
         ASSERT_EQ(values.size(), expected[i].size());
         const cv::Rect part =
             native ? cv::Rect({0, 0}, values.size()) : inside(*tiny, size, sampling);
-        EXPECT_LE(relative_error(values(part), expected[i](part)), 1e-5)
+        EXPECT_LE(testing::relative_error(values(part), expected[i](part)), 1e-5)
             << size << " filter " << i << " type " << type;
         EXPECT_TRUE(cv::checkRange(values));
       }
@@ -257,151 +247,6 @@ TEST_F(StemErrors, SmallFramesAndFixedSizes) {
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
   EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
               HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
-}
-
-TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
-  for (const int type : {CV_8UC1, CV_8UC3}) {
-    for (const cv::Size size : kSizes) {
-      const cv::Mat frame = testing::textured_frame(size, type);
-      StemOptions options{.model = "gray_k4s4"};
-      const auto folded = Stem::create(options, folder.path());
-      ASSERT_TRUE(folded) << folded.error().message;
-      EXPECT_EQ(folded->info().num_filters, 6);
-      const cv::Mat alone = folded->apply(frame)->values;
-      const cv::Mat with_others = folded->apply_range(frame, 1, 2)->front().values;
-      ASSERT_EQ(alone.size(), with_others.size());
-      EXPECT_EQ(cv::norm(alone, with_others, cv::NORM_INF), 0.0);
-      EXPECT_EQ(folded->apply(frame)->map.to_input({3, 4}), Eigen::Vector2d(7.5, 9.5));
-    }
-  }
-}
-
-/// The formula of make_models.py, at one pixel of a channel sampled every 2 pixels.
-double gray_response(const cv::Mat1d& gray, cv::Point at, int filter) {
-  double power = 9.0;
-  double own = 0.0;
-  for (int o = 0; o < 6; ++o) {
-    double z = 0.0;
-    for (int y = 0; y < 4; ++y) {
-      for (int x = 0; x < 4; ++x) {
-        const double weight = o == 0 ? 1.0 / 48.0 : testing::kNorm4.weight(o, 0, y, x);
-        z += weight * gray(2 * at.y + y, 2 * at.x + x);
-      }
-    }
-    power += z * z;
-    own = o == filter ? z : own;
-  }
-  return own / std::sqrt(power);
-}
-
-TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
-  const cv::Mat frame = testing::textured_frame({97, 66}, CV_8UC3);
-  cv::Mat3d colours;
-  frame.convertTo(colours, CV_64F);
-  cv::Mat1d gray(frame.size());
-  std::transform(colours.begin(), colours.end(), gray.begin(), [](const cv::Vec3d& rgb) {
-    return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
-  });
-  for (const int filter : {0, 1, 5}) {  // 1 has a file of its own
-    const auto stem = Stem::create({.model = "gray_k4s4", .filter = filter}, folder.path());
-    const cv::Mat1f values = stem->apply(frame)->values;
-    for (const cv::Point at : {cv::Point(0, 0), cv::Point(11, 7), cv::Point(46, 30)}) {
-      EXPECT_NEAR(values(at), gray_response(gray, at, filter), 1e-5);
-    }
-  }
-}
-
-TEST(StemFolded, ADamagedFileIsNotLoaded) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
-  (void)folder.file("gray_k4s4_filter_1.onnx", "no longer what it was");
-  const auto error_of = [&](int filter) {
-    const auto stem = Stem::create({.model = "gray_k4s4", .filter = filter}, folder.path());
-    return stem ? "no error" : stem.error().message;
-  };
-  EXPECT_THAT(error_of(1), HasSubstr("gray_k4s4_filter_1.onnx: expected sha256 "));
-  EXPECT_EQ(error_of(2), "no error");
-  EXPECT_FALSE(check_model(find_layers("gray_k4s4", folder.path())->front()));
-}
-
-StemOptions layer_options(const std::string& model,
-                          const std::string& layer,
-                          int sampling_px = 0,
-                          int filter = -1) {
-  StemOptions options;
-  options.model = model;
-  options.layer = layer;
-  options.sampling_px = sampling_px;
-  options.filter = filter;
-  return options;
-}
-
-TEST(StemLayers, EachLayerHasItsOwnFiltersAndPixelMap) {
-  const testing::TempFolder folder;
-  testing::write_two_layers(folder);
-  const auto layers = find_layers("two", folder.path());
-  ASSERT_TRUE(layers) << layers.error().message;
-  ASSERT_EQ(layers->size(), 2U);
-  EXPECT_EQ(layers->front().layer, "stem");
-  EXPECT_EQ(layers->back().num_filters, 2);
-
-  const cv::Mat frame = testing::textured_frame({96, 64}, CV_8UC3);
-  const auto expected = testing::reference_channels(testing::kPlain4, frame, 4);
-  const auto first = Stem::create(layer_options("two", "first", 4), folder.path());
-  ASSERT_TRUE(first) << first.error().message;
-  EXPECT_EQ(first->info().layer, "stem");
-  EXPECT_LE(relative_error(first->apply_all(frame)->at(2).values, expected[2]), 1e-5);
-
-  const auto deep = Stem::create(layer_options("two", "deep"), folder.path());
-  ASSERT_TRUE(deep) << deep.error().message;
-  EXPECT_EQ(deep->info().sampling_px, 4);
-  const auto channel = deep->apply_range(frame, 0, 1);
-  ASSERT_TRUE(channel) << channel.error().message;
-  ASSERT_EQ(channel->size(), 1U);
-  EXPECT_EQ(channel->front().map.to_input({5, 5}), Eigen::Vector2d(21.5, 21.5));
-  const cv::Mat1f values = channel->front().values;
-  EXPECT_NEAR(values(5, 6), cv::mean(expected[0](cv::Rect(5, 4, 3, 3)))[0], 1e-3);
-}
-
-TEST(StemLayers, RefusesUnknownLayersAndDenserSampling) {
-  const testing::TempFolder folder;
-  testing::write_two_layers(folder);
-  const auto error_of = [&](const StemOptions& options) {
-    const auto stem = Stem::create(options, folder.path());
-    return stem ? "no error" : stem.error().message;
-  };
-  EXPECT_EQ(error_of(layer_options("two", "top")),
-            "two: stem.layer: expected one of stem, deep, found 'top'");
-  EXPECT_EQ(error_of(layer_options((folder / "two_layers.onnx").string(), "deep")), "no error");
-  EXPECT_THAT(error_of(layer_options("two", "deep", 2)),
-              HasSubstr("stem.sampling_px: expected 4 for layer deep"));
-  EXPECT_THAT(error_of(layer_options("two", "deep", 0, 2)),
-              HasSubstr("expected 0 to 1 for two layer deep, found 2"));
-  EXPECT_THAT(error_of(layer_options("gray", "deep")),
-              HasSubstr("stem.layer: expected none for gray, found 'deep'"));
-}
-
-TEST(StemLayers, ALayerThatSeesTheWholeFrameIsRefusedForDenseSampling) {
-  const testing::TempFolder folder;
-  testing::write_two_layers(folder);
-  std::string text = testing::read_all(folder / "manifest.yaml");
-  (void)folder.file("manifest.yaml", text.replace(text.find("native"), 6, "any"));
-  const auto stem = Stem::create(layer_options("two", "deep"), folder.path());
-  EXPECT_THAT(stem ? "no error" : stem.error().message,
-              HasSubstr("found that pixels outside it matter"));
-}
-
-TEST(StemLayers, SizesAreHeldAgainstTheManifestEvenAtTheNativeStride) {
-  const testing::TempFolder folder;
-  testing::write_two_layers(folder);
-  std::string text = testing::read_all(folder / "manifest.yaml");
-  (void)folder.file("manifest.yaml", text.replace(text.find("[12, 12]"), 8, "[17, 17]"));
-  const auto stem = Stem::create(layer_options("two", "deep"), folder.path());
-  EXPECT_THAT(stem ? "no error" : stem.error().message, HasSubstr("expected channels of"));
 }
 
 }  // namespace
