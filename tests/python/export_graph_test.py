@@ -142,9 +142,10 @@ class Cut(Files):
     def test_list(self):
         network(self.path)
         text = export_stem.layer_list.text(export_stem.layer_list.of_graph(self.path, None))
-        self.assertRegex(text, r"front +Conv +6  yes\n")
+        self.assertRegex(text, r"front +convolution +6  yes\n")
         self.assertRegex(text, r"last +Transpose +6  no\n")
-        self.assertIn("(in 3 convolutions)", text)
+        self.assertRegex(text, r"second +depthwise +6  no\n")
+        self.assertIn("used 12 (in 2 convolutions)", text)
 
 
 class Window(unittest.TestCase):

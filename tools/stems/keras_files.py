@@ -17,7 +17,7 @@ import zipfile
 import h5py
 
 # Order of the variables in Keras 3.
-_VARIABLES = {"conv2d": ("kernel", "bias"), "depthwise_conv2d": ("kernel", "bias"), "dense": ("kernel", "bias"),
+_VARIABLES = {"conv2d": ("kernel", "bias"), "conv2d_transpose": ("kernel", "bias"), "depthwise_conv2d": ("kernel", "bias"), "dense": ("kernel", "bias"),
               "separable_conv2d": ("depthwise_kernel", "pointwise_kernel", "bias"),
               "layer_normalization": ("gamma", "beta"),
               "batch_normalization": ("gamma", "beta", "moving_mean", "moving_variance")}

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: MIT
 """What `export_stem.py --list` prints: the layers of a network, their filters, and which are used by the paper's search
 and which not, with the totals of its Table 1. The paper does not say its rule; this one gives its numbers exactly on
-Keras' own networks (docs/search.md): used are plain convolutions (class Conv2D, not separable or depthwise ones);
-layers nested in others and dense ones do not count.
+Keras' own networks (docs/search.md): used are plain convolutions (class Conv2D, not separable, depthwise or transposed
+ones); layers nested in others and dense ones do not count.
+
+The rule is one for all files (Row.used); what they tell of a layer differs. A Keras file names its class, or has arrays of
+its own for it. PyTorch's arrays show a depthwise convolution by its kernel of one plane, but not that a 1x1 convolution
+follows one directly (Keras' separable convolution), which a whole .onnx does. Neither knows of nested layers.
 """
 
 import dataclasses
@@ -18,8 +22,12 @@ class Row:
     name: str
     kind: str
     filters: int | None  # None: the file does not say
-    used: bool
     outer: str = ""  # a nested layer counts with the one it is in
+
+    @property
+    def used(self):
+        """By the paper's search."""
+        return self.kind == "convolution" and not self.outer
 
     @property
     def counted(self):
@@ -30,21 +38,22 @@ class Row:
 def of_weights(path):
     """A weights file's layers; where it holds arrays only, layers without weights are not in it."""
     file = weight_files.load(path)
-    return [Row(layer.name, layer.kind or "no weights", layer.filters, layer.kind == "convolution" and not layer.outer, layer.outer)
-            for layer in file.layers]
+    return [Row(layer.name, layer.kind or "no weights", layer.filters, layer.outer) for layer in file.layers]
 
 
 def of_arrays(path):
     """An .npz holds one stem."""
     stem = weights.load(path, "none")
-    return [Row("stem", "convolution", stem.filters, True)]
+    return [Row("stem", "convolution", stem.filters)]
 
 
 def of_graph(path, size):
     """All nodes of an .onnx that give a tensor."""
     with graph_cut.refusing_unsound(path):
-        layers = graph_cut.layers_at(path, graph_cut.read(path), size or (256, 256))
-    return [Row(node.output[0], node.op_type, filters, node.op_type in ("Conv", "ConvTranspose")) for node, filters in layers
+        model = graph_cut.read(path)
+        kinds = graph_cut.kinds_of(model)
+        layers = graph_cut.layers_at(path, model, size or (256, 256))
+    return [Row(node.output[0], kinds.get(node.output[0], node.op_type), filters) for node, filters in layers
             if filters is not None and node.op_type not in ("Constant", "Identity", "Shape")]
 
 

@@ -25,7 +25,7 @@ class Layer:
     """A layer with its arrays. Shapes are known at once, values are read when asked for."""
 
     name: str
-    kind: str  # "convolution", "separable", "depthwise", "normalization", "dense", "other", "" where it has no weights
+    kind: str  # "convolution", "separable", "depthwise", "transposed", "normalization", "dense", "other", "" where it has no weights
     filters: int | None  # None: no weights, so the file does not say
     shapes: dict  # name of the array -> shape
     read: object  # name of the array -> values
@@ -57,7 +57,7 @@ def _keras_kind(layer, shapes):
     if _is_depthwise(layer, shapes):
         return "depthwise"
     if len(kernel) in (3, 4, 5):
-        return "convolution"
+        return "transposed" if layer.kind.endswith("_transpose") else "convolution"
     if "normalization" in layer.kind or "gamma" in shapes and len(shapes) > 1:
         return "normalization"
     return "dense" if kernel else "other" if shapes else ""
@@ -68,7 +68,8 @@ def _keras_filters(layer, shapes):
         return shapes["pointwise_kernel"][-1]
     kernel = shapes.get("kernel", shapes.get("depthwise_kernel"))
     if kernel:
-        return kernel[-2] * kernel[-1] if _is_depthwise(layer, shapes) else kernel[-1]
+        outputs = kernel[-2] if layer.kind.endswith("_transpose") else kernel[-1]
+        return kernel[-2] * kernel[-1] if _is_depthwise(layer, shapes) else outputs
     return max((shape[-1] for shape in shapes.values() if shape), default=None)
 
 
@@ -84,7 +85,7 @@ def _read_keras(path):
 def _torch_kind(shapes):
     weight = shapes.get("weight", ())
     if len(weight) in (3, 4, 5):
-        return "convolution"
+        return "depthwise" if weight[1] == 1 and weight[0] > 1 else "convolution"
     if len(weight) == 2:
         return "dense"
     return "normalization" if len(weight) == 1 else "other"
