@@ -45,7 +45,7 @@ cluster: setup
 	@tools/setup.sh cluster
 
 test-frameworks: setup
-	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py
+	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py tests/frameworks/table_1.py
 
 format: setup
 	@tools/format.sh

@@ -12,6 +12,7 @@ import _environment  # noqa: F401  starts this tool again in the environment of 
 import argparse
 import json
 import pathlib
+import re
 import resource
 import subprocess
 import sys
@@ -80,13 +81,19 @@ def multiplication_rate(channels=256, height=47, width=155, repeats=10):
     return repeats * channels * channels * 9 * height * width / (time.process_time() - start)
 
 
+def positive(text):
+    if not re.fullmatch(r"[1-9]\d{0,5}", text):
+        raise argparse.ArgumentTypeError(f"expected a whole number >= 1, found {text!r}")
+    return int(text)
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sequence", metavar="SEQUENCE_DIR", type=pathlib.Path)
-    parser.add_argument("--filters", type=int, default=16, help="of each layer (default: %(default)s)")
-    parser.add_argument("--frames", type=int, default=60, help="(default: %(default)s)")
-    parser.add_argument("--block", type=int, default=16, help="filters in flight, as of stemvo search (default: %(default)s)")
-    parser.add_argument("--strides", type=int, nargs="+", default=STRIDES, help="(default: 2 4 8 16)")
+    parser.add_argument("--filters", type=positive, default=16, help="of each layer (default: %(default)s)")
+    parser.add_argument("--frames", type=positive, default=60, help="(default: %(default)s)")
+    parser.add_argument("--block", type=positive, default=16, help="filters in flight, as of stemvo search (default: %(default)s)")
+    parser.add_argument("--strides", type=positive, nargs="+", default=STRIDES, help="(default: 2 4 8 16)")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/stemvo", help="(default: %(default)s)")
     options = parser.parse_args(arguments)
     print("stride  filter-frames per core-second  motions measured  memory so far MiB")

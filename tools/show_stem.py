@@ -124,6 +124,9 @@ def main(arguments=None):
     except ShowError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
+    except OSError as error:
+        print(f"error: {error.filename}: expected to write here, found: {error.strerror}", file=sys.stderr)
+        return 1
     return 0
 
 
