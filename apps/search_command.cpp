@@ -179,8 +179,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
   command
       .add_option(
           "--block", request.block,
-          "Filters in flight: what a kill may lose. One pass of the stem serves a block: a\n"
-          "wide, slow stem wants a larger one, which takes more memory; default: 16")
+          "Filters in flight: what a kill may lose. One pass of the stem serves a block, so the\n"
+          "default is a whole layer, as far as about 1 GB allows")
       ->type_name("N")
       ->check(in_range(1, 100000));
   command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")

@@ -46,16 +46,21 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
   return sequence;
 }
 
-std::string unusable_reason(const PlanLayer& layer, const Camera& camera) {
+/// Whether a layer's filters can be run on frames of this size.
+void add_layer(const PlanLayer& layer, PlanSequence& planned) {
+  const Camera& camera = planned.sequence.camera();
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
   const auto channels = layer.stem.apply_range(blank, layer.first, layer.first + 1);
+  std::string& unusable = planned.unusable.emplace_back();
+  cv::Size& size = planned.channels.emplace_back();
   if (!channels) {
-    return channels.error().message;
+    unusable = channels.error().message;
+    return;
   }
-  const cv::Size size = channels->front().values.size();
-  return std::min(size.width, size.height) < kLeastSide_px
-             ? fmt::format("channel {}x{}", size.width, size.height)
-             : std::string();
+  size = channels->front().values.size();
+  if (std::min(size.width, size.height) < kLeastSide_px) {
+    unusable = fmt::format("channel {}x{}", size.width, size.height);
+  }
 }
 
 Status add_sequence(const SearchRequest& request,
@@ -89,9 +94,9 @@ Status add_sequence(const SearchRequest& request,
   if (!is_run) {
     return {};
   }
-  PlanSequence planned{std::move(*sequence), is_held_out, {}};
+  PlanSequence planned{std::move(*sequence), is_held_out, {}, {}};
   for (const PlanLayer& layer : plan.layers) {
-    planned.unusable.push_back(unusable_reason(layer, planned.sequence.camera()));
+    add_layer(layer, planned);
   }
   plan.sequences.push_back(std::move(planned));
   return {};

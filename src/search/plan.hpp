@@ -20,6 +20,7 @@ struct PlanLayer {
   Stem stem;
   int first = 0;
   int last = 0;
+  std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
 };
 
 struct Candidate {
@@ -33,6 +34,7 @@ struct PlanSequence {
   bool is_held_out = false;
   /// One per layer: why its filters cannot be run on frames of this size; empty: they can.
   std::vector<std::string> unusable;
+  std::vector<cv::Size> channels;  ///< the size of each layer's; empty where that is not known
 };
 
 /// A search that was found to be possible.

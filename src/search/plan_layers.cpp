@@ -168,6 +168,10 @@ Expected<std::vector<PlanLayer>> plan_layers(const SearchRequest& request) {
   if (!status) {
     return tl::unexpected(status.error());
   }
+  for (std::size_t i = 0; i < layers.size(); ++i) {  // gray and R, G, B take no pass: one for all
+    const bool goes_on = i > 0 && is_input(layers[i].model) && is_input(layers[i - 1].model);
+    layers[i].pass = goes_on ? layers[i - 1].pass : i;
+  }
   return layers;
 }
 

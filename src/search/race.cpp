@@ -6,8 +6,10 @@
 #include <set>
 #include <utility>
 
+#include "search/blocks.hpp"
 #include "search/ranking.hpp"
 #include "stemvo/check.hpp"
+#include "stemvo/config.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -29,7 +31,7 @@ Race::Race(const SearchPlan& plan,
            std::size_t most_kept)
     : plan_(plan),
       evaluation_(request.config.evaluation),
-      block_size_(static_cast<std::size_t>(std::max(1, request.block))),
+      block_size_(static_cast<std::size_t>(std::max(0, request.block))),
       most_kept_(most_kept),
       progress_(std::move(progress)),
       writer_(std::move(writer)) {
@@ -113,16 +115,45 @@ Status Race::run_rung(std::size_t rung, const Block& alive) {
     }
   }
   for (const Block& group : {going_on, starting}) {
-    for (std::size_t begin = 0; begin < group.size() && !is_stopped_; begin += block_size_) {
-      const std::size_t end = std::min(begin + block_size_, group.size());
-      const Block block(group.begin() + static_cast<std::ptrdiff_t>(begin),
-                        group.begin() + static_cast<std::ptrdiff_t>(end));
+    for (const Block& block : cut(group)) {
+      if (is_stopped_) {
+        return {};
+      }
       if (Status status = run_block_of(rung, block); !status) {
         return status;
       }
     }
   }
   return {};
+}
+
+std::vector<Race::Block> Race::cut(const Block& group) const {
+  std::vector<Flight> flights;
+  for (const std::size_t candidate : group) {
+    const std::size_t layer = plan_.candidates[candidate].layer;
+    Flight& flight =
+        flights.emplace_back(Flight{.layer = layer, .pass = plan_.layers[layer].pass, .bytes = 0});
+    for (const PlanSequence& sequence : plan_.sequences) {
+      const cv::Size channel = sequence.channels[layer];
+      flight.bytes = std::max(flight.bytes, bytes_in_flight(channel, picture_size(layer, sequence),
+                                                            plan_.sequences.size()));
+    }
+  }
+  std::vector<Block> blocks = cut_into_blocks(flights, block_size_);
+  for (Block& block : blocks) {
+    for (std::size_t& index : block) {
+      index = group[index];
+    }
+  }
+  return blocks;
+}
+
+/// What the odometry of a layer works on.
+cv::Size Race::picture_size(std::size_t layer, const PlanSequence& sequence) const {
+  const Camera& camera = sequence.sequence.camera();
+  const Config chosen = with_chosen_upsample(plan_.layers[layer].config, camera.width_px);
+  return chosen.stem.upsample == "native" ? sequence.channels[layer]
+                                          : cv::Size(camera.width_px, camera.height_px);
 }
 
 Status Race::run_block_of(std::size_t rung, const Block& block) {

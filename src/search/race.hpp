@@ -20,8 +20,8 @@ namespace stemvo::search {
 /// go on, they start again, which counts.
 inline constexpr std::size_t kMostKept = 512;
 
-/// Runs the rungs of a plan's schedule, in blocks of filters; each block's records are appended as
-/// it ends. Records of an earlier call are not repeated.
+/// Runs the rungs of a plan's schedule, in blocks of filters (blocks.hpp); each block's records are
+/// appended as it ends. Records of an earlier call are not repeated.
 class Race {
  public:
   /// The plan must outlive it.
@@ -50,6 +50,8 @@ class Race {
   void keep(std::size_t rung, const Block& block, std::vector<Drives> drives);
   [[nodiscard]] Block survivors(const Block& alive, std::size_t rung);
   Status run_rung(std::size_t rung, const Block& alive);
+  [[nodiscard]] std::vector<Block> cut(const Block& group) const;
+  [[nodiscard]] cv::Size picture_size(std::size_t layer, const PlanSequence& sequence) const;
   Status run_block_of(std::size_t rung, const Block& block);
   /// False: stopped before the last frame.
   bool run_sequence_of(std::size_t rung,
@@ -66,7 +68,7 @@ class Race {
 
   const SearchPlan& plan_;
   EvaluationOptions evaluation_;
-  std::size_t block_size_;
+  std::size_t block_size_;  ///< 0: by memory
   std::size_t most_kept_;
   SearchProgress progress_;
   RecordWriter writer_;

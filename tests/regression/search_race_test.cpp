@@ -66,6 +66,22 @@ class SearchRace : public Search {
   SearchRequest request_;
 };
 
+/// A frame that is done is one call of the progress, and one pass of the stem.
+TEST_F(SearchRace, OnePassServesAllFiltersUnlessABlockIsAskedFor) {
+  request_.exhaustive = true;
+  const auto num_passes = [&](const std::string& out, int block) {
+    request_.block = block;
+    request_.out_dir = folder_ / out;
+    std::size_t calls = 0;
+    const auto report = run_search(request_, [&](std::size_t, std::size_t) { return ++calls > 0; });
+    EXPECT_TRUE(report) << report.error().message;
+    return calls;
+  };
+  EXPECT_EQ(num_passes("whole", SearchRequest().block), 30U);
+  EXPECT_EQ(num_passes("four", 5), 4 * 30U);
+  EXPECT_EQ(table("four"), table("whole"));
+}
+
 TEST_F(SearchRace, OnlyTheBestAreKeptInMemoryAndTheTableIsTheSame) {
   const Outcome all = race("all", kMostKept);
   ASSERT_NE(all.table.find(",stopped,"), std::string::npos);

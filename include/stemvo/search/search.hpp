@@ -39,7 +39,9 @@ struct SearchRequest {
   std::optional<std::size_t> only_sequence;
   bool resume = false;  ///< go on from what out_dir holds
   int num_threads = 0;  ///< 0: all cores
-  int block = 16;       ///< filters in flight: what a kill may lose
+  /// Filters in flight, which is what a kill may lose; 0: those of a whole layer, so that one pass
+  /// of the stem serves them all, as far as some 1 GB of channels and odometries allows.
+  int block = 0;
 };
 
 /// One row's identity: a filter of a layer of a model, and what finds matches on its channel.
