@@ -58,12 +58,14 @@ def parse_arguments(arguments):
     parser.add_argument("sequences", metavar="SEQUENCE_DIR", nargs="+", type=pathlib.Path)
     parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True)
     parser.add_argument("--model", action="append", dest="models", help="name or path of an .onnx; may be repeated (default: default)")
-    parser.add_argument("--layers", type=lambda text: text.split(","), metavar="NAME,..", help="of the models (default: all)")
+    parser.add_argument("--layers", type=lambda text: text.split(","), metavar="NAME,..", help="of each model those that it has (default: all)")
     parser.add_argument("--filters", type=parse_range, metavar="A:B", help="of each layer (default: all)")
     parser.add_argument("--frames", type=parse_range, metavar="A:B", help="of each sequence")
     parser.add_argument("--held-out", type=pathlib.Path, metavar="DIR", help="a sequence that is reported, not ranked by")
     parser.add_argument("--held-out-frames", type=parse_range, metavar="A:B")
-    parser.add_argument("--config", type=pathlib.Path, metavar="FILE", help="as of stemvo search; read on each node")
+    parser.add_argument("--no-baselines", action="store_true", help="as of stemvo search: only the models' filters")
+    parser.add_argument("--config", metavar="FILE", help="as of stemvo search: a file, at the same path on each node, or the name of one that "
+                        "comes with stemvo, such as default")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as of stemvo search")
     parser.add_argument("--address", help="of a Ray cluster, or auto (default: this machine alone)")
     parser.add_argument("--filters-per-task", type=positive, default=32, metavar="N", help="what a lost worker may lose (default: %(default)s)")
@@ -76,13 +78,29 @@ def parse_arguments(arguments):
     return parser.parse_args(arguments)
 
 
+def find_config(given):
+    """The file, and the word for the program, which finds what comes with it by itself; as apps/options.cpp does."""
+    if given is None:
+        return None, None
+    file = pathlib.Path(given)
+    if file.exists() or len(file.parts) > 1:
+        if not file.is_file():
+            raise ClusterError(f"--config: expected a file, found {'a folder' if file.is_dir() else 'nothing'} at {given}")
+        return file, str(file.resolve())
+    folder = ROOT / "config"
+    shipped = next((folder / name for name in (given, given + ".yaml") if (folder / name).is_file()), None)
+    if shipped is None:
+        raise ClusterError(f"--config: expected a file or one of {', '.join(sorted(path.stem for path in folder.glob('*.yaml')))}, found '{given}'")
+    return shipped, given
+
+
 def common_arguments(options):
     """Of every task. Paths are absolute: a task runs in another folder, maybe on another machine."""
     words = [str(path.resolve()) for path in options.sequences]
     for name, value in (("--frames", options.frames), ("--held-out", options.held_out), ("--held-out-frames", options.held_out_frames),
-                        ("--config", options.config)):
+                        ("--config", find_config(options.config)[1])):
         if value is not None:
-            words += [name, f"{value[0]}:{value[1]}" if isinstance(value, tuple) else str(value.resolve())]
+            words += [name, f"{value[0]}:{value[1]}" if isinstance(value, tuple) else value if isinstance(value, str) else str(value.resolve())]
     for value in options.set:
         words += ["--set", value]
     return words
@@ -100,7 +118,8 @@ def model_files(models):
 
 def inputs_of(options):
     """Hashes of the program and the configuration, and what tells whether a sequence has changed."""
-    files = [options.program] + ([options.config] if options.config else [])
+    config, _ = find_config(options.config)
+    files = [options.program] + ([config] if config else [])
     sequences = options.sequences + ([options.held_out] if options.held_out else [])
     return [[hash_of(file.read_bytes()) for file in files], [plan.sequence_contents(sequence) for sequence in sequences]]
 
@@ -146,14 +165,17 @@ class Parts:
         partial.rename(self.path(task))
 
 
-def merge(options, parts, tasks):
-    """OUT/result, made anew: it holds nothing that the parts do not."""
+def merge(options, parts, tasks, warned):
+    """OUT/result, made anew: it holds nothing that the parts do not. warned: lines that were said already."""
     partial, result = options.out / ".result.partial", options.out / "result"
     shutil.rmtree(partial, ignore_errors=True)
     command = [options.program, "search", "--merge", *(parts.path(task) for task in tasks), "--out", partial]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise ClusterError(" ".join(done.stderr.removeprefix("error: ").split()) or f"{options.program} search --merge failed")
+    for line in done.stderr.splitlines():
+        if line.strip() and line not in warned:
+            print(line, file=sys.stderr)
     if not options.quiet:
         print(done.stdout.rpartition("table: ")[0], end="")
     shutil.rmtree(result, ignore_errors=True)
@@ -166,7 +188,9 @@ def search(options):
         raise ClusterError(f"--program: expected the program stemvo (make build), found none at {options.program}")
     models_dir = ROOT / "models"
     num_sequences = len(options.sequences) + (1 if options.held_out else 0)
-    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task, num_sequences)
+    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task, num_sequences, not options.no_baselines)
+    for line in plan.lacking(models, models_dir, options.layers):
+        print(f"warning: {line}", file=sys.stderr)
     common = common_arguments(options)
     files = model_files(models)
     contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]
@@ -178,7 +202,7 @@ def search(options):
         parts.begin()
         outcome = driver.run(waiting, driver.Options(str(options.program.resolve()), common, files, options.threads, options.retries,
                                                      options.patience, options.quiet), parts.keep)
-    merge(options, parts, tasks)
+    merge(options, parts, tasks, outcome.warnings)
     print(f"tasks: {outcome.tasks} run on {len(outcome.nodes)} nodes in {outcome.seconds:.1f} s, {outcome.repeated} repeated, "
           f"{len(tasks) - len(waiting)} from before\ntable: {options.out / 'result' / 'filters.csv'}")
 

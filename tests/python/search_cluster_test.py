@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -150,11 +151,30 @@ class SearchCluster(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("10 from before", done.stdout)
 
+    def test_a_damaged_frame_is_told_and_options_are_those_of_the_search(self):
+        drive = self.folder / "damaged"
+        shutil.copytree(self.folder / "drive", drive)
+        frame = next((drive / "sequences/00").glob("image_2/*7.png"))
+        frame.write_bytes(frame.read_bytes()[:2000])
+        what = [str(drive / "sequences/00"), "--model", str(self.model), "--layers", "fine", "--config", "default",
+                "--set", "scale.source=ground_truth", "--no-baselines", "--quiet"]
+        subprocess.run([PROGRAM, "search", *what, "--exhaustive", "--out", self.folder / "damaged_single"], check=True, capture_output=True)
+        done = subprocess.run([RAY, ROOT / "tools/search_cluster.py", *what, "--model", "default", "--layers", "fine", "--program", PROGRAM,
+                               "--filters-per-task", "2", "--out", self.folder / "damaged_cluster"], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr.count(f"warning: {frame}: expected a complete PNG image"), 1, done.stderr)
+        self.assertIn("warning: --layers: default has stem, not fine; nothing of it is searched", done.stderr)
+        table = (self.folder / "damaged_cluster/result/filters.csv").read_bytes()
+        self.assertEqual(table, (self.folder / "damaged_single/filters.csv").read_bytes())
+        self.assertEqual(len(table.splitlines()), 1 + 4)
+
     def test_errors(self):
         (self.folder / "text.onnx").write_text("text")
         cases = ((("--layers", "fine,fine"), "--layers: expected each once, found 'fine' again"),
                  (("--model", self.model), "--model: expected each once"),
-                 (("--layers", "coarse,top"), "--layers: expected coarse, fine of"), (("--filters", "0:5"), "inside 0:4 of"),
+                 (("--layers", "coarse,top"), "; found 'top'"),
+                 (("--config", "defualt"), "--config: expected a file or one of default, fast, paper, found 'defualt'"),
+                 (("--config", self.folder / "none.yaml"), "--config: expected a file, found nothing at"), (("--filters", "0:5"), "inside 0:4 of"),
                  (("--model", "nope"), "--model: expected default or the path of an .onnx, found 'nope'"),
                  (("--model", self.folder / "text.onnx"), "expected an entry with 'file: text.onnx'"),
                  (("--program", self.folder / "none"), "expected the program stemvo"),

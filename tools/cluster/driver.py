@@ -32,6 +32,7 @@ class Outcome:
     repeated: int = 0
     drives: int = 0  # filters times sequences
     nodes: set = dataclasses.field(default_factory=set)
+    warnings: list = dataclasses.field(default_factory=list)  # of the program, each line once
     seconds: float = 0.0
 
 
@@ -99,7 +100,7 @@ class _Queue:
 
     def _collect(self, reference, task):
         try:
-            node, files = ray.get(reference)
+            node, (files, warnings) = ray.get(reference)
         except ray.exceptions.RayTaskError as error:
             if isinstance(error.cause, worker.TaskFailed) or "TaskFailed" in type(error.cause).__name__:
                 raise ClusterError(str(error.cause)) from error
@@ -107,8 +108,10 @@ class _Queue:
         except ray.exceptions.RayError as error:
             return self._again(task, error)
         # The model that was sent along is the one here: what the merge writes must name it.
-        here = json.dumps(os.path.abspath(os.path.dirname(task.model)), ensure_ascii=False)[1:-1].encode()
+        folder = os.path.abspath(os.path.dirname(task.model))
+        here = json.dumps(folder, ensure_ascii=False)[1:-1].encode()
         self._keep(task, {name: content.replace(b"{folder}", here) for name, content in files.items()})
+        self._warn(task, [line.replace("{folder}", folder) for line in warnings])
         self.outcome.tasks += 1
         self.outcome.drives += task.filters
         self.outcome.nodes.add(node)
@@ -123,6 +126,13 @@ class _Queue:
                                f"{reason}; what is done is kept, --resume goes on")
         self._waiting.appendleft(task)
         return self._say(f"{task.name}: lost ({reason}), again")
+
+    def _warn(self, task, lines):
+        """Once each: all tasks of a sequence say the same of a frame of it."""
+        for line in lines:
+            if line not in self.outcome.warnings:
+                self.outcome.warnings.append(line)
+                print(f"{line} ({task.name})", file=sys.stderr, flush=True)
 
     def _say(self, text):
         if not self._options.quiet:

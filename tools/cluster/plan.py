@@ -74,29 +74,42 @@ def _once(option, values):
             raise ClusterError(f"{option}: expected each once, found '{value}' again")
 
 
-def _chosen(model, layers, wanted):
-    known = [layer for layer, _ in layers]
+def _chosen(known, wanted):
+    """Model -> its layers among those wanted, of known: model -> its layers (name, filters). Error: a layer that no model has."""
     _once("--layers", wanted or [])
     for layer in wanted or []:
-        if layer not in known:
-            raise ClusterError(f"--layers: expected {', '.join(known)} of {model}, found '{layer}'")
-    return [(layer, filters) for layer, filters in layers if not wanted or layer in wanted]
+        if not any(layer == name for layers in known.values() for name, _ in layers):
+            raise ClusterError("--layers: expected " + "; ".join(f"{', '.join(name for name, _ in layers)} of {model}" for model, layers in known.items()) +
+                               f"; found '{layer}'")
+    return {model: [(name, filters) for name, filters in layers if not wanted or name in wanted] for model, layers in known.items()}
 
 
-def tasks_of(models, models_dir, layers=None, filters=None, per_task=32, num_sequences=1):
-    """All tasks, in order. filters: (A, B) of each layer, or None. num_sequences: with the held-out one. Errors: unknown
-    model or layer, filters outside."""
+def lacking(models, models_dir, layers):
+    """A line for each model that has not all of the layers."""
+    lines = []
+    for model in models:
+        known = [layer for layer, _ in layers_of(model, models_dir)]
+        missing = [layer for layer in layers or [] if layer not in known]
+        if missing:
+            rest = "" if len(missing) < len(layers) else "; nothing of it is searched"
+            lines.append(f"--layers: {model} has {', '.join(known)}, not {', '.join(missing)}{rest}")
+    return lines
+
+
+def tasks_of(models, models_dir, layers=None, filters=None, per_task=32, num_sequences=1, baselines=True):
+    """All tasks, in order. layers: of the models, each of those that it has. filters: (A, B) of each layer, or None.
+    num_sequences: with the held-out one. baselines: once per sequence. Errors: unknown model, a layer of none, filters outside."""
     tasks = []
     _once("--model", models)
-    for model in models:
-        for layer, count in _chosen(model, layers_of(model, models_dir), layers):
+    for model, chosen in _chosen({model: layers_of(model, models_dir) for model in models}, layers).items():
+        for layer, count in chosen:
             first, last = filters or (0, count)
             if not 0 <= first < last <= count:
                 raise ClusterError(f"--filters: expected filters inside 0:{count} of {model} layer {layer}, found {first}:{last}")
             for start in range(first, last, per_task):
                 for sequence in range(num_sequences):
-                    tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last), len(tasks) < num_sequences,
-                                      sequence if num_sequences > 1 else None))
+                    tasks.append(Task(f"part{len(tasks):05}", model, layer, start, min(start + per_task, last),
+                                      baselines and len(tasks) < num_sequences, sequence if num_sequences > 1 else None))
     return tasks
 
 

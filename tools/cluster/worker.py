@@ -20,7 +20,7 @@ def _die_with_parent():
 
 
 def run_task(program, arguments, model_files, threads):
-    """`stemvo search ARGUMENTS` -> the files of its folder: name -> bytes. model_files: name -> bytes of an .onnx and its
+    """`stemvo search ARGUMENTS` -> the files of its folder: name -> bytes, and the lines of its warnings. model_files: name -> bytes of an .onnx and its
     manifest, written to a folder of this node, which {folder} stands for in arguments and in what comes back."""
     with tempfile.TemporaryDirectory(prefix="stemvo_search_") as text:
         folder = pathlib.Path(text)
@@ -36,4 +36,5 @@ def run_task(program, arguments, model_files, threads):
             raise RuntimeError(f"{program} was killed by signal {-done.returncode}")
         if done.returncode != 0:
             raise TaskFailed(" ".join(done.stderr.split()) or f"{program} ended with exit code {done.returncode}")
-        return {name: (folder / "part" / name).read_bytes().replace(text.encode(), b"{folder}") for name in PART_FILES}
+        said = [line.replace(text, "{folder}") for line in done.stderr.splitlines() if line.strip()]
+        return {name: (folder / "part" / name).read_bytes().replace(text.encode(), b"{folder}") for name in PART_FILES}, said
