@@ -39,7 +39,9 @@ std::string format_search_table(const SearchReport& report) {
          cell(is_detected ? mean.r_rel_deg_per_100m : std::nullopt, 3),
          cell(mean.average_offset_m, 2), cell(mean.translation_change_m, 3),
          cell(mean.rotation_change_deg, 3), cell(mean.mean_inliers, 0),
-         cell(100.0 * mean.tracked_fraction, 1), std::to_string(mean.num_frames),
+         cell(mean.tracked_fraction ? std::optional(100.0 * *mean.tracked_fraction) : std::nullopt,
+              1),
+         std::to_string(mean.num_frames),
          row.held_out && row.held_out->is_detected ? cell(row.held_out->t_rel_percent, 3) : "",
          remark});
   }

@@ -89,27 +89,34 @@ DriveScore FilterDrive::score(const std::string& sequence,
                               std::span<const Rigid3> truth,
                               const EvaluationOptions& options) const {
   STEMVO_CHECK(num_frames() > 0 && truth.size() >= num_frames(), "a true pose for each frame");
-  const std::span<const Rigid3> so_far = truth.first(num_frames());
-  const Trajectory trajectory = rescale_steps(odometry_.poses(), so_far);
   const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
-  const Metrics metrics = evaluate(trajectory, so_far, options);
   DriveScore score;
   score.sequence = sequence;
   score.num_frames = num_frames();
-  score.t_rel_percent = metrics.t_rel_percent;
-  score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
-  score.average_offset_m = metrics.average_offset_m;
   score.mean_inliers = static_cast<double>(num_inliers_) / num_steps;
   score.tracked_fraction = static_cast<double>(num_measured_) / num_steps;
-  add_changes(trajectory, score);
-  // A standing start has no segments: nothing is known against the filter.
-  score.early_error_percent = dense_t_rel_percent(trajectory, so_far, kEarlyShares).value_or(0.0);
-  score.path = path_of(trajectory);
-  score.is_detected = num_frames() == 1 || score.tracked_fraction >= kLeastTracked;
+  score.is_detected = num_frames() == 1 || *score.tracked_fraction >= kLeastTracked;
   if (!score.is_detected) {
     score.reason = missing_reason();
   }
+  if (num_measured_ > 0) {  // else the numbers would be those of a camera that stands
+    add_errors(truth.first(num_frames()), options, score);
+  }
   return score;
+}
+
+void FilterDrive::add_errors(std::span<const Rigid3> truth,
+                             const EvaluationOptions& options,
+                             DriveScore& score) const {
+  const Trajectory trajectory = rescale_steps(odometry_.poses(), truth);
+  const Metrics metrics = evaluate(trajectory, truth, options);
+  score.t_rel_percent = metrics.t_rel_percent;
+  score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
+  score.average_offset_m = metrics.average_offset_m;
+  add_changes(trajectory, score);
+  // A standing start has no segments: nothing is known against the filter.
+  score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
+  score.path = path_of(trajectory);
 }
 
 DriveScore unusable_score(const std::string& sequence, const std::string& reason) {

@@ -31,6 +31,9 @@ class FilterDrive {
 
  private:
   void count(const FrameResult& result);
+  void add_errors(std::span<const Rigid3> truth,
+                  const EvaluationOptions& options,
+                  DriveScore& score) const;
   [[nodiscard]] std::string missing_reason() const;
 
   ChannelOdometry odometry_;

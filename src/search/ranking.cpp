@@ -59,7 +59,7 @@ std::tuple<int, double, double> order_of(const FilterRow& row) {
     case FilterStatus::kRanked:
       return {0, mean.t_rel_percent.value_or(kWorst), mean.r_rel_deg_per_100m.value_or(kWorst)};
     case FilterStatus::kStopped:
-      return {1, -row.rung, mean.early_error_percent};
+      return {1, -row.rung, mean.early_error_percent.value_or(kWorst)};
     default:
       return {2, 0.0, 0.0};
   }
@@ -74,8 +74,9 @@ struct Standing {
 
 Standing standing_of(const Record& record) {
   const MeanScore mean = mean_score(record.drives);
-  return {{all_detected(record.drives) ? 0 : 1, mean.early_error_percent, mean.rotation_change_deg,
-           mean.average_offset_m, mean.mean_inliers},
+  return {{all_detected(record.drives) ? 0 : 1, mean.early_error_percent.value_or(kWorst),
+           mean.rotation_change_deg.value_or(kWorst), mean.average_offset_m.value_or(kWorst),
+           mean.mean_inliers.value_or(0.0)},
           &record.key};
 }
 
@@ -83,21 +84,25 @@ Standing standing_of(const Record& record) {
 
 MeanScore mean_score(const std::vector<DriveScore>& drives) {
   MeanScore mean;
-  const auto count = static_cast<double>(drives.size());
-  mean.t_rel_percent = 0.0;
-  mean.r_rel_deg_per_100m = 0.0;
-  const auto add = [count](std::optional<double>& sum, const std::optional<double>& value) {
-    sum = sum && value ? std::optional(*sum + *value / count) : std::nullopt;
+  const auto average = [&drives](auto value) -> std::optional<double> {
+    double sum = 0.0;
+    for (const DriveScore& drive : drives) {
+      if (!(drive.*value).has_value()) {
+        return std::nullopt;
+      }
+      sum += *(drive.*value) / static_cast<double>(drives.size());
+    }
+    return sum;
   };
+  mean.t_rel_percent = average(&DriveScore::t_rel_percent);
+  mean.r_rel_deg_per_100m = average(&DriveScore::r_rel_deg_per_100m);
+  mean.average_offset_m = average(&DriveScore::average_offset_m);
+  mean.translation_change_m = average(&DriveScore::translation_change_m);
+  mean.rotation_change_deg = average(&DriveScore::rotation_change_deg);
+  mean.mean_inliers = average(&DriveScore::mean_inliers);
+  mean.tracked_fraction = average(&DriveScore::tracked_fraction);
+  mean.early_error_percent = average(&DriveScore::early_error_percent);
   for (const DriveScore& drive : drives) {
-    add(mean.t_rel_percent, drive.t_rel_percent);
-    add(mean.r_rel_deg_per_100m, drive.r_rel_deg_per_100m);
-    mean.average_offset_m += drive.average_offset_m / count;
-    mean.translation_change_m += drive.translation_change_m / count;
-    mean.rotation_change_deg += drive.rotation_change_deg / count;
-    mean.mean_inliers += drive.mean_inliers / count;
-    mean.tracked_fraction += drive.tracked_fraction / count;
-    mean.early_error_percent += drive.early_error_percent / count;
     mean.num_frames += drive.num_frames;
   }
   return mean;

@@ -14,12 +14,12 @@ namespace stemvo::search {
 struct MeanScore {
   std::optional<double> t_rel_percent;
   std::optional<double> r_rel_deg_per_100m;
-  double average_offset_m = 0.0;
-  double translation_change_m = 0.0;
-  double rotation_change_deg = 0.0;
-  double mean_inliers = 0.0;
-  double tracked_fraction = 0.0;
-  double early_error_percent = 0.0;
+  std::optional<double> average_offset_m;
+  std::optional<double> translation_change_m;
+  std::optional<double> rotation_change_deg;
+  std::optional<double> mean_inliers;
+  std::optional<double> tracked_fraction;
+  std::optional<double> early_error_percent;
   std::size_t num_frames = 0;  ///< of all of them together
 };
 [[nodiscard]] MeanScore mean_score(const std::vector<DriveScore>& drives);

@@ -8,7 +8,7 @@
 namespace stemvo::search {
 namespace {
 
-constexpr int kFormat = 2;
+constexpr int kFormat = 3;
 
 Json score_json(const DriveScore& score) {
   Json json;

@@ -60,6 +60,17 @@ TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
   EXPECT_DOUBLE_EQ(*mean_score(records[0].drives).t_rel_percent, 2.5);
 }
 
+TEST(Ranking, TheMeanOfWhatOneSequenceLacksIsNone) {
+  DriveScore good = score(1.0, 1.0);
+  good.average_offset_m = 2.0;
+  good.translation_change_m = 0.5;
+  const MeanScore mean = mean_score({good, DriveScore()});
+  EXPECT_FALSE(mean.average_offset_m);
+  EXPECT_FALSE(mean.translation_change_m);
+  EXPECT_FALSE(mean.early_error_percent);
+  EXPECT_EQ(mean_score({good, good}).average_offset_m, 2.0);
+}
+
 TEST(Ranking, HeldOutAndStandingRankNothing) {
   Record good = record(1, 0, {score(1.0, 1.0)});
   Record other = record(0, 0, {score(2.0, 1.0)});

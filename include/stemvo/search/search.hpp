@@ -66,16 +66,18 @@ struct DriveScore {
   std::string sequence;
   std::size_t num_frames = 0;
   bool is_detected = false;
-  std::string reason;                   ///< why the pose was not detected, else empty
-  std::optional<double> t_rel_percent;  ///< nullopt: no segment fits into the frames run
+  std::string reason;  ///< why the pose was not detected, else empty
+  // nullopt: no motion was measured, so that there is no trajectory of its own, or no frame ran.
+  std::optional<double> t_rel_percent;  ///< nullopt too: no segment fits into the frames run
   std::optional<double> r_rel_deg_per_100m;
-  double average_offset_m = 0.0;
-  double translation_change_m = 0.0;  ///< paper, Table 2: E_t, mean over consecutive poses
-  double rotation_change_deg = 0.0;   ///< E_r, with R_p transposed
-  double mean_inliers = 0.0;
-  double tracked_fraction = 0.0;     ///< of the frames after the first: motion measured
-  double early_error_percent = 0.0;  ///< t_rel of parts of the path so far: what halving goes by
-  std::vector<PathPoint> path;       ///< at most 400 points, evenly spaced in frames
+  std::optional<double> average_offset_m;
+  std::optional<double> translation_change_m;  ///< paper, Table 2: E_t, mean over consecutive poses
+  std::optional<double> rotation_change_deg;   ///< E_r, with R_p transposed
+  std::optional<double> early_error_percent;   ///< t_rel of parts of the path: what halving goes by
+  // nullopt: no frame ran.
+  std::optional<double> mean_inliers;
+  std::optional<double> tracked_fraction;  ///< of the frames after the first: motion measured
+  std::vector<PathPoint> path;             ///< at most 400 points, evenly spaced in frames
 };
 
 /// What became of a filter.
