@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
@@ -70,6 +71,14 @@ class Fold(unittest.TestCase):
         image = np.random.default_rng(2).uniform(0, 255, (1, 3, 376, 1241)).astype(np.float32)
         _, _, ratio = fold_bench.paired_medians(*sessions, image, 9)
         self.assertLess(ratio, 0.25)
+
+    def test_waiting_is_no_time_of_a_stem(self):
+        """The machine may do other things: they would lengthen the full stem's run, and so the fold's share would shrink."""
+        class Waiting:
+            def run(self, _outputs, _inputs):
+                time.sleep(0.1)
+
+        self.assertLess(fold_bench.seconds(Waiting(), None), 0.05)
 
 
 def npz_of(stem, path):
