@@ -9,9 +9,7 @@ sent along, the parts come back over Ray. docs/search.md tells more.
 """
 
 import argparse
-import dataclasses
 import hashlib
-import json
 import os
 import pathlib
 import re
@@ -37,6 +35,7 @@ os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray would report its us
 _enter_ray()
 
 from cluster import driver, plan  # noqa: E402
+from cluster.parts import Parts  # noqa: E402
 from cluster.plan import ClusterError  # noqa: E402
 
 
@@ -122,47 +121,6 @@ def inputs_of(options):
     files = [options.program] + ([config] if config else [])
     sequences = options.sequences + ([options.held_out] if options.held_out else [])
     return [[hash_of(file.read_bytes()) for file in files], [plan.sequence_contents(sequence) for sequence in sequences]]
-
-
-class Parts:
-    """OUT/parts: a folder per task that is done, and plan.json, which says what the tasks are."""
-
-    def __init__(self, out, tasks, fingerprint, resume):
-        """Refuses a folder with parts of another search, or of this one without --resume. Writes nothing."""
-        self.folder, self._plan_file = out / "parts", out / "plan.json"
-        self._content = {"fingerprint": fingerprint, "tasks": [dataclasses.asdict(task) for task in tasks]}
-        if self._plan_file.exists() and any(self.folder.glob("part*")):
-            if not resume:
-                raise ClusterError(f"{out}: expected an empty folder, found a search (--resume goes on with it)")
-            if self._fingerprint_before() != fingerprint:
-                raise ClusterError(f"{out}: --resume: expected the same program, models, filters, sequences (frames, calibration, poses), "
-                                   "configuration and options, found others")
-
-    def _fingerprint_before(self):
-        try:
-            return json.loads(self._plan_file.read_text(encoding="utf-8"))["fingerprint"]
-        except (ValueError, KeyError, TypeError) as error:  # no JSON, no UTF-8, another document
-            raise ClusterError(f"{self._plan_file}: expected the plan of a search, found: {' '.join(str(error).split())}") from error
-
-    def begin(self):
-        self.folder.mkdir(parents=True, exist_ok=True)
-        partial = self._plan_file.with_suffix(".partial")
-        partial.write_text(json.dumps(self._content, indent=1) + "\n", encoding="utf-8")
-        partial.replace(self._plan_file)
-
-    def path(self, task):
-        return self.folder / task.name
-
-    def is_done(self, task):
-        return self.path(task).is_dir()
-
-    def keep(self, task, files):
-        """Appears whole or not at all."""
-        partial = self.folder / f".{task.name}.partial"
-        partial.mkdir(exist_ok=True)
-        for name, content in files.items():
-            (partial / name).write_bytes(content)
-        partial.rename(self.path(task))
 
 
 def merge(options, parts, tasks, warned):

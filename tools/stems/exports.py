@@ -3,7 +3,7 @@
 
 import dataclasses
 
-from stems import families, fold, fold_report, frames, graph_check, graph_cut, onnx_writer, pretrained, weight_files, weights
+from stems import families, fold, fold_report, frames, graph_check, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
 from stems.weights import WeightsError
 
 # Fitted and judged on frames of their own, in turn.
@@ -106,7 +106,7 @@ def _check_network(options, model):
     """Error: another first convolution than that of the known network it should be."""
     if families.find(options.network) is None:
         return
-    first = graph_cut.first_convolution(options.weights, model)
+    first = graph_kinds.first_convolution(model)
     if first is None:
         raise WeightsError(f"{options.weights}: --network: expected the first convolution of {options.network}, found none whose "
                            f"weights are in the file (leave --network out, or give another name)")

@@ -11,7 +11,7 @@ follows one directly (Keras' separable convolution), which a whole .onnx does. N
 
 import dataclasses
 
-from stems import graph_cut, weight_files, weights
+from stems import graph_cut, graph_kinds, weight_files, weights
 
 
 _DENSE = ("dense", "Gemm", "MatMul")  # units, not filters
@@ -51,7 +51,7 @@ def of_graph(path, size):
     """All nodes of an .onnx that give a tensor."""
     with graph_cut.refusing_unsound(path):
         model = graph_cut.read(path)
-        kinds = graph_cut.kinds_of(model)
+        kinds = graph_kinds.kinds_of(model)
         layers = graph_cut.layers_at(path, model, size or (256, 256))
     return [Row(node.output[0], kinds.get(node.output[0], node.op_type), filters) for node, filters in layers
             if filters is not None and node.op_type not in ("Constant", "Identity", "Shape")]
