@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The benchmark of whole programs (bench/run.py): statistics, errors, and the peer, on a tiny rendered drive."""
+"""The benchmark of whole programs (bench/run.py): statistics, errors, turns, and the peer, on a tiny rendered drive and on 03."""
 
 import contextlib
 import io
@@ -15,22 +15,31 @@ from unittest import mock
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "bench"))
 
+import machine  # noqa: E402
+import places  # noqa: E402
+import results  # noqa: E402
+import rounds  # noqa: E402
+import rows  # noqa: E402
 import run  # noqa: E402
+import sequence  # noqa: E402
+import table  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", "")
+DATA = os.environ.get("STEMVO_SHARED_DATA")
+NO_PEERS = "build/venv-peers is missing (tools/setup.sh peers)"
 
 
 class Statistics(unittest.TestCase):
     def test_spread(self):
-        self.assertEqual(run.spread([3.0, 1.0, 2.0]), run.Spread(2.0, 1.0, 3.0))
-        self.assertEqual(run.spread([4.0, 1.0]), run.Spread(2.5, 1.0, 4.0))
-        self.assertEqual(run.spread([5.0]), run.Spread(5.0, 5.0, 5.0))
+        self.assertEqual(results.spread([3.0, 1.0, 2.0]), results.Spread(2.0, 1.0, 3.0))
+        self.assertEqual(results.spread([4.0, 1.0]), results.Spread(2.5, 1.0, 4.0))
+        self.assertEqual(results.spread([5.0]), results.Spread(5.0, 5.0, 5.0))
 
     def test_ratios_are_within_a_round(self):
         # A machine that is half as fast in the second round changes no ratio.
-        self.assertEqual(run.ratios([3.0, 6.0], [1.0, 2.0]), [3.0, 3.0])
+        self.assertEqual(results.ratios([3.0, 6.0], [1.0, 2.0]), [3.0, 3.0])
         with self.assertRaises(ValueError):
-            run.ratios([1.0], [1.0, 2.0])
+            results.ratios([1.0], [1.0, 2.0])
 
     def test_rows_of_the_table(self):
         def result(name, fps, ratio, error):
@@ -39,10 +48,96 @@ class Statistics(unittest.TestCase):
             return {"name": name, "fps": all_of(fps), "time_over_first": all_of(ratio), "cpu_ms_per_frame": all_of(20.0),
                     "peak_mib": 99.6, "t_rel_percent": error}
 
-        lines = run.table([result("defaults", 100.0, 1.0, 0.74), result("opencv orb", 40.0, 2.5, None)]).splitlines()
+        lines = table.table([result("defaults", 100.0, 1.0, 0.74), result("opencv orb", 40.0, 2.5, None)]).splitlines()
         self.assertIn("time, defaults = 1", lines[0])
         self.assertEqual(lines[1].split(), "defaults 100.0 100.0-100.0 1.00 1.00-1.00 20.0 100 0.74".split())
         self.assertEqual(lines[2].split(), "opencv orb 40.0 40.0-40.0 2.50 2.50-2.50 20.0 100 -".split())
+
+
+class Load(unittest.TestCase):
+    def printed(self, load, cores):
+        facts = {"load_before": load, "busy": machine.is_busy(load, cores)}
+        row = {"name": "defaults", "peak_mib": 1.0, "t_rel_percent": None,
+               **dict.fromkeys(("fps", "time_over_first", "cpu_ms_per_frame"), {"median": 1.0, "low": 1.0, "high": 1.0})}
+        return table.page(facts, [row]).splitlines()
+
+    def test_a_busy_machine_is_named_under_the_table(self):
+        self.assertRegex(self.printed(1.2, [0, 1])[-1], "^BUSY MACHINE: load average 1.20 .*more than 0.5 per core")
+        self.assertNotIn("BUSY", "".join(self.printed(1.0, [0, 1])))
+        self.assertIn("BUSY", self.printed(0.6, [0])[-1])
+
+
+class Turns(unittest.TestCase):
+    ROWS = (rows.Row("a"), rows.Row("b"), rows.Row("c"))
+
+    def test_every_row_is_first_once(self):
+        turns = ["".join(row.name for row in rounds.order(self.ROWS, number)) for number in range(4)]
+        self.assertEqual(turns, ["abc", "bca", "cab", "abc"])
+
+    def test_every_frame_is_read_before_the_first_run(self):
+        with tempfile.TemporaryDirectory() as folder:
+            drive = pathlib.Path(folder).resolve() / "sequences/00"
+            (drive / "image_0").mkdir(parents=True)
+            for number in range(6):
+                (drive / f"image_0/{number:06}.png").write_bytes(b"frame")
+            options = run.parse_arguments([str(drive), "--frames", "1:5", "--rounds", "2", "--program", sys.executable])
+            contest = rounds.Contest(options, self.ROWS, drive, drive)
+            for row in self.ROWS:
+                contest.out(row).mkdir()
+                contest.trajectory(row).write_text("pose\n" * 4)
+            happened, read_bytes = [], pathlib.Path.read_bytes
+
+            def read(file):
+                happened.append(file.name)
+                return read_bytes(file)
+
+            def measured(command, *_):
+                happened.append("run")
+                return rounds.Sample(1.0, 1.0, 1.0)
+
+            with mock.patch.object(pathlib.Path, "read_bytes", read), mock.patch.object(rounds, "run_measured", measured), \
+                    contextlib.redirect_stderr(io.StringIO()):
+                contest.run()
+            self.assertEqual(happened, ["000001.png", "000002.png", "000003.png", "000004.png", *["run"] * 6])
+
+
+class BeforeTheFirstRun(unittest.TestCase):
+    """What is refused at once, in one line."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        (self.folder / "image_0").mkdir()
+
+    def refused(self, *arguments):
+        with contextlib.redirect_stderr(io.StringIO()) as said, mock.patch.object(rounds, "run_measured") as measured:
+            self.assertEqual(run.main(["--program", sys.executable, "--only", "defaults", *map(str, arguments)]), 1)
+        measured.assert_not_called()
+        self.assertEqual(len(said.getvalue().splitlines()), 1, said.getvalue())
+        return said.getvalue()
+
+    def test_a_folder_that_is_no_sequence(self):
+        self.assertIn("/nonexist: expected a KITTI sequence (a folder with image_2 or image_0), found nothing", self.refused("/nonexist"))
+        self.assertIn(f"{__file__}: expected a KITTI sequence (a folder with image_2 or image_0), found a file", self.refused(__file__))
+        self.assertIn("expected a folder image_2 or image_0 in it, found neither", self.refused(self.folder / "image_0"))
+
+    def test_a_sequence_at_the_root_of_the_disk(self):
+        self.assertEqual(sequence.truth_file(pathlib.Path("/drive")), pathlib.Path("/poses/drive.txt"))
+
+    def test_a_json_file_that_cannot_be_written(self):
+        nowhere = self.folder / "no/such/x.json"
+        self.assertIn(f"{nowhere}: expected a file that can be written, found: No such file or directory",
+                      self.refused(self.folder, "--json", nowhere))
+        self.assertIn("found: Is a directory", self.refused(self.folder, "--json", self.folder))
+
+    def test_the_check_leaves_files_as_they_are(self):
+        kept, new = self.folder / "kept.json", self.folder / "new.json"
+        kept.write_text("of before")
+        for file in (kept, new):
+            run.check_writable(file)
+        self.assertEqual(kept.read_text(), "of before")
+        self.assertFalse(new.exists())
 
 
 class Measuring(unittest.TestCase):
@@ -52,7 +147,7 @@ class Measuring(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def measure(self, code):
-        return run.run_measured([sys.executable, "-c", code], os.sched_getaffinity(0), self.folder / "log")
+        return rounds.run_measured([sys.executable, "-c", code], os.sched_getaffinity(0), self.folder / "log")
 
     def test_wall_time_processor_time_and_memory(self):
         slept = self.measure("import time; time.sleep(0.5)")
@@ -64,17 +159,17 @@ class Measuring(unittest.TestCase):
 
     def test_cores(self):
         one = {min(os.sched_getaffinity(0))}
-        run.run_measured([sys.executable, "-c", "import os; print(sorted(os.sched_getaffinity(0)))"], one, self.folder / "log")
+        rounds.run_measured([sys.executable, "-c", "import os; print(sorted(os.sched_getaffinity(0)))"], one, self.folder / "log")
         self.assertEqual((self.folder / "log").read_text().strip(), str(sorted(one)))
 
     def test_a_failure_says_what_the_program_said(self):
-        with self.assertRaisesRegex(run.BenchError, "exit code 3: no such frame"):
+        with self.assertRaisesRegex(places.BenchError, "exit code 3: no such frame"):
             self.measure("print('no such frame'); raise SystemExit(3)")
 
 
 class Rows(unittest.TestCase):
     def chosen(self, *arguments):
-        return [row.name for row in run.chosen_rows(run.parse_arguments(["--program", sys.executable, *arguments]))]
+        return [row.name for row in rows.chosen(run.parse_arguments(["--program", sys.executable, *arguments]))]
 
     def test_choice(self):
         self.assertEqual(self.chosen("--without", "opencv orb,full stem"), ["defaults", "folded stem", "gray"])
@@ -82,15 +177,15 @@ class Rows(unittest.TestCase):
         self.assertEqual(self.chosen("--only", "defaults,before", "--add", f"before={sys.executable}"), ["defaults", "before"])
 
     def test_errors(self):
-        with self.assertRaisesRegex(run.BenchError, "expected a row of defaults, .*, found 'orb'"):
+        with self.assertRaisesRegex(places.BenchError, "expected a row of defaults, .*, found 'orb'"):
             self.chosen("--only", "orb")
-        with self.assertRaisesRegex(run.BenchError, "no row is left"):
+        with self.assertRaisesRegex(places.BenchError, "no row is left"):
             self.chosen("--only", "gray", "--without", "gray")
-        with self.assertRaisesRegex(run.BenchError, "/nowhere: expected a program for the row 'before'"):
+        with self.assertRaisesRegex(places.BenchError, "/nowhere: expected a program for the row 'before'"):
             self.chosen("--only", "before", "--add", "before=/nowhere")
-        with mock.patch.object(run, "PEER_PYTHON", pathlib.Path("/nowhere")), self.assertRaisesRegex(run.BenchError, "tools/setup.sh peers"):
+        with mock.patch.object(places, "PEER_PYTHON", pathlib.Path("/nowhere")), self.assertRaisesRegex(places.BenchError, "tools/setup.sh peers"):
             self.chosen("--only", "opencv orb")
-        for wrong in (["--rounds", "0"], ["--add", "name"], ["--cores", "0"]):
+        for wrong in (["--rounds", "0"], ["--add", "name"], ["--cores", "0"], ["--frames", "a:b"], ["--frames", ":"]):
             with self.subTest(wrong), contextlib.redirect_stderr(io.StringIO()), self.assertRaises(SystemExit):
                 run.parse_arguments(wrong)
 
@@ -109,7 +204,7 @@ class TinyDrive(unittest.TestCase):
 
     def bench(self, *arguments, code=0):
         with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()) as progress, \
-                mock.patch.object(run, "WORK", self.folder / "work"):
+                mock.patch.object(places, "WORK", self.folder / "work"):
             self.assertEqual(run.main([str(self.sequence), "--program", PROGRAM, "--json", str(self.folder / "a.json"), *arguments]), code,
                              progress.getvalue())
         return said.getvalue(), progress.getvalue()
@@ -117,36 +212,60 @@ class TinyDrive(unittest.TestCase):
     def test_in_turn(self):
         said, progress = self.bench("--only", "defaults,folded stem,gray", "--rounds", "2", "--frames", "5:25")
         order = [line.split(":")[1].strip() for line in progress.splitlines() if line.startswith("round")]
-        self.assertEqual(order, ["defaults", "folded stem", "gray"] * 2)
-        results = json.loads((self.folder / "a.json").read_text())
-        self.assertEqual([row["name"] for row in results["rows"]], ["defaults", "folded stem", "gray"])
-        for row in results["rows"]:
+        self.assertEqual(order, ["defaults", "folded stem", "gray", "folded stem", "gray", "defaults"])
+        found = json.loads((self.folder / "a.json").read_text())
+        self.assertEqual([row["name"] for row in found["rows"]], ["defaults", "folded stem", "gray"])
+        for row in found["rows"]:
             self.assertEqual(len(row["wall_s"]), 2)
             self.assertLessEqual(row["fps"]["low"], row["fps"]["median"])
             self.assertAlmostEqual(row["fps"]["high"], 20 / min(row["wall_s"]), places=6)
             self.assertGreater(row["peak_mib"], 20)
             self.assertLess(row["t_rel_percent"], 10)
-        self.assertEqual(results["rows"][0]["time_over_first"], {"median": 1.0, "low": 1.0, "high": 1.0})
-        for key in ("machine", "commit", "stemvo", "rounds", "load_before"):
+            self.assertEqual(row["t_rel_lengths"], "metres from the road")
+        self.assertEqual(found["rows"][0]["time_over_first"], {"median": 1.0, "low": 1.0, "high": 1.0})
+        for key in ("machine", "commit", "stemvo", "rounds", "load_before", "busy"):
             self.assertIn(f"{key}: ", said)
 
-    @unittest.skipUnless(run.PEER_PYTHON.exists(), "build/venv-peers is missing (tools/setup.sh peers)")
+    @unittest.skipUnless(places.PEER_PYTHON.exists(), NO_PEERS)
     def test_the_peer_is_a_working_odometry(self):
         self.bench("--only", "defaults,opencv orb", "--rounds", "1")
         peer = json.loads((self.folder / "a.json").read_text())["rows"][1]
         self.assertLess(peer["t_rel_percent"], 25, "a wrong direction or composition is far above")
         self.assertGreater(peer["t_rel_percent"], 0)
+        self.assertEqual(peer["t_rel_lengths"], "true steps")
         with self.subTest("without ground truth every step is 1 long"):
             out = self.folder / "unit.txt"
-            subprocess.run([run.PEER_PYTHON, run.PEER, self.sequence, "--out", out, "--frames", "0:4"], check=True)
-            places = [[float(line.split()[i]) for i in (3, 7, 11)] for line in out.read_text().splitlines()]
-            self.assertEqual(len(places), 4)
-            for a, b in zip(places, places[1:]):
+            subprocess.run([places.PEER_PYTHON, places.PEER, self.sequence, "--out", out, "--frames", "0:4"], check=True)
+            positions = [[float(line.split()[i]) for i in (3, 7, 11)] for line in out.read_text().splitlines()]
+            self.assertEqual(len(positions), 4)
+            for a, b in zip(positions, positions[1:]):
                 self.assertAlmostEqual(sum((x - y) ** 2 for x, y in zip(a, b)), 1.0, places=6)
 
     def test_a_sequence_that_is_none(self):
         said, progress = self.bench("--only", "defaults", "--frames", "100:200", code=1)
         self.assertIn("exit code 1: error:", progress)
+
+
+def is_debug_build():
+    cache = pathlib.Path(PROGRAM).parent / "CMakeCache.txt"
+    return cache.exists() and "CMAKE_BUILD_TYPE:STRING=Debug" in cache.read_text(encoding="utf-8")
+
+
+@unittest.skipIf(is_debug_build(), "a debug build, which nobody times")
+@unittest.skipUnless(DATA, "STEMVO_SHARED_DATA is not set")
+@unittest.skipUnless(places.PEER_PYTHON.exists(), NO_PEERS)
+class AgainstThePeer(unittest.TestCase):
+    def test_less_processor_time_than_orb_and_brute_force(self):
+        # About 2.0 on 03; processor time because other programs lengthen it little.
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(places, "WORK", pathlib.Path(folder)), \
+                contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as progress:
+            numbers = pathlib.Path(folder) / "numbers.json"
+            code = run.main([f"{DATA}/kitti/sequences/03", "--frames", "0:60", "--rounds", "1", "--only", "defaults,opencv orb",
+                             "--program", PROGRAM, "--json", str(numbers)])
+            self.assertEqual(code, 0, progress.getvalue())
+            ours, peer = (row["cpu_ms_per_frame"]["median"] for row in json.loads(numbers.read_text())["rows"])
+        print(f"processor time of a frame: opencv orb {peer:.1f} ms, defaults {ours:.1f} ms, ratio {peer / ours:.2f}", file=sys.stderr)
+        self.assertGreaterEqual(peer / ours, 1.2)
 
 
 if __name__ == "__main__":
