@@ -92,10 +92,12 @@ void print_summary(const SearchReport& report, const std::filesystem::path& out_
   }
   print(format_search_table(report));
   const SearchWork& work = report.work;
-  print(fmt::format(
-      "work: {} filter-frames, {:.1f} % of an exhaustive search\n", work.filter_frames,
-      100.0 * static_cast<double>(work.filter_frames) /
-          static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1))));
+  print(
+      fmt::format("work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\n",
+                  work.filter_frames,
+                  100.0 * static_cast<double>(work.filter_frames) /
+                      static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1)),
+                  work.baseline_filter_frames));
   print(fmt::format("table: {}\n", (out_dir / "filters.csv").string()));
 }
 

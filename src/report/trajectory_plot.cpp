@@ -134,34 +134,63 @@ void draw_titles(const CairoCanvas& canvas, const PlotLayout& layout, const Traj
   draw_fitting_text(canvas, layout, 108.0, plot.subtitle, kSubtitle_px, false);
 }
 
-/// One line above the plot, where it can hide no data.
+/// What a path is called, and how it is drawn.
+struct LegendLine {
+  Color color;
+  double width_px;
+  std::string text;
+};
+
+std::vector<LegendLine> legend_lines(const TrajectoryPlot& plot) {
+  std::vector<LegendLine> lines;
+  if (plot.ground_truth) {
+    lines.push_back({kTruth, kTruthWidth_px, "ground truth"});
+  }
+  lines.push_back({kEstimate, kEstimateWidth_px, plot.estimate_name});
+  for (std::size_t i = 0; i < plot.others.size(); ++i) {
+    lines.push_back({color_of_other(i), kEstimateWidth_px, plot.others[i].name});
+  }
+  return lines;
+}
+
+constexpr double kSwatch_px = 76.0;  ///< room of a path's sample
+constexpr double kAfterText_px = 48.0;
+constexpr double kAfterMarker_px = 14.0;
+
+double legend_width(const CairoCanvas& canvas, const std::vector<LegendLine>& lines) {
+  double width_px = 2.0 * (kStart_px + kEnd_px + kAfterMarker_px) + kAfterText_px +
+                    canvas.text_width("start") + canvas.text_width("end");
+  for (const LegendLine& line : lines) {
+    width_px += kSwatch_px + canvas.text_width(line.text) + kAfterText_px;
+  }
+  return width_px;
+}
+
+/// One line above the plot, where it can hide no data; shrinks until it fits the figure.
 void draw_legend(const CairoCanvas& canvas, const PlotLayout& layout, const TrajectoryPlot& plot) {
+  const std::vector<LegendLine> lines = legend_lines(plot);
+  canvas.set_font(kTick_px);
+  const double room_px = layout.width_px - layout.left_px - 20.0;
+  const double zoom = std::min(1.0, room_px / legend_width(canvas, lines));
+  canvas.set_font(kTick_px * zoom);
   const double y = layout.top_px - 30.0;
   double x = layout.left_px;
-  canvas.set_font(kTick_px);
   const auto label = [&](const std::string& text) {
     canvas.set_color(kInk);
-    canvas.text(x, y + 0.36 * kTick_px, text, TextAnchor::kLeft);
-    x += canvas.text_width(text) + 48.0;
+    canvas.text(x, y + 0.36 * kTick_px * zoom, text, TextAnchor::kLeft);
+    x += canvas.text_width(text) + kAfterText_px * zoom;
   };
-  const auto swatch = [&](const Color& color, double width_px, const std::string& text) {
-    canvas.set_color(color);
-    canvas.line(x + 5.0, y, x + 59.0, y, width_px);
-    x += 76.0;
-    label(text);
-  };
-  if (plot.ground_truth) {
-    swatch(kTruth, kTruthWidth_px, "ground truth");
+  for (const LegendLine& line : lines) {
+    canvas.set_color(line.color);
+    canvas.line(x + 5.0 * zoom, y, x + 59.0 * zoom, y, line.width_px);
+    x += kSwatch_px * zoom;
+    label(line.text);
   }
-  swatch(kEstimate, kEstimateWidth_px, plot.estimate_name);
-  for (std::size_t i = 0; i < plot.others.size(); ++i) {
-    swatch(color_of_other(i), kEstimateWidth_px, plot.others[i].name);
-  }
-  canvas.disk(x + kStart_px, y, kStart_px, kStart);
-  x += 2.0 * kStart_px + 14.0;
+  canvas.disk(x + kStart_px * zoom, y, kStart_px * zoom, kStart);
+  x += (2.0 * kStart_px + kAfterMarker_px) * zoom;
   label("start");
-  canvas.square(x + kEnd_px, y, kEnd_px, kEnd);
-  x += 2.0 * kEnd_px + 14.0;
+  canvas.square(x + kEnd_px * zoom, y, kEnd_px * zoom, kEnd);
+  x += (2.0 * kEnd_px + kAfterMarker_px) * zoom;
   label("end");
 }
 

@@ -18,33 +18,21 @@
 namespace stemvo::search {
 namespace {
 
-struct ShownFilter {
-  const char* place;
-  const FilterRow* row;
-};
-
-/// Best, median and worst; the same filter once.
-std::vector<ShownFilter> choose_rows(const SearchReport& report) {
-  const auto end = std::find_if(report.rows.begin(), report.rows.end(), [](const FilterRow& row) {
-    return row.status != FilterStatus::kRanked;
-  });
-  const auto count = static_cast<std::size_t>(end - report.rows.begin());
-  std::vector<ShownFilter> shown;
-  if (count > 0) {
-    shown.push_back({"best", &report.rows[0]});
-  }
-  if (count > 2) {
-    shown.push_back({"median", &report.rows[count / 2]});
-  }
-  if (count > 1) {
-    shown.push_back({"worst ranked", &report.rows[count - 1]});
-  }
-  return shown;
+/// "t_rel 1.41 %", or "stopped after 25 frames".
+std::string outcome_of(const FilterRow& row) {
+  return row.status == FilterStatus::kStopped
+             ? fmt::format("stopped after {} frames", row.drives.front().num_frames)
+             : fmt::format("t_rel {:.2f} %", mean_score(row.drives).t_rel_percent.value_or(0.0));
 }
 
 std::string caption_of(const ShownFilter& shown) {
-  return fmt::format("{}: {}, t_rel {:.2f} %", shown.place, to_string(shown.row->key),
-                     mean_score(shown.row->drives).t_rel_percent.value_or(0.0));
+  return fmt::format("{}: {}, {}", shown.place, to_string(shown.row->key), outcome_of(*shown.row));
+}
+
+std::string legend_of(const ShownFilter& shown) {
+  return shown.row->status == FilterStatus::kStopped
+             ? fmt::format("{} ({})", shown.place, outcome_of(*shown.row))
+             : shown.place;
 }
 
 Expected<KittiSequence> open_first(const Folders& folders, const SearchIdentity& identity) {
@@ -76,10 +64,10 @@ Status write_trajectories(const std::filesystem::path& file,
   TrajectoryPlot plot;
   plot.title = fmt::format("{}, each step of its true length", sequence.name());
   plot.estimate = trajectory_of(*shown.front().row);
-  plot.estimate_name = shown.front().place;
+  plot.estimate_name = legend_of(shown.front());
   plot.ground_truth = sequence.ground_truth();
   for (std::size_t i = 1; i < shown.size(); ++i) {
-    plot.others.push_back({shown[i].place, trajectory_of(*shown[i].row)});
+    plot.others.push_back({legend_of(shown[i]), trajectory_of(*shown[i].row)});
   }
   return write_trajectory_png(file, plot);
 }
@@ -117,10 +105,30 @@ Expected<cv::Mat> draw_channels(const Folders& folders,
 
 }  // namespace
 
+std::vector<ShownFilter> choose_rows(const SearchIdentity& identity, const SearchReport& report) {
+  std::vector<const FilterRow*> rows;
+  for (const FilterRow& row : report.rows) {
+    if (row.status != FilterStatus::kNotDetected && !layer_of(identity, row.key).is_baseline) {
+      rows.push_back(&row);
+    }
+  }
+  std::vector<ShownFilter> shown;
+  if (!rows.empty()) {
+    shown.push_back({"best", rows.front()});
+  }
+  if (rows.size() > 2) {
+    shown.push_back({"median", rows[rows.size() / 2]});
+  }
+  if (rows.size() > 1) {
+    shown.push_back({"worst", rows.back()});
+  }
+  return shown;
+}
+
 Status write_contact_sheet(const Folders& folders,
                            const SearchIdentity& identity,
                            const SearchReport& report) {
-  const std::vector<ShownFilter> shown = choose_rows(report);
+  const std::vector<ShownFilter> shown = choose_rows(identity, report);
   if (shown.empty()) {
     return {};
   }

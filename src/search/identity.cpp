@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "stemvo/check.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::search {
@@ -106,6 +107,24 @@ std::size_t num_filters(const SearchIdentity& identity) {
     count += static_cast<std::size_t>(layer.last - layer.first);
   }
   return count;
+}
+
+std::size_t num_baselines(const SearchIdentity& identity) {
+  std::size_t count = 0;
+  for (const LayerIdentity& layer : identity.layers) {
+    count += layer.is_baseline ? static_cast<std::size_t>(layer.last - layer.first) : 0;
+  }
+  return count;
+}
+
+const LayerIdentity& layer_of(const SearchIdentity& identity, const FilterKey& key) {
+  const auto layer = std::find_if(
+      identity.layers.begin(), identity.layers.end(), [&key](const LayerIdentity& one) {
+        return one.model == key.model && one.layer == key.layer && one.features == key.features &&
+               one.first <= key.filter && key.filter < one.last;
+      });
+  STEMVO_CHECK(layer != identity.layers.end(), "each row has a layer");
+  return *layer;
 }
 
 std::string describe_change(const SearchIdentity& before,

@@ -8,6 +8,7 @@
 
 #include "search/schedule.hpp"
 #include "stemvo/error.hpp"
+#include "stemvo/search/search.hpp"
 
 namespace stemvo::search {
 
@@ -24,6 +25,7 @@ struct LayerIdentity {
   std::string hash;  ///< of the model's file and the manifest's entry
   int sampling_px = 1;
   std::string stem_model;  ///< as stem.model takes it here; not compared
+  bool is_baseline = false;
 };
 
 struct SequenceIdentity {
@@ -47,7 +49,11 @@ struct SearchIdentity {
   std::optional<std::size_t> only_sequence;  ///< a part that runs this one of them
 };
 
+/// With the baselines.
 [[nodiscard]] std::size_t num_filters(const SearchIdentity& identity);
+[[nodiscard]] std::size_t num_baselines(const SearchIdentity& identity);
+/// The layer a row belongs to (checked).
+[[nodiscard]] const LayerIdentity& layer_of(const SearchIdentity& identity, const FilterKey& key);
 
 /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty where
 /// nothing did. With `as_parts` other layers, models and filters are no change, nor are frames that

@@ -85,6 +85,7 @@ void visit_layer(Layer& layer, const Visitor& visit) {
   visit("hash", layer.hash);
   visit("sampling_px", layer.sampling_px);
   visit("stem_model", layer.stem_model);
+  visit("baseline", layer.is_baseline);
 }
 
 template <typename Sequence, typename Visitor>

@@ -121,7 +121,8 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
     return tl::unexpected(records.error());
   }
   identity.layers = join_layers(std::move(layers));
-  identity.schedule = search::exhaustive_schedule(records->size());
+  identity.schedule =
+      search::exhaustive_schedule(search::num_filters(identity) - search::num_baselines(identity));
   identity.only_sequence.reset();
   Status status = pipeline::create_out_folder(out_dir);
   if (status) {

@@ -113,11 +113,33 @@ void add_candidates(SearchPlan& plan) {
                                     .last = layer.last,
                                     .hash = {},
                                     .sampling_px = layer.stem.info().sampling_px,
-                                    .stem_model = layer.config.stem.model});
+                                    .stem_model = layer.config.stem.model,
+                                    .is_baseline = layer.is_baseline});
     for (int filter = layer.first; filter < layer.last; ++filter) {
-      plan.candidates.push_back({{layer.model, layer.layer, filter, features}, i});
+      plan.candidates.push_back({.key = {layer.model, layer.layer, filter, features},
+                                 .layer = i,
+                                 .is_baseline = layer.is_baseline});
     }
   }
+}
+
+void choose_racing(SearchPlan& plan) {
+  for (Candidate& candidate : plan.candidates) {
+    candidate.races =
+        !candidate.is_baseline && std::all_of(plan.sequences.begin(), plan.sequences.end(),
+                                              [&candidate](const PlanSequence& sequence) {
+                                                return sequence.is_held_out ||
+                                                       sequence.unusable[candidate.layer].empty();
+                                              });
+  }
+}
+
+/// Of the filters; baselines are outside.
+Schedule schedule_of(const SearchPlan& plan, bool exhaustive) {
+  const auto racing = std::count_if(plan.candidates.begin(), plan.candidates.end(),
+                                    [](const Candidate& one) { return one.races; });
+  return exhaustive ? exhaustive_schedule(num_filters(plan.identity) - num_baselines(plan.identity))
+                    : halving_schedule(static_cast<std::size_t>(racing));
 }
 
 /// Those of the program and of each layer's model.
@@ -180,8 +202,8 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   common.stem.layer = StemOptions().layer;
   common.stem.filter = -1;
   plan.identity.configuration = dump_config(common);
-  plan.identity.schedule = request.exhaustive ? exhaustive_schedule(plan.candidates.size())
-                                              : halving_schedule(plan.candidates.size());
+  choose_racing(plan);
+  plan.identity.schedule = schedule_of(plan, request.exhaustive);
   return plan;
 }
 

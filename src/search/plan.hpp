@@ -20,12 +20,16 @@ struct PlanLayer {
   Stem stem;
   int first = 0;
   int last = 0;
+  bool is_baseline = false;
   std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
 };
 
 struct Candidate {
   FilterKey key;
   std::size_t layer = 0;  ///< index of its PlanLayer
+  bool is_baseline = false;
+  /// No baseline, and can be run on all sequences that rank: what halving chooses from.
+  bool races = false;
 };
 
 /// One sequence and what can be said of it before work starts.

@@ -152,6 +152,7 @@ Status add_baselines(const SearchRequest& request, std::vector<PlanLayer>& layer
     if (!layer) {
       return tl::unexpected(layer.error());
     }
+    layer->is_baseline = true;
     layers.push_back(std::move(*layer));
   }
   return {};

@@ -2,7 +2,6 @@
 #include "search/race.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
 #include <utility>
 
@@ -47,11 +46,17 @@ void Race::add_record(Record record) {
 }
 
 Status Race::run() {
-  Block alive(plan_.candidates.size());
-  std::iota(alive.begin(), alive.end(), std::size_t{0});
+  Block alive;
+  Block baselines;
+  for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+    (plan_.candidates[i].is_baseline ? baselines : alive).push_back(i);
+  }
   for (std::size_t rung = 0; rung < plan_.identity.schedule.size() && !is_stopped_; ++rung) {
     if (rung > 0) {
       alive = survivors(alive, rung);
+    }
+    if (is_last(rung)) {  // what filters are compared with runs all frames, outside the race
+      alive.insert(alive.end(), baselines.begin(), baselines.end());
     }
     if (Status status = run_rung(rung, alive); !status) {
       return status;
@@ -65,13 +70,25 @@ bool Race::is_last(std::size_t rung) const { return rung + 1 == plan_.identity.s
 /// Without what is repeated.
 std::size_t Race::frames_planned() const {
   const Schedule& schedule = plan_.identity.schedule;
-  std::size_t planned = plan_.num_frames(true) * schedule.back().num_filters;
+  std::size_t planned = 0;
   for (const PlanSequence& sequence : plan_.sequences) {
+    const std::size_t num_frames = sequence.sequence.size();
+    std::size_t racing = 0;
+    for (const Candidate& candidate : plan_.candidates) {
+      const bool runs = sequence.unusable[candidate.layer].empty();
+      if (runs && (candidate.is_baseline || schedule.size() == 1)) {
+        planned += num_frames;
+      } else if (runs && !candidate.races && !sequence.is_held_out) {
+        planned += frames_at(schedule.front(), num_frames);
+      }
+      racing += candidate.races && schedule.size() > 1 ? 1 : 0;
+    }
     std::size_t before = 0;
-    for (std::size_t rung = 0; rung < schedule.size() && !sequence.is_held_out; ++rung) {
-      const std::size_t frames = frames_at(schedule[rung], sequence.sequence.size());
-      planned += schedule[rung].num_filters * (frames - before);
-      before = frames;
+    for (const Rung& rung : schedule) {
+      const std::size_t frames = frames_at(rung, num_frames);
+      const bool is_asked = !sequence.is_held_out || rung == schedule.back();
+      planned += is_asked ? std::min(racing, rung.num_filters) * (frames - before) : 0;
+      before = sequence.is_held_out ? 0 : frames;
     }
   }
   return std::max(planned, frames_done_);
@@ -89,8 +106,10 @@ const Record* Race::find(std::size_t candidate, std::size_t rung) const {
 Race::Block Race::survivors(const Block& alive, std::size_t rung) {
   std::vector<const Record*> done;
   for (const std::size_t candidate : alive) {
-    done.push_back(find(candidate, rung - 1));
-    STEMVO_CHECK(done.back() != nullptr, "a rung is complete before the next");
+    if (plan_.candidates[candidate].races) {
+      done.push_back(find(candidate, rung - 1));
+      STEMVO_CHECK(done.back() != nullptr, "a rung is complete before the next");
+    }
   }
   const KeySet keys = survivors_of(done, plan_.identity.schedule[rung].num_filters);
   Block chosen;

@@ -2,6 +2,7 @@
 #include "search/ranking.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <tuple>
 
@@ -36,6 +37,15 @@ namespace stemvo::search {
 namespace {
 
 constexpr double kWorst = std::numeric_limits<double>::infinity();
+/// Early on filters differ by less than chance; then more inliers are better: 10 % more weigh like
+/// 0.5 % of error (docs/search.md).
+constexpr double kInlierPower = 0.05;
+
+/// What unfinished filters are compared by.
+double early_error(const MeanScore& mean) {
+  const double inliers = std::max(1.0, mean.mean_inliers.value_or(1.0));
+  return mean.early_error_percent.value_or(kWorst) * std::pow(inliers, -kInlierPower);
+}
 
 bool all_detected(const std::vector<DriveScore>& drives) {
   return std::all_of(drives.begin(), drives.end(),
@@ -59,7 +69,7 @@ std::tuple<int, double, double> order_of(const FilterRow& row) {
     case FilterStatus::kRanked:
       return {0, mean.t_rel_percent.value_or(kWorst), mean.r_rel_deg_per_100m.value_or(kWorst)};
     case FilterStatus::kStopped:
-      return {1, -row.rung, mean.early_error_percent.value_or(kWorst)};
+      return {1, -row.rung, early_error(mean)};
     default:
       return {2, 0.0, 0.0};
   }
@@ -74,7 +84,7 @@ struct Standing {
 
 Standing standing_of(const Record& record) {
   const MeanScore mean = mean_score(record.drives);
-  return {{all_detected(record.drives) ? 0 : 1, mean.early_error_percent.value_or(kWorst),
+  return {{all_detected(record.drives) ? 0 : 1, early_error(mean),
            mean.rotation_change_deg.value_or(kWorst), mean.average_offset_m.value_or(kWorst),
            mean.mean_inliers.value_or(0.0)},
           &record.key};

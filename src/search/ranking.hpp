@@ -39,9 +39,9 @@ struct KeyOrder {
 [[nodiscard]] std::vector<FilterRow> rank_filters(std::span<const Record> records,
                                                   std::size_t num_rungs);
 
-/// Of records of one rung, those that go on: the `count` best by their early errors. Of filters
-/// with the same numbers (R, G and B of a gray sequence) one goes on, the others where there is
-/// room.
+/// Of records of one rung, those that go on: the `count` best by their early errors, near ties by
+/// inliers. Of filters with the same numbers (R, G and B of a gray sequence) one goes on, the
+/// others where there is room.
 [[nodiscard]] std::vector<FilterKey> choose_survivors(const std::vector<const Record*>& records,
                                                       std::size_t count);
 

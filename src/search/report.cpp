@@ -15,18 +15,40 @@ bool is_complete(const SearchIdentity& identity, const std::vector<Record>& reco
   const int last = static_cast<int>(identity.schedule.size()) - 1;
   const auto done = std::count_if(records.begin(), records.end(),
                                   [last](const Record& record) { return record.rung == last; });
-  return static_cast<std::size_t>(done) == identity.schedule.back().num_filters;
+  const std::size_t expected = last == 0
+                                   ? num_filters(identity)
+                                   : identity.schedule.back().num_filters + num_baselines(identity);
+  return static_cast<std::size_t>(done) == expected;
+}
+
+/// A layer that cannot be run on a sequence: all its filters have no frames there.
+bool cannot_run(const LayerIdentity& layer,
+                const std::string& sequence,
+                const std::vector<Record>& records) {
+  return std::any_of(records.begin(), records.end(), [&](const Record& record) {
+    return record.key.model == layer.model && record.key.layer == layer.layer &&
+           record.key.features == layer.features &&
+           std::any_of(record.drives.begin(), record.drives.end(), [&](const DriveScore& drive) {
+             return drive.sequence == sequence && drive.num_frames == 0;
+           });
+  });
 }
 
 SearchWork work_of(const SearchIdentity& identity, const std::vector<Record>& records) {
   SearchWork work;
   for (const Record& record : records) {
-    work.filter_frames += record.filter_frames;
+    (layer_of(identity, record.key).is_baseline ? work.baseline_filter_frames
+                                                : work.filter_frames) += record.filter_frames;
     work.held_out_filter_frames += record.held_out_filter_frames;
   }
   for (const SequenceIdentity& sequence : identity.sequences) {
-    work.exhaustive_filter_frames +=
-        sequence.is_held_out ? 0 : sequence.num_frames * num_filters(identity);
+    for (const LayerIdentity& layer : identity.layers) {
+      if (!sequence.is_held_out && !layer.is_baseline &&
+          !cannot_run(layer, sequence.name, records)) {
+        work.exhaustive_filter_frames +=
+            sequence.num_frames * static_cast<std::size_t>(layer.last - layer.first);
+      }
+    }
   }
   return work;
 }

@@ -28,8 +28,8 @@ Schedule schedule_of_few(std::size_t num_filters) {
   for (int i = 0; i < kNumRungs; ++i) {
     const double count =
         static_cast<double>(num_filters) * kSharesOfFew[static_cast<std::size_t>(i)];
-    schedule.push_back(
-        {frame_share(i), std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(count)))});
+    schedule.push_back({frame_share(i), std::max(std::min<std::size_t>(1, num_filters),
+                                                 static_cast<std::size_t>(std::lround(count)))});
   }
   return schedule;
 }

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "search/tables.hpp"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "report/metrics_keys.hpp"
 #include "search/json_fields.hpp"
 #include "search/ranking.hpp"
-#include "stemvo/check.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 
@@ -55,6 +52,7 @@ Json work_json(const SearchWork& work) {
   Json json;
   json["filter_frames"] = work.filter_frames;
   json["held_out_filter_frames"] = work.held_out_filter_frames;
+  json["baseline_filter_frames"] = work.baseline_filter_frames;
   json["exhaustive_filter_frames"] = work.exhaustive_filter_frames;
   return json;
 }
@@ -102,18 +100,12 @@ Expected<Config> config_of(const std::filesystem::path& out_dir,
   if (!config) {
     return config;
   }
-  const auto layer = std::find_if(
-      identity.layers.begin(), identity.layers.end(), [&key](const LayerIdentity& candidate) {
-        return candidate.model == key.model && candidate.layer == key.layer &&
-               candidate.features == key.features && candidate.first <= key.filter &&
-               key.filter < candidate.last;
-      });
-  STEMVO_CHECK(layer != identity.layers.end(), "each row has a layer");
-  config->stem.model = layer->stem_model;
+  const LayerIdentity& layer = layer_of(identity, key);
+  config->stem.model = layer.stem_model;
   const bool is_network = key.model != "gray" && key.model != "input_layer";
   config->stem.layer = is_network ? key.layer : StemOptions().layer;
   config->stem.filter = key.filter;
-  config->stem.sampling_px = layer->sampling_px;
+  config->stem.sampling_px = layer.sampling_px;
   config->features.method = key.features;
   return config;
 }

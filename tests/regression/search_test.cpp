@@ -33,7 +33,9 @@ TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   EXPECT_EQ(metrics["t_rel_percent"], filters["filters"][0]["t_rel_percent"]);
   EXPECT_EQ(metrics["filter"], filters["filters"][0]["filter"]);
   EXPECT_LT(metrics["t_rel_percent"].get<double>(), 10.0);
-  EXPECT_EQ(filters["work"]["filter_frames"], 7 * 30);
+  EXPECT_EQ(filters["work"]["filter_frames"], 3 * 30);
+  EXPECT_EQ(filters["work"]["exhaustive_filter_frames"], 3 * 30);
+  EXPECT_EQ(filters["work"]["baseline_filter_frames"], 4 * 30);
 }
 
 /// Filters 0:1 and 1:3, each on two sequences that rank and one that is held out.
@@ -128,6 +130,41 @@ TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
   }
 }
 
+/// 2 of 5 filters (layer `deep`) are too small: neither the work nor the race counts them.
+TEST_F(Search, WhatCannotRunIsNoPartOfTheRaceAndBaselinesRunToTheEnd) {
+  const testing::TempFolder models;
+  testing::write_two_layers(models);
+  const fs::path small =
+      test::rendered_drive({.frames = 30, .width_px = 160, .height_px = 48}) / "sequences/00";
+  const Words asked = {"search",  small.string(), "--model", (models / "two_layers.onnx").string(),
+                       "--quiet", "--out"};
+  const auto run = [&](const std::string& out, const Words& more) {
+    Words words = asked;
+    words.push_back(folder_ / out);
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult program = run_stemvo(words);
+    EXPECT_EQ(program.exit_code, 0) << program.err;
+    return result(out);
+  };
+  const auto all = run("all", {"--exhaustive"});
+  EXPECT_EQ(all["work"]["filter_frames"], 3 * 30);
+  EXPECT_EQ(all["work"]["exhaustive_filter_frames"], 3 * 30);
+  const auto halved = run("halved", {});
+  EXPECT_TRUE(halved["complete"].get<bool>());
+  EXPECT_EQ(halved["rungs"][0]["filters"], 3);
+  EXPECT_EQ(halved["work"]["exhaustive_filter_frames"], 3 * 30);
+  EXPECT_EQ(halved["work"]["baseline_filter_frames"], 4 * 30);
+  EXPECT_LT(halved["work"]["filter_frames"].get<int>(), 3 * 30);
+  int baselines = 0;
+  for (const auto& row : halved["filters"]) {
+    const bool is_baseline = row["model"] != "two";
+    baselines += is_baseline ? 1 : 0;
+    EXPECT_TRUE(!is_baseline || row["sequences"][0]["frames"] == 30) << row;
+    EXPECT_TRUE(row["layer"] != "deep" || row["status"] == "not detected") << row;
+  }
+  EXPECT_EQ(baselines, 4);
+}
+
 /// Halving and the exhaustive search on 100 frames of 00: the same first row, a quarter of the
 /// work.
 class Halving : public Search, public ::testing::WithParamInterface<const char*> {
@@ -164,7 +201,9 @@ TEST_P(Halving, FindsTheWinnerForAQuarterOfTheWork) {
   winner["rung"] = halving["rungs"].size() - 1;
   EXPECT_EQ(halving["filters"][0], winner);
   EXPECT_EQ(halving["filters"].size(), all["filters"].size());
-  EXPECT_EQ(all["work"]["filter_frames"], all["filters"].size() * 100);
+  EXPECT_EQ(all["work"]["filter_frames"], (all["filters"].size() - 4) * 100);  // 4 baselines
+  EXPECT_EQ(halving["work"]["exhaustive_filter_frames"], all["work"]["filter_frames"]);
+  EXPECT_EQ(halving["work"]["baseline_filter_frames"], 4 * 100);
   EXPECT_LE(4 * halving["work"]["filter_frames"].get<int>(),
             all["work"]["filter_frames"].get<int>());
 }

@@ -130,6 +130,21 @@ std::vector<Eigen::Vector2d> polyline(const std::vector<Tag>& tags, const std::s
   return found.empty() ? std::vector<Eigen::Vector2d>(4) : found.front();
 }
 
+/// The last pixels of each row stay paper: a legend that ran over the edge would be cut there.
+TEST(TrajectoryPng, ALongLegendFitsTheFigure) {
+  const TempFolder folder;
+  TrajectoryPlot plot = corner();
+  plot.title.clear();
+  for (const char* name :
+       {"median (stopped after 1000 frames)", "worst (stopped after 6 frames)"}) {
+    plot.others.push_back({name, {at(0, 0), at(1, 20), at(0, 30)}});
+  }
+  ASSERT_TRUE(write_trajectory_png(folder / "a.png", plot));
+  const cv::Mat picture = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
+  ASSERT_FALSE(picture.empty());
+  EXPECT_EQ(cv::countNonZero(picture.colRange(picture.cols - 12, picture.cols) != 255), 0);
+}
+
 TEST(TrajectorySvg, HasBothPathsWithEqualAxes) {
   const TempFolder folder;
   ASSERT_TRUE(write_trajectory_svg(folder / "a.svg", corner()));

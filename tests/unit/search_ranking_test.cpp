@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "search/contact_sheet.hpp"
 #include "search/race.hpp"
 #include "search/ranking.hpp"
 #include "search/schedule.hpp"
@@ -95,6 +96,36 @@ TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
   EXPECT_EQ(rows[1].status, FilterStatus::kStopped);
 }
 
+/// Filter 0 ran to the end, 1 to 4 were stopped, 5 was not detected; the best is a baseline.
+TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
+  SearchReport report;
+  const auto add = [&report](int filter, FilterStatus status, const std::string& model = "net") {
+    report.rows.push_back({{model, "stem", filter, "klt"}, status, 0, {score(1.0, 1.0)}, {}});
+  };
+  add(0, FilterStatus::kRanked, "input_layer");
+  add(0, FilterStatus::kRanked);
+  for (const int filter : {1, 2, 3, 4}) {
+    add(filter, FilterStatus::kStopped);
+  }
+  add(5, FilterStatus::kNotDetected);
+  SearchIdentity identity;
+  for (const std::string model : {"net", "input_layer"}) {
+    LayerIdentity& layer = identity.layers.emplace_back();
+    layer.model = model;
+    layer.layer = "stem";
+    layer.features = "klt";
+    layer.last = 6;
+    layer.is_baseline = model != "net";
+  }
+  const auto shown = choose_rows(identity, report);
+  ASSERT_EQ(shown.size(), 3U);
+  EXPECT_EQ(shown[0].row, &report.rows[1]);
+  EXPECT_EQ(shown[1].row->key.filter, 2);
+  EXPECT_EQ(shown[2].row->key.filter, 4);
+  report.rows.clear();
+  EXPECT_TRUE(choose_rows(identity, report).empty());
+}
+
 TEST(Ranking, DoesNotDependOnTheOrderOfRecords) {
   std::vector<Record> records;
   for (int i = 0; i < 6; ++i) {
@@ -123,6 +154,21 @@ TEST(Ranking, SurvivorsAreTheLeastWrongOfThoseDetected) {
   EXPECT_EQ(choose_survivors(all, 9).size(), 4U);
 }
 
+TEST(Ranking, MoreInliersDecideBetweenErrorsThatAreNearlyEqual) {
+  const auto best = [](double error, double inliers) {
+    std::vector<Record> records = {record(0, 0, {score(1.0, 1.0)}),
+                                   record(1, 0, {score(1.0, 1.0)})};
+    records[0].drives[0].early_error_percent = 4.0;
+    records[0].drives[0].mean_inliers = 160.0;
+    records[1].drives[0].early_error_percent = error;
+    records[1].drives[0].mean_inliers = inliers;
+    return choose_survivors({&records[0], &records[1]}, 1).front().filter;
+  };
+  EXPECT_EQ(best(4.02, 160.0), 0);
+  EXPECT_EQ(best(4.02, 200.0), 1);
+  EXPECT_EQ(best(4.20, 200.0), 0);  // a larger error is not made up for
+}
+
 TEST(Ranking, OfTheSameChannelOneSurvives) {
   std::vector<Record> records;
   for (int i = 0; i < 5; ++i) {
@@ -138,7 +184,7 @@ TEST(Ranking, OfTheSameChannelOneSurvives) {
   for (const FilterKey& key : choose_survivors(all, 5)) {
     chosen.push_back(key.filter);
   }
-  EXPECT_THAT(chosen, ElementsAre(2, 0, 3, 4, 1));
+  EXPECT_THAT(chosen, ElementsAre(0, 2, 3, 4, 1));
 }
 
 TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
@@ -166,6 +212,7 @@ TEST(HalvingSchedule, FewFilters) {
   for (const std::size_t count : {8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
     EXPECT_LE(cost_share(halving_schedule(count)), count < 12 ? 0.28 : 0.25) << count;
   }
+  EXPECT_EQ(halving_schedule(0).back().num_filters, 0U);
   EXPECT_EQ(halving_schedule(1).back().num_filters, 1U);
   EXPECT_EQ(halving_schedule(3).front().num_filters, 3U);
   EXPECT_EQ(cost_share(exhaustive_schedule(7)), 1.0);

@@ -98,9 +98,10 @@ struct FilterRow {
 
 /// What a search costs: frames times filters, and what was run again after a kill.
 struct SearchWork {
-  std::size_t filter_frames = 0;  ///< of the sequences that rank
-  std::size_t held_out_filter_frames = 0;
-  std::size_t exhaustive_filter_frames = 0;  ///< what ranking all filters on all frames takes
+  std::size_t filter_frames = 0;             ///< of the filters, on the sequences that rank
+  std::size_t baseline_filter_frames = 0;    ///< of the baselines, which always run to the end
+  std::size_t held_out_filter_frames = 0;    ///< of both
+  std::size_t exhaustive_filter_frames = 0;  ///< of all filters that can run, on all frames
 };
 
 struct SearchReport {
