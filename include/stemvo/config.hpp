@@ -78,9 +78,10 @@ struct Config {
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 /// Ranges and choices of every key; written so that NaN fails.
 [[nodiscard]] Status validate(const Config& config);
-/// With what stem.upsample: auto stands for, for frames of this width. KLT finds subpixel places on
-/// the channel as it is; orb and sift lose their keypoints on a smaller picture, and small frames
-/// (less than 1000 columns) the texture of the road.
+/// With what stem.upsample: auto stands for, for frames of this width: `half` for KLT on 1000
+/// columns and more, else `bicubic`. KLT finds subpixel places on a channel of every second pixel
+/// as it is, but not on a coarser one (of 16 random filters of stride 16 none is tracked). orb and
+/// sift lose their keypoints on a smaller picture, and small frames the texture of the road.
 [[nodiscard]] Config with_chosen_upsample(Config config, int width_px);
 /// YAML with every key, exact (numbers round-trip).
 [[nodiscard]] std::string dump_config(const Config& config);

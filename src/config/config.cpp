@@ -121,7 +121,7 @@ std::string dump_config(const Config& config) {
 Config with_chosen_upsample(Config config, int width_px) {
   if (config.stem.upsample == "auto") {
     config.stem.upsample =
-        config.features.method == "klt" && width_px >= kWideFrame_px ? "native" : "bicubic";
+        config.features.method == "klt" && width_px >= kWideFrame_px ? "half" : "bicubic";
   }
   return config;
 }

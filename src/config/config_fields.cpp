@@ -59,9 +59,10 @@ std::vector<Field> stem_fields(StemOptions& o) {
       {"stem", "sampling_px", &o.sampling_px, at_least(0),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
-      {"stem", "upsample", &o.upsample, one_of({"auto", "bicubic", "native"}),
-       "size of the picture to track on: bicubic (the input's), native (the channel's), or auto: "
-       "native for klt on frames of 1000 columns and more, else bicubic"},
+      {"stem", "upsample", &o.upsample, one_of({"auto", "bicubic", "half", "native"}),
+       "size of the picture to track on: bicubic (the input's), half (of the input's where the "
+       "channel is coarser, else the channel's), native (the channel's), or auto: half for klt on "
+       "frames of 1000 columns and more, else bicubic"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),
        "percentile of the response that becomes black"},
       {"stem", "stretch_high_percent", &o.stretch_high_percent, between(0, 100),

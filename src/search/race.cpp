@@ -170,9 +170,16 @@ std::vector<Race::Block> Race::cut(const Block& group) const {
 /// What the odometry of a layer works on.
 cv::Size Race::picture_size(std::size_t layer, const PlanSequence& sequence) const {
   const Camera& camera = sequence.sequence.camera();
+  const cv::Size channel = sequence.channels[layer];
+  const cv::Size half(camera.width_px / 2, camera.height_px / 2);
   const Config chosen = with_chosen_upsample(plan_.layers[layer].config, camera.width_px);
-  return chosen.stem.upsample == "native" ? sequence.channels[layer]
-                                          : cv::Size(camera.width_px, camera.height_px);
+  if (chosen.stem.upsample == "native") {
+    return channel;
+  }
+  if (chosen.stem.upsample == "half") {
+    return channel.width > half.width ? channel : half;
+  }
+  return {camera.width_px, camera.height_px};
 }
 
 Status Race::run_block_of(std::size_t rung, const Block& block) {

@@ -47,6 +47,24 @@ class ConfigLoad : public ::testing::Test {
   std::filesystem::path file_;
 };
 
+TEST(Config, AutoUpsamplingGoesByFeaturesAndWidth) {
+  const auto chosen = [](const std::string& features, int width_px, const std::string& asked) {
+    Config config;
+    config.features.method = features;
+    config.stem.upsample = asked;
+    return with_chosen_upsample(config, width_px).stem.upsample;
+  };
+  EXPECT_EQ(chosen("klt", 1241, "auto"), "half");
+  EXPECT_EQ(chosen("klt", 1000, "auto"), "half");
+  EXPECT_EQ(chosen("klt", 999, "auto"), "bicubic");
+  EXPECT_EQ(chosen("orb", 1241, "auto"), "bicubic");
+  EXPECT_EQ(chosen("sift", 1241, "auto"), "bicubic");
+  for (const char* asked : {"bicubic", "half", "native"}) {
+    EXPECT_EQ(chosen("klt", 1241, asked), asked);
+    EXPECT_EQ(chosen("orb", 640, asked), asked);
+  }
+}
+
 TEST_F(ConfigLoad, ReadsEveryKindOfValueOverTheDefaults) {
   const Expected<Config> config = load(
       "stem:\n  model: input_layer\n  filter: 2\n"

@@ -92,6 +92,23 @@ TEST(ChannelStretch, NotANumberHarmsNobodyElse) {
   EXPECT_EQ(dirty.apply(nothing).pixels.size(), cv::Size(10, 10));
 }
 
+/// As before there was `half`: the default's channels are what they were.
+TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsFineEnough) {
+  for (const double sampling : {1.0, 2.0}) {
+    Channel channel = ramp(0.0F, 1.0F);
+    channel.map.scale = Eigen::Vector2d::Constant(sampling);
+    channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
+    StemOptions options;
+    options.upsample = "native";
+    const ChannelImage native = ChannelStretch(options).apply(channel);
+    options.upsample = "half";
+    const ChannelImage half = ChannelStretch(options).apply(channel);
+    EXPECT_EQ(cv::norm(native.pixels, half.pixels, cv::NORM_INF), 0.0);
+    EXPECT_EQ(native.map.scale, half.map.scale);
+    EXPECT_EQ(native.map.offset_px, half.map.offset_px);
+  }
+}
+
 TEST(ChannelStretch, NativeKeepsTheSize) {
   StemOptions options;
   options.upsample = "native";
@@ -154,6 +171,10 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
+    if (std::string(upsample) == "half") {
+      EXPECT_EQ(image.pixels.size(), channel->values.size() * std::max(1, sampling / 2));
+      EXPECT_EQ(image.map.scale, Eigen::Vector2d::Constant(std::min(sampling, 2)));
+    }
     if (std::string(upsample) == "bicubic") {
       EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(1, 1));
@@ -166,6 +187,9 @@ INSTANTIATE_TEST_SUITE_P(All,
                          ::testing::Values(Case{&testing::kPlain4, 4, "bicubic"},
                                            Case{&testing::kPlain4, 2, "bicubic"},
                                            Case{&testing::kPlain4, 2, "native"},
+                                           Case{&testing::kPlain4, 4, "half"},
+                                           Case{&testing::kPlain4, 2, "half"},
+                                           Case{&testing::kPlain4, 1, "half"},
                                            Case{&testing::kPlain4, 1, "bicubic"},
                                            Case{&testing::kPadded3, 2, "bicubic"},
                                            Case{&testing::kPadded3, 2, "native"},

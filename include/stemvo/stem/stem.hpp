@@ -19,8 +19,9 @@ struct StemOptions {
   std::string layer = "first";  ///< of a model that has several, by name
   int filter = -1;              ///< -1: the manifest's default_filter (gray, input_layer: 0)
   int sampling_px = 0;          ///< divisor of the native stride; 0: 2 if it divides it, else 1
-  /// `bicubic` (to the input's size), `native`, or `auto`: with_chosen_upsample() of config.hpp
-  /// says which (here: bicubic).
+  /// `bicubic` (to the input's size), `half` (bicubic to half of it, where the channel is coarser
+  /// than that; else native), `native`, or `auto`: with_chosen_upsample() of config.hpp says which
+  /// (here: bicubic).
   std::string upsample = "auto";
   double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
   double stretch_high_percent = 99.5;
@@ -74,9 +75,9 @@ class Stem {
 
 /// Float channel -> 8-bit picture: percentile limits that follow the drive slowly, so that a patch
 /// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
-/// brings it to the input's size (PixelMap is adjusted; no resampling between pixels).
-/// A channel without contrast becomes one gray and leaves the limits as they were; NaN becomes 0
-/// (upsampled: its surroundings too).
+/// brings it to the input's size, or half of it (PixelMap is adjusted; no resampling between
+/// pixels). A channel without contrast becomes one gray and leaves the limits as they were; NaN
+/// becomes 0 (upsampled: its surroundings too).
 class ChannelStretch {
  public:
   explicit ChannelStretch(const StemOptions& options);
