@@ -31,8 +31,9 @@ CLI::Validator in_range(int min, int max) { return CLI::Range(min, max).descript
 
 void add_config_options(CLI::App& command, ConfigArguments& arguments) {
   command
-      .add_option("--config", arguments.file,
-                  "Configuration file, or the name of one that comes with stemvo: default, paper")
+      .add_option(
+          "--config", arguments.file,
+          "Configuration file, or the name of one that comes with stemvo: default, fast, paper")
       ->type_name("FILE");
   command
       .add_option("--set", arguments.overrides,

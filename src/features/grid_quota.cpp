@@ -23,10 +23,6 @@ std::size_t GridQuota::cell_of(const cv::Point2f& picture_uv) const {
   return static_cast<std::size_t>(row * columns_ + column);
 }
 
-bool GridQuota::has_room(const cv::Point2f& picture_uv) const {
-  return counts_[cell_of(picture_uv)] < quota_;
-}
-
 bool GridQuota::take(const cv::Point2f& picture_uv) {
   int& count = counts_[cell_of(picture_uv)];
   if (count >= quota_) {
@@ -34,14 +30,6 @@ bool GridQuota::take(const cv::Point2f& picture_uv) {
   }
   ++count;
   return true;
-}
-
-int GridQuota::num_free() const {
-  int num_free = 0;
-  for (const int count : counts_) {
-    num_free += quota_ - count;
-  }
-  return num_free;
 }
 
 }  // namespace stemvo

@@ -15,11 +15,8 @@ class GridQuota {
   /// Quota per cell = max_features / cells, at least 1.
   GridQuota(const FeatureOptions& options, cv::Size picture_size);
 
-  [[nodiscard]] bool has_room(const cv::Point2f& picture_uv) const;
   /// Takes a place in the point's cell; false when the cell is full.
   bool take(const cv::Point2f& picture_uv);
-  /// Places left in all cells together.
-  [[nodiscard]] int num_free() const;
 
  private:
   [[nodiscard]] std::size_t cell_of(const cv::Point2f& picture_uv) const;

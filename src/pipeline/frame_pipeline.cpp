@@ -6,7 +6,7 @@
 #include <chrono>
 #include <exception>
 #include <mutex>
-#include <optional>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -63,45 +63,80 @@ class Guard {
   std::exception_ptr first_;
 };
 
-/// What the stages do; which of them may work at the same time is the graph's business.
+namespace flow = tbb::flow;
+/// A frame, and the one before; null: it is the first.
+using FrameAndBefore = std::tuple<Frame*, Frame*>;
+using Starts = flow::multifunction_node<Frame*, std::tuple<Frame*>>;
+
+/// What the nodes of the graph do.
 class Stages {
  public:
   Stages(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit)
       : sequence_(sequence), odometry_(odometry), visit_(visit) {}
 
-  /// False: there are no more frames.
-  bool start(Frame& frame) {
+  /// Gives a free place to the next frame, if there is one. Null: there was no frame to be freed.
+  void start(Frame* const& frame, Starts::output_ports_type& started) {
     const Turn turn(between_starts_);
-    if (guard_.is_over() || num_started_ == sequence_.size()) {
-      return false;
+    if (frame == nullptr || guard_.is_over() || num_started_ == sequence_.size()) {
+      return;
     }
-    const Turn stage(frame.between_stages);  // of the frame that was here
-    frame.index = num_started_++;
-    frame.started = std::chrono::steady_clock::now();
-    frame.prepared = {};
-    return true;
+    {
+      const Turn stage(frame->between_stages);  // of the frame that was here
+      frame->index = num_started_++;
+      frame->started = std::chrono::steady_clock::now();
+      frame->prepared = {};
+    }
+    std::get<0>(started).try_put(frame);
   }
-  void read(Frame& frame) {
-    const Turn stage(frame.between_stages);
+  Frame* read(Frame* const& frame) {
+    const Turn stage(frame->between_stages);
     guard_.run(
-        [&] { frame.pixels = timed(Stage::kRead, [&] { return sequence_.read(frame.index); }); });
+        [&] { frame->pixels = timed(Stage::kRead, [&] { return sequence_.read(frame->index); }); });
+    return frame;
   }
-  void prepare(Frame& frame) {
+  Frame* prepare(Frame* const& frame) {
     const Turn turn(between_prepares_);
-    const Turn stage(frame.between_stages);
+    const Turn stage(frame->between_stages);
     guard_.run([&] {
-      if (frame.pixels) {
-        frame.prepared = odometry_.prepare(*frame.pixels);
+      if (frame->pixels) {
+        frame->prepared = odometry_.prepare(*frame->pixels);
       }
     });
+    return frame;
   }
-  void follow(Frame& frame) {
-    const Turn turn(between_steps_);
-    const Turn stage(frame.between_stages);
-    guard_.run([&] { odometry_.follow(std::move(frame.prepared)); });
+  Frame* follow(const FrameAndBefore& pair) {
+    const Turn turn(placed_, followed_);
+    Frame* const frame = std::get<0>(pair);
+    const Turn stage(frame->between_stages);
+    guard_.run([&] { odometry_.follow(std::move(frame->prepared)); });
+    return frame;
   }
-  void finish(Frame& frame) {
-    const Turn turn(between_steps_);
+  /// Of the one before, whose place is free then.
+  Frame* finish(const FrameAndBefore& pair) {
+    const Turn turn(placed_, finished_);
+    Frame* const before = std::get<1>(pair);
+    if (before != nullptr) {
+      hand_result_over(*before);
+    }
+    return before;
+  }
+  Frame* place(const FrameAndBefore& pair) {
+    const Turn after_follow(followed_, placed_);
+    const Turn after_finish(finished_, placed_);
+    guard_.run([&] { odometry_.place(); });
+    last_placed_ = std::get<0>(pair);
+    return last_placed_;
+  }
+  /// Once the graph has nothing more to do. Throws what a stage threw.
+  void end() {
+    if (last_placed_ != nullptr) {
+      hand_result_over(*last_placed_);
+    }
+    guard_.rethrow();
+  }
+
+ private:
+  void hand_result_over(Frame& frame) {
     const Turn stage(frame.between_stages);
     guard_.run([&] {
       const FrameResult result = odometry_.finish();
@@ -113,95 +148,84 @@ class Stages {
       }
     });
   }
-  void place() {
-    const Turn turn(between_steps_);
-    guard_.run([&] { odometry_.place(); });
-  }
-  void rethrow() const { guard_.rethrow(); }
 
- private:
   const KittiSequence& sequence_;
   Odometry& odometry_;
   const FrameVisitor& visit_;
   std::size_t num_started_ = 0;
+  Frame* last_placed_ = nullptr;
   Guard guard_;
   HandOver between_starts_;
   HandOver between_prepares_;
-  HandOver between_steps_;  ///< of the odometry: follow, finish, place
+  HandOver placed_;
+  HandOver followed_;
+  HandOver finished_;
+};
+
+/// What waits for what (docs/architecture.md).
+class FrameGraph {
+ public:
+  explicit FrameGraph(Stages& stages)
+      : starts_(graph_, flow::serial, body<&Stages::start>(stages)),
+        reads_(graph_, flow::unlimited, body<&Stages::read>(stages)),
+        in_order_(graph_, [](Frame* frame) { return frame->index; }),
+        prepares_(graph_, flow::serial, body<&Stages::prepare>(stages)),
+        steps_(graph_),
+        follows_(graph_, flow::serial, body<&Stages::follow>(stages), kUrgent),
+        finishes_(graph_, flow::serial, body<&Stages::finish>(stages), kUrgent),
+        both_(graph_),
+        places_(graph_, flow::serial, body<&Stages::place>(stages), kUrgent) {
+    flow::make_edge(flow::output_port<0>(starts_), reads_);
+    flow::make_edge(reads_, in_order_);
+    flow::make_edge(in_order_, prepares_);
+    flow::make_edge(prepares_, flow::input_port<0>(steps_));
+    flow::make_edge(steps_, follows_);   // the frame ..
+    flow::make_edge(steps_, finishes_);  // .. beside the one before
+    flow::make_edge(follows_, flow::input_port<0>(both_));
+    flow::make_edge(finishes_, flow::input_port<1>(both_));
+    flow::make_edge(finishes_, starts_);
+    flow::make_edge(both_, places_);
+    flow::make_edge(places_, flow::input_port<1>(steps_));
+  }
+
+  /// Until no frame is left.
+  void run(std::span<Frame> places) {
+    begin_.give();
+    flow::input_port<1>(steps_).try_put(nullptr);
+    for (Frame& place : places) {
+      starts_.try_put(&place);
+    }
+    graph_.wait_for_all();
+    end_.take();
+  }
+
+ private:
+  template <auto kMethod>
+  HandedOver<kMethod, Stages> body(Stages& stages) {
+    return {begin_, end_, stages};
+  }
+
+  HandOver begin_;
+  HandOver end_;
+  flow::graph graph_;
+  Starts starts_;
+  flow::function_node<Frame*, Frame*> reads_;
+  flow::sequencer_node<Frame*> in_order_;
+  flow::function_node<Frame*, Frame*> prepares_;
+  flow::join_node<FrameAndBefore> steps_;
+  flow::function_node<FrameAndBefore, Frame*> follows_;
+  flow::function_node<FrameAndBefore, Frame*> finishes_;
+  flow::join_node<FrameAndBefore> both_;
+  flow::function_node<FrameAndBefore, Frame*> places_;
 };
 
 }  // namespace
 
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
-  namespace flow = tbb::flow;
-  using Pair = std::tuple<Frame*, Frame*>;  // a frame, and the one before (null: it is the first)
-  using Starts = flow::multifunction_node<Frame*, std::tuple<Frame*>>;
-
+  std::array<Frame, kMaxInFlight> places;
   Stages stages(sequence, odometry, visit);
-  const auto start = [&](Frame* frame, Starts::output_ports_type& ports) {
-    if (frame != nullptr && stages.start(*frame)) {
-      std::get<0>(ports).try_put(frame);
-    }
-  };
-  const auto read = [&](Frame* frame) { return stages.read(*frame), frame; };
-  const auto prepare = [&](Frame* frame) { return stages.prepare(*frame), frame; };
-  const auto follow = [&](const Pair& pair) {
-    stages.follow(*std::get<0>(pair));
-    return std::get<0>(pair);
-  };
-  const auto finish = [&](const Pair& pair) {
-    Frame* const before = std::get<1>(pair);
-    if (before != nullptr) {
-      stages.finish(*before);
-    }
-    return before;
-  };
-  Frame* last = nullptr;
-  const auto place = [&](const Pair& pair) {
-    stages.place();
-    return last = std::get<0>(pair);
-  };
-
-  HandOver begin;
-  HandOver end;
-  flow::graph graph;
-  Starts starts(graph, flow::serial, HandedOver(begin, end, start));
-  flow::function_node<Frame*, Frame*> reads(graph, flow::unlimited, HandedOver(begin, end, read));
-  flow::sequencer_node<Frame*> in_order(graph, [](Frame* frame) { return frame->index; });
-  flow::function_node<Frame*, Frame*> prepares(graph, flow::serial,
-                                               HandedOver(begin, end, prepare));
-  flow::join_node<Pair> steps(graph);
-  flow::function_node<Pair, Frame*> follows(graph, flow::serial, HandedOver(begin, end, follow),
-                                            kUrgent);
-  flow::function_node<Pair, Frame*> finishes(graph, flow::serial, HandedOver(begin, end, finish),
-                                             kUrgent);
-  flow::join_node<Pair> both(graph);
-  flow::function_node<Pair, Frame*> places(graph, flow::serial, HandedOver(begin, end, place),
-                                           kUrgent);
-  flow::make_edge(flow::output_port<0>(starts), reads);
-  flow::make_edge(reads, in_order);
-  flow::make_edge(in_order, prepares);
-  flow::make_edge(prepares, flow::input_port<0>(steps));
-  flow::make_edge(steps, follows);   // the frame ..
-  flow::make_edge(steps, finishes);  // .. beside the one before
-  flow::make_edge(follows, flow::input_port<0>(both));
-  flow::make_edge(finishes, flow::input_port<1>(both));
-  flow::make_edge(finishes, starts);  // its place is free for the next one to be read
-  flow::make_edge(both, places);
-  flow::make_edge(places, flow::input_port<1>(steps));
-
-  std::array<Frame, kMaxInFlight> frames;
-  begin.give();
-  flow::input_port<1>(steps).try_put(nullptr);
-  for (Frame& frame : frames) {
-    starts.try_put(&frame);
-  }
-  graph.wait_for_all();
-  end.take();
-  if (last != nullptr) {
-    stages.finish(*last);
-  }
-  stages.rethrow();
+  FrameGraph(stages).run(places);
+  stages.end();
 }
 
 }  // namespace stemvo::pipeline

@@ -3,7 +3,15 @@
 
 #include <utility>
 
-#ifdef __SANITIZE_THREAD__
+#if defined(__SANITIZE_THREAD__)
+#define STEMVO_THREAD_SANITIZER  // GCC
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define STEMVO_THREAD_SANITIZER  // Clang
+#endif
+#endif
+
+#ifdef STEMVO_THREAD_SANITIZER
 #include <sanitizer/tsan_interface.h>
 #define STEMVO_NOT_INSTRUMENTED __attribute__((no_sanitize("thread")))
 #else
@@ -18,12 +26,12 @@ namespace stemvo {
 class HandOver {
  public:
   void give() {
-#ifdef __SANITIZE_THREAD__
+#ifdef STEMVO_THREAD_SANITIZER
     __tsan_release(this);
 #endif
   }
   void take() {
-#ifdef __SANITIZE_THREAD__
+#ifdef STEMVO_THREAD_SANITIZER
     __tsan_acquire(this);
 #endif
   }
@@ -43,23 +51,23 @@ class Turn {
   HandOver& after_;
 };
 
-/// `work` as TBB is given it, to call in any thread: a Turn around it. It must stay where it is.
-template <typename Work>
+/// A method of `object` as TBB is given it, to call in any thread: a Turn around it.
+template <auto kMethod, typename Object>
 class HandedOver {
  public:
-  HandedOver(HandOver& before, HandOver& after, const Work& work)
-      : before_(&before), after_(&after), work_(&work) {}
-  /// Nothing is known of the thread that made this object until before_ was taken.
+  HandedOver(HandOver& before, HandOver& after, Object& object)
+      : before_(&before), after_(&after), object_(&object) {}
+  /// Nothing is known of the thread that made this until before_ was taken.
   template <typename... Arguments>
   STEMVO_NOT_INSTRUMENTED decltype(auto) operator()(Arguments&&... arguments) const {
     const Turn turn(*before_, *after_);
-    return (*work_)(std::forward<Arguments>(arguments)...);
+    return (object_->*kMethod)(std::forward<Arguments>(arguments)...);
   }
 
  private:
   HandOver* before_;
   HandOver* after_;
-  const Work* work_;
+  Object* object_;
 };
 
 }  // namespace stemvo

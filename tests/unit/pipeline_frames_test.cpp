@@ -117,6 +117,41 @@ TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
   EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
 }
 
+/// The last frame is finished after the graph has ended.
+TEST_F(FramePipeline, CarriesWhatTheVisitorThrowsAtTheFirstAndTheLastFrame) {
+  for (const std::size_t bad : {std::size_t{0}, std::size_t{kNumFrames - 1}}) {
+    Odometry piped = odometry();
+    std::size_t num_visited = 0;
+    const auto visit = [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
+      ++num_visited;
+      if (i == bad) {
+        throw std::runtime_error("disk on fire");
+      }
+      return true;
+    };
+    EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
+    EXPECT_EQ(num_visited, bad + 1);
+  }
+}
+
+TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
+  for (const std::size_t num_frames : {1, 2, 3}) {
+    const auto sequence =
+        KittiSequence::open(folder_ / "sequences/08",
+                            {.frames = parse_frame_range(fmt::format("0:{}", num_frames)).value()});
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    Odometry piped = odometry();
+    std::vector<std::size_t> visited;
+    pipeline::run_frames(*sequence, piped,
+                         [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
+                           visited.push_back(i);
+                           return true;
+                         });
+    EXPECT_EQ(visited.size(), num_frames);
+    EXPECT_EQ(visited.back(), num_frames - 1);
+  }
+}
+
 TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
   Odometry whole = odometry();
   Odometry parts = odometry();
