@@ -39,18 +39,20 @@ def random_stem(stride, filters):
     return stem.Stem(np.repeat(weights, 3, axis=1) / size**2, np.zeros(filters), stride)
 
 
-def write_model(folder, stride, filters):
+def write_model(folder, stride, filters, sampling=None):
+    """An .onnx and its manifest. Layers from stride 4 on are native as deeper ones of a network are, unless `sampling` says `any`, as for a stem."""
     file = folder / f"stride{stride}.onnx"
     layer = random_stem(stride, filters)
     file.write_bytes(onnx_writer.to_bytes(onnx_writer.build_layers({"layer": layer})))
     manifest.add(folder / "manifest.yaml", manifest.entry(file.stem, file, layer, network="random", layer="layer", licence="MIT",
-                                                           command="search_rates.py"))
+                                                           command="search_rates.py",
+                                                           sampling=sampling or ("native" if stride >= 4 else "any")))
     return file
 
 
 def search_rate(options, folder, stride):
     """Filter-frames per second of processor time, MiB at most of all searches so far, mean share of tracked frames."""
-    model, out = write_model(folder, stride, options.filters), folder / f"out{stride}"
+    model, out = write_model(folder, stride, options.filters, options.sampling), folder / f"out{stride}"
     command = [options.program, "search", options.sequence, "--frames", f"0:{options.frames}", "--model", model, "--exhaustive", "--no-baselines",
                "--block", options.block, "--threads", "1", "--quiet", "--out", out]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -93,6 +95,7 @@ def main(arguments=None):
     parser.add_argument("--filters", type=positive, default=16, help="of each layer (default: %(default)s)")
     parser.add_argument("--frames", type=positive, default=60, help="(default: %(default)s)")
     parser.add_argument("--block", type=positive, default=16, help="filters in flight, as of stemvo search (default: %(default)s)")
+    parser.add_argument("--sampling", choices=("any", "native"), help="any: passes over shifted frames, as over a stem (default: native from stride 4 on)")
     parser.add_argument("--strides", type=positive, nargs="+", default=STRIDES, help="(default: 2 4 8 16)")
     parser.add_argument("--program", type=pathlib.Path, default=ROOT / "build/release/stemvo", help="(default: %(default)s)")
     options = parser.parse_args(arguments)

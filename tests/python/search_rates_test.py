@@ -41,6 +41,7 @@ class SearchRates(unittest.TestCase):
         entries = yaml.safe_load((self.folder / "manifest.yaml").read_text(encoding="utf-8"))["models"]
         self.assertEqual([(entry["file"], entry["filters"], entry["stride"], entry["kernel"]) for entry in entries],
                          [("stride2.onnx", 6, 2, [3, 3]), ("stride4.onnx", 6, 4, [4, 4])])
+        self.assertEqual([entry.get("sampling") for entry in entries], [None, "native"])  # as exported layers behind a stem are
         image = np.random.default_rng(1).uniform(0, 255, (1, 3, 40, 60)).astype(np.float32)
         for entry, shape in zip(entries, ((6, 19, 29), (6, 10, 15))):
             self.assertEqual(entry["sha256"], manifest.sha256(self.folder / entry["file"]))

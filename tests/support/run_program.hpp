@@ -23,6 +23,7 @@ inline std::string read_file(const std::filesystem::path& file) {
 struct ProgramResult {
   int exit_code = -1;  ///< 128 + signal when the program was killed
   double cpu_s = 0.0;  ///< of all its threads; unlike the clock's it hardly knows of other programs
+  double peak_mib = 0.0;  ///< most memory it held at once
   std::string out;
   std::string err;
 };
@@ -55,6 +56,7 @@ class RunningProgram {
     ::wait4(pid_, &status, 0, &usage);
     ProgramResult result;
     result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+    result.peak_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;
     result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     result.out = read_file(out_);
     result.err = read_file(err_);

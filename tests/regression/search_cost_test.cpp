@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+#include <fstream>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "support/search_program.hpp"
+
+namespace stemvo {
+namespace {
+
+/// What a search may cost, loosely: a layer of 256 filters as wide as ConvNeXt-XL's stem, of frames
+/// of KITTI's size.
+class SearchCost : public Search {
+ protected:
+  /// Random filters, the tool's own; the path of the model.
+  [[nodiscard]] std::string random_stem(int filters) const {
+    const std::string tools = std::string(STEMVO_SOURCE_DIR) + "/tools";
+    const std::string script = folder_ / "write.py";
+    std::ofstream(script) << "import pathlib, sys\nsys.path.insert(0, sys.argv[1])\n"
+                             "import search_rates\nfolder = pathlib.Path(sys.argv[2])\n"
+                             "search_rates.write_model(folder, 4, int(sys.argv[3]), 'any')\n";
+    const ProgramResult written =
+        test::run_program(std::string(STEMVO_SOURCE_DIR) + "/build/venv/bin/python",
+                          {script, tools, folder_.path().string(), std::to_string(filters)});
+    EXPECT_EQ(written.exit_code, 0) << written.err;
+    return folder_ / "stride4.onnx";
+  }
+};
+
+TEST_F(SearchCost, Of256FiltersInOnePassIsBounded) {
+  const fs::path drive =
+      test::rendered_drive({.frames = 14, .width_px = 1241, .height_px = 376}) / "sequences/00";
+  const ProgramResult result =
+      run_stemvo({"search", drive.string(), "--model", random_stem(256), "--exhaustive", "--quiet",
+                  "--no-baselines", "--out", folder_ / "out"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  ASSERT_EQ(count_lines(folder_ / "out/filters.csv"), 257U);
+  EXPECT_LE(result.peak_mib, 2048.0);
+  EXPECT_GE(result.peak_mib, 300.0) << "the whole layer was not in flight";
+  // 80 filter-frames per second on 2 cores are 25 ms of processor time each; found: 5 to 8 ms.
+  EXPECT_LE(result.cpu_s / (256 * 14), 0.025);
+}
+
+}  // namespace
+}  // namespace stemvo
