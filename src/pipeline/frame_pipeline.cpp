@@ -75,7 +75,7 @@ class Stages {
       : sequence_(sequence), odometry_(odometry), visit_(visit) {}
 
   /// Gives a free place to the next frame, if there is one. Null: there was no frame to be freed.
-  void start(Frame* const& frame, Starts::output_ports_type& started) {
+  void start(Frame* frame, Starts::output_ports_type& started) {
     const Turn turn(between_starts_);
     if (frame == nullptr || guard_.is_over() || num_started_ == sequence_.size()) {
       return;
@@ -88,13 +88,13 @@ class Stages {
     }
     std::get<0>(started).try_put(frame);
   }
-  Frame* read(Frame* const& frame) {
+  Frame* read(Frame* frame) {
     const Turn stage(frame->between_stages);
     guard_.run(
         [&] { frame->pixels = timed(Stage::kRead, [&] { return sequence_.read(frame->index); }); });
     return frame;
   }
-  Frame* prepare(Frame* const& frame) {
+  Frame* prepare(Frame* frame) {
     const Turn turn(between_prepares_);
     const Turn stage(frame->between_stages);
     guard_.run([&] {

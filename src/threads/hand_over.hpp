@@ -57,7 +57,7 @@ class HandedOver {
  public:
   HandedOver(HandOver& before, HandOver& after, Object& object)
       : before_(&before), after_(&after), object_(&object) {}
-  /// Nothing is known of the thread that made this until before_ was taken.
+  /// Nothing is known of the thread that made this, or a pointer given, until before_ was taken.
   template <typename... Arguments>
   STEMVO_NOT_INSTRUMENTED decltype(auto) operator()(Arguments&&... arguments) const {
     const Turn turn(*before_, *after_);
