@@ -7,6 +7,7 @@
 
 #include "search/blocks.hpp"
 #include "search/ranking.hpp"
+#include "stem/enlargement.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/config.hpp"
 
@@ -169,17 +170,9 @@ std::vector<Race::Block> Race::cut(const Block& group) const {
 
 /// What the odometry of a layer works on.
 cv::Size Race::picture_size(std::size_t layer, const PlanSequence& sequence) const {
-  const Camera& camera = sequence.sequence.camera();
-  const cv::Size channel = sequence.channels[layer];
-  const cv::Size half(camera.width_px / 2, camera.height_px / 2);
-  const Config chosen = with_chosen_upsample(plan_.layers[layer].config, camera.width_px);
-  if (chosen.stem.upsample == "native") {
-    return channel;
-  }
-  if (chosen.stem.upsample == "half") {
-    return channel.width > half.width ? channel : half;
-  }
-  return {camera.width_px, camera.height_px};
+  const PlanLayer& of = plan_.layers[layer];
+  const Config chosen = with_chosen_upsample(of.config, sequence.sequence.camera().width_px);
+  return sequence.channels[layer] * enlargement(chosen.stem.upsample, of.stem.info().sampling_px);
 }
 
 Status Race::run_block_of(std::size_t rung, const Block& block) {

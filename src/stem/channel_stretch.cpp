@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
+#include "stem/enlargement.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/stem/stem.hpp"
 
@@ -46,14 +46,6 @@ double percentile(std::vector<float>& samples, double percent) {
 
 bool has_contrast(double low, double high) {
   return high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20});
-}
-
-/// How many times larger than its channel a picture is; `sampling` input pixels per channel's.
-int enlargement(const std::string& upsample, int sampling) {
-  if (upsample == "native") {
-    return 1;
-  }
-  return upsample == "half" ? std::max(1, sampling / 2) : sampling;
 }
 
 /// Picture pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
