@@ -35,7 +35,7 @@ struct OdometryOptions {
   std::string composition = "right";  ///< `right`: R_c R; `paper`: R R_c
   std::string gate = "translation";   ///< `translation`, `paper` (drops the rotation too), `off`
   int min_inliers = 20;               ///< fewer: the frame is lost
-  double standing_flow_px = 0.15;     ///< median flow below it: standing still
+  double stationary_flow_px = 0.15;     ///< median flow below it: standing still
   double min_parallax_px = 0.6;       ///< median rotation-free flow below it: creeping
 };
 

@@ -127,7 +127,7 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
       {"odometry", "gate", &o.gate, one_of({"translation", "paper", "off"}),
        "what a step that does not go forward loses: its translation, paper: its rotation too"},
       {"odometry", "min_inliers", &o.min_inliers, at_least(5), "fewer: the frame is lost"},
-      {"odometry", "standing_flow_px", &o.standing_flow_px, at_least(0),
+      {"odometry", "stationary_flow_px", &o.stationary_flow_px, at_least(0),
        "median flow below it: standing still, input pixels"},
       {"odometry", "min_parallax_px", &o.min_parallax_px, at_least(0),
        "median flow without the rotation's below it: too slow to see a direction, input pixels"},

@@ -62,7 +62,7 @@ std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
   return described;
 }
 
-Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared) {
+Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
   auto current = std::dynamic_pointer_cast<const Described>(std::move(prepared));
   STEMVO_CHECK(current != nullptr, "a picture prepared by this front end");
   Matches matches;
@@ -80,6 +80,7 @@ Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedPicture> prepa
       matched_.push_back(to);
     }
   }
+  matches.prev_frame = std::exchange(last_frame_, frame);
   last_ = std::move(current);
   track_ids_ = std::move(track_ids);
   return matches;

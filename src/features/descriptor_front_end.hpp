@@ -20,7 +20,7 @@ class DescriptorFrontEnd : public FrontEnd {
   using FrontEnd::process;
   [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
       const ChannelImage& image) const override;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture, int frame) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
@@ -36,6 +36,7 @@ class DescriptorFrontEnd : public FrontEnd {
   FeatureOptions options_;
   cv::Ptr<cv::Feature2D> feature_;
   std::shared_ptr<const Described> last_;
+  int last_frame_ = -1;
   std::vector<int> track_ids_;        ///< of last_'s keypoints; -1: not matched with those before
   std::vector<std::size_t> matched_;  ///< keypoints of last_ that the last matches led to
   int num_tracks_ = 0;

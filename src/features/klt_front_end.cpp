@@ -61,7 +61,7 @@ std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& 
   return picture;
 }
 
-Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared) {
+Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
   auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
   STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
   Matches matches;
@@ -71,6 +71,7 @@ Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared) {
   } else {
     points_.clear();
   }
+  matches.prev_frame = std::exchange(last_frame_, frame);
   last_ = std::move(picture);
   return matches;
 }

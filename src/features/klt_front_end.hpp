@@ -19,7 +19,7 @@ class KltFrontEnd : public FrontEnd {
   using FrontEnd::process;
   [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
       const ChannelImage& image) const override;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture, int frame) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
@@ -38,6 +38,7 @@ class KltFrontEnd : public FrontEnd {
   FeatureOptions options_;
   std::shared_ptr<const Picture> last_;
   std::vector<Point> points_;  ///< on the last picture
+  int last_frame_ = -1;
   int next_id_ = 0;
 };
 

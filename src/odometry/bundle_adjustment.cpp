@@ -7,6 +7,7 @@
 
 #include <ceres/ceres.h>
 
+#include "geometry/median.hpp"
 #include "odometry/reprojection_cost.hpp"
 
 namespace stemvo {
@@ -33,8 +34,8 @@ struct PointBlock {
   bool is_in_front = true;  ///< of every keyframe that sees it
 };
 
-/// Everything the solver changes; the map takes it over only where it succeeds.
-struct Window {
+/// Everything the solver changes; the window takes it over only where it succeeds.
+struct Unknowns {
   std::vector<PoseBlock> poses;
   std::vector<PointBlock> points;  ///< ordered by track id
 };
@@ -42,10 +43,10 @@ struct Window {
 /// Calls use(keyframe, observation, point) for every observation of a landmark; both lists are
 /// ordered by track id.
 template <typename Use>
-void for_each_observation(const LocalMap& map, std::vector<PointBlock>& points, const Use& use) {
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+void for_each_observation(const Window& window, std::vector<PointBlock>& points, const Use& use) {
+  for (std::size_t i = 0; i < window.keyframes.size(); ++i) {
     auto point = points.begin();
-    for (const MapObservation& observation : map.keyframes[i].observations) {
+    for (const TrackPoint& observation : window.keyframes[i].points) {
       while (point != points.end() && point->track_id < observation.track_id) {
         ++point;
       }
@@ -56,39 +57,39 @@ void for_each_observation(const LocalMap& map, std::vector<PointBlock>& points, 
   }
 }
 
-Window open_window(const LocalMap& map, const BundleAdjustmentOptions& options) {
-  Window window;
-  for (const Keyframe& keyframe : map.keyframes) {
-    window.poses.emplace_back(keyframe.world_from_camera.inverse());
+Unknowns read_unknowns(const Window& window, const BundleAdjustmentOptions& options) {
+  Unknowns unknowns;
+  for (const Keyframe& keyframe : window.keyframes) {
+    unknowns.poses.emplace_back(keyframe.world_from_camera.inverse());
   }
-  for (const auto& [track_id, point] : map.landmarks) {
-    window.points.push_back({track_id, point});
+  for (const auto& [track_id, point] : window.landmarks) {
+    unknowns.points.push_back({track_id, point});
   }
   for_each_observation(
-      map, window.points, [&](std::size_t keyframe, const MapObservation&, PointBlock& point) {
-        const PoseBlock& pose = window.poses[keyframe];
+      window, unknowns.points, [&](std::size_t keyframe, const TrackPoint&, PointBlock& point) {
+        const PoseBlock& pose = unknowns.poses[keyframe];
         const double depth = pose.rotation.row(2).dot(point.point) + pose.change[5];
         point.is_in_front = point.is_in_front && depth > ReprojectionCost::kMinDepth;
         ++point.num_observations;
       });
-  std::erase_if(window.points, [&](const PointBlock& point) {  // the solver must start somewhere
+  std::erase_if(unknowns.points, [&](const PointBlock& point) {  // the solver must start somewhere
     return point.num_observations < options.min_observations || !point.is_in_front;
   });
-  return window;
+  return unknowns;
 }
 
 /// Adds a residual per observation; every block's order is fixed, so the result is too. Returns the
 /// costs, which must outlive the problem: it would keep a tree of those it had to free.
-std::deque<ReprojectionCost> add_residuals(const LocalMap& map,
+std::deque<ReprojectionCost> add_residuals(const Window& window,
                                            const Camera& camera,
                                            ceres::LossFunction* loss,
-                                           Window& window,
+                                           Unknowns& unknowns,
                                            ceres::Problem& problem) {
   std::deque<ReprojectionCost> costs;
   for_each_observation(
-      map, window.points,
-      [&](std::size_t keyframe, const MapObservation& observation, PointBlock& point) {
-        PoseBlock& pose = window.poses[keyframe];
+      window, unknowns.points,
+      [&](std::size_t keyframe, const TrackPoint& observation, PointBlock& point) {
+        PoseBlock& pose = unknowns.poses[keyframe];
         problem.AddResidualBlock(&costs.emplace_back(camera, pose.rotation, observation.uv), loss,
                                  pose.change.data(), point.point.data());
       });
@@ -96,7 +97,7 @@ std::deque<ReprojectionCost> add_residuals(const LocalMap& map,
 }
 
 ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
-                                      Window& window,
+                                      Unknowns& unknowns,
                                       ceres::Problem& problem) {
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
@@ -107,11 +108,11 @@ ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
   // Turns, shifts and points are of like size here, and it would pass twice over the Jacobian.
   solver.jacobi_scaling = false;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (PointBlock& point : window.points) {
+  for (PointBlock& point : unknowns.points) {
     ordering->AddElementToGroup(point.point.data(), 0);
   }
-  for (std::size_t i = 0; i < window.poses.size(); ++i) {
-    double* pose = window.poses[i].change.data();
+  for (std::size_t i = 0; i < unknowns.poses.size(); ++i) {
+    double* pose = unknowns.poses[i].change.data();
     if (problem.HasParameterBlock(pose)) {
       ordering->AddElementToGroup(pose, 1);
       if (static_cast<int>(i) < options.num_fixed_keyframes) {
@@ -123,44 +124,68 @@ ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
   return solver;
 }
 
-void write_back(const Window& window, LocalMap& map) {
-  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
-    map.keyframes[i].world_from_camera = window.poses[i].camera_from_world().inverse();
+/// From the oldest keyframe to the last but one.
+double length_of(const Window& window) {
+  const Keyframe& last_but_one = *(window.keyframes.rbegin() + 1);
+  return (last_but_one.world_from_camera.translation -
+          window.keyframes.front().world_from_camera.translation)
+      .norm();
+}
+
+void write_back(const Unknowns& unknowns, Window& window) {
+  for (std::size_t i = 0; i < window.keyframes.size(); ++i) {
+    window.keyframes[i].world_from_camera = unknowns.poses[i].camera_from_world().inverse();
   }
-  for (const PointBlock& point : window.points) {
-    map.landmarks[point.track_id] = point.point;
+  for (const PointBlock& point : unknowns.points) {
+    window.landmarks[point.track_id] = point.point;
   }
 }
 
 }  // namespace
 
-BundleAdjustmentReport refine_window(LocalMap& map,
+BundleAdjustmentReport refine_window(Window& window,
                                      const Camera& camera,
                                      const BundleAdjustmentOptions& options) {
   BundleAdjustmentReport report;
-  if (static_cast<int>(map.keyframes.size()) <= options.num_fixed_keyframes) {
+  if (static_cast<int>(window.keyframes.size()) <= options.num_fixed_keyframes) {
     return report;
   }
-  Window window = open_window(map, options);
-  ceres::CauchyLoss loss(options.loss_scale_px);
+  Unknowns unknowns = read_unknowns(window, options);
+  std::vector<double> errors;
+  for_each_observation(window, unknowns.points,
+                       [&](std::size_t keyframe, const TrackPoint& observation, PointBlock& point) {
+                         const PoseBlock& pose = unknowns.poses[keyframe];
+                         const Eigen::Vector3d x = pose.rotation * point.point + pose.change.tail<3>();
+                         errors.push_back((camera.project(x) - observation.uv).norm());
+                       });
+  const double typical_px = median(std::move(errors));
+  if (getenv("DBG2")) fprintf(stderr, "median %.3f\n", typical_px);
+  const double k = getenv("KLOSS") ? atof(getenv("KLOSS")) : 1.0;
+  ceres::CauchyLoss loss(std::max(options.loss_scale_px, k * typical_px));
   ceres::Problem::Options problem_options;
   problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.disable_all_safety_checks = true;
   ceres::Problem problem(problem_options);
-  const auto costs = add_residuals(map, camera, &loss, window, problem);
+  const auto costs = add_residuals(window, camera, &loss, unknowns, problem);
   report.num_residuals = static_cast<int>(costs.size());
   if (report.num_residuals == 0) {
     return report;
   }
   ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(options, window, problem), &problem, &summary);
+  ceres::Solve(solver_options(options, unknowns, problem), &problem, &summary);
   report.num_iterations = static_cast<int>(summary.iterations.size());
   report.initial_cost = summary.initial_cost;
   report.final_cost = summary.final_cost;
   report.is_usable = summary.IsSolutionUsable();
   if (report.is_usable) {
-    write_back(window, map);
+    const double length = length_of(window);
+    write_back(unknowns, window);
+    const double refined_length = length_of(window);
+    if (options.num_fixed_keyframes < 2 && length > 0.0 && refined_length > 0.0) {
+      rescale(window, length / refined_length,
+              window.keyframes.front().world_from_camera.translation);
+    }
   }
   return report;
 }

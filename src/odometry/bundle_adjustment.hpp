@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "odometry/local_map.hpp"
+#include "odometry/window.hpp"
 #include "stemvo/geometry/camera.hpp"
 
 namespace stemvo {
 
 struct BundleAdjustmentOptions {
-  int num_fixed_keyframes = 2;  ///< the oldest: they hold the gauge, scale included
+  /// The oldest. Two hold the gauge, scale included; with one the length of the window is kept, from
+  /// the oldest keyframe to the last but one.
+  int num_fixed_keyframes = 2;
   int max_iterations = 4;
   double loss_scale_px = 0.2;  ///< Cauchy scale on the reprojection error
   int min_observations = 3;    ///< of a landmark that takes part
@@ -23,7 +25,7 @@ struct BundleAdjustmentReport {
 
 /// Sliding-window bundle adjustment: poses of the window and its landmarks, robust reprojection
 /// error, Schur complement over the landmarks. One thread: the same bytes on every run.
-BundleAdjustmentReport refine_window(LocalMap& map,
+BundleAdjustmentReport refine_window(Window& window,
                                      const Camera& camera,
                                      const BundleAdjustmentOptions& options);
 

@@ -3,9 +3,10 @@
 
 #include <utility>
 
-#include "odometry/map_history.hpp"
+#include "odometry/pair_estimator.hpp"
 #include "odometry/road_picture.hpp"
 #include "odometry/stopwatch.hpp"
+#include "odometry/window_estimator.hpp"
 #include "stemvo/check.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -23,27 +24,26 @@ ChannelOdometry::ChannelOdometry(const Config& config,
                                  const Camera& camera,
                                  std::unique_ptr<FrontEnd> front_end)
     : camera_(camera),
-      seed_(config.seed),
       asks_road_(config.scale.source == "camera_height"),
       stretch_(with_chosen_upsample(config, camera.width_px).stem),
-      front_end_(std::move(front_end)),
-      estimator_(config, camera),
-      chain_(config.odometry, config.scale) {
-  if (config.odometry.mode == "map" || asks_road_) {
-    map_.emplace(config, camera);
+      front_end_(std::move(front_end)) {
+  if (config.odometry.mode == "two_frame") {
+    estimator_ = std::make_unique<PairEstimator>(config, camera);
+  } else {
+    estimator_ = std::make_unique<WindowEstimator>(config, camera);
   }
 }
 
 FrameResult ChannelOdometry::process(const Channel& channel, const cv::Mat& frame) {
-  follow(prepare(channel, frame));
-  place();
-  return finish();
+  track(prepare(channel, frame));
+  localize();
+  return optimize();
 }
 
 FrameResult ChannelOdometry::process_missing() {
-  follow({});
-  place();
-  return finish();
+  track({});
+  localize();
+  return optimize();
 }
 
 PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& frame) {
@@ -60,127 +60,57 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   return prepared;
 }
 
-/// Uses the front end only: the frame before may be finished meanwhile.
-void ChannelOdometry::follow(PreparedFrame frame) {
-  STEMVO_CHECK(!followed_.has_value(), "the frame before is placed");
-  FrameInWork& work = followed_.emplace();
-  work.frame = std::move(frame);
-  if (work.frame.picture != nullptr) {
+/// Uses the front end only: the frame before may be optimized meanwhile.
+void ChannelOdometry::track(PreparedFrame frame) {
+  STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
+  FrameInWork& work = tracked_.emplace();
+  work.tracked.number = num_tracked_++;
+  work.picture = std::move(frame.picture);
+  work.problem = std::move(frame.problem);
+  if (work.picture != nullptr) {
     Stopwatch watch;
-    work.matches = front_end_->process(work.frame.picture);
-    work.result.times.stem_ms = work.frame.stem_ms;
-    work.result.times.features_ms = watch.lap_ms();
+    work.tracked.has_image = true;
+    work.tracked.matches = front_end_->process(work.picture, work.tracked.number);
+    work.tracked.image = std::move(frame.pixels);
+    work.tracked.road = std::move(frame.road);
+    work.times.stem_ms = frame.stem_ms;
+    work.times.features_ms = watch.lap_ms();
   }
 }
 
-void ChannelOdometry::place() {
-  STEMVO_CHECK(followed_.has_value(), "a frame was followed");
-  STEMVO_CHECK(!placed_.has_value(), "the frame before is finished");
-  FrameInWork& work = placed_.emplace(*std::exchange(followed_, std::nullopt));
-  if (work.frame.picture == nullptr) {
-    return;
-  }
-  work.is_first = !chain_.has_picture();
-  if (work.is_first) {
-    chain_.start();
-    return;
-  }
+void ChannelOdometry::localize() {
+  STEMVO_CHECK(tracked_.has_value(), "a frame was tracked");
+  STEMVO_CHECK(!localized_.has_value(), "the frame before is optimized");
+  FrameInWork& work = localized_.emplace(*std::exchange(tracked_, std::nullopt));
   Stopwatch watch;
-  work.motion = estimator_.measure(work.matches.prev_uv, work.matches.cur_uv,
-                                   chain_.is_initializing(), seed_);
-  if (map_.has_value()) {
-    const StageTimer timer(Stage::kPlacement);
-    map_->place(frame_number(), chain_.world_from_picture(), work.matches, work.motion);
+  work.localized = estimator_->localize(work.tracked);
+  if (work.tracked.has_image) {
+    front_end_->keep(work.localized.inlier_mask);
+    work.times.pose_ms = watch.lap_ms();
   }
-  front_end_->keep(work.motion.inlier_mask);
-  work.result.times.pose_ms = watch.lap_ms();
 }
 
 /// Uses all but the front end.
-FrameResult ChannelOdometry::finish() {
-  STEMVO_CHECK(placed_.has_value(), "a frame was placed");
-  FrameInWork work = *std::exchange(placed_, std::nullopt);
-  if (work.frame.picture == nullptr) {
-    skip(work);
-  } else {
-    refine(work);
-  }
-  work.result.world_from_camera = chain_.world_from_camera();
-  poses_.push_back(work.result.world_from_camera);
-  if (work.frame.picture == nullptr) {  // pictures go on showing the last one there was
-    work.frame.picture = finished_.frame.picture;
-  }
-  finished_ = std::move(work);
-  return finished_.result;
-}
-
-void ChannelOdometry::refine(FrameInWork& work) {
-  const RoadPicture no_road;
-  const RoadPicture& road = work.frame.road != nullptr ? *work.frame.road : no_road;
-  FrameResult& result = work.result;
-  if (work.is_first) {
-    if (map_.has_value()) {
-      map_->restart(frame_number(), road);
-    }
-    add_road(result);
-    return;
-  }
+FrameResult ChannelOdometry::optimize() {
+  STEMVO_CHECK(localized_.has_value(), "a frame was localized");
+  FrameInWork work = *std::exchange(localized_, std::nullopt);
   Stopwatch watch;
-  if (map_.has_value()) {
-    map_->refine(road, work.matches, work.motion);
-    map_->look(work.frame.pixels);
+  estimator_->optimize(work.tracked, work.localized);
+  if (work.tracked.has_image) {
+    work.times.pose_ms += watch.lap_ms();
+  } else {  // what is drawn goes on showing the last image there was
+    work.picture = optimized_.picture;
   }
-  result.state = chain_.add(work.motion);
-  result.times.pose_ms += watch.lap_ms();
-  result.num_matches = static_cast<int>(work.matches.cur_uv.size());
-  result.num_inliers = work.motion.num_inliers;
-  result.homography_score = work.motion.homography_score;
-  result.fundamental_score = work.motion.fundamental_score;
-  result.homography_ratio = work.motion.homography_ratio;
-  result.model = work.motion.model;
-  add_road(result);
-}
-
-void ChannelOdometry::skip(FrameInWork& work) {
-  chain_.extrapolate(/*has_picture=*/false);
-  FrameResult& result = work.result;
-  result.state = FrameState::kBroken;
-  result.problem = work.frame.problem;
-  add_road(result);
-  if (result.road == RoadState::kMeasured) {
-    result.road = RoadState::kHeld;
-  }
-  if (result.road != RoadState::kNotAsked) {
-    result.road_reason = "no picture";
-  }
-}
-
-void ChannelOdometry::add_road(FrameResult& result) const {
-  if (map_.has_value()) {
-    result.road = map_->road_state();
-    result.road_reason = map_->road_reason();
-    result.scale_sigma = map_->scale_sigma();
-  }
-}
-
-void ChannelOdometry::keep_landmarks() {
-  if (map_.has_value()) {
-    map_->keep_landmarks();
-  }
-}
-
-std::vector<MapLandmark> ChannelOdometry::landmarks() const {
-  return map_.has_value() ? map_->history().landmarks() : std::vector<MapLandmark>();
-}
-
-std::vector<Rigid3> ChannelOdometry::refined_trajectory() const {
-  return map_.has_value() ? refined_poses(poses_, map_->history().motions()) : poses_;
+  FrameResult& result = work.localized.result;
+  result.times = work.times;
+  result.problem = work.problem;
+  optimized_ = std::move(work);
+  return optimized_.localized.result;
 }
 
 const ChannelImage& ChannelOdometry::image() const {
   static const ChannelImage no_image;
-  const auto& picture = finished_.frame.picture;
-  return picture != nullptr ? picture->image : no_image;
+  return optimized_.picture != nullptr ? optimized_.picture->image : no_image;
 }
 
 }  // namespace stemvo

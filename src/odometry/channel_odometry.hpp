@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "odometry/map_odometry.hpp"
-#include "odometry/motion_chain.hpp"
-#include "odometry/two_view_estimator.hpp"
+#include "odometry/estimator.hpp"
 #include "stemvo/config.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/features/front_end.hpp"
@@ -35,53 +33,42 @@ class ChannelOdometry {
 
   /// The parts of process(), as in Odometry.
   [[nodiscard]] PreparedFrame prepare(const Channel& channel, const cv::Mat& frame);
-  void follow(PreparedFrame frame);
-  void place();
-  FrameResult finish();
+  void track(PreparedFrame frame);
+  void localize();
+  FrameResult optimize();
 
-  void keep_landmarks();
-  [[nodiscard]] std::vector<MapLandmark> landmarks() const;
-  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
-  /// Of all frames finished, as they came.
-  [[nodiscard]] const std::vector<Rigid3>& poses() const { return poses_; }
+  /// Of all frames optimized.
+  [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
 
-  /// Of the last frame finished; the picture of the last one that had one.
+  /// Of the last frame optimized; the image of the last one that had one.
   [[nodiscard]] const ChannelImage& image() const;
-  [[nodiscard]] const Matches& matches() const { return finished_.matches; }
+  [[nodiscard]] const Matches& matches() const { return optimized_.tracked.matches; }
   [[nodiscard]] const std::vector<char>& inlier_mask() const {
-    return finished_.motion.inlier_mask;
+    return optimized_.localized.inlier_mask;
   }
 
  private:
-  /// A frame on its way: first its points, then its place, at last what refinement and road add.
+  /// A frame on its way: first tracked, then localized, at last optimized.
   struct FrameInWork {
-    PreparedFrame frame;
-    Matches matches;
-    bool is_first = false;  ///< nothing before it to measure a motion from
-    MeasuredMotion motion;
-    FrameResult result;
+    std::shared_ptr<const PreparedPicture> picture;
+    TrackedFrame tracked;
+    StageTimes times;
+    std::string problem;
+    LocalizedFrame localized;
   };
 
   ChannelOdometry(const Config& config, const Camera& camera, std::unique_ptr<FrontEnd> front_end);
-  void refine(FrameInWork& work);
-  void skip(FrameInWork& work);
-  void add_road(FrameResult& result) const;
-  /// Of the frame in work.
-  [[nodiscard]] int frame_number() const { return static_cast<int>(poses_.size()); }
 
   Camera camera_;
-  std::uint64_t seed_;
   bool asks_road_;
   ChannelStretch stretch_;
   std::unique_ptr<FrontEnd> front_end_;
-  TwoViewEstimator estimator_;
-  MotionChain chain_;
-  std::optional<MapOdometry> map_;
+  std::unique_ptr<Estimator> estimator_;
 
-  std::optional<FrameInWork> followed_;  ///< not placed
-  std::optional<FrameInWork> placed_;    ///< not refined
-  FrameInWork finished_;                 ///< the last one
-  std::vector<Rigid3> poses_;
+  int num_tracked_ = 0;
+  std::optional<FrameInWork> tracked_;    ///< not localized
+  std::optional<FrameInWork> localized_;  ///< not optimized
+  FrameInWork optimized_;                 ///< the last one
 };
 
 }  // namespace stemvo

@@ -11,30 +11,30 @@ std::string_view to_string(FrameState state) {
       return "initializing";
     case FrameState::kTracking:
       return "tracking";
-    case FrameState::kStanding:
-      return "standing";
-    case FrameState::kCreeping:
-      return "creeping";
+    case FrameState::kStationary:
+      return "stationary";
+    case FrameState::kLowParallax:
+      return "low_parallax";
     case FrameState::kRotating:
       return "rotating";
     case FrameState::kGated:
       return "gated";
     case FrameState::kLost:
       return "lost";
-    case FrameState::kBroken:
-      return "broken";
+    case FrameState::kNoImage:
+      return "no_image";
   }
   return "unknown";
 }
 
 bool is_measured(FrameState state) {
-  return state != FrameState::kGated && state != FrameState::kLost && state != FrameState::kBroken;
+  return state != FrameState::kGated && state != FrameState::kLost && state != FrameState::kNoImage;
 }
 
 std::string_view to_string(RoadState state) {
   switch (state) {
-    case RoadState::kNotAsked:
-      return "-";
+    case RoadState::kDisabled:
+      return "disabled";
     case RoadState::kNone:
       return "none";
     case RoadState::kHeld:

@@ -13,13 +13,13 @@ namespace {
 
 struct View {
   const Keyframe* keyframe;
-  const MapObservation* observation;
+  const TrackPoint* observation;
 };
 
-std::vector<View> views_of(const LocalMap& map, int track_id) {
+std::vector<View> views_of(const Window& window, int track_id) {
   std::vector<View> views;
-  for (const Keyframe& keyframe : map.keyframes) {
-    if (const MapObservation* observation = find_observation(keyframe, track_id)) {
+  for (const Keyframe& keyframe : window.keyframes) {
+    if (const TrackPoint* observation = find_point(keyframe.points, track_id)) {
       views.push_back({&keyframe, observation});
     }
   }
@@ -36,7 +36,7 @@ bool is_seen_well(const Eigen::Vector3d& point_in_world,
 
 std::optional<Eigen::Vector3d> triangulate_views(const std::vector<View>& views,
                                                  const Camera& camera,
-                                                 const LocalMapOptions& options) {
+                                                 const WindowOptions& options) {
   const View& first = views.front();
   const View& last = views.back();
   const Rigid3 last_from_first =
@@ -59,28 +59,28 @@ std::optional<Eigen::Vector3d> triangulate_views(const std::vector<View>& views,
 
 }  // namespace
 
-void triangulate_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options) {
-  if (map.keyframes.size() < 2) {
+void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
+  if (window.keyframes.size() < 2) {
     return;
   }
-  for (const MapObservation& observation : map.keyframes.back().observations) {
-    if (map.landmarks.contains(observation.track_id)) {
+  for (const TrackPoint& observation : window.keyframes.back().points) {
+    if (window.landmarks.contains(observation.track_id)) {
       continue;
     }
-    const std::vector<View> views = views_of(map, observation.track_id);
+    const std::vector<View> views = views_of(window, observation.track_id);
     if (views.size() < 2) {
       continue;
     }
     if (const auto point = triangulate_views(views, camera, options)) {
-      map.landmarks.emplace(observation.track_id, *point);
+      window.landmarks.emplace(observation.track_id, *point);
     }
   }
 }
 
-void cull_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options) {
-  std::erase_if(map.landmarks, [&](const auto& landmark) {
+void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
+  std::erase_if(window.landmarks, [&](const auto& landmark) {
     const auto& [track_id, point_in_world] = landmark;
-    for (const View& view : views_of(map, track_id)) {
+    for (const View& view : views_of(window, track_id)) {
       if (!is_seen_well(point_in_world, view, camera, options.max_reprojection_error_px)) {
         return true;
       }

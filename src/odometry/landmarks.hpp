@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "odometry/local_map.hpp"
+#include "odometry/window.hpp"
 #include "stemvo/geometry/camera.hpp"
 
 namespace stemvo {
@@ -9,9 +9,9 @@ namespace stemvo {
 /// Triangulates the tracks of the newest keyframe that are no landmarks yet, from the first and the
 /// last keyframe that see them. Kept are points with enough parallax, in front of every keyframe
 /// that sees them and reprojected well in each.
-void triangulate_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options);
+void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
 
 /// Drops landmarks that a keyframe sees from behind or too far from their observation.
-void cull_landmarks(LocalMap& map, const Camera& camera, const LocalMapOptions& options);
+void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
 
 }  // namespace stemvo

@@ -62,7 +62,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
       last_direction_ = direction.normalized();
       apply(prev_from_cur, full_step_m);
       break;
-    case FrameState::kCreeping:
+    case FrameState::kLowParallax:
       if (is_step_known) {  // placed against landmarks: the direction is measured too
         apply(prev_from_cur, full_step_m);
         break;
@@ -78,7 +78,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
         apply({prev_from_cur.rotation, last_direction_}, full_step_m);
       }
       break;
-    case FrameState::kStanding:
+    case FrameState::kStationary:
     case FrameState::kRotating:
       apply(prev_from_cur, 0.0);
       break;

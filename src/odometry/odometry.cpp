@@ -42,9 +42,9 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 FrameResult Odometry::process(const cv::Mat& frame) {
-  follow(prepare(frame));
-  place();
-  return finish();
+  track(prepare(frame));
+  localize();
+  return optimize();
 }
 
 FrameResult Odometry::process_missing() { return impl_->channel_odometry.process_missing(); }
@@ -65,19 +65,19 @@ PreparedFrame Odometry::prepare(const cv::Mat& frame) {
   return prepared;
 }
 
-void Odometry::follow(PreparedFrame frame) { impl_->channel_odometry.follow(std::move(frame)); }
+void Odometry::track(PreparedFrame frame) { impl_->channel_odometry.track(std::move(frame)); }
 
-void Odometry::place() { impl_->channel_odometry.place(); }
+void Odometry::localize() { impl_->channel_odometry.localize(); }
 
-FrameResult Odometry::finish() { return impl_->channel_odometry.finish(); }
+FrameResult Odometry::optimize() { return impl_->channel_odometry.optimize(); }
 
 std::vector<Rigid3> Odometry::refined_trajectory() const {
-  return impl_->channel_odometry.refined_trajectory();
+  return impl_->channel_odometry.estimator().refined_trajectory();
 }
 
-void Odometry::keep_landmarks() { impl_->channel_odometry.keep_landmarks(); }
-
-std::vector<MapLandmark> Odometry::landmarks() const { return impl_->channel_odometry.landmarks(); }
+std::vector<MapLandmark> Odometry::landmarks() const {
+  return impl_->channel_odometry.estimator().landmarks();
+}
 
 const ChannelImage& Odometry::channel_image() const { return impl_->channel_odometry.image(); }
 const Matches& Odometry::matches() const { return impl_->channel_odometry.matches(); }

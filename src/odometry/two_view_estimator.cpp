@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "geometry/median.hpp"
+#include "odometry/parallax.hpp"
 #include "odometry/robust_models.hpp"
 #include "stemvo/check.hpp"
 #include "stemvo/geometry/decomposition.hpp"
@@ -21,57 +21,10 @@ using Points = std::vector<Eigen::Vector2d>;
 /// ORB-SLAM2's acceptance, but the share is of all matches here, outliers included.
 constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5};
 
-/// Median length of noise in two pictures over its median distance from epipolar lines: 2.5 where
-/// it is equal in all directions (1.177 sqrt(2) / 0.6745), 3-4.5 on rendered turns of 18 px a
-/// frame. The slowest steps that can be seen have 10 and more.
-constexpr double kNoiseParallax = 5.0;
-
 /// Once initialised, S_H is only written down: few points of a street lie on one plane, and the
 /// estimator would always use all its iterations, and polish each of them.
 constexpr int kRecordIterations = 100;
 constexpr const char* kRecordEstimator = "ransac";
-
-double median_flow_px(std::span<const Eigen::Vector2d> prev_uv,
-                      std::span<const Eigen::Vector2d> cur_uv) {
-  std::vector<double> lengths;
-  lengths.reserve(prev_uv.size());
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    lengths.push_back((cur_uv[i] - prev_uv[i]).norm());
-  }
-  return median(std::move(lengths));
-}
-
-/// Median length of what is left of the flow once the rotation is taken out.
-double median_parallax_px(const Eigen::Quaterniond& rotation,
-                          std::span<const Eigen::Vector2d> prev_uv,
-                          std::span<const Eigen::Vector2d> cur_uv,
-                          const Camera& camera) {
-  std::vector<double> lengths;
-  lengths.reserve(prev_uv.size());
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    const Eigen::Vector3d ray = rotation * camera.normalize(prev_uv[i]).homogeneous();
-    lengths.push_back((cur_uv[i] - camera.project(ray)).norm());
-  }
-  return median(std::move(lengths));
-}
-
-/// Median distance of the matches to their epipolar lines in both pictures (Sampson).
-double median_epipolar_px(const Rigid3& cur_from_prev,
-                          std::span<const Eigen::Vector2d> prev_uv,
-                          std::span<const Eigen::Vector2d> cur_uv,
-                          const Camera& camera) {
-  const Eigen::Matrix3d fundamental =
-      fundamental_from_essential(essential_from_motion(cur_from_prev), camera);
-  std::vector<double> distances;
-  distances.reserve(prev_uv.size());
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    const Eigen::Vector3d line_in_cur = fundamental * prev_uv[i].homogeneous();
-    const Eigen::Vector3d line_in_prev = fundamental.transpose() * cur_uv[i].homogeneous();
-    const double gradient = std::hypot(line_in_cur.head<2>().norm(), line_in_prev.head<2>().norm());
-    distances.push_back(std::abs(cur_uv[i].homogeneous().dot(line_in_cur)) / gradient);
-  }
-  return median(std::move(distances));
-}
 
 Points select(std::span<const Eigen::Vector2d> points, const std::vector<char>& mask) {
   Points selected;
@@ -86,16 +39,11 @@ Points select(std::span<const Eigen::Vector2d> points, const std::vector<char>& 
 
 }  // namespace
 
-std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,
-                                   std::span<const Eigen::Vector2d> prev_uv,
-                                   std::span<const Eigen::Vector2d> cur_uv,
-                                   const Camera& camera,
-                                   double bound_px) {
-  const Eigen::Matrix3d fundamental =
-      fundamental_from_essential(essential_from_motion(cur_from_prev), camera);
-  // score_fundamental counts d^2 <= 3.841 sigma^2
-  return score_fundamental(fundamental, prev_uv, cur_uv, bound_px / std::sqrt(kFundamentalChi2))
-      .inlier_mask;
+void add_scores(const MeasuredMotion& motion, FrameResult& result) {
+  result.homography_score = motion.homography_score;
+  result.fundamental_score = motion.fundamental_score;
+  result.homography_ratio = motion.homography_ratio;
+  result.model = motion.model;
 }
 
 TwoViewEstimator::TwoViewEstimator(const Config& config, const Camera& camera)
@@ -112,8 +60,8 @@ MeasuredMotion TwoViewEstimator::measure(std::span<const Eigen::Vector2d> prev_u
     return result;
   }
   const Models models = score_models(prev_uv, cur_uv, is_initializing, seed, result);
-  if (median_flow_px(prev_uv, cur_uv) < odometry_.standing_flow_px) {
-    result.state = FrameState::kStanding;
+  if (median_flow_px(prev_uv, cur_uv) < odometry_.stationary_flow_px) {
+    result.state = FrameState::kStationary;
     result.inlier_mask.assign(prev_uv.size(), 1);
     result.num_inliers = static_cast<int>(prev_uv.size());
     return result;
@@ -205,11 +153,11 @@ void TwoViewEstimator::refine(std::span<const Eigen::Vector2d> prev_uv,
   const double noise_px = median_epipolar_px(result.cur_from_prev, prev, cur, camera_);
   const bool is_noise = result.parallax_px < std::min(kNoiseParallax * noise_px,  //
                                                       odometry_.min_parallax_px);
-  if (result.parallax_px < odometry_.standing_flow_px || is_noise) {
+  if (result.parallax_px < odometry_.stationary_flow_px || is_noise) {
     result.cur_from_prev = rotation_only;
     result.state = FrameState::kRotating;
   } else if (result.parallax_px < odometry_.min_parallax_px) {
-    result.state = FrameState::kCreeping;
+    result.state = FrameState::kLowParallax;
   } else {
     result.state = FrameState::kTracking;
   }

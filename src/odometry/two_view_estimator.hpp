@@ -18,7 +18,7 @@ namespace stemvo {
 /// What two frames tell about the motion between them.
 struct MeasuredMotion {
   FrameState state = FrameState::kLost;
-  Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (standing, rotating, lost)
+  Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (stationary, rotating, lost)
   TwoViewModel model = TwoViewModel::kNone;
   double homography_score = 0.0;   ///< S_H
   double fundamental_score = 0.0;  ///< S_F
@@ -62,11 +62,7 @@ class TwoViewEstimator {
   Camera camera_;
 };
 
-/// Matches within `bound_px` of their epipolar lines; one flag per match.
-[[nodiscard]] std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,
-                                                 std::span<const Eigen::Vector2d> prev_uv,
-                                                 std::span<const Eigen::Vector2d> cur_uv,
-                                                 const Camera& camera,
-                                                 double bound_px);
+/// S_H, S_F, R_H and the model.
+void add_scores(const MeasuredMotion& motion, FrameResult& result);
 
 }  // namespace stemvo

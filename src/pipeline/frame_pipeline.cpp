@@ -108,7 +108,7 @@ class Stages {
     const Turn turn(placed_, followed_);
     Frame* const frame = std::get<0>(pair);
     const Turn stage(frame->between_stages);
-    guard_.run([&] { odometry_.follow(std::move(frame->prepared)); });
+    guard_.run([&] { odometry_.track(std::move(frame->prepared)); });
     return frame;
   }
   /// Of the one before, whose place is free then.
@@ -123,7 +123,7 @@ class Stages {
   Frame* place(const FrameAndBefore& pair) {
     const Turn after_follow(followed_, placed_);
     const Turn after_finish(finished_, placed_);
-    guard_.run([&] { odometry_.place(); });
+    guard_.run([&] { odometry_.localize(); });
     last_placed_ = std::get<0>(pair);
     return last_placed_;
   }
@@ -139,7 +139,7 @@ class Stages {
   void hand_result_over(Frame& frame) {
     const Turn stage(frame.between_stages);
     guard_.run([&] {
-      const FrameResult result = odometry_.finish();
+      const FrameResult result = odometry_.optimize();
       if (!visit_(frame.index, frame.pixels, result)) {
         guard_.end();
       }

@@ -220,9 +220,6 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return tl::unexpected(csv.error());
   }
 
-  if (request.write_map) {
-    odometry->keep_landmarks();
-  }
   std::optional<StageRecorder> recorder;
   if (request.measure_times) {
     recorder.emplace();

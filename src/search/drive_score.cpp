@@ -58,7 +58,7 @@ void FilterDrive::count(const FrameResult& result) {
   num_inliers_ += static_cast<std::size_t>(result.num_inliers);
   if (is_measured(result.state)) {
     ++num_measured_;
-  } else if (result.state == FrameState::kBroken) {
+  } else if (result.state == FrameState::kNoImage) {
     ++num_broken_;
   } else if (result.state == FrameState::kGated) {
     ++num_gated_;
@@ -108,7 +108,7 @@ DriveScore FilterDrive::score(const std::string& sequence,
 void FilterDrive::add_errors(std::span<const Rigid3> truth,
                              const EvaluationOptions& options,
                              DriveScore& score) const {
-  const Trajectory trajectory = rescale_steps(odometry_.poses(), truth);
+  const Trajectory trajectory = rescale_steps(odometry_.estimator().trajectory(), truth);
   const Metrics metrics = evaluate(trajectory, truth, options);
   score.t_rel_percent = metrics.t_rel_percent;
   score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;

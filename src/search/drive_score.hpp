@@ -23,7 +23,7 @@ class FilterDrive {
   /// No picture, or a stem that refused it.
   void process_missing() { count(odometry_.process_missing()); }
 
-  [[nodiscard]] std::size_t num_frames() const { return odometry_.poses().size(); }
+  [[nodiscard]] std::size_t num_frames() const { return odometry_.estimator().trajectory().size(); }
   /// Of the frames so far. The truth has at least as many poses (checked), the first the identity.
   [[nodiscard]] DriveScore score(const std::string& sequence,
                                  std::span<const Rigid3> truth,

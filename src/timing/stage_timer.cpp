@@ -15,7 +15,7 @@ namespace {
 constexpr std::array<std::string_view, kNumStages> kNames = {
     "read and decode",     "stem",      "stretch",        "pyramid",    "description",
     "road picture",        "detection", "tracking",       "homography", "epipolar geometry",
-    "two-view refinement", "placement", "map refinement", "road scale", "frame files",
+    "two-view refinement", "localization", "window refinement", "road scale", "frame files",
     "result files"};
 
 double read_ms(clockid_t clock) {

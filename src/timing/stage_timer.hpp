@@ -24,8 +24,8 @@ enum class Stage {
   kHomography,  ///< robust estimate
   kEpipolar,    ///< fundamental or essential matrix, robust estimate
   kTwoViewRefinement,
-  kPlacement,      ///< among the landmarks
-  kMapRefinement,  ///< triangulation and bundle adjustment
+  kLocalization,      ///< among the landmarks
+  kWindowRefinement,  ///< triangulation and bundle adjustment
   kRoadScale,
   kFrameFiles,   ///< frames.csv, pictures
   kResultFiles,  ///< everything that is written at the end

@@ -101,7 +101,7 @@ TEST(MapOdometry, ARoadThatIsNotAskedHasNoState) {
   config.scale.source = "constant";
   MapOdometry map(config, drive.scene.camera);
   map.restart(0, drive.road_picture(0));
-  EXPECT_EQ(map.road_state(), RoadState::kNotAsked);
+  EXPECT_EQ(map.road_state(), RoadState::kDisabled);
   EXPECT_FALSE(map.scale_sigma().has_value());
 }
 

@@ -193,7 +193,7 @@ TEST(MapTracker, StandingStillKeepsMapAndScale) {
   Matches still = drive.matches(8);
   still.prev_uv = still.cur_uv;
   MeasuredMotion motion;
-  motion.state = FrameState::kStanding;
+  motion.state = FrameState::kStationary;
   motion.inlier_mask.assign(still.cur_uv.size(), 1);
   for (int i = 0; i < 40; ++i) {
     pose.translation.x() += 1e-15 * (i % 3);

@@ -109,13 +109,13 @@ TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
 TEST(MotionChain, CreepingKeepsTheDirectionAndStandingStays) {
   MotionChain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  MeasuredMotion creeping = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kCreeping);
+  MeasuredMotion creeping = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kLowParallax);
   creeping.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
   chain.add(creeping);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 1.0 * kDeg, 1e-12);
   MeasuredMotion standing;
-  standing.state = FrameState::kStanding;
+  standing.state = FrameState::kStationary;
   chain.add(standing);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
 }

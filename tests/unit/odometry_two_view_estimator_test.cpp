@@ -89,7 +89,7 @@ TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
 
 TEST(TwoViewEstimator, StandingRotatingAndCreepingAreStates) {
   const MeasuredMotion standing = measure(drive_scene({}, 0.05, 0.05, 5));
-  EXPECT_EQ(standing.state, FrameState::kStanding);
+  EXPECT_EQ(standing.state, FrameState::kStationary);
   EXPECT_EQ(standing.cur_from_prev.translation.norm(), 0.0);
 
   const Rigid3 turn(so3_exp({0.0, 0.02, 0.0}), Eigen::Vector3d::Zero());
@@ -98,15 +98,15 @@ TEST(TwoViewEstimator, StandingRotatingAndCreepingAreStates) {
   EXPECT_LE(rotating.cur_from_prev.inverse().rotation.angularDistance(turn.rotation), 2e-4);
   EXPECT_EQ(rotating.cur_from_prev.translation.norm(), 0.0);
 
-  // Noise beyond standing_flow_px does not make a turn a drive.
+  // Noise beyond stationary_flow_px does not make a turn a drive.
   const MeasuredMotion noisy = measure(drive_scene(turn, 0.15, 0.05, 6));
-  EXPECT_GT(noisy.parallax_px, OdometryOptions{}.standing_flow_px);
+  EXPECT_GT(noisy.parallax_px, OdometryOptions{}.stationary_flow_px);
   EXPECT_EQ(noisy.state, FrameState::kRotating);
   EXPECT_LE(noisy.cur_from_prev.inverse().rotation.angularDistance(turn.rotation), 5e-4);
 
   const Rigid3 creep(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.0, 0.02});
   const MeasuredMotion creeping = measure(drive_scene(creep, 0.05, 0.05, 7));
-  EXPECT_EQ(creeping.state, FrameState::kCreeping);
+  EXPECT_EQ(creeping.state, FrameState::kLowParallax);
   EXPECT_LE(creeping.cur_from_prev.inverse().rotation.angularDistance(creep.rotation), 5e-4);
 }
 

@@ -33,6 +33,7 @@ struct Matches {
   std::vector<Eigen::Vector2d> prev_uv;
   std::vector<Eigen::Vector2d> cur_uv;
   std::vector<int> track_ids;  ///< the same id while a point is followed
+  int prev_frame = -1;         ///< the number of the frame that prev_uv is on; -1: none
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
@@ -54,8 +55,12 @@ class FrontEnd {
       const ChannelImage& image) const = 0;
   /// Matches from the previous picture (none on the first). A picture of another size starts over.
   /// `picture` was prepared by this front end.
-  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedPicture> picture) = 0;
-  [[nodiscard]] Matches process(const ChannelImage& image) { return process(prepare(image)); }
+  /// `frame` is the picture's number for Matches::prev_frame.
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedPicture> picture,
+                                        int frame) = 0;
+  [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
+    return process(prepare(image), frame);
+  }
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
   /// not followed further.
   virtual void keep(const std::vector<char>& is_good) = 0;

@@ -25,27 +25,27 @@ namespace stemvo {
 /// What became of a frame. Every frame has a pose whatever its state.
 enum class FrameState {
   kFirst,         ///< the world's origin
-  kInitializing,  ///< measured by the initial H/F selection
-  kTracking,      ///< rotation and direction measured
-  kStanding,      ///< no motion
-  kCreeping,      ///< rotation measured; too little parallax for a direction: the last one is kept
+  kInitializing,  ///< no landmarks yet: the initial H/F selection waits for parallax, or decided
+  kTracking,      ///< rotation and translation measured
+  kStationary,    ///< no motion
+  kLowParallax,   ///< rotation measured; too little parallax for a translation
   kRotating,      ///< pure rotation measured
-  kGated,         ///< rotation measured; the forward motion gate refused the direction
+  kGated,         ///< two_frame: rotation measured; the forward motion gate refused the direction
   kLost,          ///< nothing measured: the last motion is continued
-  kBroken,        ///< no picture: the last motion is continued
+  kNoImage,       ///< nothing to be seen: the last motion is continued
 };
 [[nodiscard]] std::string_view to_string(FrameState state);
-/// First, initialising, tracking, standing, creeping and rotating frames count as measured.
+/// All count as measured but gated, lost and no_image.
 [[nodiscard]] bool is_measured(FrameState state);
 
 /// What the road told of a frame's scale (`scale.source: camera_height`).
 enum class RoadState {
-  kNotAsked,  ///< the scale comes from elsewhere
+  kDisabled,  ///< the scale comes from elsewhere
   kNone,      ///< no road was measured since the map started: the scale is a guess
   kHeld,      ///< measured before, not on this frame: the last scale is kept, its sigma grows
   kMeasured,  ///< measured on this frame and believed
 };
-/// `-`, `none`, `held`, `measured`.
+/// `disabled`, `none`, `held`, `measured`.
 [[nodiscard]] std::string_view to_string(RoadState state);
 
 /// Milliseconds per stage of one frame. Stages of different frames overlap: their sum is no frame's
@@ -78,7 +78,7 @@ struct FrameResult {
   double fundamental_score = 0.0;  ///< S_F
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
-  RoadState road = RoadState::kNotAsked;
+  RoadState road = RoadState::kDisabled;
   std::string_view road_reason;       ///< why the road was not measured, else empty
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;
@@ -114,22 +114,20 @@ class Odometry {
   /// the same. Frames are prepared in their order, one call at a time, which may run ahead of the
   /// others in another thread.
   [[nodiscard]] PreparedFrame prepare(const cv::Mat& frame);
-  /// Follows the points to this frame, once the one before is placed.
-  void follow(PreparedFrame frame);
-  /// Refines the frame placed last, and returns its result. May run beside follow() of the next
+  /// Tracks the points to this frame, once the one before is localized.
+  void track(PreparedFrame frame);
+  /// Localizes the frame tracked, once the one before is optimized.
+  void localize();
+  /// Optimizes the frame localized last, and returns its result. May run beside track() of the next
   /// frame, in another thread.
-  [[nodiscard]] FrameResult finish();
-  /// Places the frame followed, once the one before is finished.
-  void place();
+  [[nodiscard]] FrameResult optimize();
 
-  /// One pose per frame so far, as the local map last knew them: with the look-ahead of its window.
+  /// One pose per frame so far, as the window last knew them: with its look-ahead.
   /// Mode two_frame refines nothing: the poses as they came.
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
 
-  /// Before the first frame: landmarks are kept (some 30 bytes each). Mode two_frame has none.
-  void keep_landmarks();
   /// Landmarks seen from at least 3 keyframes under at least 1.5 degrees of parallax, as they were
-  /// when they left the window, or are now. Empty without keep_landmarks().
+  /// when they left the window, or are now.
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
   /// Of the last frame whose result was returned, for pictures.

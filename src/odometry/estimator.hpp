@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "odometry/road_picture.hpp"
+#include "stemvo/features/front_end.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/odometry/odometry.hpp"
+
+namespace stemvo {
+
+/// A frame as an estimator gets it.
+struct TrackedFrame {
+  int number = 0;          ///< counted from 0, frames without an image among them
+  bool has_image = false;  ///< false: it could not be read, or not be seen through the channel
+  Matches matches;         ///< none on the first image
+  cv::Mat image;           ///< as given, gray or RGB: where landmarks get their colour
+  std::shared_ptr<const RoadPicture> road;  ///< null: the road is not asked
+};
+
+/// A frame whose pose may still be refined.
+struct LocalizedFrame {
+  FrameResult result;             ///< all but the pose, and what the road says
+  std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
+};
+
+/// Tracks in, poses out; the front end follows tracks to the next frame while a frame is optimized.
+/// Frames come in order, each through both halves.
+class Estimator {
+ public:
+  virtual ~Estimator() = default;
+
+  /// First half: state and inliers.
+  [[nodiscard]] virtual LocalizedFrame localize(const TrackedFrame& frame) = 0;
+  /// Second half, the slower one: completes the result with pose and scale.
+  virtual void optimize(const TrackedFrame& frame, LocalizedFrame& localized) = 0;
+
+  /// One pose per frame so far, world_from_camera, as they came.
+  [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;
+  /// The same with look-ahead, where something is refined.
+  [[nodiscard]] virtual std::vector<Rigid3> refined_trajectory() const = 0;
+  /// See Odometry::landmarks().
+  [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
+};
+
+}  // namespace stemvo

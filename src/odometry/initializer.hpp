@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "odometry/landmarks.hpp"
+#include "odometry/localization.hpp"
+#include "odometry/two_view_estimator.hpp"
+#include "odometry/window.hpp"
+#include "stemvo/config.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+/// A frame as it was localized: what later ones are compared with.
+struct View {
+  int frame = -1;
+  Rigid3 world_from_camera;
+  TrackPoints points;
+};
+
+/// Finds the first landmarks: the paper's H/F selection between a reference frame and the newest
+/// one, once there is parallax to decide (paper section 3.5-3.6).
+class Initializer {
+ public:
+  Initializer(const Config& config, const Camera& camera);
+
+  /// The frame that the next ones are compared with. Its points may lack those that begin there.
+  void start(View reference);
+  [[nodiscard]] const View& reference() const { return reference_; }
+  /// Fewer than half of its tracks live: it will not decide any more.
+  [[nodiscard]] bool is_worn_out(const TrackPoints& now) const;
+
+  /// The motion from the reference to a frame. `inlier_mask` is one per match of the frame; a match
+  /// that the reference does not see is kept.
+  [[nodiscard]] MeasuredMotion measure(const Matches& matches, const TrackPoints& now);
+
+  /// The window of the reference, `now` and the landmarks between them, the frames between them
+  /// localized. `now.world_from_camera` says where it is. nullopt: too few landmarks.
+  [[nodiscard]] std::optional<Window> open_window(const View& now,
+                                                  const WindowOptions& window_options,
+                                                  const LocalizationOptions& localization) const;
+  /// A frame that did not decide: localized once the window is open.
+  void wait(View view);
+
+ private:
+  Camera camera_;
+  TwoViewEstimator two_view_;
+  std::uint64_t seed_;
+  View reference_;
+  std::vector<View> waiting_;
+};
+
+}  // namespace stemvo

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "odometry/window.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+/// The landmarks that a frame sees, and where.
+struct SeenLandmarks {
+  std::vector<Eigen::Vector3d> points;  ///< in the world
+  std::vector<Eigen::Vector2d> uv;
+
+  [[nodiscard]] int size() const { return static_cast<int>(points.size()); }
+};
+[[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame);
+
+struct LocalizationOptions {
+  double first_loss_px = 2.0;  ///< Cauchy scale of the first round: the prediction may be far off
+  double loss_px = 0.2;        ///< of the second, on the inliers of the first
+  double inlier_bound_px = 2.0;
+  int min_landmarks = 30;      ///< that agree with a pose; fewer: there is none
+  double min_agreement = 0.5;  ///< share of the landmarks seen; less: the prediction was wrong
+  std::uint64_t seed = 1;      ///< of the search without a prediction
+};
+
+struct Localization {
+  Rigid3 world_from_camera;
+  int num_inliers = 0;  ///< of all landmarks seen, within the bound
+};
+
+/// Pose of a frame by the landmarks it sees: motion-only optimization (Cauchy loss) from a
+/// predicted pose, in two rounds, outliers left out between them. Where fewer than
+/// `min_agreement` agree, it is searched without a prediction (P3P consensus) and the better one
+/// counts. nullopt: fewer than `min_landmarks` agree with any pose.
+[[nodiscard]] std::optional<Localization> localize(const SeenLandmarks& seen,
+                                                   const Rigid3& predicted_world_from_camera,
+                                                   const Camera& camera,
+                                                   const LocalizationOptions& options);
+
+}  // namespace stemvo

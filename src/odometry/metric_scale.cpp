@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/metric_scale.hpp"
+
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+
+MetricScale::MetricScale(const Config& config,
+                         const Camera& camera,
+                         std::optional<double> drift_sigma) {
+  if (config.scale.source != "camera_height") {
+    return;
+  }
+  RoadOptions options;
+  options.camera_height_m = config.scale.camera_height_m;
+  options.drift_sigma = drift_sigma.value_or(options.drift_sigma);
+  options.use_dense = config.scale.estimators != "points";
+  options.use_points = config.scale.estimators != "dense";
+  options.join_frames = config.scale.joining;
+  road_.emplace(options, camera);
+}
+
+void MetricScale::restart(const RoadPicture* road) {
+  if (road_.has_value() && road != nullptr) {
+    road_->restart();
+    keep(road_->update(*road, {}));
+  }
+}
+
+void MetricScale::start_new_unit() {
+  if (road_.has_value()) {
+    road_->start_new_unit();
+  }
+}
+
+double MetricScale::measure(const RoadPicture* road, const Rigid3& cur_from_prev) {
+  if (!road_.has_value() || road == nullptr) {
+    return 1.0;
+  }
+  const RoadScaleEstimate estimate =
+      timed(Stage::kRoadScale, [&] { return road_->update(*road, cur_from_prev); });
+  keep(estimate);
+  if (!estimate.is_initialized) {
+    return 1.0;
+  }
+  road_->rescale(estimate.metres_per_unit);
+  return estimate.metres_per_unit;
+}
+
+void MetricScale::hold(std::string_view reason) {
+  if (road_.has_value()) {
+    state_ = state_ == RoadState::kMeasured ? RoadState::kHeld : state_;
+    reason_ = reason;
+  }
+}
+
+void MetricScale::keep(const RoadScaleEstimate& estimate) {
+  sigma_ = estimate.sigma;
+  state_ = estimate.is_measured      ? RoadState::kMeasured
+           : estimate.is_initialized ? RoadState::kHeld
+                                     : RoadState::kNone;
+  reason_ = estimate.is_measured ? std::string_view() : estimate.reason;
+}
+
+void MetricScale::report(FrameResult& result) const {
+  result.road = state_;
+  result.road_reason = reason_;
+  result.scale_sigma = sigma_;
+}
+
+}  // namespace stemvo

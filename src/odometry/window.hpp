@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <deque>
+#include <map>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "odometry/track_points.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+/// A frame between two keyframes, where it was localized against the earlier one's landmarks.
+struct FrameBetween {
+  int frame = 0;
+  Rigid3 keyframe_from_camera;
+};
+
+/// A frame that stays in the window.
+struct Keyframe {
+  int frame = 0;
+  Rigid3 world_from_camera;
+  TrackPoints points;
+  std::vector<FrameBetween> followers;  ///< frames after it, until the next keyframe
+};
+
+/// The last keyframes and the landmarks they see, connected by track ids. Everything is in units of
+/// the map; the owner says what one is in metres.
+struct Window {
+  std::deque<Keyframe> keyframes;            ///< oldest first
+  std::map<int, Eigen::Vector3d> landmarks;  ///< track id -> point in the world
+
+  void clear() {
+    keyframes.clear();
+    landmarks.clear();
+  }
+};
+
+struct WindowOptions {
+  int num_keyframes = 8;  ///< length of the window
+  /// Of a new landmark, between its first and last keyframe: only the direction of distant ones is
+  /// known, but that holds the rotation.
+  double min_parallax_deg = 0.1;
+  double max_reprojection_error_px = 1.5;  ///< of a landmark in any keyframe
+};
+
+/// Appends the keyframe, drops the oldest beyond the window's length, and landmarks that no
+/// keyframe sees any more.
+void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);
+
+/// Multiplies every length; `center` (in the world) stays where it is.
+void rescale(Window& window, double factor, const Eigen::Vector3d& center);
+
+}  // namespace stemvo

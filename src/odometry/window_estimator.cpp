@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/window_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "odometry/landmarks.hpp"
+#include "odometry/motion_chain.hpp"
+#include "odometry/parallax.hpp"
+#include "stemvo/check.hpp"
+#include "stemvo/geometry/relative_pose_refinement.hpp"
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A new keyframe: so much parallax to the last one, pixels of a camera of focal length 718 ..
+constexpr double kKeyframeParallax_px = 5.0;
+constexpr double kFocal_px = 718.0;
+/// .. or less than this share of its tracks left.
+constexpr double kMinOverlap = 0.6;
+/// An anchor with fewer of its tracks left is renewed where the camera is.
+constexpr double kMinLiving = 0.5;
+/// More parallax than this is no noise, pixels.
+constexpr double kSureParallax_px = 2.0;
+
+Rigid3 motion_of_one_frame(const Rigid3& motion, int num_frames) {
+  if (num_frames <= 1) {
+    return motion;
+  }
+  return {so3_exp(so3_log(motion.rotation) / num_frames), motion.translation / num_frames};
+}
+
+}  // namespace
+
+WindowEstimator::WindowEstimator(const Config& config, const Camera& camera)
+    : camera_(camera),
+      options_(config.odometry),
+      refine_every_(config.refine.every),
+      epipolar_bound_px_(2.0 * config.two_view.inlier_threshold_px),
+      keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
+      initializer_(config, camera),
+      scale_(config, camera),
+      step_(assumed_step(config.scale)) {
+  window_options_.num_keyframes = config.refine.window;
+  refinement_.loss_scale_px = config.refine.loss_px;
+  refinement_.max_iterations = config.refine.max_iterations;
+  localization_.loss_px = config.refine.loss_px;
+  localization_.seed = config.seed;
+}
+
+LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
+  LocalizedFrame localized;
+  FrameResult& result = localized.result;
+  localized.inlier_mask.assign(frame.matches.cur_uv.size(), 1);
+  has_opened_ = false;
+  if (!frame.has_image) {
+    world_from_camera_ = world_from_camera_ * prev_from_cur_;
+    result.state = FrameState::kNoImage;
+  } else if (last_.frame < 0) {
+    start_map({frame.number, world_from_camera_, {}}, frame.road.get());
+    result.state = FrameState::kFirst;
+  } else if (is_initializing()) {
+    result.state = initialize(frame, localized);
+  } else {
+    const StageTimer timer(Stage::kLocalization);
+    result.state = track(frame, localized);
+  }
+  result.num_matches = static_cast<int>(localized.inlier_mask.size());
+  result.num_inliers = static_cast<int>(
+      std::count(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{1}));
+  return localized;
+}
+
+/// The reference is the first keyframe of a map to be.
+void WindowEstimator::start_map(View reference, const RoadPicture* road) {
+  history_.close(window_);
+  window_.clear();
+  initializer_.start(std::move(reference));
+  scale_.restart(road);
+}
+
+FrameState WindowEstimator::initialize(const TrackedFrame& frame, LocalizedFrame& localized) {
+  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  if (initializer_.is_worn_out(now)) {
+    start_map({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_.get());
+  }
+  return accept(frame, initializer_.measure(frame.matches, now), localized);
+}
+
+/// What the motion since the reference makes of the frame.
+FrameState WindowEstimator::accept(const TrackedFrame& frame,
+                                   const MeasuredMotion& motion,
+                                   LocalizedFrame& localized) {
+  add_scores(motion, localized.result);
+  localized.inlier_mask = motion.inlier_mask;
+  if (motion.state == FrameState::kLost) {
+    start_map({frame.number, world_from_camera_ * prev_from_cur_, {}}, frame.road.get());
+    return lose(localized);
+  }
+  const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
+  if (motion.state == FrameState::kTracking) {
+    if (motion.is_decisive && open_window(frame, motion, points)) {
+      return FrameState::kInitializing;
+    }
+  }
+  // The position is held until there is a map.
+  const Rigid3& reference = initializer_.reference().world_from_camera;
+  world_from_camera_ = Rigid3(reference.rotation * motion.cur_from_prev.rotation.conjugate(),
+                              reference.translation);
+  initializer_.wait({frame.number, world_from_camera_, points});
+  return motion.state == FrameState::kTracking ? FrameState::kInitializing : motion.state;
+}
+
+bool WindowEstimator::open_window(const TrackedFrame& frame,
+                                  const MeasuredMotion& motion,
+                                  TrackPoints points) {
+  const View& reference = initializer_.reference();
+  const Rigid3 direction = motion.cur_from_prev.inverse();
+  const double length = step_ * (frame.number - reference.frame);
+  View view{frame.number,
+            reference.world_from_camera *
+                Rigid3(direction.rotation, length * direction.translation),
+            std::move(points)};
+  std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
+  if (!window.has_value()) {
+    return false;
+  }
+  window_ = std::move(*window);
+  world_from_camera_ = view.world_from_camera;
+  anchor_ = std::move(view);
+  num_keyframes_ = 2;
+  has_opened_ = true;
+  return true;
+}
+
+/// Nothing tells how the camera moved: the last motion goes on, and no track does.
+FrameState WindowEstimator::lose(LocalizedFrame& localized) {
+  world_from_camera_ = world_from_camera_ * prev_from_cur_;
+  std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
+  return FrameState::kLost;
+}
+
+FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& localized) {
+  const TrackPoints all = current_points(frame.matches, localized.inlier_mask);
+  if (frame.matches.prev_frame == anchor_.frame) {
+    add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
+  }
+  if (is_stationary(all)) {
+    world_from_camera_ = anchor_.world_from_camera;
+    keep_anchor_alive(frame, all);
+    return FrameState::kStationary;
+  }
+  const std::optional<Localization> found =
+      stemvo::localize(find_seen_landmarks(window_, all), world_from_camera_ * prev_from_cur_,
+                       camera_, localization_);
+  if (getenv("DBG")) fprintf(stderr, "f %d matches %zu seen %d found %d kf %zu lm %zu lastkf %d\n", frame.number, all.size(), find_seen_landmarks(window_, all).size(), found?found->num_inliers:-1, window_.keyframes.size(), window_.landmarks.size(), window_.keyframes.back().frame); //DBG
+  if (!found.has_value()) {
+    return start_new_map(frame, localized);
+  }
+  world_from_camera_ = found->world_from_camera;
+  localized.inlier_mask = judge_matches(frame.matches, world_from_camera_);
+  TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  if (const std::optional<Rigid3> turned = turned_pose(world_from_camera_, now)) {
+    world_from_camera_ = *turned;
+    keep_anchor_alive(frame, now);
+    return FrameState::kRotating;
+  }
+  anchor_ = {frame.number, world_from_camera_, std::move(now)};
+  return FrameState::kTracking;
+}
+
+/// The landmarks are out of view, or the frame shows another place. The window is kept for a frame
+/// that may see it again until another map is begun.
+FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFrame& localized) {
+  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  View before{frame.matches.prev_frame, last_.world_from_camera, {}};
+  initializer_.start(before);
+  const MeasuredMotion motion = initializer_.measure(frame.matches, now);
+  const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
+  if (motion.state == FrameState::kLost ||
+      motion.num_inliers < localization_.min_agreement * num_matches) {
+    return lose(localized);
+  }
+  View reference = initializer_.reference();
+  start_map(std::move(reference), last_road_.get());
+  return accept(frame, motion, localized);
+}
+
+bool WindowEstimator::is_stationary(const TrackPoints& now) const {
+  const PointPairs pairs = common_points(anchor_.points, now);
+  return pairs.size() >= options_.min_inliers &&
+         median_flow_px(pairs.prev_uv, pairs.cur_uv) < options_.stationary_flow_px;
+}
+
+std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_camera,
+                                                   const TrackPoints& now) const {
+  const PointPairs pairs = common_points(anchor_.points, now);
+  if (pairs.size() < options_.min_inliers) {
+    return std::nullopt;
+  }
+  const Rigid3 cur_from_anchor = world_from_camera.inverse() * anchor_.world_from_camera;
+  if (median_parallax_px(cur_from_anchor.rotation, pairs.prev_uv, pairs.cur_uv, camera_) >
+      kSureParallax_px) {
+    return std::nullopt;
+  }
+  const Rigid3 turn =
+      refine_rotation(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_).cur_from_prev;
+  const double parallax_px =
+      median_parallax_px(turn.rotation, pairs.prev_uv, pairs.cur_uv, camera_);
+  const double noise_px =
+      median_epipolar_px(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_);
+  if (parallax_px >= options_.stationary_flow_px &&
+      parallax_px >= std::min(kNoiseParallax * noise_px, options_.min_parallax_px)) {
+    return std::nullopt;
+  }
+  return anchor_.world_from_camera * turn.inverse();
+}
+
+void WindowEstimator::keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now) {
+  const auto living = static_cast<double>(common_points(anchor_.points, now).size());
+  if (living < kMinLiving * static_cast<double>(anchor_.points.size())) {
+    anchor_ = {frame.number, world_from_camera_, now};
+  }
+}
+
+std::vector<char> WindowEstimator::judge_matches(const Matches& matches,
+                                                 const Rigid3& world_from_camera) const {
+  const Keyframe& keyframe = window_.keyframes.back();
+  const Rigid3 camera_from_world = world_from_camera.inverse();
+  const std::size_t num_matches = matches.cur_uv.size();
+  std::vector<char> mask(num_matches, 1);
+  std::vector<std::size_t> of_keyframe;
+  std::vector<std::size_t> of_last;
+  std::vector<Eigen::Vector2d> keyframe_uv;
+  for (std::size_t i = 0; i < num_matches; ++i) {
+    if (const TrackPoint* point = find_point(keyframe.points, matches.track_ids[i])) {
+      of_keyframe.push_back(i);
+      keyframe_uv.push_back(point->uv);
+    } else if (matches.prev_frame == last_.frame) {
+      of_last.push_back(i);
+    }
+  }
+  const auto judge = [&](const std::vector<std::size_t>& indices,
+                         const std::vector<Eigen::Vector2d>& prev_uv,
+                         const Rigid3& world_from_prev) {
+    std::vector<Eigen::Vector2d> cur_uv;
+    for (const std::size_t i : indices) {
+      cur_uv.push_back(matches.cur_uv[i]);
+    }
+    const std::vector<char> inliers = epipolar_inliers(camera_from_world * world_from_prev,
+                                                       prev_uv, cur_uv, camera_,
+                                                       epipolar_bound_px_);
+    for (std::size_t k = 0; k < indices.size(); ++k) {
+      mask[indices[k]] = inliers[k];
+    }
+  };
+  judge(of_keyframe, keyframe_uv, keyframe.world_from_camera);
+  std::vector<Eigen::Vector2d> last_uv;
+  for (const std::size_t i : of_last) {
+    last_uv.push_back(matches.prev_uv[i]);
+  }
+  judge(of_last, last_uv, last_.world_from_camera);
+  return mask;
+}
+
+void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
+  FrameResult& result = localized.result;
+  if (!is_initializing() && frame.has_image) {
+    Keyframe& newest = window_.keyframes.back();
+    if (newest.frame == frame.matches.prev_frame) {
+      add_begun_points(frame.matches, localized.inlier_mask, newest.points);
+    }
+    if (result.state == FrameState::kTracking && is_keyframe(anchor_)) {
+      timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
+    }
+  }
+  measure_scale(frame);
+  finish_frame(frame, result.state);
+  scale_.report(result);
+  result.world_from_camera = world_from_camera_;
+}
+
+bool WindowEstimator::is_keyframe(const View& view) const {
+  const Keyframe& newest = window_.keyframes.back();
+  const PointPairs pairs = common_points(newest.points, view.points);
+  if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(newest.points.size())) {
+    return true;
+  }
+  const Rigid3 cur_from_newest = view.world_from_camera.inverse() * newest.world_from_camera;
+  return median_parallax_px(cur_from_newest.rotation, pairs.prev_uv, pairs.cur_uv, camera_) >
+         keyframe_parallax_px_;
+}
+
+void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
+  Keyframe keyframe{frame.number, world_from_camera_, anchor_.points, {}};
+  if (static_cast<int>(window_.keyframes.size()) >= window_options_.num_keyframes) {
+    history_.leave(window_, keyframe);
+  }
+  stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
+  ++num_keyframes_;
+  triangulate_landmarks(window_, camera_, window_options_);
+  if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
+    keyframes_since_refinement_ = 0;
+    refinement_.num_fixed_keyframes = num_keyframes_ < window_options_.num_keyframes ? 1 : (getenv("NFIX") ? atoi(getenv("NFIX")) : 2);
+    refine_window(window_, camera_, refinement_);
+    world_from_camera_ = window_.keyframes.back().world_from_camera;
+    anchor_.world_from_camera = world_from_camera_;
+  }
+  cull_landmarks(window_, camera_, window_options_);
+  history_.observe(window_, frame.image);
+}
+
+void WindowEstimator::measure_scale(const TrackedFrame& frame) {
+  if (!frame.has_image) {
+    scale_.hold("no image");
+  } else if (is_initializing()) {
+    if (initializer_.reference().frame != frame.number) {
+      scale_.hold("no map");
+    }
+  } else {
+    // The road was last seen where the camera was then.
+    const Rigid3& before =
+        has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
+    const double factor =
+        scale_.measure(frame.road.get(), world_from_camera_.inverse() * before);
+    rescale_map(factor, before.translation);
+  }
+}
+
+void WindowEstimator::rescale_map(double factor, const Eigen::Vector3d& center) {
+  if (factor == 1.0) {
+    return;
+  }
+  rescale(window_, factor, center);
+  for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
+    pose->translation = center + factor * (pose->translation - center);
+  }
+}
+
+/// The pose is final, but for the refined trajectory.
+void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) {
+  if (frame.has_image) {
+    if (state != FrameState::kLost && last_.frame >= 0 && !is_initializing()) {
+      const Rigid3& before =
+          has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
+      const int frame_before = has_opened_ ? initializer_.reference().frame : last_.frame;
+      prev_from_cur_ =
+          motion_of_one_frame(before.inverse() * world_from_camera_, frame.number - frame_before);
+      const double step = prev_from_cur_.translation.norm();
+      step_ = step > 0.0 && state == FrameState::kTracking ? step : step_;
+    }
+    last_ = {frame.number, world_from_camera_, {}};
+    last_road_ = frame.road;
+  }
+  if (!is_initializing() && window_.keyframes.back().frame != frame.number) {
+    Keyframe& newest = window_.keyframes.back();
+    newest.followers.push_back(
+        {frame.number, newest.world_from_camera.inverse() * world_from_camera_});
+  }
+  trajectory_.push_back(world_from_camera_);
+}
+
+std::vector<Rigid3> WindowEstimator::refined_trajectory() const {
+  WindowHistory history = history_;
+  history.close(window_);
+  return refined_poses(trajectory_, history.motions());
+}
+
+std::vector<MapLandmark> WindowEstimator::landmarks() const {
+  WindowHistory history = history_;
+  history.close(window_);
+  return history.landmarks();
+}
+
+}  // namespace stemvo

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "odometry/bundle_adjustment.hpp"
+#include "odometry/estimator.hpp"
+#include "odometry/initializer.hpp"
+#include "odometry/localization.hpp"
+#include "odometry/metric_scale.hpp"
+#include "odometry/window.hpp"
+#include "odometry/window_history.hpp"
+#include "stemvo/config.hpp"
+#include "stemvo/geometry/camera.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+
+namespace stemvo {
+
+/// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is localized
+/// against its landmarks. It alone owns pose, window and scale (docs/architecture.md).
+class WindowEstimator final : public Estimator {
+ public:
+  WindowEstimator(const Config& config, const Camera& camera);
+
+  [[nodiscard]] LocalizedFrame localize(const TrackedFrame& frame) override;
+  void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
+
+  [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
+  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override;
+  [[nodiscard]] std::vector<MapLandmark> landmarks() const override;
+
+  [[nodiscard]] const Window& window() const { return window_; }
+
+ private:
+  [[nodiscard]] bool is_initializing() const { return window_.keyframes.empty(); }
+
+  // While there are no landmarks.
+  FrameState initialize(const TrackedFrame& frame, LocalizedFrame& localized);
+  FrameState accept(const TrackedFrame& frame,
+                    const MeasuredMotion& motion,
+                    LocalizedFrame& localized);
+  [[nodiscard]] bool open_window(const TrackedFrame& frame,
+                                 const MeasuredMotion& motion,
+                                 TrackPoints points);
+  void start_map(View reference, const RoadPicture* road);
+  FrameState lose(LocalizedFrame& localized);
+
+  // Against landmarks.
+  FrameState track(const TrackedFrame& frame, LocalizedFrame& localized);
+  FrameState start_new_map(const TrackedFrame& frame, LocalizedFrame& localized);
+  [[nodiscard]] bool is_stationary(const TrackPoints& now) const;
+  /// The pose that only turns since the anchor, where that explains the tracks too.
+  [[nodiscard]] std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
+                                                  const TrackPoints& now) const;
+  void keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now);
+  /// Epipolar test against the newest keyframe, else against the frame before.
+  [[nodiscard]] std::vector<char> judge_matches(const Matches& matches,
+                                                const Rigid3& world_from_camera) const;
+
+  // After localization.
+  [[nodiscard]] bool is_keyframe(const View& view) const;
+  void add_keyframe(const TrackedFrame& frame);
+  void measure_scale(const TrackedFrame& frame);
+  void rescale_map(double factor, const Eigen::Vector3d& center);
+  void finish_frame(const TrackedFrame& frame, FrameState state);
+
+  Camera camera_;
+  OdometryOptions options_;
+  WindowOptions window_options_;
+  BundleAdjustmentOptions refinement_;
+  LocalizationOptions localization_;
+  int refine_every_;
+  double epipolar_bound_px_;
+  double keyframe_parallax_px_;
+
+  Initializer initializer_;
+  Window window_;  ///< empty: initializing
+  WindowHistory history_;
+  MetricScale scale_;
+  Rigid3 world_from_camera_;  ///< of the frame in work
+  Rigid3 prev_from_cur_;      ///< the last motion of one frame
+  double step_;               ///< length of the last step measured, per frame
+  View last_;                 ///< the last frame with an image, without its points
+  View anchor_;               ///< the last frame that was seen to move
+  std::shared_ptr<const RoadPicture> last_road_;
+  int num_keyframes_ = 0;  ///< since the window was opened
+  int keyframes_since_refinement_ = 0;
+  bool has_opened_ = false;  ///< the frame in work opened the window
+  std::vector<Rigid3> trajectory_;
+};
+
+}  // namespace stemvo

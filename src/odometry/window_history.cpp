@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/window_history.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "stemvo/check.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A kept landmark: seen from so many keyframes, under so large an angle between two of them.
+constexpr int kMinKeyframes = 3;
+constexpr double kMinParallax_rad = 1.5 * std::numbers::pi / 180.0;
+
+double parallax_rad(const Eigen::Vector3d& point, const Keyframe& a, const Keyframe& b) {
+  const Eigen::Vector3d from_a = point - a.world_from_camera.translation;
+  const Eigen::Vector3d from_b = point - b.world_from_camera.translation;
+  return std::atan2(from_a.cross(from_b).norm(), from_a.dot(from_b));
+}
+
+std::array<std::uint8_t, 3> color_at(const cv::Mat& image, const Eigen::Vector2d& uv) {
+  const cv::Point pixel(std::clamp(static_cast<int>(std::lround(uv.x())), 0, image.cols - 1),
+                        std::clamp(static_cast<int>(std::lround(uv.y())), 0, image.rows - 1));
+  if (image.channels() == 3) {
+    const auto& rgb = image.at<cv::Vec3b>(pixel);
+    return {rgb[0], rgb[1], rgb[2]};
+  }
+  const auto gray = image.at<std::uint8_t>(pixel);
+  return {gray, gray, gray};
+}
+
+}  // namespace
+
+void WindowHistory::observe(const Window& window, const cv::Mat& image) {
+  const Keyframe& newest = window.keyframes.back();
+  for (const TrackPoint& observation : newest.points) {
+    Track& track = tracks_[observation.track_id];
+    ++track.num_keyframes;
+    track.rgb = color_at(image, observation.uv);  // the last view is the nearest
+    const auto landmark = window.landmarks.find(observation.track_id);
+    if (landmark == window.landmarks.end()) {
+      continue;
+    }
+    const auto oldest =
+        std::find_if(window.keyframes.begin(), window.keyframes.end(), [&](const Keyframe& keyframe) {
+          return find_point(keyframe.points, observation.track_id) != nullptr;
+        });
+    track.max_parallax_rad =
+        std::max(track.max_parallax_rad, parallax_rad(landmark->second, *oldest, newest));
+  }
+}
+
+void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, int track_id) {
+  const auto track = tracks_.find(track_id);
+  if (track == tracks_.end()) {
+    return;
+  }
+  const auto landmark = window.landmarks.find(track_id);
+  if (landmark != window.landmarks.end() && track->second.num_keyframes >= kMinKeyframes &&
+      track->second.max_parallax_rad >= kMinParallax_rad) {
+    const Eigen::Vector3d in_camera = last_seen_from.world_from_camera.inverse() * landmark->second;
+    landmarks_.push_back({last_seen_from.frame, in_camera.cast<float>(), track->second.rgb});
+  }
+  tracks_.erase(track);
+}
+
+void WindowHistory::keep_followers(const Keyframe& keyframe) {
+  for (const FrameBetween& follower : keyframe.followers) {
+    motions_.push_back({keyframe.frame, follower.frame, follower.keyframe_from_camera});
+  }
+}
+
+void WindowHistory::keep_motions(const Keyframe& prev, const Keyframe& cur) {
+  keep_followers(prev);
+  motions_.push_back(
+      {prev.frame, cur.frame, prev.world_from_camera.inverse() * cur.world_from_camera});
+}
+
+void WindowHistory::leave(const Window& window, const Keyframe& coming) {
+  const Keyframe& oldest = window.keyframes.front();
+  const Keyframe& next = window.keyframes.size() > 1 ? window.keyframes[1] : coming;
+  keep_motions(oldest, next);
+  for (const TrackPoint& observation : oldest.points) {
+    const auto sees = [&](const Keyframe& keyframe) {
+      return find_point(keyframe.points, observation.track_id) != nullptr;
+    };
+    if (!sees(coming) && std::none_of(window.keyframes.begin() + 1, window.keyframes.end(), sees)) {
+      keep(window, oldest, observation.track_id);
+    }
+  }
+}
+
+void WindowHistory::close(const Window& window) {
+  for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
+    keep_motions(window.keyframes[i - 1], window.keyframes[i]);
+  }
+  if (!window.keyframes.empty()) {
+    keep_followers(window.keyframes.back());
+  }
+  for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend(); ++keyframe) {
+    for (const TrackPoint& observation : keyframe->points) {
+      keep(window, *keyframe, observation.track_id);
+    }
+  }
+  tracks_.clear();
+}
+
+std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
+                                  std::span<const RefinedMotion> motions) {
+  std::vector<Rigid3> poses(world_from_camera.begin(), world_from_camera.end());
+  auto motion = motions.begin();
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const auto frame = static_cast<int>(i);
+    if (motion != motions.end() && motion->cur == frame) {
+      STEMVO_CHECK(motion->prev >= 0 && motion->prev < frame, "motions come in order");
+      poses[i] = poses[static_cast<std::size_t>(motion->prev)] * motion->prev_from_cur;
+      ++motion;
+    } else {
+      poses[i] = poses[i - 1] * (world_from_camera[i - 1].inverse() * world_from_camera[i]);
+    }
+  }
+  STEMVO_CHECK(motion == motions.end(), "every motion belongs to a frame");
+  return poses;
+}
+
+}  // namespace stemvo

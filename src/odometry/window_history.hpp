@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "odometry/window.hpp"
+#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/odometry/odometry.hpp"
+
+namespace stemvo {
+
+/// Motion from a keyframe to the next, or to a frame between them, as it was last refined.
+struct RefinedMotion {
+  int prev = 0;  ///< frame numbers
+  int cur = 0;
+  Rigid3 prev_from_cur;
+};
+
+/// What the window leaves behind. Motions are kept, not poses: the window is rescaled and moved as a
+/// whole later on, and what has left must not be torn from it. For the same reason a landmark is
+/// kept in the camera of the last keyframe that saw it.
+class WindowHistory {
+ public:
+  /// The newest keyframe of the window saw this image (the input, gray or RGB).
+  void observe(const Window& window, const cv::Mat& image);
+
+  /// The oldest keyframe is about to leave the window for the one that comes.
+  void leave(const Window& window, const Keyframe& coming);
+  /// The whole window is about to be dropped; nothing will connect with it.
+  void close(const Window& window);
+
+  /// Ordered by `cur`.
+  [[nodiscard]] const std::vector<RefinedMotion>& motions() const { return motions_; }
+  /// Well-constrained landmarks that have left.
+  [[nodiscard]] const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
+
+ private:
+  /// What is known of a track that the window sees.
+  struct Track {
+    int num_keyframes = 0;
+    double max_parallax_rad = 0.0;
+    std::array<std::uint8_t, 3> rgb{};
+  };
+  void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
+  void keep_motions(const Keyframe& prev, const Keyframe& cur);
+  void keep_followers(const Keyframe& keyframe);
+
+  std::vector<RefinedMotion> motions_;
+  std::vector<MapLandmark> landmarks_;
+  std::map<int, Track> tracks_;
+};
+
+/// Poses of all frames, with look-ahead: by their refined motion where there is one, else from the
+/// frame before as they came. `motions` are ordered by `cur`; frame numbers count
+/// `world_from_camera`, the poses as they came.
+[[nodiscard]] std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
+                                                std::span<const RefinedMotion> motions);
+
+}  // namespace stemvo
