@@ -17,6 +17,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/frame_scheduler.hpp"
+#include "pipeline/thread_scope.hpp"
 
 namespace stemvo::pipeline {
 namespace {
@@ -264,8 +265,7 @@ TEST(FrameScheduler, ThrowsAgainWhatAStageThrows) {
 
 /// Threads with nothing else to do help with a loop of OpenCV, and no others.
 TEST(FrameScheduler, SharesTheLoopsOfOpenCvAmongItsThreads) {
-  const int threads_before = cv::getNumThreads();
-  cv::setNumThreads(3);
+  const ThreadScope limit(3);
   Meeting meeting(3);
   std::mutex mutex;
   std::set<std::thread::id> threads;
@@ -292,13 +292,11 @@ TEST(FrameScheduler, SharesTheLoopsOfOpenCvAmongItsThreads) {
   EXPECT_EQ(threads.size(), 3U);
   EXPECT_EQ(num_threads_told, 3);
   EXPECT_EQ(cv::getNumThreads(), 3);  // OpenCV's own again
-  cv::setNumThreads(threads_before);
 }
 
 TEST(FrameScheduler, NeverHasMoreThreadsThanAskedForInStagesAndTheirLoops) {
-  const int threads_before = cv::getNumThreads();
   for (const int num_threads : {1, 2, 4}) {
-    cv::setNumThreads(num_threads);
+    const ThreadScope limit(num_threads);
     std::mutex mutex;
     std::set<std::thread::id> threads;
     std::array<std::atomic<int>, 5> sums{};
@@ -327,12 +325,10 @@ TEST(FrameScheduler, NeverHasMoreThreadsThanAskedForInStagesAndTheirLoops) {
       EXPECT_EQ(sum, 40 * 64);
     }
   }
-  cv::setNumThreads(threads_before);
 }
 
 TEST(FrameScheduler, ThrowsAgainWhatALoopOfOpenCvThrows) {
-  const int threads_before = cv::getNumThreads();
-  cv::setNumThreads(3);
+  const ThreadScope limit(3);
   Diary diary(5, 0);
   FrameStages stages = diary.stages();
   stages.place = [&](std::size_t) {
@@ -343,13 +339,11 @@ TEST(FrameScheduler, ThrowsAgainWhatALoopOfOpenCvThrows) {
     });
   };
   EXPECT_THROW(run_stages(stages, 5, 3), std::runtime_error);
-  cv::setNumThreads(threads_before);
 }
 
 /// Each on threads of its own, the loops included.
 TEST(FrameScheduler, RunsBesideAnother) {
-  const int threads_before = cv::getNumThreads();
-  cv::setNumThreads(2);
+  const ThreadScope limit(2);
   const auto run = [] {
     Diary diary(100, 50);
     FrameStages stages = diary.stages();
@@ -366,7 +360,6 @@ TEST(FrameScheduler, RunsBesideAnother) {
     const std::jthread other(run);
     run();
   }
-  cv::setNumThreads(threads_before);
 }
 
 }  // namespace
