@@ -17,8 +17,7 @@ if(STEMVO_SANITIZE)
   target_link_options(stemvo_options INTERFACE -fsanitize=address,undefined)
 endif()
 if(STEMVO_SANITIZE_THREAD)
-  # GCC: fences are not seen by this sanitizer; TBB's headers have some.
-  target_compile_options(stemvo_options INTERFACE -fsanitize=thread -fno-omit-frame-pointer -Wno-tsan)
+  target_compile_options(stemvo_options INTERFACE -fsanitize=thread -fno-omit-frame-pointer)
   target_link_options(stemvo_options INTERFACE -fsanitize=thread)
 endif()
 

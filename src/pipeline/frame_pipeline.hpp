@@ -20,8 +20,9 @@ using FrameVisitor =
 
 /// Takes the frames of a sequence through an odometry. Reading, the stem and the rest work on
 /// different frames at the same time, on as many threads as ThreadScope allows (without one: a
-/// thread per core), a few frames ahead at most; the poses do not depend on it. What a stage or the
-/// visitor throws leaves this function; frames behind the last one visited are dropped then.
+/// thread per core), OpenCV's loops included, a few frames ahead at most; the poses do not depend
+/// on it. What a stage or the visitor throws leaves this function; frames behind the last one
+/// visited are dropped then.
 void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

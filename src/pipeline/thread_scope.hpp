@@ -14,7 +14,7 @@ class ThreadScope {
   ThreadScope& operator=(const ThreadScope&) = delete;
 
  private:
-  tbb::global_control limit_;
+  tbb::global_control limit_;  ///< of OpenCV's threads where it is built with TBB
   int opencv_before_;
 };
 

@@ -157,14 +157,14 @@ TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
   Odometry parts = odometry();
   for (std::size_t i = 0; i < 3; ++i) {
     const cv::Mat frame = sequence_->read(i).value();
-    parts.follow(parts.prepare(frame));
+    parts.track(parts.prepare(frame));
     if (i > 0) {  // of the frame before
-      EXPECT_EQ(parts.finish().num_matches,
+      EXPECT_EQ(parts.optimize().num_matches,
                 whole.process(sequence_->read(i - 1).value()).num_matches);
     }
-    parts.place();
+    parts.localize();
   }
-  const FrameResult last = parts.finish();
+  const FrameResult last = parts.optimize();
   EXPECT_GT(last.num_matches, 50);
   EXPECT_EQ(last.world_from_camera.translation,
             whole.process(sequence_->read(2).value()).world_from_camera.translation);

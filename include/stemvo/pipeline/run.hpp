@@ -53,7 +53,9 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
 /// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
 /// result cannot be written the others still are; `written` says so.
-/// One run with measure_times at a time in a process.
+/// One run with measure_times at a time in a process. OpenCV is told, for the whole process, how
+/// many threads it may use, and by whom its loops are run: call nothing of it in another thread
+/// while a run begins or ends.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

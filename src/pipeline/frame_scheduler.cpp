@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: MIT
+#include "pipeline/frame_scheduler.hpp"
+
+#include <array>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "pipeline/opencv_loops.hpp"
+
+namespace stemvo::pipeline {
+namespace {
+
+enum StageId : std::size_t { kRead, kPrepare, kTrack, kLocalize, kOptimize, kNumStageIds };
+/// What the next frame waits for goes before what only fills the queue.
+constexpr std::array kMostUrgentFirst = {kLocalize, kOptimize, kTrack, kPrepare, kRead};
+
+struct Job {
+  StageId stage = kRead;
+  std::size_t frame = 0;
+};
+
+/// A free thread takes the most urgent stage that can run. Everything but the stages themselves
+/// happens under one mutex: which frame a stage is given is a counter there.
+class FrameScheduler : public LoopCrew {
+ public:
+  FrameScheduler(const FrameStages& stages, std::size_t num_frames, int num_threads)
+      : stages_(stages), num_frames_(num_frames), num_threads_(num_threads) {}
+
+  void run() {
+    if (num_threads_ > 1) {
+      const OpenCvLoops loops;
+      run_on_threads();
+    } else {
+      work(0);
+    }
+    if (thrown_ != nullptr) {
+      std::rethrow_exception(thrown_);
+    }
+  }
+
+  [[nodiscard]] int num_threads() const override { return num_threads_; }
+  void run_loop(int num_stripes, const SharedLoop::Body& body) override;
+
+ private:
+  struct Progress {
+    std::size_t num_begun = 0;
+    std::size_t num_done = 0;
+  };
+
+  void run_on_threads();
+  void work(int thread);
+  bool run_stage(const Job& job) const;
+
+  // With the mutex held.
+  [[nodiscard]] bool is_over() const {
+    return is_ended_ || progress_[kOptimize].num_done == num_frames_;
+  }
+  [[nodiscard]] bool can_run(StageId stage) const;
+  [[nodiscard]] std::optional<Job> next_job() const;
+  [[nodiscard]] bool is_help_wanted() const {
+    return loop_ != nullptr && loop_->has_stripes_left();
+  }
+  void begin(const Job& job);
+  void end(const Job& job, bool goes_on);
+  void end_run();
+  void wake_one();
+  void help(std::unique_lock<std::mutex>& lock);
+
+  const FrameStages& stages_;
+  const std::size_t num_frames_;
+  const int num_threads_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;  ///< there is more to do, or nothing any more
+  std::condition_variable helped_;
+  std::array<Progress, kNumStageIds> progress_;
+  std::array<bool, kMaxInFlight> is_read_{};  ///< and not begun to be prepared
+  bool is_ended_ = false;                     ///< before the last frame
+  std::exception_ptr thrown_;
+  int num_idle_ = 0;
+  SharedLoop* loop_ = nullptr;  ///< OpenCV has one at a time
+};
+
+bool FrameScheduler::can_run(StageId stage) const {
+  const Progress& own = progress_[stage];
+  const std::size_t frame = own.num_begun;
+  const bool is_busy = stage != kRead && own.num_begun > own.num_done;
+  if (is_over() || is_busy || frame == num_frames_) {
+    return false;
+  }
+  switch (stage) {
+    case kRead:
+      return frame < progress_[kOptimize].num_done + kMaxInFlight;
+    case kPrepare:
+      return is_read_[frame % kMaxInFlight];
+    case kTrack:
+      return progress_[kPrepare].num_done > frame && progress_[kLocalize].num_done == frame;
+    case kLocalize:
+      return progress_[kTrack].num_done > frame && progress_[kOptimize].num_done == frame;
+    case kOptimize:
+      return progress_[kLocalize].num_done > frame;
+    case kNumStageIds:
+      break;
+  }
+  return false;
+}
+
+std::optional<Job> FrameScheduler::next_job() const {
+  for (const StageId stage : kMostUrgentFirst) {
+    if (can_run(stage)) {
+      return Job{stage, progress_[stage].num_begun};
+    }
+  }
+  return std::nullopt;
+}
+
+void FrameScheduler::begin(const Job& job) {
+  ++progress_[job.stage].num_begun;
+  if (job.stage == kPrepare) {
+    is_read_[job.frame % kMaxInFlight] = false;
+  }
+}
+
+void FrameScheduler::end(const Job& job, bool goes_on) {
+  ++progress_[job.stage].num_done;
+  if (job.stage == kRead) {
+    is_read_[job.frame % kMaxInFlight] = true;
+  }
+  if (!goes_on) {
+    end_run();
+  } else if (is_over()) {
+    changed_.notify_all();
+  }
+}
+
+void FrameScheduler::end_run() {
+  is_ended_ = true;
+  changed_.notify_all();
+}
+
+/// Whoever finds something to do wakes the next one, if there is more.
+void FrameScheduler::wake_one() {
+  if (num_idle_ > 0 && (is_help_wanted() || next_job())) {
+    changed_.notify_one();
+  }
+}
+
+bool FrameScheduler::run_stage(const Job& job) const {
+  switch (job.stage) {
+    case kRead:
+      stages_.read(job.frame);
+      return true;
+    case kPrepare:
+      stages_.prepare(job.frame);
+      return true;
+    case kTrack:
+      stages_.track(job.frame);
+      return true;
+    case kLocalize:
+      stages_.localize(job.frame);
+      return true;
+    case kOptimize:
+      return stages_.optimize(job.frame);
+    case kNumStageIds:
+      break;
+  }
+  return false;
+}
+
+void FrameScheduler::work(int thread) {
+  const CrewMember member(*this, thread);
+  std::unique_lock lock(mutex_);
+  while (!is_over()) {
+    if (const std::optional<Job> job = next_job()) {
+      begin(*job);
+      wake_one();
+      lock.unlock();
+      bool goes_on = false;
+      std::exception_ptr thrown;
+      try {
+        goes_on = run_stage(*job);
+      } catch (...) {
+        thrown = std::current_exception();
+      }
+      lock.lock();
+      thrown_ = thrown_ == nullptr ? thrown : thrown_;
+      end(*job, goes_on);
+    } else if (is_help_wanted()) {
+      help(lock);
+    } else {
+      ++num_idle_;
+      changed_.wait(lock);
+      --num_idle_;
+    }
+  }
+}
+
+void FrameScheduler::run_on_threads() {
+  std::vector<std::jthread> threads;
+  try {
+    for (int i = 1; i < num_threads_; ++i) {
+      threads.emplace_back([this, i] { work(i); });
+    }
+  } catch (...) {  // no more threads to be had
+    const std::lock_guard lock(mutex_);
+    thrown_ = thrown_ == nullptr ? std::current_exception() : thrown_;
+    end_run();
+  }
+  work(0);
+}
+
+void FrameScheduler::run_loop(int num_stripes, const SharedLoop::Body& body) {
+  SharedLoop loop(num_stripes, num_threads_, body);
+  std::unique_lock lock(mutex_);
+  if (loop_ != nullptr) {
+    lock.unlock();
+    body(0, num_stripes);
+    return;
+  }
+  loop_ = &loop;
+  wake_one();
+  lock.unlock();
+  loop.work();
+  lock.lock();
+  loop_ = nullptr;
+  helped_.wait(lock, [&loop] { return loop.num_helpers == 0; });
+}
+
+void FrameScheduler::help(std::unique_lock<std::mutex>& lock) {
+  SharedLoop& loop = *loop_;
+  ++loop.num_helpers;
+  wake_one();
+  lock.unlock();
+  loop.work();
+  lock.lock();
+  if (--loop.num_helpers == 0) {
+    helped_.notify_all();
+  }
+}
+
+}  // namespace
+
+void run_stages(const FrameStages& stages, std::size_t num_frames, int num_threads) {
+  FrameScheduler(stages, num_frames, num_threads).run();
+}
+
+}  // namespace stemvo::pipeline
