@@ -71,7 +71,7 @@ using Starts = flow::multifunction_node<Frame*, std::tuple<Frame*>>;
 /// What the nodes of the graph do.
 class Stages {
  public:
-  Stages(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit)
+  Stages(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit)
       : sequence_(sequence), odometry_(odometry), visit_(visit) {}
 
   /// Gives a free place to the next frame, if there is one. Null: there was no frame to be freed.
@@ -149,7 +149,7 @@ class Stages {
     });
   }
 
-  const KittiSequence& sequence_;
+  const FrameSource& sequence_;
   Odometry& odometry_;
   const FrameVisitor& visit_;
   std::size_t num_started_ = 0;
@@ -221,7 +221,7 @@ class FrameGraph {
 
 }  // namespace
 
-void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
+void run_frames(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit) {
   std::array<Frame, kMaxInFlight> places;
   Stages stages(sequence, odometry, visit);
   FrameGraph(stages).run(places);
