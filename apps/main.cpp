@@ -19,6 +19,8 @@ constexpr const char* kFooter = R"(A first drive, without any data:
   stemvo run drive/sequences/00 --out result          reconstruct it, see result/trajectory.png
 With KITTI:
   stemvo run kitti/sequences/00 --out result --set scale.source=ground_truth
+With your own camera (see 'stemvo run --help'):
+  stemvo run drive/images --camera camera.yaml --out result
 
 'stemvo COMMAND --help' explains a command. Every configuration key is explained by
   stemvo --dump-config > my.yaml                      edit it, then: stemvo run ... --config my.yaml
