@@ -38,7 +38,12 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   for (const CLI::App* sub : app.get_subcommands()) {
     command += " " + sub->get_name();
   }
-  print_error(std::string(error.what()) + " (see '" + command + " --help')");
+  constexpr std::size_t kMaxShown = 300;  // the shell may have made a thousand names of a pattern
+  std::string message = error.what();
+  if (message.size() > kMaxShown) {
+    message = message.substr(0, kMaxShown) + " ..; a pattern of files must be quoted";
+  }
+  print_error(message + " (see '" + command + " --help')");
   return kExitUsage;
 }
 

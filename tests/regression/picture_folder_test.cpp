@@ -174,6 +174,16 @@ TEST_F(PictureFolderRun, NoCameraFile) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
+TEST_F(PictureFolderRun, APatternThatTheShellReplaced) {
+  std::vector<std::string> names = {"--camera", camera_};
+  for (int i = 1; i < 1000; ++i) {
+    names.push_back((pictures_ / fmt::format("{:06}.png", i)).string());
+  }
+  const ProgramResult result = run_path((pictures_ / "000000.png").string(), names);
+  expect_error(result, 2, {"not expected", "a pattern of files must be quoted", "--help"});
+  EXPECT_LT(result.err.size(), 500U);
+}
+
 TEST_F(PictureFolderRun, BadCameraFiles) {
   write_file(camera_, "intrinsics: [1, 2\n");
   expect_error(run(), 1, {"camera.yaml:2", "not YAML"});
