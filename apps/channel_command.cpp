@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
+#include <string>
 
 #include <fmt/format.h>
 
@@ -26,6 +27,7 @@ Examples:
 struct Arguments {
   ChannelPicturesRequest request;
   ConfigArguments config;
+  std::string camera_file;
 };
 
 int draw(Arguments& arguments) {
@@ -36,6 +38,9 @@ int draw(Arguments& arguments) {
   }
   arguments.request.config = *config;
   arguments.request.models_dir = data_folder("models");
+  if (!arguments.camera_file.empty()) {
+    arguments.request.camera_file = arguments.camera_file;
+  }
   Progress progress("frames", /*is_quiet=*/false);
   const Expected<std::size_t> written = write_channel_pictures(
       arguments.request,
@@ -55,7 +60,9 @@ CLI::App* add_channel(CLI::App& app, Action& action) {
       app.add_subcommand("channel", "Draw what the filters make of the frames (paper, Figure 1)");
   const auto arguments = std::make_shared<Arguments>();
   arguments->request.frames = FrameRangeRequest{0, 1};
-  command->add_option("SEQUENCE_DIR", arguments->request.sequence_dir, "Sequence in KITTI's layout")
+  command
+      ->add_option("SEQUENCE_DIR", arguments->request.sequence_dir,
+                   "Sequence in KITTI's layout; with --camera, pictures")
       ->required()
       ->type_name("");
   command->add_option("--out", arguments->request.out_dir, "Folder for the pictures; created")
@@ -65,6 +72,10 @@ CLI::App* add_channel(CLI::App& app, Action& action) {
                    "Frames A to B-1; default: the first one");
   add_range_option(*command, "--filters", arguments->request.filters,
                    "Filters A to B-1; default: all");
+  command
+      ->add_option("--camera", arguments->camera_file,
+                   "SEQUENCE_DIR is a folder of pictures or a pattern (see 'stemvo run --help')")
+      ->type_name("FILE");
   add_config_options(*command, arguments->config);
   command->footer(kFooter);
   command->callback([arguments, &action] { action = [arguments] { return draw(*arguments); }; });

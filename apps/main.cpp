@@ -19,6 +19,8 @@ constexpr const char* kFooter = R"(A first drive, without any data:
   stemvo run drive/sequences/00 --out result          reconstruct it, see result/trajectory.png
 With KITTI:
   stemvo run kitti/sequences/00 --out result --set scale.source=ground_truth
+With your own camera (see 'stemvo run --help'):
+  stemvo run drive/images --camera camera.yaml --out result
 
 'stemvo COMMAND --help' explains a command. Every configuration key is explained by
   stemvo --dump-config > my.yaml                      edit it, then: stemvo run ... --config my.yaml
@@ -36,7 +38,12 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   for (const CLI::App* sub : app.get_subcommands()) {
     command += " " + sub->get_name();
   }
-  print_error(std::string(error.what()) + " (see '" + command + " --help')");
+  constexpr std::size_t kMaxShown = 300;  // the shell may have made a thousand names of a pattern
+  std::string message = error.what();
+  if (message.size() > kMaxShown) {
+    message = message.substr(0, kMaxShown) + " ..; a pattern of files must be quoted";
+  }
+  print_error(message + " (see '" + command + " --help')");
   return kExitUsage;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
+#include <algorithm>
 #include <map>
 #include <string_view>
 #include <system_error>
@@ -71,6 +72,18 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
     return tl::unexpected(status.error());
   }
   return config;
+}
+
+NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key) {
+  NamedKeys result;
+  result.by_set = std::any_of(
+      arguments.overrides.begin(), arguments.overrides.end(),
+      [&key](const std::string& assignment) { return assignment.starts_with(key + "="); });
+  if (!arguments.file.empty()) {
+    const auto keys = keys_in_config(find_config(arguments.file));
+    result.by_file = keys && std::find(keys->begin(), keys->end(), key) != keys->end();
+  }
+  return result;
 }
 
 CLI::Option* add_range_option(CLI::App& command,

@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 
 #include "stemvo/config.hpp"
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::apps {
@@ -26,6 +26,13 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments);
 /// configurations that come with the program, with or without ".yaml". `base`: the defaults.
 [[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments,
                                            const Config& base = {});
+
+/// Whether --set or the --config file names the key. Call after read_config, which checks both.
+struct NamedKeys {
+  bool by_set = false;
+  bool by_file = false;
+};
+[[nodiscard]] NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key);
 
 /// Whole numbers from min to max; leaves the help's line short.
 [[nodiscard]] CLI::Validator in_range(int min, int max);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -18,6 +20,20 @@ constexpr const char* kFooter =
     R"(SEQUENCE_DIR holds image_2/000000.png, .. (colour) or image_0 (gray), calib.txt and times.txt, as in
 KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
 
+With --camera it is a folder of PNG or JPEG pictures in the order of their names (frame2 before
+frame10), or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
+
+  image_width: 640
+  image_height: 480
+  intrinsics: [520.9, 521.0, 325.1, 249.7]                      # fx, fy, cx, cy, pixels
+  distortion_model: radial-tangential                           # or none, or equidistant
+  distortion_coefficients: [0.23, -0.78, -0.003, -0.0001, 0.92] # k1 k2 p1 p2 [k3], or k1 k2 k3 k4
+  rate_hz: 30                                                   # or give --times
+  camera_height: 1.65                                           # metres above the road, if known
+
+EuRoC's sensor.yaml is read as well. Frames are undistorted. Without camera_height the path is up to
+scale (scale.source=none).
+
 --out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory_refined_kitti.txt
 (odometry.mode map: the same with look-ahead), trajectory.png and .svg (the path drawn), metrics.json
 (the numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
@@ -27,13 +43,17 @@ Examples:
   stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth   the paper's protocol
   stemvo run kitti/sequences/03 --out result --map                            with a point cloud
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
-  stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn)";
+  stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn
+  stemvo run drive/images --camera camera.yaml --out result                    your own camera
+  stemvo run 'drive/left_*.png' --camera camera.yaml --times times.txt --out result)";
 
 struct Arguments {
   RunRequest request;
   ConfigArguments config;
   std::string ground_truth;
   std::string calibration;
+  std::string camera_file;
+  std::string times;
   bool is_quiet = false;
 };
 
@@ -51,6 +71,23 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   }
 }
 
+/// What was typed, for the library; an empty path: not given.
+void fill_request(const Arguments& arguments, RunRequest& request) {
+  const auto take = [](const std::string& typed, std::optional<std::filesystem::path>& path) {
+    if (!typed.empty()) {
+      path = typed;
+    }
+  };
+  take(arguments.ground_truth, request.ground_truth);
+  take(arguments.calibration, request.calibration);
+  take(arguments.camera_file, request.camera_file);
+  take(arguments.times, request.times);
+  const NamedKeys source = named_keys(arguments.config, "scale.source");
+  request.chosen.source = source.by_set || source.by_file;
+  // A file's height is some camera's, often the default; that of the camera file is this one's.
+  request.chosen.camera_height = named_keys(arguments.config, "scale.camera_height_m").by_set;
+}
+
 int run(Arguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
@@ -61,12 +98,7 @@ int run(Arguments& arguments) {
   request.config = *config;
   request.models_dir = data_folder("models");
   request.started = process_start();
-  if (!arguments.ground_truth.empty()) {
-    request.ground_truth = arguments.ground_truth;
-  }
-  if (!arguments.calibration.empty()) {
-    request.calibration = arguments.calibration;
-  }
+  fill_request(arguments, request);
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
       request,
@@ -96,7 +128,9 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a folder of frames");
   const auto arguments = std::make_shared<Arguments>();
   RunRequest& request = arguments->request;
-  command->add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
+  command
+      ->add_option("SEQUENCE_DIR", request.sequence_dir,
+                   "Sequence in KITTI's layout; with --camera, pictures")
       ->required()
       ->type_name("");
   command->add_option("--out", request.out_dir, "Folder for the results; created, files replaced")
@@ -105,6 +139,14 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
   command->add_option("--gt", arguments->ground_truth, "Ground truth: a pose file of KITTI")
+      ->type_name("FILE");
+  command
+      ->add_option("--camera", arguments->camera_file,
+                   "SEQUENCE_DIR is a folder of pictures or a pattern, of this camera (see below)")
+      ->type_name("FILE");
+  command
+      ->add_option("--times", arguments->times,
+                   "With --camera: a time in seconds per picture; default: its rate_hz")
       ->type_name("FILE");
   command
       ->add_option("--calib", arguments->calibration,

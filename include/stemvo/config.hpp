@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "stemvo/error.hpp"
 #include "stemvo/evaluation/metrics.hpp"
@@ -74,6 +75,8 @@ struct Config {
 /// wrong type, value out of range.
 [[nodiscard]] Expected<Config> load_config(const std::filesystem::path& file,
                                            const Config& base = {});
+/// The keys a YAML file sets, e.g. "scale.source". Errors: it cannot be read, it is not YAML.
+[[nodiscard]] Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& file);
 /// `key=value` of --set, e.g. "stem.filter=10".
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 /// Ranges and choices of every key; written so that NaN fails.

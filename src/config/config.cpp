@@ -32,6 +32,11 @@ Expected<std::string> read_text(const std::filesystem::path& file) {
   return std::string(std::istreambuf_iterator<char>(in), {});
 }
 
+Expected<YAML::Node> read_yaml(const std::filesystem::path& file) {
+  return read_text(file).and_then(
+      [&](const std::string& text) { return config::parse_document(text, file.string()); });
+}
+
 /// A list is written as in the file; anything else is taken as it stands, so that a path may hold
 /// any character.
 std::string read_assigned(const std::string& text, const config::Field& field) {
@@ -46,11 +51,7 @@ std::string read_assigned(const std::string& text, const config::Field& field) {
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
-  const Expected<std::string> text = read_text(file);
-  if (!text) {
-    return tl::unexpected(text.error());
-  }
-  const Expected<YAML::Node> root = config::parse_document(*text, file.string());
+  const Expected<YAML::Node> root = read_yaml(file);
   if (!root) {
     return tl::unexpected(root.error());
   }
@@ -60,6 +61,21 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
     return tl::unexpected(status.error());
   }
   return result;
+}
+
+Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& file) {
+  const Expected<YAML::Node> root = read_yaml(file);
+  if (!root) {
+    return tl::unexpected(root.error());
+  }
+  Config config;
+  std::vector<std::string> keys;
+  for (const config::Field& field : config::fields_of(config)) {
+    if (config::is_set(*root, field)) {
+      keys.push_back(field.name());
+    }
+  }
+  return keys;
 }
 
 Status apply_override(Config& config, const std::string& assignment) {

@@ -150,6 +150,14 @@ std::string read_value(const YAML::Node& node, const Field& field) {
   return problem.empty() ? violation_of(field) : problem;
 }
 
+bool is_set(const YAML::Node& root, const Field& field) {
+  if (!root.IsMap()) {
+    return false;
+  }
+  const YAML::Node map = field.section.empty() ? root : root[std::string(field.section)];
+  return map && map.IsMap() && map[std::string(field.key)].IsDefined();
+}
+
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);

@@ -24,6 +24,9 @@ namespace stemvo::config {
 /// Reads one value, a scalar or a list. Nothing, or "expected ..., found ...".
 [[nodiscard]] std::string read_value(const YAML::Node& node, const Field& field);
 
+/// Whether a document names the field.
+[[nodiscard]] bool is_set(const YAML::Node& root, const Field& field);
+
 /// "unknown key; known keys of stem: model, filter, ..."
 [[nodiscard]] std::string unknown_key(std::string_view section, const std::vector<Field>& fields);
 

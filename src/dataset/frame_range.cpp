@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 
 namespace stemvo {
 namespace {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "dataset/frame_files.hpp"
 #include "dataset/kitti_text.hpp"
 #include "dataset/png_file.hpp"
 #include "stemvo/check.hpp"
@@ -18,18 +19,13 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 
-bool is_folder(const fs::path& path) {
-  std::error_code code;
-  return fs::is_directory(path, code);
-}
-
 /// 0..3; colour cameras are 2 and 3.
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
   if (option == "auto") {
-    if (is_folder(directory / "image_2")) {
+    if (dataset::is_folder(directory / "image_2")) {
       return 2;
     }
-    if (is_folder(directory / "image_0")) {
+    if (dataset::is_folder(directory / "image_0")) {
       return 0;
     }
     return fail(
@@ -38,7 +34,7 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
   for (int index = 0; index < 4; ++index) {
     const std::string name = fmt::format("image_{}", index);
     if (option == name) {
-      if (!is_folder(directory / name)) {
+      if (!dataset::is_folder(directory / name)) {
         return fail(fmt::format("{}: expected a folder (input.camera is {}), found none",
                                 (directory / name).string(), name));
       }
@@ -88,46 +84,12 @@ Expected<std::vector<fs::path>> list_frames(const fs::path& folder) {
   return files;
 }
 
-Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& request,
-                                   std::size_t num_images,
-                                   const fs::path& folder) {
-  if (!request) {
-    return FrameRange{0, num_images};
-  }
-  const FrameRange range{request->begin, request->end.value_or(num_images)};
-  if (range.begin >= range.end || range.end > num_images) {
-    const std::string end = request->end ? std::to_string(*request->end) : "";
-    return fail(fmt::format("{}: expected frames inside 0:{}, found --frames {}:{}",
-                            folder.string(), num_images, request->begin, end));
-  }
-  return range;
-}
-
-/// So many readable frames vote on the size of all: one odd frame must not throw the rest away.
-constexpr int kNumSizeVotes = 5;
-
-/// The size most of the first readable frames have; of equals the one seen first.
+/// The size most of the first readable frames have.
 Expected<cv::Size> find_image_size(const std::vector<fs::path>& files, bool is_color) {
-  std::string first_message;
-  std::vector<cv::Size> sizes;
-  for (const fs::path& file : files) {
-    const auto image = dataset::read_png(file, is_color);
-    if (image) {
-      sizes.push_back(image->size());
-    } else if (first_message.empty()) {
-      first_message = image.error().message;
-    }
-    if (static_cast<int>(sizes.size()) == kNumSizeVotes) {
-      break;
-    }
-  }
-  if (sizes.empty()) {
-    return fail(
-        fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
-  }
-  return *std::max_element(sizes.begin(), sizes.end(), [&](const auto& a, const auto& b) {
-    return std::count(sizes.begin(), sizes.end(), a) < std::count(sizes.begin(), sizes.end(), b);
-  });
+  return dataset::vote_on_pictures<cv::Size>(
+      files, [is_color](const fs::path& file) -> Expected<cv::Size> {
+        return dataset::read_png(file, is_color).map([](const cv::Mat& m) { return m.size(); });
+      });
 }
 
 /// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.
@@ -154,22 +116,11 @@ Expected<Trajectory> read_ground_truth(const fs::path& file, const FrameRange& r
   return relative_to_first(std::span(*poses).subspan(range.begin, range.end - range.begin));
 }
 
-bool has_center_inside(const Camera& camera) {
-  return camera.cx_px > 0.0 && camera.cx_px < camera.width_px && camera.cy_px > 0.0 &&
-         camera.cy_px < camera.height_px;
-}
-
-template <typename T>
-std::vector<T> cut(const std::vector<T>& all, const FrameRange& range) {
-  const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
-  return {at(range.begin), at(range.end)};
-}
-
 }  // namespace
 
 Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                                             const SequenceOptions& options) {
-  if (!is_folder(directory)) {
+  if (!dataset::is_folder(directory)) {
     return fail(fmt::format("{}: expected a sequence folder, found none", directory.string()));
   }
   const auto camera_index = choose_camera(directory, options.camera);
@@ -181,7 +132,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   if (!images) {
     return fail(images.error().message);
   }
-  const auto range = resolve_range(options.frames, images->size(), image_folder);
+  const auto range = dataset::resolve_range(options.frames, images->size(), image_folder);
   if (!range) {
     return fail(range.error().message);
   }
@@ -194,53 +145,50 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   if (!times_s) {
     return fail(times_s.error().message);
   }
-  std::error_code code;
-  const fs::path absolute = (fs::absolute(directory, code) / "").lexically_normal().parent_path();
+  const fs::path absolute = dataset::absolute_folder(directory);
 
-  KittiSequence sequence;
-  sequence.name_ = absolute.filename().string();
-  sequence.range_ = *range;
-  sequence.camera_ = *camera;
-  sequence.given_calibration_ = options.calibration;
-  sequence.is_color_ = *camera_index >= 2;
-  sequence.files_ = cut(*images, *range);
-  sequence.timestamps_s_ = cut(*times_s, *range);
+  FrameList frames;
+  frames.name = absolute.filename().string();
+  frames.range = *range;
+  frames.camera = *camera;
+  frames.given_calibration = options.calibration;
+  frames.files = dataset::cut(*images, *range);
+  frames.timestamps_s = dataset::cut(*times_s, *range);
 
   const auto pose_file =
-      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, sequence.name_);
+      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
   if (pose_file) {
     auto poses = read_ground_truth(*pose_file, *range);
     if (!poses) {
       return fail(poses.error().message);
     }
-    sequence.ground_truth_ = std::move(*poses);
-    sequence.ground_truth_file_ = *pose_file;
+    frames.ground_truth = std::move(*poses);
+    frames.ground_truth_file = *pose_file;
   }
-  const auto size = find_image_size(sequence.files_, sequence.is_color_);
+  const bool is_color = *camera_index >= 2;
+  const auto size = find_image_size(frames.files, is_color);
   if (!size) {
     return fail(size.error().message);
   }
-  sequence.camera_.width_px = size->width;
-  sequence.camera_.height_px = size->height;
-  if (options.calibration && !has_center_inside(sequence.camera_)) {
+  frames.camera.width_px = size->width;
+  frames.camera.height_px = size->height;
+  if (options.calibration && !dataset::has_center_inside(frames.camera)) {
     return fail(fmt::format(
         "{}: expected a principal point inside pictures of {}x{} pixels, found ({}, {}): a "
         "calibration of another picture size",
         calibration.string(), size->width, size->height, camera->cx_px, camera->cy_px));
   }
-  return sequence;
+  return KittiSequence(std::move(frames), is_color);
 }
 
 Expected<cv::Mat> KittiSequence::read(std::size_t index) const {
-  STEMVO_CHECK(index < files_.size(), "frame index inside the range");
-  auto image = dataset::read_png(files_[index], is_color_);
+  STEMVO_CHECK(index < size(), "frame index inside the range");
+  auto image = dataset::read_png(file(index), is_color_);
   if (!image) {
     return image;
   }
-  if (image->cols != camera_.width_px || image->rows != camera_.height_px) {
-    return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}",
-                            files_[index].string(), camera_.width_px, camera_.height_px,
-                            image->cols, image->rows));
+  if (const Status status = dataset::check_size(file(index), *image, camera()); !status) {
+    return fail(status.error().message);
   }
   return image;
 }

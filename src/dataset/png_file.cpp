@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <fstream>
-#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
@@ -17,8 +15,6 @@
 namespace stemvo::dataset {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
-
 constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 static_assert(kSignature.size() == kPngSignatureSize);
 
@@ -27,8 +23,7 @@ Status check_complete(const Bytes& bytes, const std::string& name) {
   if (bytes.empty()) {
     return fail(fmt::format("{}: expected a PNG image, found an empty file", name));
   }
-  if (bytes.size() < kSignature.size() ||
-      !std::equal(kSignature.begin(), kSignature.end(), bytes.begin())) {
+  if (!is_png(bytes)) {
     return fail(fmt::format("{}: expected a PNG image, found another kind of file", name));
   }
   PngChunks chunks(bytes);
@@ -39,19 +34,6 @@ Status check_complete(const Bytes& bytes, const std::string& name) {
   }
   return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
                           name, bytes.size()));
-}
-
-Expected<Bytes> read_bytes(const std::filesystem::path& file) {
-  std::error_code code;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || std::filesystem::is_directory(file, code)) {
-    return fail(fmt::format("{}: expected a readable PNG image, cannot open it", file.string()));
-  }
-  const std::uintmax_t size = std::filesystem::file_size(file, code);
-  Bytes bytes(code ? 0 : size);
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
 }
 
 /// Every kind of PNG.
@@ -70,22 +52,37 @@ cv::Mat decode_any_png(const Bytes& bytes, bool as_color) {
 
 }  // namespace
 
+bool is_png(const Bytes& bytes) {
+  return bytes.size() >= kSignature.size() &&
+         std::equal(kSignature.begin(), kSignature.end(), bytes.begin());
+}
+
+bool is_color_png(const Bytes& bytes) {
+  constexpr std::size_t kColorType = 25;  // of IHDR, which comes first
+  constexpr std::uint8_t kColorBit = 2;
+  return bytes.size() > kColorType && (bytes[kColorType] & kColorBit) != 0;
+}
+
+Expected<cv::Mat> decode_png(const Bytes& bytes, const std::string& name, bool as_color) {
+  if (const Status complete = check_complete(bytes, name); !complete) {
+    return fail(complete.error().message);
+  }
+  cv::Mat image = decode_plain_png(bytes, as_color);
+  if (image.empty()) {
+    image = decode_any_png(bytes, as_color);
+  }
+  if (image.empty()) {
+    return fail(fmt::format("{}: expected a sound PNG image, found damaged data", name));
+  }
+  return image;
+}
+
 Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color) {
-  const auto bytes = read_bytes(file);
+  const auto bytes = read_bytes(file, "PNG image");
   if (!bytes) {
     return fail(bytes.error().message);
   }
-  if (const Status complete = check_complete(*bytes, file.string()); !complete) {
-    return fail(complete.error().message);
-  }
-  cv::Mat image = decode_plain_png(*bytes, as_color);
-  if (image.empty()) {
-    image = decode_any_png(*bytes, as_color);
-  }
-  if (image.empty()) {
-    return fail(fmt::format("{}: expected a sound PNG image, found damaged data", file.string()));
-  }
-  return image;
+  return decode_png(*bytes, file.string(), as_color);
 }
 
 }  // namespace stemvo::dataset

@@ -75,11 +75,14 @@ Expected<std::size_t> write_channel_pictures(const ChannelPicturesRequest& reque
   if (const Status status = validate(request.config); !status) {
     return tl::unexpected(status.error());
   }
-  const Expected<KittiSequence> sequence = KittiSequence::open(
-      request.sequence_dir, {request.config.input.camera, request.frames, std::nullopt});
-  if (!sequence) {
-    return tl::unexpected(sequence.error());
+  const auto opened = open_source({.path = request.sequence_dir,
+                                   .kitti_camera = request.config.input.camera,
+                                   .frames = request.frames,
+                                   .camera_file = request.camera_file});
+  if (!opened) {
+    return tl::unexpected(opened.error());
   }
+  const FrameSource& sequence = **opened;
   const Expected<Stem> stem = Stem::create(request.config.stem, request.models_dir);
   if (!stem) {
     return tl::unexpected(stem.error());
@@ -93,15 +96,15 @@ Expected<std::size_t> write_channel_pictures(const ChannelPicturesRequest& reque
   }
   ChannelWriter writer(request, *stem, *filters);
   bool go_on = true;
-  for (std::size_t i = 0; i < sequence->size() && go_on; ++i) {
-    const Expected<cv::Mat> frame = sequence->read(i);
+  for (std::size_t i = 0; i < sequence.size() && go_on; ++i) {
+    const Expected<cv::Mat> frame = sequence.read(i);
     if (!frame) {
       return tl::unexpected(frame.error());
     }
-    if (const Status status = writer.write(*frame, sequence->range().begin + i); !status) {
+    if (const Status status = writer.write(*frame, sequence.range().begin + i); !status) {
       return tl::unexpected(status.error());
     }
-    go_on = !progress || progress(i + 1, sequence->size());
+    go_on = !progress || progress(i + 1, sequence.size());
   }
   return writer.num_written();
 }

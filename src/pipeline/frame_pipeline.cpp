@@ -24,7 +24,7 @@ struct Frame {
 /// The stages of an odometry, on frames that go round kMaxInFlight places.
 class OdometryStages {
  public:
-  OdometryStages(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit)
+  OdometryStages(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit)
       : sequence_(sequence), odometry_(odometry), visit_(visit) {}
 
   [[nodiscard]] FrameStages stages() {
@@ -74,7 +74,7 @@ class OdometryStages {
     return frame;
   }
 
-  const KittiSequence& sequence_;
+  const FrameSource& sequence_;
   Odometry& odometry_;
   const FrameVisitor& visit_;
   std::array<Frame, kMaxInFlight> ring_;
@@ -86,7 +86,7 @@ class OdometryStages {
 
 }  // namespace
 
-void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit) {
+void run_frames(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit) {
   OdometryStages odometry_stages(sequence, odometry, visit);
   run_stages(odometry_stages.stages(), sequence.size(), cv::getNumThreads());
 }

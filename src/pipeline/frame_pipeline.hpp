@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/odometry/odometry.hpp"
 
@@ -23,6 +23,6 @@ using FrameVisitor =
 /// thread per core), OpenCV's loops included, a few frames ahead at most; the poses do not depend
 /// on it. What a stage or the visitor throws leaves this function; frames behind the last one
 /// visited are dropped then.
-void run_frames(const KittiSequence& sequence, Odometry& odometry, const FrameVisitor& visit);
+void run_frames(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

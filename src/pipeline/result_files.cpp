@@ -24,7 +24,7 @@ std::string one_line(std::string text) {
 }
 
 /// "frames 10:20 of 03", in the folder's numbering.
-std::string describe_frames(const KittiSequence& sequence, std::size_t num_frames) {
+std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
   const std::size_t begin = sequence.range().begin;
   return fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence.name());
 }
@@ -47,7 +47,7 @@ std::string describe_numbers(const MetricsReport& report) {
 }  // namespace
 
 Status write_trajectories(const std::filesystem::path& out_dir,
-                          const KittiSequence& sequence,
+                          const FrameSource& sequence,
                           std::span<const Rigid3> trajectory) {
   const std::span<const double> times_s(sequence.timestamps_s().data(), trajectory.size());
   const Status kitti = write_kitti_trajectory(out_dir / "trajectory_kitti.txt", trajectory);
@@ -72,7 +72,7 @@ Status write_refined_trajectory(const std::filesystem::path& out_dir,
 
 Status write_config(const std::filesystem::path& out_dir,
                     const Config& config,
-                    const KittiSequence& sequence,
+                    const FrameSource& sequence,
                     const StemInfo& stem) {
   const std::filesystem::path file = out_dir / "config.yaml";
   std::ofstream out(file, std::ios::binary);
@@ -97,7 +97,7 @@ Status write_config(const std::filesystem::path& out_dir,
 }
 
 Status write_map(const std::filesystem::path& out_dir,
-                 const KittiSequence& sequence,
+                 const FrameSource& sequence,
                  std::span<const Rigid3> trajectory,
                  const MetricsReport& report) {
   TrajectoryPlot plot;

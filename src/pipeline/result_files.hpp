@@ -6,7 +6,7 @@
 #include <span>
 
 #include "stemvo/config.hpp"
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/evaluation/trajectory.hpp"
 #include "stemvo/pipeline/run.hpp"
@@ -15,7 +15,7 @@ namespace stemvo::pipeline {
 
 /// trajectory_kitti.txt and trajectory_tum.txt. Poses of the first frames of the sequence.
 [[nodiscard]] Status write_trajectories(const std::filesystem::path& out_dir,
-                                        const KittiSequence& sequence,
+                                        const FrameSource& sequence,
                                         std::span<const Rigid3> trajectory);
 
 /// trajectory_refined_kitti.txt; without one, what an earlier run left there is removed.
@@ -34,12 +34,12 @@ namespace stemvo::pipeline {
 /// made the results. `stemvo run --config` takes it as it is.
 [[nodiscard]] Status write_config(const std::filesystem::path& out_dir,
                                   const Config& config,
-                                  const KittiSequence& sequence,
+                                  const FrameSource& sequence,
                                   const StemInfo& stem);
 
 /// trajectory.png and .svg, against the ground truth where there is one.
 [[nodiscard]] Status write_map(const std::filesystem::path& out_dir,
-                               const KittiSequence& sequence,
+                               const FrameSource& sequence,
                                std::span<const Rigid3> trajectory,
                                const MetricsReport& report);
 

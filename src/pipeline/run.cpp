@@ -2,6 +2,7 @@
 #include "stemvo/pipeline/run.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -42,12 +43,26 @@ struct Drive {
   Status written;  ///< of frames.csv and the pictures
 };
 
-Expected<KittiSequence> open_sequence(const RunRequest& request) {
-  Expected<KittiSequence> sequence = KittiSequence::open(
-      request.sequence_dir,
-      {request.config.input.camera, request.frames, request.ground_truth, request.calibration});
-  if (sequence && request.config.scale.source == "ground_truth" && !sequence->ground_truth()) {
-    const auto file = request.sequence_dir / "../../poses" / (sequence->name() + ".txt");
+/// A folder of pictures is no car of KITTI's: what its camera file does not say is not known.
+Config with_camera_height(Config config, const RunRequest& request, const FrameSource& source) {
+  const bool is_default = config.scale.source == "camera_height" && !request.chosen.source;
+  if (request.camera_file && !source.camera_height_m() && is_default) {
+    config.scale.source = "none";
+  }
+  if (source.camera_height_m() && !request.chosen.camera_height) {
+    config.scale.camera_height_m = *source.camera_height_m();
+  }
+  return config;
+}
+
+Expected<std::unique_ptr<const FrameSource>> open_sequence(const RunRequest& request) {
+  auto sequence =
+      open_source({request.sequence_dir, request.config.input.camera, request.frames,
+                   request.ground_truth, request.calibration, request.camera_file, request.times});
+  if (sequence && request.config.scale.source == "ground_truth" && !(*sequence)->ground_truth()) {
+    const auto file = request.camera_file
+                          ? request.sequence_dir
+                          : request.sequence_dir / "../../poses" / ((*sequence)->name() + ".txt");
     return fail(fmt::format(
         "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
         file.lexically_normal().string()));
@@ -69,7 +84,7 @@ Status write_frame_picture(const RunRequest& request,
 }
 
 Drive drive(const RunRequest& request,
-            const KittiSequence& sequence,
+            const FrameSource& sequence,
             Odometry& odometry,
             FramesCsv& csv,
             const RunProgress& progress) {
@@ -100,7 +115,7 @@ Drive drive(const RunRequest& request,
 }
 
 /// The ground truth of the frames done; an interrupted run has fewer than the sequence.
-std::optional<std::span<const Rigid3>> truth_of(const KittiSequence& sequence,
+std::optional<std::span<const Rigid3>> truth_of(const FrameSource& sequence,
                                                 std::size_t num_frames) {
   if (!sequence.ground_truth()) {
     return std::nullopt;
@@ -114,7 +129,7 @@ Alignment alignment_of(const ScaleOptions& scale) {
 }
 
 Trajectory refined_trajectory(const RunRequest& request,
-                              const KittiSequence& sequence,
+                              const FrameSource& sequence,
                               const Odometry& odometry) {
   Trajectory refined = odometry.refined_trajectory();
   return request.config.scale.source == "ground_truth"
@@ -123,7 +138,7 @@ Trajectory refined_trajectory(const RunRequest& request,
 }
 
 MetricsReport make_report(const RunRequest& request,
-                          const KittiSequence& sequence,
+                          const FrameSource& sequence,
                           const StemInfo& stem,
                           const Drive& done,
                           double seconds) {
@@ -157,7 +172,7 @@ MetricsReport make_report(const RunRequest& request,
 
 /// All but metrics.json, for which it makes the report.
 Status write_results(const RunRequest& request,
-                     const KittiSequence& sequence,
+                     const FrameSource& sequence,
                      const Odometry& odometry,
                      Drive& done,
                      MetricsReport& report) {
@@ -183,6 +198,50 @@ Status write_results(const RunRequest& request,
   return written;
 }
 
+/// The folder and what an earlier run left in it, before work starts.
+Status prepare_out_folder(const RunRequest& request) {
+  if (request.picture_every == 0) {
+    return pipeline::create_out_folder(request.out_dir);
+  }
+  const std::filesystem::path pictures = request.out_dir / "pictures";
+  const Status status = pipeline::create_out_folder(pictures);
+  return status ? pipeline::remove_old_pictures(pictures) : status;
+}
+
+Expected<RunSummary> run_source(const RunRequest& request,
+                                const FrameSource& sequence,
+                                const RunProgress& progress) {
+  Expected<Odometry> odometry =
+      Odometry::create(request.config, sequence.camera(), request.models_dir);
+  if (!odometry) {
+    return tl::unexpected(odometry.error());
+  }
+  if (const Status status = prepare_out_folder(request); !status) {
+    return tl::unexpected(status.error());
+  }
+  Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
+  if (!csv) {
+    return tl::unexpected(csv.error());
+  }
+
+  std::optional<StageRecorder> recorder;
+  if (request.measure_times) {
+    recorder.emplace();
+  }
+  Drive done = drive(request, sequence, *odometry, *csv, progress);
+  MetricsReport report;
+  Status written = timed(Stage::kResultFiles,
+                         [&] { return write_results(request, sequence, *odometry, done, report); });
+  if (recorder) {
+    report.timing = recorder->report();
+    report.timing->fps = report.fps;
+    report.timing->num_threads = cv::getNumThreads();
+  }
+  keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
+  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted,
+                    std::move(written)};
+}
+
 }  // namespace
 
 Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
@@ -194,49 +253,13 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
                             request.config.odometry.mode));
   }
   const pipeline::ThreadScope threads(request.num_threads);
-  const Expected<KittiSequence> sequence = open_sequence(request);
+  const auto sequence = open_sequence(request);
   if (!sequence) {
     return tl::unexpected(sequence.error());
   }
-  Expected<Odometry> odometry =
-      Odometry::create(request.config, sequence->camera(), request.models_dir);
-  if (!odometry) {
-    return tl::unexpected(odometry.error());
-  }
-  const bool has_pictures = request.picture_every > 0;
-  if (const Status status = pipeline::create_out_folder(has_pictures ? request.out_dir / "pictures"
-                                                                     : request.out_dir);
-      !status) {
-    return tl::unexpected(status.error());
-  }
-  if (has_pictures) {
-    if (const Status status = pipeline::remove_old_pictures(request.out_dir / "pictures");
-        !status) {
-      return tl::unexpected(status.error());
-    }
-  }
-  Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
-  if (!csv) {
-    return tl::unexpected(csv.error());
-  }
-
-  std::optional<StageRecorder> recorder;
-  if (request.measure_times) {
-    recorder.emplace();
-  }
-  Drive done = drive(request, *sequence, *odometry, *csv, progress);
-  MetricsReport report;
-  Status written = timed(Stage::kResultFiles, [&] {
-    return write_results(request, *sequence, *odometry, done, report);
-  });
-  if (recorder) {
-    report.timing = recorder->report();
-    report.timing->fps = report.fps;
-    report.timing->num_threads = cv::getNumThreads();
-  }
-  keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
-  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted,
-                    std::move(written)};
+  RunRequest effective = request;
+  effective.config = with_camera_height(request.config, request, **sequence);
+  return run_source(effective, **sequence, progress);
 }
 
 }  // namespace stemvo

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,10 +13,6 @@
 namespace stemvo {
 namespace {
 
-void write_file(const fs::path& file, const std::string& text) {
-  std::ofstream(file, std::ios::binary) << text;
-}
-
 /// Line `number` (from 1) of a file replaced.
 void replace_line(const fs::path& file, int number, const std::string& text) {
   std::istringstream in(read_file(file));
@@ -27,20 +22,6 @@ void replace_line(const fs::path& file, int number, const std::string& text) {
     result += (i == number ? text : line) + "\n";
   }
   write_file(file, result);
-}
-
-/// One line, with the words given, and the exit code; nothing on standard output.
-void expect_error(const ProgramResult& result,
-                  int exit_code,
-                  const std::vector<std::string>& words) {
-  EXPECT_EQ(result.exit_code, exit_code) << result.err;
-  EXPECT_THAT(result.out, IsEmpty());
-  EXPECT_THAT(result.err, StartsWith("error: "));
-  EXPECT_THAT(result.err, Not(HasSubstr("internal")));
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-  for (const std::string& word : words) {
-    EXPECT_THAT(result.err, HasSubstr(word));
-  }
 }
 
 /// A copy of ten rendered frames that each test breaks in its own way.

@@ -29,9 +29,10 @@ class ConfigLoad : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove(file_); }
 
-  Expected<Config> load(const std::string& text) {
+  Expected<Config> load(const std::string& text) { return load_config(write(text)); }
+  const std::filesystem::path& write(const std::string& text) {
     std::ofstream(file_, std::ios::binary) << text;
-    return load_config(file_);
+    return file_;
   }
   /// The error without the folder: "<name>.yaml:3: ...".
   std::string error_of(const std::string& text) {
@@ -84,6 +85,16 @@ TEST_F(ConfigLoad, ReadsEveryKindOfValueOverTheDefaults) {
 TEST_F(ConfigLoad, EmptyFileAndEmptySectionAreTheDefaults) {
   EXPECT_EQ(dump_config(load("").value()), dump_config({}));
   EXPECT_EQ(dump_config(load("stem:\n# filter: 3\n").value()), dump_config({}));
+}
+
+TEST_F(ConfigLoad, TellsWhichKeysAFileSets) {
+  const auto keys = keys_in_config(write("stem:\n  filter: 3\nscale:\n# source: none\nseed: 2\n"));
+  ASSERT_TRUE(keys) << keys.error().message;
+  EXPECT_THAT(*keys, ::testing::ElementsAre("stem.filter", "seed"));
+  EXPECT_THAT(keys_in_config(write("")).value(), ::testing::IsEmpty());
+  EXPECT_THAT(keys_in_config(write("stem: 3\n")).value(), ::testing::IsEmpty());
+  EXPECT_FALSE(keys_in_config(write("stem: [")));
+  EXPECT_FALSE(keys_in_config("/nowhere.yaml"));
 }
 
 TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {

@@ -13,6 +13,7 @@
 
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/thread_scope.hpp"
+#include "stemvo/dataset/sequence.hpp"
 
 namespace stemvo {
 namespace {

@@ -7,19 +7,20 @@
 #include <optional>
 
 #include "stemvo/config.hpp"
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {
 
 /// Everything `stemvo channel` was asked for.
 struct ChannelPicturesRequest {
-  std::filesystem::path sequence_dir;
+  std::filesystem::path sequence_dir;  ///< with camera_file: pictures, FrameSourceRequest::path
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;                             ///< `input` and `stem` are used
   std::optional<FrameRangeRequest> frames;   ///< else all
   std::optional<FrameRangeRequest> filters;  ///< half open, as frames; else all of the layer
+  std::optional<std::filesystem::path> camera_file;  ///< of a folder of pictures
 };
 
 /// Called after each frame: frames done, frames in all; false stops.

@@ -10,26 +10,37 @@
 #include <vector>
 
 #include "stemvo/config.hpp"
-#include "stemvo/dataset/sequence.hpp"
+#include "stemvo/dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/odometry/odometry.hpp"
 #include "stemvo/report/metrics_json.hpp"
 
 namespace stemvo {
 
+/// Keys that were chosen for this run, whatever a camera file says.
+struct ChosenScale {
+  bool source = false;         ///< scale.source; always, where it is not the default
+  bool camera_height = false;  ///< scale.camera_height_m
+};
+
 /// Everything `stemvo run` was asked for.
 struct RunRequest {
-  std::filesystem::path sequence_dir;
+  std::filesystem::path sequence_dir;  ///< with camera_file: pictures, FrameSourceRequest::path
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;
   std::optional<FrameRangeRequest> frames;
   std::optional<std::filesystem::path> ground_truth;
   std::optional<std::filesystem::path> calibration;  ///< else calib.txt of the sequence
-  int num_threads = 0;                               ///< 0: all cores
-  int picture_every = 0;                             ///< 0: no per-frame pictures
-  bool write_map = false;                            ///< map.ply; needs odometry.mode map
-  bool measure_times = false;                        ///< RunSummary::report.timing
+  /// Of a folder of pictures. Its camera_height sets scale.camera_height_m; without one
+  /// scale.source becomes none; neither where the key was chosen.
+  std::optional<std::filesystem::path> camera_file;
+  std::optional<std::filesystem::path> times;  ///< of a folder of pictures; else its rate_hz
+  ChosenScale chosen;
+  int num_threads = 0;         ///< 0: all cores
+  int picture_every = 0;       ///< 0: no per-frame pictures
+  bool write_map = false;      ///< map.ply; needs odometry.mode map
+  bool measure_times = false;  ///< RunSummary::report.timing
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <filesystem>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "stemvo/evaluation/trajectory.hpp"
+#include "support/program_test.hpp"
+
+namespace stemvo {
+namespace {
+
+/// The camera of the rendered drive's calib.txt, row P2.
+std::string camera_yaml(const fs::path& sequence, const test::DriveSize& size) {
+  const std::string text = read_file(sequence / "calib.txt");
+  double fx = 0.0;
+  double cx = 0.0;
+  double fy = 0.0;
+  double cy = 0.0;
+  std::sscanf(text.c_str() + text.find("P2:"), "P2: %lf 0 %lf %*f 0 %lf %lf", &fx, &cx, &fy, &cy);
+  return fmt::format(
+      "image_width: {}\nimage_height: {}\nintrinsics: [{}, {}, {}, {}]\n"
+      "distortion_model: none\nrate_hz: 10\n",
+      size.width_px, size.height_px, fx, fy, cx, cy);
+}
+
+/// As many lines of a rendered drive's file as there are pictures.
+std::string first_ten_lines(const fs::path& file) {
+  const std::string text = read_file(file);
+  std::size_t end = 0;
+  for (int i = 0; i < 10; ++i) {
+    end = text.find('\n', end) + 1;
+  }
+  return text.substr(0, end);
+}
+
+/// Ten rendered frames as a folder of pictures; each test breaks them in its own way.
+class PictureFolderRun : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::rename(sequence_ / "image_2", pictures_);
+    write_file(camera_, good_camera_);
+  }
+
+  ProgramResult run_path(const std::string& path, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"run", path, "--out", out_});
+    return run_stemvo(more);
+  }
+  ProgramResult run(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"--camera", camera_});
+    return run_path(pictures_.string(), more);
+  }
+  ProgramResult run_with_camera(const std::string& before, const std::string& after) const {
+    std::string text = good_camera_;
+    text.replace(text.find(before), before.size(), after);
+    write_file(camera_, text);
+    return run();
+  }
+  std::string config_key(const std::string& key) const {
+    const std::string text = read_file(out_ + "/config.yaml");
+    const std::size_t begin = text.find("  " + key + ": ") + key.size() + 4;
+    return text.substr(begin, text.find('\n', begin) - begin);
+  }
+  std::size_t num_poses() const {
+    return read_kitti_trajectory(out_ + "/trajectory_kitti.txt").value().size();
+  }
+
+  test::TemporaryFolder folder_;
+  const fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  const fs::path pictures_ = folder_.path() / "my pictures";
+  const std::string camera_ = folder_ / "camera.yaml";
+  const std::string out_ = folder_ / "out";
+  const std::string good_camera_ = camera_yaml(sequence_, {});
+};
+
+TEST_F(PictureFolderRun, GivesTheBytesOfTheSameKittiFolder) {
+  fs::create_directories(folder_.path() / "other/00");
+  for (const char* name : {"calib.txt", "times.txt"}) {
+    fs::copy_file(sequence_ / name, folder_.path() / "other/00" / name);
+  }
+  fs::copy(pictures_, folder_.path() / "other/00/image_2");
+  const std::string kitti = folder_ / "kitti";
+  ASSERT_EQ(run_stemvo({"run", folder_ / "other/00", "--out", kitti}).exit_code, 0);
+  write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
+  const ProgramResult result =
+      run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* name : {"kitti", "tum", "refined_kitti"}) {
+    const std::string file = std::string("/trajectory_") + name + ".txt";
+    EXPECT_EQ(read_file(out_ + file), read_file(kitti + file)) << file;
+  }
+}
+
+TEST_F(PictureFolderRun, NamesTheFolderAndTheCameraFile) {
+  const ProgramResult result =
+      run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 pictures
+  expect_error(result, 1, {"00.txt", "10 pictures", "60 poses"});
+  write_file(folder_ / "ten.txt", first_ten_lines(folder_ / "poses/00.txt"));
+  const ProgramResult good = run({"--gt", folder_ / "ten.txt", "--frames", "2:9"});
+  ASSERT_EQ(good.exit_code, 0) << good.err;
+  const auto metrics = nlohmann::json::parse(read_file(out_ + "/metrics.json"));
+  EXPECT_EQ(metrics.at("sequence"), "my pictures");
+  EXPECT_EQ(metrics.at("frames"), 7);
+  EXPECT_EQ(metrics.at("scale_source"), "none");
+  EXPECT_EQ(metrics.at("alignment"), "sim3");
+  EXPECT_THAT(read_file(out_ + "/config.yaml"), AllOf(HasSubstr("# frames 2:9 of my pictures"),
+                                                      HasSubstr("# calibration " + camera_)));
+  EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("0.200000000 "));
+}
+
+TEST_F(PictureFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
+  const std::string height = good_camera_ + "camera_height: 1.25\n";
+  const auto expect_scale = [&](const std::vector<std::string>& more, const std::string& source,
+                                const std::string& height_m) {
+    std::vector<std::string> arguments = {"--frames", "0:2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const ProgramResult result = run(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(config_key("source"), source);
+    EXPECT_EQ(config_key("camera_height_m"), height_m);
+  };
+  write_file(folder_ / "my.yaml", "scale:\n  camera_height_m: 1.5\n  source: camera_height\n");
+  expect_scale({}, "none", "1.65");
+  expect_scale({"--set", "scale.source=camera_height"}, "camera_height", "1.65");
+  expect_scale({"--set", "scale.source=constant"}, "constant", "1.65");
+  expect_scale({"--config", folder_ / "my.yaml"}, "camera_height", "1.5");
+  expect_scale({"--config", "fast"}, "none", "1.65");
+  write_file(camera_, height);
+  expect_scale({}, "camera_height", "1.25");
+  expect_scale({"--set", "scale.source=none"}, "none", "1.25");
+  expect_scale({"--config", folder_ / "my.yaml"}, "camera_height", "1.25");
+  expect_scale({"--set", "scale.camera_height_m=1.75"}, "camera_height", "1.75");
+}
+
+TEST_F(PictureFolderRun, PatternsAndJpegs) {
+  const cv::Mat picture = cv::imread((pictures_ / "000003.png").string());
+  cv::imwrite((pictures_ / "000003.jpg").string(), picture);
+  const ProgramResult result =
+      run_path((pictures_ / "00000?.*").string(), {"--camera", camera_, "--quiet"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(num_poses(), 11U);
+  expect_error(run_path((pictures_ / "1*.png").string(), {"--camera", camera_}), 1,
+               {"1*.png", "expected pictures (.png, .jpg, .jpeg), found none"});
+  expect_error(run_path((pictures_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
+}
+
+TEST_F(PictureFolderRun, ABrokenPictureIsAWarningAndGetsAPose) {
+  const cv::Mat picture = cv::imread((pictures_ / "000003.png").string());
+  fs::remove(pictures_ / "000003.png");
+  cv::imwrite((pictures_ / "000003.jpg").string(), picture);
+  fs::resize_file(pictures_ / "000003.jpg", 5000);
+  cv::imwrite((pictures_ / "000005.png").string(), picture(cv::Rect(0, 0, 100, 100)));
+  const ProgramResult result = run({"--quiet"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("warning: " + (pictures_ / "000003.jpg").string() +
+                                    ": expected a complete JPEG image, found one cut off"));
+  EXPECT_THAT(result.err, HasSubstr("000005.png: expected an image of 620x188 pixels, found 100x"));
+  EXPECT_EQ(num_poses(), 10U);
+}
+
+TEST_F(PictureFolderRun, NoCameraFile) {
+  expect_error(run_path(pictures_.string()), 1,
+               {"my pictures: expected KITTI's layout", "--camera FILE, found neither"});
+  expect_error(run_path(pictures_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
+  expect_error(run({"--calib", "c.txt"}), 1, {"c.txt", "--camera or --calib"});
+  fs::remove(camera_);
+  expect_error(run(), 1, {"camera.yaml: expected a camera file, found nothing"});
+  EXPECT_FALSE(fs::exists(out_));
+}
+
+TEST_F(PictureFolderRun, APatternThatTheShellReplaced) {
+  std::vector<std::string> names = {"--camera", camera_};
+  for (int i = 1; i < 1000; ++i) {
+    names.push_back((pictures_ / fmt::format("{:06}.png", i)).string());
+  }
+  const ProgramResult result = run_path((pictures_ / "000000.png").string(), names);
+  expect_error(result, 2, {"not expected", "a pattern of files must be quoted", "--help"});
+  EXPECT_LT(result.err.size(), 500U);
+}
+
+TEST_F(PictureFolderRun, BadCameraFiles) {
+  write_file(camera_, "intrinsics: [1, 2\n");
+  expect_error(run(), 1, {"camera.yaml:2", "not YAML"});
+  expect_error(run_with_camera("intrinsics", "intrinsic"), 1,
+               {"camera.yaml: expected intrinsics: [fx, fy, cx, cy], found no such key"});
+  expect_error(run_with_camera("intrinsics: [", "intrinsics: [-"), 1,
+               {"camera.yaml:3: intrinsics: expected positive focal lengths"});
+  expect_error(
+      run_with_camera("image_width: 620", "image_width: 200"), 1,
+      {"camera.yaml:3: intrinsics: expected a principal point inside pictures of 200x188"});
+  expect_error(run_with_camera("image_width: 620", "image_width: 0"), 1,
+               {"camera.yaml:1: image_width: expected whole pixels", "found 0"});
+  expect_error(run_with_camera("image_width: 620", "image_width: 621"), 1,
+               {"my pictures: expected pictures of 621x188 pixels", "found 620x188"});
+  expect_error(run_with_camera("none", "radial"), 1,
+               {"camera.yaml:4: distortion_model: expected none, radial-tangential or "
+                "equidistant, found 'radial'"});
+  expect_error(run_with_camera("none", "radtan\ndistortion_coefficients: [0.1]"), 1,
+               {"camera.yaml:5: distortion_coefficients: expected [k1, k2, p1, p2]", "found 1"});
+  expect_error(run_with_camera("none", "radtan\ndistortion_coefficients: [.nan, 0, 0, 0]"), 1,
+               {"camera.yaml:5: distortion_coefficients: expected a finite number"});
+  expect_error(run_with_camera("rate_hz: 10", "rate_hz: 0"), 1,
+               {"camera.yaml:5: rate_hz: expected frames per second above 0", "found 0"});
+  expect_error(run_with_camera("rate_hz: 10", ""), 1,
+               {"camera.yaml: expected rate_hz (frames per second) or --times FILE"});
+}
+
+TEST_F(PictureFolderRun, BadFoldersTimesAndPoses) {
+  expect_error(run_path(folder_ / "none", {"--camera", camera_}), 1, {"none: expected a folder"});
+  fs::create_directories(folder_.path() / "empty");
+  expect_error(run_path(folder_ / "empty", {"--camera", camera_}), 1,
+               {"empty: expected pictures (.png, .jpg, .jpeg), found none"});
+  write_file(folder_ / "times.txt", "0\n0.1\n");
+  expect_error(run({"--times", folder_ / "times.txt"}), 1,
+               {"times.txt: expected a time for each of 10", "found 2"});
+  write_file(folder_ / "times.txt", "0\n1\n2\n3\n4\n4\n6\n7\n8\n9\n");
+  expect_error(run({"--times", folder_ / "times.txt"}), 1,
+               {"times.txt:6: expected a time after 4 s, found 4 s"});
+  expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
+  expect_error(
+      run({"--set", "scale.source=ground_truth"}), 1,
+      {"my pictures: expected a pose file, which scale.source=ground_truth needs", "--gt"});
+  expect_error(run({"--frames", "5:11"}), 1, {"my pictures", "0:10", "5:11"});
+  for (const auto& entry : fs::directory_iterator(pictures_)) {
+    fs::resize_file(entry.path(), 50);
+  }
+  expect_error(run(), 1, {"none of 10 images can be read", "000000.png"});
+}
+
+TEST_F(PictureFolderRun, Channel) {
+  const ProgramResult result = run_stemvo(
+      {"channel", pictures_.string(), "--camera", camera_, "--out", out_, "--filters", "0:1"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(fs::exists(out_ + "/000000_filter_000.png"));
+  expect_error(run_stemvo({"channel", pictures_.string(), "--out", out_}), 1, {"--camera FILE"});
+}
+
+/// Pictures of other people's cameras. How well they are followed is not asked here.
+class OtherCameras : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!test::shared_data()) {
+      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+    }
+  }
+  void expect_poses(std::vector<std::string> arguments, std::size_t count) const {
+    const std::string out = folder_ / "out";
+    arguments.insert(arguments.begin(), "run");
+    arguments.insert(arguments.end(), {"--out", out});
+    const ProgramResult result = run_stemvo(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, Not(HasSubstr("warning")));
+    const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");
+    ASSERT_TRUE(poses) << poses.error().message;  // it refuses what is not finite
+    EXPECT_EQ(poses->size(), count);
+  }
+  static std::size_t num_pictures(const fs::path& folder) {
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(OtherCameras, HandheldJpegsWithPosesAndTimes) {
+  const fs::path data = *test::shared_data() / "handheld";
+  expect_poses(
+      {(data / "images").string(), "--camera", (data / "camera.yaml").string(), "--gt",
+       (data / "poses.txt").string(), "--times", (data / "times.txt").string(), "--frames", "0:60"},
+      60);
+  const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+  EXPECT_EQ(metrics.at("sequence"), "images");
+  EXPECT_EQ(metrics.at("alignment"), "sim3");
+}
+
+TEST_F(OtherCameras, DroneOfEuroc) {
+  const fs::path data = *test::shared_data() / "euroc/mav0/cam0";
+  expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
+               num_pictures(data / "data"));
+}
+
+TEST_F(OtherCameras, KinectOfTum) {
+  const fs::path pictures = *test::shared_data() / "tum/rgb";
+  write_file(folder_ / "camera.yaml",
+             "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
+             "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
+             "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\nrate_hz: 10\n");
+  expect_poses({pictures.string(), "--camera", folder_ / "camera.yaml"}, num_pictures(pictures));
+}
+
+}  // namespace
+}  // namespace stemvo

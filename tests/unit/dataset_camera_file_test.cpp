@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "dataset/camera_file.hpp"
+#include "support/shared_data.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using dataset::Distortion;
+using dataset::read_camera_file;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr const char* kGood =
+    "image_width: 640\n"
+    "image_height: 480\n"
+    "camera_model: pinhole\n"
+    "intrinsics: [520.9, 521.0, 325.1, 249.7]\n"
+    "distortion_model: radial-tangential\n"
+    "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\n"
+    "rate_hz: 10\n"
+    "camera_height: 1.2\n";
+
+/// kGood with line `number` (from 1) replaced.
+std::string with_line(int number, const std::string& line) {
+  std::string text = kGood;
+  std::size_t begin = 0;
+  for (int i = 1; i < number; ++i) {
+    begin = text.find('\n', begin) + 1;
+  }
+  return text.replace(begin, text.find('\n', begin) - begin, line);
+}
+
+class CameraFileTest : public ::testing::Test {
+ protected:
+  std::string error_of(const std::string& text) const {
+    const auto camera = read_camera_file(folder_.file("camera.yaml", text));
+    return camera ? "(read)" : camera.error().message;
+  }
+  /// All of the words, the file's name first.
+  void expect_refused(const std::string& text, const std::vector<std::string>& words) const {
+    const std::string message = error_of(text);
+    EXPECT_THAT(message, HasSubstr((folder_ / "camera.yaml").string()));
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    for (const std::string& word : words) {
+      EXPECT_THAT(message, HasSubstr(word));
+    }
+  }
+
+  testing::TempFolder folder_;
+};
+
+TEST_F(CameraFileTest, ReadsEveryKey) {
+  const auto file = read_camera_file(folder_.file("camera.yaml", kGood));
+  ASSERT_TRUE(file) << file.error().message;
+  const Camera& camera = file->lens.camera;
+  EXPECT_EQ(camera.width_px, 640);
+  EXPECT_EQ(camera.height_px, 480);
+  EXPECT_EQ(camera.fx_px, 520.9);
+  EXPECT_EQ(camera.fy_px, 521.0);
+  EXPECT_EQ(camera.cx_px, 325.1);
+  EXPECT_EQ(camera.cy_px, 249.7);
+  EXPECT_EQ(file->lens.distortion, Distortion::kRadialTangential);
+  EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2312, -0.7849, -0.0033, -0.0001, 0.9172));
+  EXPECT_EQ(file->rate_hz, 10.0);
+  EXPECT_EQ(file->camera_height_m, 1.2);
+}
+
+TEST_F(CameraFileTest, OptionalKeysMayBeAbsent) {
+  const auto file = read_camera_file(folder_.file(
+      "camera.yaml",
+      "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: none\n"));
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->lens.camera.width_px, 64);
+  EXPECT_EQ(file->lens.camera.height_px, 48);
+  EXPECT_EQ(file->lens.distortion, Distortion::kNone);
+  EXPECT_FALSE(file->rate_hz);
+  EXPECT_FALSE(file->camera_height_m);
+}
+
+TEST_F(CameraFileTest, OtherNamesOfTheModels) {
+  std::string four = with_line(5, "distortion_model: radtan");
+  EXPECT_EQ(error_of(four), "(read)");
+  four = with_line(6, "distortion_coefficients: [0.1, 0, 0, 0]");
+  EXPECT_EQ(error_of(four), "(read)") << "k3 may be absent";
+  four.replace(four.find("radial-tangential"), 17, "equidistant");
+  const auto file = read_camera_file(folder_.file("camera.yaml", four));
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->lens.distortion, Distortion::kEquidistant);
+}
+
+TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
+  const std::string text =
+      "%YAML:1.0\n# comment\n---\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
+      "  data: [0.1, 0.2,\n    0.3, 0.4]\nrate_hz: 20\nresolution: [752, 480]\n"
+      "camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
+      "distortion_model: radial-tangential\n"
+      "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";
+  const auto file = read_camera_file(folder_.file("sensor.yaml", text));
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->lens.camera.width_px, 752);
+  EXPECT_THAT(file->lens.coefficients,
+              ElementsAre(-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0));
+  EXPECT_EQ(file->rate_hz, 20.0);
+}
+
+TEST_F(CameraFileTest, ReadsTheSharedFiles) {
+  STEMVO_NEEDS_SHARED_DATA();
+  const auto handheld = read_camera_file(testing::shared_data() / "handheld/camera.yaml");
+  ASSERT_TRUE(handheld) << handheld.error().message;
+  EXPECT_EQ(handheld->lens.camera.fx_px, 585.0);
+  EXPECT_EQ(handheld->lens.distortion, Distortion::kNone);
+  EXPECT_EQ(handheld->rate_hz, 30.0);
+  const auto euroc = read_camera_file(testing::shared_data() / "euroc/mav0/cam0/sensor.yaml");
+  ASSERT_TRUE(euroc) << euroc.error().message;
+  EXPECT_EQ(euroc->lens.camera.cy_px, 248.375);
+  EXPECT_EQ(euroc->lens.distortion, Distortion::kRadialTangential);
+}
+
+TEST_F(CameraFileTest, NoFile) {
+  const auto none = read_camera_file(folder_ / "camera.yaml");
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message,
+              HasSubstr("camera.yaml: expected a camera file, found nothing"));
+  const auto folder = read_camera_file(folder_.path());
+  ASSERT_FALSE(folder);
+  EXPECT_THAT(folder.error().message, HasSubstr("found a folder"));
+}
+
+TEST_F(CameraFileTest, NoYaml) {
+  expect_refused("intrinsics: [1, 2\n", {"camera.yaml:2", "not YAML"});
+  expect_refused("\x89PNG\r\n\x1a\n", {"camera.yaml:1"});
+  expect_refused("", {"expected the keys of a camera"});
+  expect_refused("just words\n", {"camera.yaml:1: expected the keys of a camera"});
+  expect_refused(std::string(kGood) + "rate_hz: 20\n", {"camera.yaml:9", "'rate_hz'", "twice"});
+}
+
+TEST_F(CameraFileTest, MissingKeys) {
+  expect_refused(with_line(1, ""), {"image_width and image_height, or resolution", "no such key"});
+  expect_refused(with_line(4, ""), {"intrinsics: [fx, fy, cx, cy]", "no such key"});
+  expect_refused(with_line(5, ""), {"distortion_model: none, radial-tangential or equidistant"});
+  expect_refused(with_line(6, ""), {"distortion_coefficients: [k1, k2, p1, p2]", "no such key"});
+}
+
+TEST_F(CameraFileTest, OddSizes) {
+  for (const char* size : {"0", "-640", "640.5", "nan", "1e9", "wide", "[640]", ""}) {
+    expect_refused(with_line(1, std::string("image_width: ") + size), {"image_width: expected"});
+  }
+  expect_refused(with_line(2, "image_height: 0"), {"camera.yaml:2", "found 0"});
+  expect_refused(with_line(1, "resolution: [640]").replace(18, 18, "\n"),
+                 {"camera.yaml:1: resolution: expected [width, height], found 1 numbers"});
+}
+
+TEST_F(CameraFileTest, OddIntrinsics) {
+  const auto refused = [&](const std::string& numbers, const std::vector<std::string>& words) {
+    expect_refused(with_line(4, "intrinsics: " + numbers), {"camera.yaml:4: intrinsics: expected"});
+    expect_refused(with_line(4, "intrinsics: " + numbers), words);
+  };
+  refused("[520, 520, 320]", {"[fx, fy, cx, cy]", "found 3"});
+  refused("520", {"[fx, fy, cx, cy]", "found no list"});
+  refused("[-520, 520, 320, 240]", {"positive focal lengths", "-520"});
+  refused("[520, 0, 320, 240]", {"positive focal lengths", "and 0"});
+  refused("[520, nan, 320, 240]", {"finite number", "nan"});
+  refused("[520, .inf, 320, 240]", {"finite number", "inf"});
+  refused("[520, x, 320, 240]", {"finite number", "'x'"});
+  refused("[520, [1], 320, 240]", {"finite number", "a list"});
+  refused("[520, 520, 640, 240]", {"principal point inside pictures of 640x480", "(640, 240)"});
+  refused("[520, 520, 320, -1]", {"principal point inside pictures of 640x480", "(320, -1)"});
+  expect_refused(with_line(3, "camera_model: omni"),
+                 {"camera.yaml:3: camera_model: expected pinhole, found 'omni'"});
+}
+
+TEST_F(CameraFileTest, OddDistortion) {
+  expect_refused(with_line(5, "distortion_model: fov"),
+                 {"camera.yaml:5: distortion_model: expected none, radial-tangential or "
+                  "equidistant, found 'fov'"});
+  expect_refused(with_line(5, "distortion_model: [none]"), {"camera.yaml:5", "expected one word"});
+  expect_refused(with_line(5, "distortion_model: equidistant"),
+                 {"camera.yaml:6", "[k1, k2, k3, k4], found 5"});
+  expect_refused(with_line(5, "distortion_model: none"), {"camera.yaml:6", "[]", "found 5"});
+  expect_refused(with_line(6, "distortion_coefficients: [0.1, 0.2, 0.3]"),
+                 {"camera.yaml:6", "[k1, k2, p1, p2]", "found 3"});
+  expect_refused(with_line(6, "distortion_coefficients: [0.1, .nan, 0, 0]"),
+                 {"camera.yaml:6", "finite number", "nan"});
+}
+
+TEST_F(CameraFileTest, OddRateAndHeight) {
+  for (const char* number : {"0", "-10", "nan", "1e300", "fast", ""}) {
+    expect_refused(with_line(7, std::string("rate_hz: ") + number), {"rate_hz: expected"});
+    expect_refused(with_line(8, std::string("camera_height: ") + number),
+                   {"camera_height: expected"});
+  }
+  expect_refused(with_line(7, "rate_hz: 0"), {"camera.yaml:7", "above 0", "found 0"});
+}
+
+}  // namespace
+}  // namespace stemvo

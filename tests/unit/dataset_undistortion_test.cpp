@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iostream>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "dataset/undistortion.hpp"
+
+namespace stemvo {
+namespace {
+
+using dataset::Distortion;
+using dataset::Lens;
+using dataset::Undistortion;
+
+struct NamedLens {
+  const char* name;
+  Lens lens;
+};
+
+void PrintTo(const NamedLens& named, std::ostream* out) { *out << named.name; }
+
+std::vector<NamedLens> lenses() {
+  const Camera euroc{458.654, 457.296, 367.215, 248.375, 752, 480};
+  const Camera kinect{520.9, 521.0, 325.1, 249.7, 640, 480};
+  const Camera fisheye{190.98, 190.97, 254.93, 256.9, 512, 512};
+  const Camera strong{300.0, 310.0, 330.0, 235.0, 640, 480};
+  const Distortion radial = Distortion::kRadialTangential;
+  return {
+      {"Euroc", {euroc, radial, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0}}},
+      {"Kinect", {kinect, radial, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172}}},
+      {"Tangential", {kinect, radial, {-0.1, 0.02, 0.01, -0.008, 0.001}}},
+      {"Fisheye", {fisheye, Distortion::kEquidistant, {0.0034, 0.0007, -0.002, 0.0002, 0}}},
+      {"PureFisheye", {strong, Distortion::kEquidistant, {}}},
+  };
+}
+
+/// OpenCV's own formulas, of a point on the plane z = 1.
+cv::Point2d project_by_opencv(const Lens& lens, const cv::Point2d& xy) {
+  const Camera& c = lens.camera;
+  const cv::Matx33d k(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
+  std::vector<cv::Point2d> result;
+  if (lens.distortion == Distortion::kEquidistant) {
+    const cv::Vec4d coefficients(lens.coefficients.data());
+    cv::fisheye::distortPoints(std::vector<cv::Point2d>{xy}, result, k, coefficients);
+  } else {
+    const std::vector<double> coefficients(lens.coefficients.begin(), lens.coefficients.end());
+    cv::projectPoints(std::vector<cv::Point3d>{{xy.x, xy.y, 1.0}}, cv::Vec3d(), cv::Vec3d(), k,
+                      coefficients, result);
+  }
+  return result.front();
+}
+
+class UndistortionTest : public ::testing::TestWithParam<NamedLens> {
+ protected:
+  const Lens lens_ = GetParam().lens;
+  const Undistortion undistortion_ = Undistortion::create(lens_).value();
+  const Camera view_ = undistortion_.camera();
+
+  cv::Point2d source_of(double u, double v) const {
+    const Eigen::Vector2d xy = view_.normalize({u, v});
+    return project_by_opencv(lens_, {xy.x(), xy.y()});
+  }
+};
+
+/// The scene: a grid of round spots, in pixels of the view.
+constexpr double kSpacing_px = 42.0;
+constexpr double kFirst_px = 14.3;
+
+double distance_to_spot(double at) {
+  return at - (kFirst_px + kSpacing_px * std::round((at - kFirst_px) / kSpacing_px));
+}
+
+double brightness(const cv::Point2d& at) {
+  constexpr double kSigma_px = 2.0;
+  const double x = distance_to_spot(at.x);
+  const double y = distance_to_spot(at.y);
+  return 20.0 + 220.0 * std::exp(-0.5 * (x * x + y * y) / (kSigma_px * kSigma_px));
+}
+
+/// The scene as the lens shows it, each pixel where OpenCV says it comes from.
+cv::Mat draw_through(const Lens& lens, const Camera& view) {
+  const auto matrix = [](const Camera& c) {
+    return cv::Matx33d(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
+  };
+  cv::Mat picture(lens.camera.height_px, lens.camera.width_px, CV_8UC1);
+  std::vector<cv::Point2d> pixels;
+  for (int i = 0; i < static_cast<int>(picture.total()); ++i) {
+    pixels.emplace_back(i % picture.cols, i / picture.cols);
+  }
+  std::vector<cv::Point2d> scene;
+  const cv::TermCriteria exact(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-12);
+  if (lens.distortion == Distortion::kEquidistant) {
+    cv::fisheye::undistortPoints(pixels, scene, matrix(lens.camera),
+                                 cv::Vec4d(lens.coefficients.data()), cv::noArray(), matrix(view));
+  } else {
+    const std::vector<double> coefficients(lens.coefficients.begin(), lens.coefficients.end());
+    cv::undistortPoints(pixels, scene, matrix(lens.camera), coefficients, cv::noArray(),
+                        matrix(view), exact);
+  }
+  for (int i = 0; i < static_cast<int>(picture.total()); ++i) {
+    picture.at<std::uint8_t>(i / picture.cols, i % picture.cols) =
+        cv::saturate_cast<std::uint8_t>(brightness(scene[static_cast<std::size_t>(i)]));
+  }
+  return picture;
+}
+
+/// The centre of the brightness above the background, around a place.
+cv::Point2d center_of_spot(const cv::Mat& picture, const cv::Point2d& near) {
+  const cv::Rect window(cvRound(near.x) - 9, cvRound(near.y) - 9, 19, 19);
+  cv::Mat weight;
+  picture(window).convertTo(weight, CV_64F, 1.0, -20.0);
+  const cv::Moments moments = cv::moments(weight);
+  return {window.x + moments.m10 / moments.m00, window.y + moments.m01 / moments.m00};
+}
+
+TEST_P(UndistortionTest, SpotsComeToLieWhereAPinholeCameraShowsThem) {
+  const cv::Mat picture = undistortion_.apply(draw_through(lens_, view_));
+  ASSERT_EQ(picture.size(), cv::Size(view_.width_px, view_.height_px));
+  double worst_px = 0.0;
+  for (double v = kFirst_px; v < view_.height_px - 14; v += kSpacing_px) {
+    for (double u = kFirst_px; u < view_.width_px - 14; u += kSpacing_px) {
+      worst_px = std::max(worst_px, cv::norm(center_of_spot(picture, {u, v}) - cv::Point2d(u, v)));
+    }
+  }
+  EXPECT_LT(worst_px, 0.05);
+  std::cout << worst_px << " px\n";
+}
+
+TEST_P(UndistortionTest, TheFormulasAreOpencvs) {
+  for (double y = -0.6; y <= 0.6; y += 0.2) {
+    for (double x = -0.7; x <= 0.7; x += 0.1) {
+      const Eigen::Vector2d found = distort(lens_, {x, y});
+      const cv::Point2d expected = project_by_opencv(lens_, {x, y});
+      EXPECT_NEAR(lens_.camera.fx_px * found.x() + lens_.camera.cx_px, expected.x, 1e-6);
+      EXPECT_NEAR(lens_.camera.fy_px * found.y() + lens_.camera.cy_px, expected.y, 1e-6);
+    }
+  }
+}
+
+TEST_P(UndistortionTest, EveryPixelComesFromInsideAndTheViewIsAsWideAsThatAllows) {
+  double margin_px = 1e9;  // of the rim of the view to that of the lens' picture
+  for (int v = 0; v < view_.height_px; ++v) {
+    for (int u = 0; u < view_.width_px; ++u) {
+      if (u % 50 != 0 && v % 50 != 0 && u != view_.width_px - 1 && v != view_.height_px - 1) {
+        continue;
+      }
+      const cv::Point2d source = source_of(u, v);
+      margin_px = std::min({margin_px, source.x, source.y, view_.width_px - 1 - source.x,
+                            view_.height_px - 1 - source.y});
+    }
+  }
+  EXPECT_GE(margin_px, -1e-3);
+  const double scale = view_.fx_px / lens_.camera.fx_px;
+  EXPECT_NEAR(view_.fy_px / lens_.camera.fy_px, scale, 1e-9);
+  EXPECT_GE(scale, 0.8 - 1e-9);
+  EXPECT_LE(scale, 1.2);
+  EXPECT_TRUE(margin_px < 0.01 || scale < 0.8 + 1e-9) << margin_px << " px at " << scale;
+  EXPECT_EQ(view_.cx_px, lens_.camera.cx_px);
+  EXPECT_EQ(view_.cy_px, lens_.camera.cy_px);
+}
+
+TEST_P(UndistortionTest, ColourIsUndistortedAsGrayIs) {
+  cv::Mat gray(lens_.camera.height_px, lens_.camera.width_px, CV_8UC1);
+  cv::randu(gray, 0, 255);
+  cv::Mat color;
+  cv::merge(std::vector<cv::Mat>{gray, gray, gray}, color);
+  std::vector<cv::Mat> planes;
+  cv::split(undistortion_.apply(color), planes);
+  for (const cv::Mat& plane : planes) {
+    EXPECT_EQ(cv::norm(plane, undistortion_.apply(gray), cv::NORM_INF), 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Lenses,
+                         UndistortionTest,
+                         ::testing::ValuesIn(lenses()),
+                         [](const auto& named) { return named.param.name; });
+
+TEST(Undistortion, NoDistortionChangesNothing) {
+  const Camera camera{585.0, 586.0, 320.0, 240.0, 640, 480};
+  cv::Mat picture(480, 640, CV_8UC3);
+  cv::randu(picture, 0, 255);
+  for (const Distortion model : {Distortion::kNone, Distortion::kRadialTangential}) {
+    const auto undistortion = Undistortion::create({camera, model, {}});
+    ASSERT_TRUE(undistortion);
+    EXPECT_EQ(undistortion->camera().matrix(), camera.matrix());
+    EXPECT_EQ(cv::norm(undistortion->apply(picture), picture, cv::NORM_INF), 0.0);
+  }
+}
+
+TEST(Undistortion, CoefficientsThatTurnThePictureInsideOutAreRefused) {
+  const Camera camera{500.0, 500.0, 320.0, 240.0, 640, 480};
+  for (const double k1 : {-8.0, -1e6, 50.0, 1e300}) {
+    const auto undistortion =
+        Undistortion::create({camera, Distortion::kRadialTangential, {k1, 0, 0, 0, 0}});
+    ASSERT_FALSE(undistortion) << k1;
+    EXPECT_THAT(undistortion.error().message, ::testing::HasSubstr("distortion_coefficients"));
+  }
+}
+
+}  // namespace
+}  // namespace stemvo
