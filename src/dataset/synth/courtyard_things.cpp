@@ -101,7 +101,7 @@ Style board_style(Draw& draw) {
 
 Style hedge_style(Draw& draw) {
   Style style;
-  style.material = Material::kHedge;
+  style.material = Material::kNearHedge;
   style.seed = draw.bits();
   style.albedo = {static_cast<float>(draw.in(0.13, 0.2)), 0.24F, 0.09F};
   return style;
@@ -193,15 +193,24 @@ void add_shelves(const Stand& stand, const Room& room, Draw draw, Scene& scene) 
 }
 
 void add_notices(const Stand& stand, double width_m, Draw draw, Scene& scene) {
-  double x = draw.in(0.05, 0.3);
+  double x = draw.in(0.05, 0.25);
   for (;;) {
-    const double sheet_m = draw.in(0.25, 0.65);
+    const double sheet_m = draw.in(0.22, 0.6);
     if (x + sheet_m > width_m - 0.05) {
       return;
     }
-    const double tall_m = sheet_m * draw.in(0.8, 1.5);
-    add_notice(stand, {x, draw.in(0.5, 2.4 - tall_m)}, {sheet_m, tall_m}, draw, scene);
-    x += sheet_m + draw.in(0.08, 0.4);
+    double low = draw.in(0.4, 1.0);
+    for (;;) {
+      const double tall_m = sheet_m * draw.in(0.8, 1.5);
+      if (low + tall_m > 2.5) {
+        break;
+      }
+      if (draw.chance(0.75)) {
+        add_notice(stand, {x + draw.in(-0.02, 0.02), low}, {sheet_m, tall_m}, draw, scene);
+      }
+      low += tall_m + draw.in(0.05, 0.3);
+    }
+    x += sheet_m + draw.in(0.08, 0.35);
   }
 }
 

@@ -203,6 +203,8 @@ Rgb paint(const Style& style, const Footprint& at, const Textures& textures) {
       return roof(style, at, textures);
     case Material::kHedge:
       return leaves(style, at, textures, 0.015F, 0.75F);
+    case Material::kNearHedge:
+      return leaves(style, at, textures, 0.006F, 0.6F);
     case Material::kFence:
       return fence(style, at, textures);
     case Material::kBark:

@@ -26,7 +26,8 @@ enum class Material : std::uint8_t {
   kFence,
   kBark,
   kLeaves,
-  kPaint,  // cars, poles, signs: one colour
+  kPaint,      // cars, poles, signs: one colour
+  kNearHedge,  // one that is looked at from a step away
   kBrick,
   kBoards,  // upright planks
 };
@@ -52,8 +53,9 @@ struct Face {
 /// What is near one frame: part of a street, or a courtyard.
 class Scene {
  public:
-  explicit Scene(const Eigen::Vector3d& origin, const Eigen::Vector3d& to_sun)
-      : origin_(origin), to_sun_(to_sun) {}
+  /// `ambient`: light on what the sun does not reach.
+  Scene(const Eigen::Vector3d& origin, const Eigen::Vector3d& to_sun, double ambient)
+      : origin_(origin), to_sun_(to_sun), ambient_(ambient) {}
 
   [[nodiscard]] const std::vector<Face>& faces() const { return faces_; }
 
@@ -84,6 +86,7 @@ class Scene {
 
   Eigen::Vector3d origin_;
   Eigen::Vector3d to_sun_;
+  double ambient_;
   std::vector<Face> faces_;
 };
 

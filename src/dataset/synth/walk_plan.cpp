@@ -179,7 +179,7 @@ class WalkPlanner {
     look.hold_s = draw_.in(0.3, 0.7) / tempo_;
     const double most_rad = 0.5 * (room_s - look.hold_s) * rate_rad_s;
     const double angle_rad = std::min(radians(draw_.in(32.0, 60.0)), most_rad);
-    const double late = draw_.next();
+    const double late = draw_.in(0.0, 0.6);
     look.angle_rad = draw_.chance(0.5) ? angle_rad : -angle_rad;
     look.turn_s = angle_rad / rate_rad_s;
     look.begin_s = begin_s + late * (room_s - 2.0 * look.turn_s - look.hold_s);
