@@ -62,12 +62,15 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
   command->add_option("OUT_DIR", arguments->out_dir, "Folder for the drive; created")
       ->required()
       ->type_name("");
+  CLI::Option* trajectory =
+      command
+          ->add_option("--trajectory", arguments->trajectory,
+                       "Drive along these KITTI poses; default: a curve of its own")
+          ->type_name("POSES");
   command
-      ->add_option("--trajectory", arguments->trajectory,
-                   "Drive along these KITTI poses; default: a curve of its own")
-      ->type_name("POSES");
-  command->add_flag("--walk", options.walk,
-                    "Walk through a courtyard with the camera in the hand, in place of a drive");
+      ->add_flag("--walk", options.walk,
+                 "Walk through a courtyard with the camera in the hand, in place of a drive")
+      ->excludes(trajectory);
   command
       ->add_option("--rate", options.rate_hz,
                    "Pictures per second, 1 to 1000; default 10, of a walk 30")
@@ -75,7 +78,8 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
   command
       ->add_option("--speed", options.speed_m_s,
                    "Mean speed, 0.1 to 60, of a walk to 1; default 8-12, of a walk 0.5")
-      ->type_name("M_PER_S");
+      ->type_name("M_PER_S")
+      ->excludes(trajectory);
   command->add_option("--name", options.name, "Of the sequence; default 00")
       ->type_name("NAME")
       ->check([](const std::string& text) {

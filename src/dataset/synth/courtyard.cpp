@@ -61,7 +61,7 @@ void add_wall_part(const Stand& stand, double width_m, Wall kind, Draw draw, Sce
   plaster.material = Material::kPlainWall;
   plaster.seed = draw.bits();
   const auto tone = static_cast<float>(draw.in(0.85, 1.15));
-  plaster.albedo = {0.54F * tone, 0.50F * tone, 0.42F * tone};
+  plaster.albedo = {0.48F * tone, 0.45F * tone, 0.38F * tone};
   switch (kind) {
     case Wall::kHouse: {
       const double height_m = draw.in(6.0, 6.6);
@@ -73,6 +73,7 @@ void add_wall_part(const Stand& stand, double width_m, Wall kind, Draw draw, Sce
            front.at(0.0, 0.0, height_m)},
           {Eigen::Vector2d(0, 0), Eigen::Vector2d(width_m, 0), Eigen::Vector2d(width_m, height_m)},
           plaster);
+      add_notices(front, width_m, draw, scene);
       break;
     }
     case Wall::kBrick:
@@ -195,7 +196,7 @@ Courtyard lay_courtyard(std::uint64_t seed) {
 Scene build_courtyard(const Courtyard& courtyard,
                       const Eigen::Vector3d& camera_position,
                       const Eigen::Vector3d& to_sun) {
-  constexpr double kAmbient = 0.55;  // walls light each other
+  constexpr double kAmbient = 0.7;  // walls light each other
   Scene scene(camera_position, to_sun, kAmbient);
   add_floor(courtyard, scene);
   const auto sides = sides_of(courtyard);

@@ -42,7 +42,7 @@ void add_notice(const Stand& stand,
                 Scene& scene) {
   constexpr double kOff_m = 0.01;
   constexpr double kLayer_m = 0.002;
-  const auto paper = static_cast<float>(draw.in(0.45, 0.8));
+  const auto paper = static_cast<float>(draw.in(0.4, 0.64));
   add_sheet(stand, corner, size, kOff_m, {paper, paper, 0.92F * paper}, scene);
   const double split = corner[1] + draw.in(0.3, 0.7) * size[1];
   const double border = 0.06 * size[0];

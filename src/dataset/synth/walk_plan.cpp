@@ -111,7 +111,7 @@ class WalkPlanner {
                            direction_.z == 0 ? line : 1 - direction_.z};
     to_ = step(from, direction_, 2);
     const Eigen::Vector2d begin = place(from);
-    at_m_ = begin + draw_.in(0.28, 0.36) * (place(to_) - begin);
+    at_m_ = begin + draw_.in(0.36, 0.44) * (place(to_) - begin);
     heading_rad_ = heading_along(place(to_) - at_m_);
   }
 
@@ -142,12 +142,10 @@ class WalkPlanner {
 
   void walk_leg(int leg) {
     const Eigen::Vector2d end = place(to_);
-    const double length_m = (end - at_m_).norm();
-    const bool is_long = length_m > 2.5;
-    const bool wants_look = is_long && (looks.size() < 2 || draw_.chance(0.7));
+    const bool wants_look = is_long_ && (looks.size() < 2 || draw_.chance(0.7));
     const bool wants_pause =
         leg == 1 || (leg > 1 && now_s_ > last_pause_s_ + 12.0 / tempo_ && draw_.chance(0.6));
-    const double split = is_long ? draw_.in(0.60, 0.66) : draw_.in(0.45, 0.55);
+    const double split = is_long_ ? draw_.in(0.60, 0.66) : draw_.in(0.45, 0.55);
     const Eigen::Vector2d stop = wants_pause ? (at_m_ + split * (end - at_m_)).eval() : end;
     walk_to(stop, leg > 0);
     if (wants_look) {
@@ -179,7 +177,7 @@ class WalkPlanner {
     look.hold_s = draw_.in(0.3, 0.7) / tempo_;
     const double most_rad = 0.5 * (room_s - look.hold_s) * rate_rad_s;
     const double angle_rad = std::min(radians(draw_.in(32.0, 60.0)), most_rad);
-    const double late = draw_.in(0.0, 0.6);
+    const double late = draw_.in(0.0, looks.size() < 2 ? 0.1 : 0.8);
     look.angle_rad = draw_.chance(0.5) ? angle_rad : -angle_rad;
     look.turn_s = angle_rad / rate_rad_s;
     look.begin_s = begin_s + late * (room_s - 2.0 * look.turn_s - look.hold_s);
@@ -211,6 +209,7 @@ class WalkPlanner {
     const bool must_be_long = leg >= 1 && looks.size() < 2 && !long_ways.empty();
     const auto& choice = must_be_long ? long_ways : ways;
     const Way way = choice[draw_.bits() % choice.size()];
+    is_long_ = way.to == step(to_, way.direction, 2);
     direction_ = way.direction;
     to_ = way.to;
     WalkPhase phase = stand(0.0);
@@ -233,6 +232,7 @@ class WalkPlanner {
   double heading_rad_ = 0.0;
   Crossing direction_;
   Crossing to_;
+  bool is_long_ = true;  ///< from one side to the other
 };
 
 double way_m(const std::vector<WalkPhase>& phases, double time_s) {
@@ -262,7 +262,8 @@ double look_at(const WalkLook& look, double time_s) {
 WalkPlan::WalkPlan(const Courtyard& courtyard,
                    double duration_s,
                    double mean_m_s,
-                   std::uint64_t seed) {
+                   std::uint64_t seed)
+    : stride_(std::min(1.0, mean_m_s / kUnhurried_m_s)) {
   // Faster between the stops than in the mean: how much is found by halving.
   double low_m_s = 0.2 * mean_m_s;
   double high_m_s = 2.0 * mean_m_s;
@@ -284,10 +285,10 @@ Stance WalkPlan::at(double time_s) const {
   if (phase.is_turn()) {
     const double t = std::clamp(t_s / phase.duration_s, 0.0, 1.0);
     stance.heading_rad += ease(t) * (phase.heading_to_rad - phase.heading_from_rad);
-    stance.stride = 8.0 * t * t * (1.0 - t) * (1.0 - t);  // small steps
+    stance.stride = stride_ * 8.0 * t * t * (1.0 - t) * (1.0 - t);  // small steps
   } else if (!phase.is_pause()) {
     stance.axis_m += share_walked(phase, t_s) * (phase.to_m - phase.from_m);
-    stance.stride = share_of_speed(phase, t_s);
+    stance.stride = stride_ * share_of_speed(phase, t_s);
   }
   if (!looks_.empty()) {
     stance.look_rad = look_at(last_begun(looks_, time_s), time_s);

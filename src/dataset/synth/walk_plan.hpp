@@ -44,7 +44,7 @@ struct Stance {
   Eigen::Vector2d axis_m;  ///< x, z
   double heading_rad;
   double look_rad;
-  double stride;  ///< 1: walks on, 0: stands
+  double stride;  ///< 1: walks on at 0.5 m/s or more, 0: stands
 };
 
 /// A walk along the walkways of a courtyard, for any length of time: turns on the spot of about
@@ -61,6 +61,7 @@ class WalkPlan {
   [[nodiscard]] Stance at(double time_s) const;
 
  private:
+  double stride_;  ///< short steps where the walk is slow
   std::vector<WalkPhase> phases_;
   std::vector<WalkLook> looks_;
 };
