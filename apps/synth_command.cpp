@@ -16,12 +16,14 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses. The same
-options give the same files.
+    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses; of a walk
+also camera.yaml beside calib.txt. The same options give the same files.
 
 Examples:
   stemvo synth drive --frames 200
   stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
+  stemvo synth slow --rate 30 --speed 5
+  stemvo synth walk --walk --frames 600
   stemvo synth drives --name street7 --seed 7              several drives in one folder)";
 
 struct Arguments {
@@ -54,16 +56,30 @@ int render(Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_synth(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("synth", "Render a drive along a street");
+  CLI::App* command = app.add_subcommand("synth", "Render a drive along a street, or a walk");
   const auto arguments = std::make_shared<Arguments>();
   SyntheticDriveOptions& options = arguments->options;
   command->add_option("OUT_DIR", arguments->out_dir, "Folder for the drive; created")
       ->required()
       ->type_name("");
+  CLI::Option* trajectory =
+      command
+          ->add_option("--trajectory", arguments->trajectory,
+                       "Drive along these KITTI poses; default: a curve of its own")
+          ->type_name("POSES");
   command
-      ->add_option("--trajectory", arguments->trajectory,
-                   "Drive along these KITTI poses; default: a curve of its own")
-      ->type_name("POSES");
+      ->add_flag("--walk", options.walk,
+                 "Walk through a courtyard with the camera in the hand, in place of a drive")
+      ->excludes(trajectory);
+  command
+      ->add_option("--rate", options.rate_hz,
+                   "Pictures per second, 1 to 1000; default 10, of a walk 30")
+      ->type_name("HZ");
+  command
+      ->add_option("--speed", options.speed_m_s,
+                   "Mean speed, 0.1 to 60, of a walk to 1; default 8-12, of a walk 0.5")
+      ->type_name("M_PER_S")
+      ->excludes(trajectory);
   command->add_option("--name", options.name, "Of the sequence; default 00")
       ->type_name("NAME")
       ->check([](const std::string& text) {
@@ -81,10 +97,10 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
         return text.starts_with('-') ? "expected a whole number of at least 0, found " + text
                                      : std::string();
       });
-  command->add_option("--width", options.width_px, "Pixels; default 1241")
+  command->add_option("--width", options.width_px, "Pixels; default 1241, of a walk 640")
       ->type_name("W")
       ->check(in_range(16, 8192));
-  command->add_option("--height", options.height_px, "Pixels; default 376")
+  command->add_option("--height", options.height_px, "Pixels; default 376, of a walk 480")
       ->type_name("H")
       ->check(in_range(16, 8192));
   command->add_flag("--depth", options.write_depth,

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -158,6 +160,110 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
     const double expected = 1.65 * 718.856 * 160 / 1241 / (47.0 - 185.2157 * 48 / 376);
     EXPECT_NEAR(static_cast<double>(z), expected, 0.12 * expected) << "frame " << i;
   }
+}
+
+/// Pictures of a drive of before there were rates, speeds and walks: means of their quarters.
+TEST_F(SyntheticDriveTest, DefaultDriveIsWhatItAlwaysWas) {
+  SyntheticDriveOptions options = small(20);
+  options.seed = 7;
+  options.width_px = 310;
+  options.height_px = 94;
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  const cv::Mat picture = *sequence->read(19);
+  constexpr std::array<double, 4> kMeans = {124.3807, 128.3152, 97.2685, 90.0490};
+  for (int i = 0; i < 4; ++i) {
+    const cv::Scalar mean = cv::mean(picture(cv::Rect(155 * (i % 2), 47 * (i / 2), 155, 47)));
+    EXPECT_NEAR((mean[0] + mean[1] + mean[2]) / 3.0, kMeans[static_cast<std::size_t>(i)], 0.01);
+  }
+  EXPECT_FALSE(fs::exists(root_ / "out" / "sequences" / "00" / "camera.yaml"));
+}
+
+TEST_F(SyntheticDriveTest, TimesFollowTheRate) {
+  SyntheticDriveOptions options = small(4);
+  options.rate_hz = 30.0;
+  options.speed_m_s = 6.0;
+  const auto expect_times = [&](const std::string& name, double rate_hz) {
+    const auto sequence = KittiSequence::open(root_ / name / "sequences" / "00");
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(sequence->timestamps_s()[i], static_cast<double>(i) / rate_hz, 1e-9);
+    }
+    const double step_m = sequence->ground_truth()->at(3).translation.norm() / 3.0;
+    EXPECT_NEAR(step_m, 0.2, 0.05);
+  };
+  ASSERT_TRUE(render_synthetic_drive(root_ / "own", options));
+  expect_times("own", 30.0);
+  options.speed_m_s.reset();
+  options.rate_hz = 5.0;
+  options.trajectory = root_ / "own" / "poses" / "00.txt";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "along", options));
+  expect_times("along", 5.0);
+}
+
+TEST_F(SyntheticDriveTest, WalkIsASequenceWithACameraFile) {
+  SyntheticDriveOptions options = small(3);
+  options.walk = true;
+  options.width_px = 80;
+  options.height_px = 60;
+  const fs::path folder = root_ / "out" / "sequences" / "00";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(folder);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 3U);
+  EXPECT_DOUBLE_EQ(sequence->camera().fx_px, 585.0 / 8);
+  EXPECT_DOUBLE_EQ(sequence->camera().cx_px, 40.0);
+  EXPECT_NEAR(sequence->timestamps_s()[2], 2.0 / 30.0, 1e-9);
+  EXPECT_EQ(bytes_of(folder / "camera.yaml"),
+            "image_width: 80\nimage_height: 60\ncamera_model: pinhole\n"
+            "intrinsics: [73.125, 73.125, 40, 30]\n"
+            "distortion_model: none\ndistortion_coefficients: []\nrate_hz: 30\n");
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  EXPECT_FALSE(fs::exists(folder / "camera.yaml")) << "of the walk that was there before";
+}
+
+TEST_F(SyntheticDriveTest, SameWalkForAnyNumberOfThreadsAndAnotherForAnotherSeed) {
+  SyntheticDriveOptions options = small(3);
+  options.walk = true;
+  cv::setNumThreads(1);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
+  cv::setNumThreads(2);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
+  EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3));
+  options.seed = 2;
+  ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
+  EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3));
+}
+
+TEST_F(SyntheticDriveTest, ContradictionsAreOneLine) {
+  const auto message = [&](const SyntheticDriveOptions& options) {
+    const Status status = render_synthetic_drive(root_ / "out", options);
+    return status ? std::string("(done)") : status.error().message;
+  };
+  SyntheticDriveOptions options = small(1);
+  options.trajectory = root_ / "given.txt";
+  options.walk = true;
+  EXPECT_THAT(message(options), HasSubstr("a trajectory or a walk, found both"));
+  options.walk = false;
+  options.speed_m_s = 5.0;
+  EXPECT_THAT(message(options), HasSubstr("a trajectory or a speed, found both"));
+  options = small(1);
+  options.rate_hz = 0.0;
+  EXPECT_THAT(message(options), HasSubstr("rate from 1 to 1000, found 0"));
+  options.rate_hz = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(message(options), HasSubstr("rate from 1 to 1000, found nan"));
+  options = small(1);
+  options.speed_m_s = 61.0;
+  EXPECT_THAT(message(options), HasSubstr("speed from 0.1 to 60, found 61"));
+  options.walk = true;
+  options.speed_m_s = 2.0;
+  EXPECT_THAT(message(options), HasSubstr("speed from 0.1 to 1, found 2"));
+  options = small(1000000);
+  options.rate_hz = 1.0;
+  options.speed_m_s = 60.0;
+  EXPECT_THAT(message(options), HasSubstr("at most 2000 km"));
+  EXPECT_FALSE(fs::exists(root_ / "out"));
 }
 
 TEST_F(SyntheticDriveTest, BadInputIsOneLine) {

@@ -57,17 +57,16 @@ cv::Mat predict(const RenderedFrame& a,
   return map;
 }
 
-/// Frame b warped on to frame a by the exact depth and poses lies on it: tracking finds no motion.
-TEST(SyntheticPicture, DepthAndPosesPredictTheNextFrame) {
-  const Camera camera = kitti_camera(0.5);
-  const Renderer renderer(make_own_drive(30, 3), camera, 3);
+/// What tracking finds between frames and their successors warped on to them, in pixels.
+struct Offsets {
   std::vector<double> dx;
   std::vector<double> dy;
   std::vector<double> length;
-  for (const std::size_t i : {0U, 14U, 28U}) {
+
+  void add(const Renderer& renderer, std::size_t i, const Camera& camera) {
     const RenderedFrame a = renderer.render(i);
     const RenderedFrame b = renderer.render(i + 1);
-    const auto& poses = renderer.drive().world_from_camera;
+    const auto& poses = renderer.world_from_camera();
     const cv::Mat map = predict(a, b, poses[i + 1].inverse() * poses[i], camera);
     cv::Mat warped;
     cv::remap(gray_of(b), warped, map, {}, cv::INTER_CUBIC);
@@ -91,10 +90,74 @@ TEST(SyntheticPicture, DepthAndPosesPredictTheNextFrame) {
       }
     }
   }
-  ASSERT_GT(length.size(), 600U);
-  EXPECT_LE(median(length), 0.1);
-  EXPECT_LE(std::abs(median(dx)), 0.01) << "no systematic offset, not even a hundredth of a pixel";
-  EXPECT_LE(std::abs(median(dy)), 0.01);
+
+  /// Depth and poses are exact: there is no motion left, not even a hundredth of a pixel.
+  void expect_none() const {
+    EXPECT_LE(median(length), 0.1);
+    EXPECT_LE(std::abs(median(dx)), 0.01);
+    EXPECT_LE(std::abs(median(dy)), 0.01);
+  }
+};
+
+TEST(SyntheticPicture, DepthAndPosesPredictTheNextFrame) {
+  const Camera camera = kitti_camera(0.5);
+  const Renderer renderer(make_own_drive(30, 3), camera, 3);
+  Offsets offsets;
+  for (const std::size_t i : {0U, 14U, 28U}) {
+    offsets.add(renderer, i, camera);
+  }
+  ASSERT_GT(offsets.length.size(), 600U);
+  offsets.expect_none();
+}
+
+Camera hand_camera() {
+  Camera camera;
+  camera.fx_px = camera.fy_px = 585.0;
+  camera.cx_px = 320.0;
+  camera.cy_px = 240.0;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  return camera;
+}
+
+/// Walking, looking aside, turning on the spot: surfaces are 0.6 to 6 m away.
+TEST(SyntheticPicture, DepthAndPosesPredictTheNextFrameOfAWalk) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
+    Offsets offsets;
+    for (std::size_t i = 10; i < 600; i += 97) {
+      offsets.add(renderer, i, hand_camera());
+    }
+    ASSERT_GT(offsets.length.size(), 2000U);
+    offsets.expect_none();
+  }
+}
+
+TEST(SyntheticPicture, CourtyardIsNearAndRichInTexture) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
+    std::vector<double> counts;
+    std::vector<double> depths_m;
+    for (std::size_t i = 5; i < 600; i += 45) {
+      const RenderedFrame frame = renderer.render(i);
+      const cv::Mat gray = gray_of(frame);
+      std::vector<cv::Point2f> corners;
+      cv::goodFeaturesToTrack(gray, corners, 3000, 0.005, 8.0);
+      counts.push_back(static_cast<double>(corners.size()));
+      for (const cv::Point2f& corner : corners) {
+        depths_m.push_back(static_cast<double>(frame.depth_m.at<float>(corner)));
+      }
+      EXPECT_GT(corners.size(), 250U) << "seed " << seed << ", frame " << i;
+      const double mean = cv::mean(gray)[0];
+      EXPECT_GT(mean, 45.0) << "seed " << seed << ", frame " << i;
+      EXPECT_LT(mean, 170.0) << "seed " << seed << ", frame " << i;
+    }
+    EXPECT_GT(median(counts), 700.0);
+    std::sort(depths_m.begin(), depths_m.end());
+    EXPECT_LT(depths_m[depths_m.size() / 2], 4.0);
+    EXPECT_LT(depths_m[depths_m.size() / 10], 2.6);
+    EXPECT_LT(depths_m[depths_m.size() * 9 / 10], 7.0);
+  }
 }
 
 /// Deviation of the picture between blurs of 1 and 8 px over part of the lane before the car.

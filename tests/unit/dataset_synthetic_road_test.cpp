@@ -69,6 +69,63 @@ TEST(OwnDrive, MovesLikeACar) {
   }
 }
 
+/// The mean of any rate and speed, and never faster in a turn than in a straight.
+TEST(OwnDrive, KeepsTheSpeedThatIsAsked) {
+  for (const double rate_hz : {5.0, 10.0, 30.0}) {
+    for (const double speed_m_s : {0.5, 5.0, 10.0, 30.0}) {
+      const int frames = static_cast<int>(20.0 * rate_hz) + 1;
+      const Drive drive = make_own_drive(frames, 2, {rate_hz, speed_m_s});
+      double way_m = 0.0;
+      double fastest_m_s = 0.0;
+      double hardest_m_s2 = 0.0;
+      for (std::size_t i = 1; i < drive.places.size(); ++i) {
+        const double step_m = drive.places[i].arc_m - drive.places[i - 1].arc_m;
+        way_m += step_m;
+        fastest_m_s = std::max(fastest_m_s, step_m * rate_hz);
+        const RoadCurve& road = drive.roads.front();
+        const double bend = (road.at(drive.places[i].arc_m + 2.0).forward -
+                             road.at(drive.places[i].arc_m - 2.0).forward)
+                                .norm() /
+                            4.0;
+        hardest_m_s2 = std::max(hardest_m_s2, bend * speed_m_s * speed_m_s);
+      }
+      EXPECT_NEAR(way_m / 20.0, speed_m_s, 0.03 * speed_m_s);
+      EXPECT_LT(fastest_m_s, 1.5 * speed_m_s);
+      EXPECT_LT(hardest_m_s2, 8.0) << "at " << speed_m_s << " m/s";
+    }
+  }
+}
+
+/// Nodding is a matter of time, not of frames.
+TEST(OwnDrive, NodsAtTheSamePaceAtAnyRate) {
+  const AgainstRoad slow(make_own_drive(100, 3, {.rate_hz = 10.0, .speed_m_s = 5.0}));
+  const AgainstRoad fast(make_own_drive(300, 3, {.rate_hz = 30.0, .speed_m_s = 5.0}));
+  double error = 0.0;
+  for (std::size_t i = 0; i < slow.pitch_deg.size(); ++i) {
+    error = std::max(error, std::abs(slow.pitch_deg[i] - fast.pitch_deg[3 * i]));
+  }
+  EXPECT_LT(error, 0.1);
+  EXPECT_GT(deviation(slow.pitch_deg), 0.25);
+}
+
+/// Numbers of a drive of before there were rates and speeds.
+TEST(OwnDrive, DefaultIsWhatItAlwaysWas) {
+  const Drive drive = make_own_drive(20, 7);
+  const Rigid3 last = drive.world_from_camera.front().inverse() * drive.world_from_camera.back();
+  EXPECT_NEAR(last.translation.x(), 1.3654172970722067e+00, 1e-9);
+  EXPECT_NEAR(last.translation.y(), -9.3043270156147884e-02, 1e-9);
+  EXPECT_NEAR(last.translation.z(), 2.2395173912182045e+01, 1e-9);
+}
+
+TEST(FittedRoad, LongStepsAreNoJumpsAtALowRate) {
+  Trajectory poses;
+  for (int i = 0; i < 20; ++i) {
+    poses.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0, 0.0, 20.0 * i));
+  }
+  EXPECT_EQ(make_drive_along(poses).roads.size(), 20U);
+  EXPECT_EQ(make_drive_along(poses, 1.0).roads.size(), 1U);
+}
+
 TEST(OwnDrive, PitchesRollsAndBouncesAgainstTheRoad) {
   const Drive drive = make_own_drive(600, 1);
   const AgainstRoad against(drive);

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "dataset/synth/drive.hpp"
 #include "stemvo/check.hpp"
 
 namespace stemvo::synth {
@@ -16,12 +15,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kCameraFile = "camera.yaml";
+
 Status make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code || !fs::is_directory(folder, code)) {
     return fail(fmt::format("{}: expected a folder that can be made, found: {}", folder.string(),
                             code ? code.message() : "something that is no folder"));
+  }
+  return {};
+}
+
+Status remove_file(const fs::path& file) {
+  std::error_code code;
+  fs::remove(file, code);
+  if (code) {
+    return fail(fmt::format("{}: cannot replace the file: {}", file.string(), code.message()));
   }
   return {};
 }
@@ -38,9 +48,8 @@ Status remove_frames(const fs::path& folder, const std::string& extension) {
     }
   }
   for (const fs::path& file : old) {
-    fs::remove(file, code);
-    if (code) {
-      return fail(fmt::format("{}: cannot replace the file: {}", file.string(), code.message()));
+    if (const Status removed = remove_file(file); !removed) {
+      return removed;
     }
   }
   return {};
@@ -84,6 +93,9 @@ Expected<DriveWriter> DriveWriter::create(const fs::path& out_dir,
       return fail(removed.error().message);
     }
   }
+  if (const Status removed = remove_file(writer.sequence_dir_ / kCameraFile); !removed) {
+    return fail(removed.error().message);
+  }
   return writer;
 }
 
@@ -125,11 +137,22 @@ Status DriveWriter::write_calibration(const Camera& camera) const {
   return write_text(sequence_dir_ / "calib.txt", text);
 }
 
-Status DriveWriter::write_truth(std::span<const Rigid3> world_from_camera) const {
+Status DriveWriter::write_camera_file(const Camera& camera, double rate_hz) const {
+  return write_text(
+      sequence_dir_ / kCameraFile,
+      fmt::format("image_width: {}\nimage_height: {}\ncamera_model: pinhole\n"
+                  "intrinsics: [{}, {}, {}, {}]\n"
+                  "distortion_model: none\ndistortion_coefficients: []\nrate_hz: {}\n",
+                  camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px,
+                  camera.cy_px, rate_hz));
+}
+
+Status DriveWriter::write_truth(std::span<const Rigid3> world_from_camera, double rate_hz) const {
+  const int digits = rate_hz == 10.0 ? 6 : 12;  // KITTI's own number of digits where it is exact
   std::string times;
   std::string poses;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
-    times += fmt::format("{:.6e}\n", kFrameInterval_s * static_cast<double>(i));
+    times += fmt::format("{:.{}e}\n", static_cast<double>(i) / rate_hz, digits);
     const Matrix34d m = i == 0
                             ? Rigid3().matrix()
                             : (world_from_camera.front().inverse() * world_from_camera[i]).matrix();

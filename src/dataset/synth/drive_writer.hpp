@@ -15,8 +15,8 @@ namespace stemvo::synth {
 /// OUT/sequences/NAME and OUT/poses in KITTI's layout. Every Error names the file.
 class DriveWriter {
  public:
-  /// Makes the folders and removes the frames of an earlier drive: a longer one would leave images
-  /// without times and poses behind.
+  /// Makes the folders and removes the frames and the camera file of an earlier drive: a longer one
+  /// would leave images without times and poses behind.
   [[nodiscard]] static Expected<DriveWriter> create(const std::filesystem::path& out_dir,
                                                     const std::string& name,
                                                     bool with_depth);
@@ -27,8 +27,10 @@ class DriveWriter {
   [[nodiscard]] Status write_depth(std::size_t index, const cv::Mat& depth_m) const;
   /// calib.txt with the same intrinsics in P0 to P3, no baseline.
   [[nodiscard]] Status write_calibration(const Camera& camera) const;
-  /// times.txt (10 Hz) and poses/NAME.txt, moved so that the first pose is the identity; 17 digits.
-  [[nodiscard]] Status write_truth(std::span<const Rigid3> world_from_camera) const;
+  /// camera.yaml beside calib.txt, for sources that read a folder of images.
+  [[nodiscard]] Status write_camera_file(const Camera& camera, double rate_hz) const;
+  /// times.txt and poses/NAME.txt, moved so that the first pose is the identity; 17 digits.
+  [[nodiscard]] Status write_truth(std::span<const Rigid3> world_from_camera, double rate_hz) const;
 
  private:
   std::filesystem::path sequence_dir_;

@@ -10,6 +10,7 @@ namespace {
 using Points = std::vector<Eigen::Vector3d>;
 
 constexpr double kJump_m = 12.0;       // a step no car makes in 0.1 s
+constexpr double kJump_m_s = 120.0;    // and in longer intervals
 constexpr double kMinAdvance_m = 0.3;  // less is standing, turning on the spot, or reversing
 constexpr double kFine_m = 0.25;       // spacing while smoothing
 
@@ -125,21 +126,22 @@ RoadCurve fit_road(const std::vector<Key>& keys) {
 
 }  // namespace
 
-Drive make_drive_along(const Trajectory& world_from_camera) {
+Drive make_drive_along(const Trajectory& world_from_camera, double rate_hz) {
+  const double jump_m = std::max(kJump_m, kJump_m_s / rate_hz);
   Drive drive;
   drive.world_from_camera = world_from_camera;
   for (std::size_t begin = 0; begin < world_from_camera.size();) {
     std::size_t end = begin + 1;
     while (end < world_from_camera.size() &&
            (world_from_camera[end].translation - world_from_camera[end - 1].translation).norm() <=
-               kJump_m) {
+               jump_m) {
       ++end;
     }
     const auto poses = std::span(world_from_camera).subspan(begin, end - begin);
     drive.roads.push_back(fit_road(keys_of(poses)));
     double arc_m = kRoadBehind_m + 10.0;
     for (const Rigid3& pose : poses) {
-      arc_m = drive.roads.back().nearest(pose.translation, arc_m, 2.0 * kJump_m);
+      arc_m = drive.roads.back().nearest(pose.translation, arc_m, 2.0 * jump_m);
       drive.places.push_back({drive.roads.size() - 1, arc_m});
     }
     begin = end;

@@ -122,6 +122,48 @@ Rgb fence(const Style& style, const Footprint& at, const Textures& textures) {
   return scaled(style.albedo, 1.0F - 0.6F * gaps + 0.15F * noise(textures.grain, at, 0.02F));
 }
 
+/// Each brick and each board has its own tone while it is larger than the footprint.
+float own_tone(std::uint64_t hash, float footprint_share) {
+  const float sharp = std::clamp(2.0F - 2.0F * footprint_share, 0.0F, 1.0F);
+  return sharp * (static_cast<float>(unit(hash)) - 0.5F);
+}
+
+/// For walls that are looked at from a step away: grains of 3 mm, and stains.
+Rgb brick(const Style& style, const Footprint& at, const Textures& textures) {
+  constexpr float kLength_m = 0.25F;
+  constexpr float kHeight_m = 0.083F;
+  constexpr float kMortar_m = 0.012F;
+  const auto row = static_cast<int>(std::floor(at.v / kHeight_m));
+  const float u = at.u + (row % 2 == 0 ? 0.0F : 0.5F * kLength_m);
+  const auto column = static_cast<int>(std::floor(u / kLength_m));
+  const float mortar = std::max(bars_coverage(u, at.width_u, kLength_m, kMortar_m),
+                                bars_coverage(at.v, at.width_v, kHeight_m, kMortar_m));
+  const auto shift = static_cast<float>(style.seed % 61U);
+  const float own = own_tone(hash_of(style.seed, row, column),
+                             std::max(at.width_u / kLength_m, at.width_v / kHeight_m));
+  const float stains = 0.06F * noise(textures.grain, at, 0.03F, shift) +
+                       0.10F * noise(textures.leaf, at, 0.04F, shift);
+  const float tone = 1.0F + 0.55F * own + 0.10F * noise(textures.grain, at, 0.003F, shift) + stains;
+  const float gray = 0.46F * (1.0F + 0.06F * noise(textures.grain, at, 0.004F, shift) + stains);
+  return blend(scaled(style.albedo, tone), {gray, 0.97F * gray, 0.92F * gray}, mortar);
+}
+
+/// Planks of 13 cm with streaks along them and gaps between them.
+Rgb boards(const Style& style, const Footprint& at, const Textures& textures) {
+  constexpr float kWidth_m = 0.13F;
+  const float gaps = bars_coverage(at.u, at.width_u, kWidth_m, 0.008F);
+  const auto board = static_cast<int>(std::floor(at.u / kWidth_m));
+  const float own = own_tone(hash_of(style.seed, board), at.width_u / kWidth_m);
+  Footprint along = at;  // ten times as long as wide
+  along.v = 0.1F * at.v + 1.7F * static_cast<float>(board);
+  along.width_v = 0.1F * at.width_v;
+  const auto shift = static_cast<float>(style.seed % 53U);
+  const float tone = 1.0F + 0.5F * own + 0.16F * noise(textures.grain, along, 0.004F, shift) +
+                     0.12F * noise(textures.leaf, along, 0.01F, shift) +
+                     0.06F * noise(textures.grain, at, 0.02F, shift);
+  return scaled(style.albedo, std::max(0.1F, tone) * (1.0F - 0.75F * gaps));
+}
+
 }  // namespace
 
 float box_coverage(float x, float width, float begin, float end) {
@@ -161,12 +203,18 @@ Rgb paint(const Style& style, const Footprint& at, const Textures& textures) {
       return roof(style, at, textures);
     case Material::kHedge:
       return leaves(style, at, textures, 0.015F, 0.75F);
+    case Material::kNearHedge:
+      return leaves(style, at, textures, 0.006F, 0.6F);
     case Material::kFence:
       return fence(style, at, textures);
     case Material::kBark:
       return leaves(style, at, textures, 0.01F, 0.3F);
     case Material::kLeaves:
       return leaves(style, at, textures, 0.02F, 0.75F);
+    case Material::kBrick:
+      return brick(style, at, textures);
+    case Material::kBoards:
+      return boards(style, at, textures);
     case Material::kPaint:
       break;
   }

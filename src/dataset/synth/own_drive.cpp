@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -8,6 +7,7 @@
 
 #include "dataset/synth/drive.hpp"
 #include "dataset/synth/hash.hpp"
+#include "dataset/synth/sway.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -15,42 +15,10 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kMinSpeed_m_s = 8.0;
 constexpr double kMaxSpeed_m_s = 12.0;
+/// Turns get wider above this speed, so that no car has to skid.
+constexpr double kTightestTurns_m_s = 12.0;
 
 double radians(double degrees) { return degrees * kPi / 180.0; }
-
-/// A smooth random function of time: five sines with incommensurate periods.
-class Sway {
- public:
-  Sway(std::uint64_t seed,
-       int key,
-       double standard_deviation,
-       double slowest_hz,
-       double fastest_hz) {
-    Draw draw(seed, 'w', key);
-    const double amplitude =
-        standard_deviation * std::sqrt(2.0 / static_cast<double>(waves_.size()));
-    for (std::size_t i = 0; i < waves_.size(); ++i) {
-      const double t = (static_cast<double>(i) + draw.next()) / static_cast<double>(waves_.size());
-      waves_[i] = {slowest_hz * std::pow(fastest_hz / slowest_hz, t), draw.in(0.0, 2.0 * kPi),
-                   amplitude * draw.in(0.8, 1.2)};
-    }
-  }
-  [[nodiscard]] double at(double time_s) const {
-    double sum = 0.0;
-    for (const Wave& wave : waves_) {
-      sum += wave.amplitude * std::sin(2.0 * kPi * wave.frequency_hz * time_s + wave.phase_rad);
-    }
-    return sum;
-  }
-
- private:
-  struct Wave {
-    double frequency_hz;
-    double phase_rad;
-    double amplitude;
-  };
-  std::array<Wave, 5> waves_{};
-};
 
 std::vector<double> moving_average(const std::vector<double>& values, int reach) {
   std::vector<double> result(values.size());
@@ -67,12 +35,14 @@ std::vector<double> moving_average(const std::vector<double>& values, int reach)
 
 /// Curvature (1/m, > 0 to the right) per knot: straights and turns in alternation, with smooth
 /// entries (the averages make them clothoid-like). The first two turns go to different sides.
-std::vector<double> draw_curvature(std::size_t num_knots, std::uint64_t seed) {
+std::vector<double> draw_curvature(std::size_t num_knots, std::uint64_t seed, const Pace& pace) {
   Draw draw(seed, 'k');
+  const double faster = pace.speed_m_s.value_or(0.0) / kTightestTurns_m_s;
+  const double widened = std::max(1.0, faster * faster);
   std::vector<double> curvature(static_cast<std::size_t>(kRoadBehind_m) + 12, 0.0);
   double side = draw.chance(0.5) ? 1.0 : -1.0;
   for (int turn = 0; curvature.size() < num_knots; ++turn) {
-    const double radius_m = draw.in(22.0, 70.0);
+    const double radius_m = widened * draw.in(22.0, 70.0);
     const double angle_rad = radians(draw.in(25.0, 80.0));
     curvature.insert(curvature.end(), static_cast<std::size_t>(radius_m * angle_rad),
                      side / radius_m);
@@ -121,6 +91,21 @@ std::vector<double> plan_speed(const std::vector<double>& curvature) {
   return moving_average(moving_average(speed, 10), 10);
 }
 
+/// Scales the speeds so that the way of `length_m` from the first camera on is driven at
+/// `mean_m_s`.
+void set_mean_speed(double mean_m_s, double length_m, std::vector<double>& speed) {
+  const auto begin = static_cast<std::size_t>(kRoadBehind_m / kKnotSpacing_m);
+  const auto count = static_cast<std::size_t>(length_m / kKnotSpacing_m) + 1;
+  double time_s = 0.0;
+  for (std::size_t i = begin; i < begin + count; ++i) {
+    time_s += kKnotSpacing_m / speed[i];
+  }
+  const double factor = mean_m_s * time_s / (static_cast<double>(count) * kKnotSpacing_m);
+  for (double& value : speed) {
+    value *= factor;
+  }
+}
+
 /// How the camera moves against the road.
 class CarBody {
  public:
@@ -158,21 +143,25 @@ class CarBody {
 
 }  // namespace
 
-Drive make_own_drive(int num_frames, std::uint64_t seed) {
-  const double longest_m = kMaxSpeed_m_s * kFrameInterval_s * num_frames;
+Drive make_own_drive(int num_frames, std::uint64_t seed, const Pace& pace) {
+  const double interval_s = 1.0 / pace.rate_hz;
+  const double longest_m = pace.speed_m_s.value_or(kMaxSpeed_m_s) * interval_s * num_frames;
   const auto num_knots =
       static_cast<std::size_t>((kRoadBehind_m + longest_m + kRoadAhead_m) / kKnotSpacing_m);
-  const auto curvature = draw_curvature(num_knots, seed);
-  const auto speed = plan_speed(curvature);
+  const auto curvature = draw_curvature(num_knots, seed, pace);
+  auto speed = plan_speed(curvature);
+  if (pace.speed_m_s) {
+    set_mean_speed(*pace.speed_m_s, longest_m, speed);
+  }
   Drive drive;
   drive.roads.push_back(lay_road(curvature, seed));
   const CarBody body(seed);
   double arc_m = kRoadBehind_m;
   for (int i = 0; i < num_frames; ++i) {
     drive.world_from_camera.push_back(
-        body.world_from_camera(drive.roads.front(), arc_m, kFrameInterval_s * i));
+        body.world_from_camera(drive.roads.front(), arc_m, interval_s * i));
     drive.places.push_back({0, arc_m});
-    arc_m += kFrameInterval_s * speed[static_cast<std::size_t>(arc_m / kKnotSpacing_m)];
+    arc_m += interval_s * speed[static_cast<std::size_t>(arc_m / kKnotSpacing_m)];
   }
   return drive;
 }

@@ -72,7 +72,8 @@ void add_loose_leaves(const Eigen::Vector3d& centre,
   }
 }
 
-/// Overlapping balls of different size and tone, with loose leaves.
+}  // namespace
+
 void add_crown(
     const Eigen::Vector3d& centre, double radius_m, double stretch, Draw draw, Scene& scene) {
   Style style;
@@ -94,6 +95,8 @@ void add_crown(
     add_loose_leaves(at, semi, static_cast<int>(50.0 * radius_m * size), style, draw, scene);
   }
 }
+
+namespace {
 
 void add_tree(const StreetContext& street,
               double arc_m,

@@ -167,8 +167,8 @@ class FramePainter {
 
 }  // namespace
 
-Renderer::Renderer(Drive drive, const Camera& camera, std::uint64_t seed)
-    : drive_(std::move(drive)), camera_(camera), seed_(seed), textures_(seed), sky_(seed) {
+Renderer::Renderer(std::variant<Drive, Walk> path, const Camera& camera, std::uint64_t seed)
+    : path_(std::move(path)), camera_(camera), seed_(seed), textures_(seed), sky_(seed) {
   Draw draw(seed, 'L');
   const double azimuth = draw.in(0.0, 6.283185307179586);
   const double height = draw.in(0.6, 0.8);  // rad
@@ -176,12 +176,25 @@ Renderer::Renderer(Drive drive, const Camera& camera, std::uint64_t seed)
              std::cos(height) * std::cos(azimuth)};
 }
 
+const Trajectory& Renderer::world_from_camera() const {
+  return std::visit([](const auto& path) -> const Trajectory& { return path.world_from_camera; },
+                    path_);
+}
+
+Scene Renderer::scene_at(std::size_t index) const {
+  const Eigen::Vector3d& position = world_from_camera()[index].translation;
+  if (const auto* walk = std::get_if<Walk>(&path_)) {
+    return build_courtyard(walk->courtyard, position, to_sun_);
+  }
+  const auto& drive = std::get<Drive>(path_);
+  const FramePlace& place = drive.places[index];
+  return build_scene(drive.roads[place.road], place.arc_m, position, to_sun_,
+                     hash_of(seed_, place.road));
+}
+
 RenderedFrame Renderer::render(std::size_t index) const {
-  const Rigid3& pose = drive_.world_from_camera[index];
-  const FramePlace& place = drive_.places[index];
-  const Scene scene = build_scene(drive_.roads[place.road], place.arc_m, pose.translation, to_sun_,
-                                  hash_of(seed_, place.road));
-  FramePainter painter(camera_, pose, scene, textures_, sky_);
+  const Scene scene = scene_at(index);
+  FramePainter painter(camera_, world_from_camera()[index], scene, textures_, sky_);
   painter.paint_all();
   return {expose(painter.light(), hash_of(seed_, 'n', index)), painter.depth_m()};
 }

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <variant>
 
 #include <opencv2/core.hpp>
 
 #include "dataset/synth/drive.hpp"
 #include "dataset/synth/ripmap.hpp"
+#include "dataset/synth/scene.hpp"
 #include "dataset/synth/sky.hpp"
+#include "dataset/synth/walk.hpp"
 #include "stemvo/geometry/camera.hpp"
 
 namespace stemvo::synth {
@@ -17,17 +20,19 @@ struct RenderedFrame {
   cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
 };
 
-/// Draws frames of a drive. One frame needs nothing of the others, so any number of threads may
-/// call render() at once.
+/// Draws frames of a drive or of a walk. One frame needs nothing of the others, so any number of
+/// threads may call render() at once.
 class Renderer {
  public:
-  Renderer(Drive drive, const Camera& camera, std::uint64_t seed);
+  Renderer(std::variant<Drive, Walk> path, const Camera& camera, std::uint64_t seed);
 
-  [[nodiscard]] const Drive& drive() const { return drive_; }
+  [[nodiscard]] const Trajectory& world_from_camera() const;
   [[nodiscard]] RenderedFrame render(std::size_t index) const;
 
  private:
-  Drive drive_;
+  [[nodiscard]] Scene scene_at(std::size_t index) const;
+
+  std::variant<Drive, Walk> path_;
   Camera camera_;
   std::uint64_t seed_;
   Textures textures_;

@@ -45,7 +45,6 @@ RoadWindow visible_window(const RoadCurve& road, double arc_m) {
 void Scene::add_polygon(std::span<const Eigen::Vector3d> corners,
                         std::span<const Eigen::Vector2d> texture,
                         const Style& style) {
-  constexpr double kAmbient = 0.36;
   constexpr double kSun = 0.95;
   Face face;
   face.num_points = static_cast<int>(corners.size());
@@ -61,7 +60,7 @@ void Scene::add_polygon(std::span<const Eigen::Vector3d> corners,
     normal = -normal;  // towards the camera
   }
   const double sky = 0.12 * -normal.y();
-  const double light = kAmbient + sky + kSun * std::max(0.0, normal.dot(to_sun_));
+  const double light = ambient_ + sky + kSun * std::max(0.0, normal.dot(to_sun_));
   face.style.light = static_cast<float>(light * static_cast<double>(style.light));
   faces_.push_back(face);
 }
@@ -108,12 +107,14 @@ void Scene::add_prism(const Eigen::Vector3d& foot,
 void Scene::add_box(const Eigen::Vector3d& corner,
                     const std::array<Eigen::Vector3d, 3>& edges,
                     const Style& style) {
+  double begin_m = 0.0;  // each side has a texture of its own, not its neighbour's mirrored
   const auto side = [&](const Eigen::Vector3d& at, const Eigen::Vector3d& u,
                         const Eigen::Vector3d& v) {
-    add_quad(
-        {at, at + u, at + u + v, at + v},
-        {Eigen::Vector2d(0, 0), Eigen::Vector2d(u.norm(), 0), Eigen::Vector2d(u.norm(), v.norm())},
-        style);
+    add_quad({at, at + u, at + u + v, at + v},
+             {Eigen::Vector2d(begin_m, 0), Eigen::Vector2d(begin_m + u.norm(), 0),
+              Eigen::Vector2d(begin_m + u.norm(), v.norm())},
+             style);
+    begin_m += 2.3;
   };
   const auto& [along, across, up] = edges;
   side(corner, along, up);
@@ -128,7 +129,8 @@ Scene build_scene(const RoadCurve& road,
                   const Eigen::Vector3d& camera_position,
                   const Eigen::Vector3d& to_sun,
                   std::uint64_t seed) {
-  Scene scene(camera_position, to_sun);
+  constexpr double kAmbient = 0.36;
+  Scene scene(camera_position, to_sun, kAmbient);
   const StreetContext street{road, visible_window(road, arc_m),
                              std::floor(arc_m / kTexturePeriod_m) * kTexturePeriod_m, seed};
   add_ground(street, scene);

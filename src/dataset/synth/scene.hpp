@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "dataset/synth/hash.hpp"
 #include "dataset/synth/road_curve.hpp"
 
 namespace stemvo::synth {
@@ -25,7 +26,10 @@ enum class Material : std::uint8_t {
   kFence,
   kBark,
   kLeaves,
-  kPaint,  // cars, poles, signs: one colour
+  kPaint,      // cars, poles, signs: one colour
+  kNearHedge,  // one that is looked at from a step away
+  kBrick,
+  kBoards,  // upright planks
 };
 
 /// How a face is painted; the meaning of `size` depends on the material.
@@ -46,11 +50,12 @@ struct Face {
   Style style;
 };
 
-/// The part of a street that is near one frame.
+/// What is near one frame: part of a street, or a courtyard.
 class Scene {
  public:
-  explicit Scene(const Eigen::Vector3d& origin, const Eigen::Vector3d& to_sun)
-      : origin_(origin), to_sun_(to_sun) {}
+  /// `ambient`: light on what the sun does not reach.
+  Scene(const Eigen::Vector3d& origin, const Eigen::Vector3d& to_sun, double ambient)
+      : origin_(origin), to_sun_(to_sun), ambient_(ambient) {}
 
   [[nodiscard]] const std::vector<Face>& faces() const { return faces_; }
 
@@ -81,6 +86,7 @@ class Scene {
 
   Eigen::Vector3d origin_;
   Eigen::Vector3d to_sun_;
+  double ambient_;
   std::vector<Face> faces_;
 };
 
@@ -112,6 +118,10 @@ void add_trees(const StreetContext& street, Scene& scene);
 void add_bushes(const StreetContext& street, Scene& scene);
 void add_poles(const StreetContext& street, Scene& scene);
 void add_parked_cars(const StreetContext& street, Scene& scene);
+
+/// Overlapping balls of leaves of different size and tone, with loose leaves.
+void add_crown(
+    const Eigen::Vector3d& centre, double radius_m, double stretch, Draw draw, Scene& scene);
 
 /// Calls build(slot, arc_m) for every slot of `length_m` that touches the window; slots are
 /// numbered along the whole road, so that a thing is the same from wherever it is seen.
