@@ -21,7 +21,7 @@ foreach(i RANGE ${last})
   list(APPEND names ${stage})
 endforeach()
 foreach(stage decode stem stretch pyramid road_picture detection klt orb homography fundamental essential
-              two_view_refinement two_view placement map_refinement road_scale)
+              two_view_refinement two_view localization window_refinement road_scale)
   if(NOT stage IN_LIST names)
     message(SEND_ERROR "no benchmark of ${stage}")
   endif()

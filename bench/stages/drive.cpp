@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "odometry/motion_chain.hpp"
+#include "odometry/road_picture.hpp"
 #include "stemvo/dataset/synthetic_drive.hpp"
 
 namespace stemvo::bench {
@@ -68,7 +68,7 @@ Frames load_frames() {
   return frames;
 }
 
-/// As ChannelOdometry does it; the last frame is left before its place.
+/// As ChannelOdometry does it; the last frame is not localized.
 Chain run_chain() {
   Chain result;
   result.camera = frames().sequence.camera();
@@ -76,33 +76,27 @@ Chain run_chain() {
   const Stem stem = load_stem(config.stem);
   ChannelStretch stretch(config.stem);
   const auto front_end = value_of(create_front_end(config.features));
-  const TwoViewEstimator estimator(config, result.camera);
-  MotionChain motions(config.odometry, config.scale);
-  result.map = std::make_unique<MapOdometry>(config, result.camera);
+  result.estimator = std::make_unique<WindowEstimator>(config, result.camera);
   const int last = static_cast<int>(frames().pixels.size()) - 1;
   for (int i = 0; i <= last; ++i) {
     const cv::Mat& pixels = frames().pixels[static_cast<std::size_t>(i)];
     result.channel = value_of(stem.apply(pixels));
     result.images.push_back(stretch.apply(result.channel));
-    result.road =
+    TrackedFrame frame;
+    frame.number = i;
+    frame.has_image = true;
+    frame.image = pixels;
+    frame.road =
         std::make_shared<RoadPicture>(make_road_picture(result.images.back(), result.camera));
-    result.matches = front_end->process(result.images.back());
-    if (i == 0) {
-      motions.start();
-      result.map->restart(i, *result.road);
-      continue;
-    }
-    result.motion = estimator.measure(result.matches.prev_uv, result.matches.cur_uv,
-                                      motions.is_initializing(), config.seed);
-    result.world_from_prev = motions.world_from_picture();
+    frame.matches = front_end->process(result.images.back(), i);
     if (i == last) {
+      result.matches = frame.matches;
+      result.last = std::move(frame);
       break;
     }
-    MeasuredMotion motion = result.motion;
-    result.map->place(i, result.world_from_prev, result.matches, motion);
-    front_end->keep(motion.inlier_mask);
-    result.map->refine(*result.road, result.matches, motion);
-    motions.add(motion);
+    LocalizedFrame localized = result.estimator->localize(frame);
+    front_end->keep(localized.inlier_mask);
+    result.estimator->optimize(frame, localized);
   }
   return result;
 }

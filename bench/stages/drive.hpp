@@ -7,9 +7,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "odometry/map_odometry.hpp"
-#include "odometry/road_picture.hpp"
-#include "odometry/two_view_estimator.hpp"
+#include "odometry/estimator.hpp"
+#include "odometry/window_estimator.hpp"
 #include "stemvo/config.hpp"
 #include "stemvo/dataset/sequence.hpp"
 #include "stemvo/features/front_end.hpp"
@@ -31,13 +30,11 @@ struct Frames {
 struct Chain {
   Config config;
   Camera camera;
-  Channel channel;                    ///< of the last frame
-  std::vector<ChannelImage> images;   ///< of all frames
-  std::shared_ptr<RoadPicture> road;  ///< of the last frame
-  Matches matches;                    ///< to the last frame
-  MeasuredMotion motion;              ///< of the last frame, by the two-view estimator
-  Rigid3 world_from_prev;             ///< pose of the frame before
-  std::unique_ptr<MapOdometry> map;   ///< after the frame before
+  Channel channel;                             ///< of the last frame
+  std::vector<ChannelImage> images;            ///< of all frames
+  TrackedFrame last;                           ///< the last frame
+  Matches matches;                             ///< to the last frame
+  std::unique_ptr<WindowEstimator> estimator;  ///< after the frame before
 };
 [[nodiscard]] const Chain& chain();
 

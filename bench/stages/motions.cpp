@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-// From matches to a metric pose: the two-view pieces, placement, map refinement, road scale.
-#include <algorithm>
-#include <vector>
-
+// From matches to a metric pose: the two-view pieces, localization, window refinement, road
+// scale.
 #include <benchmark/benchmark.h>
 
 #include "odometry/robust_models.hpp"
+#include "odometry/two_view_estimator.hpp"
 #include "stages/drive.hpp"
 #include "stages/run_stage.hpp"
 #include "stemvo/geometry/relative_pose_refinement.hpp"
@@ -57,30 +56,18 @@ void two_view(State& state, bool is_initializing) {
   }
 }
 
-/// The last frame, from the map as it was before it.
+/// The last frame, from the window as it was before it.
 void run_last_frame(State& state, Stage stage) {
   const Chain& c = chain();
   run_stage(state, stage, [&] {
-    MapOdometry map = *c.map;
-    MeasuredMotion motion = c.motion;
-    map.place(static_cast<int>(c.images.size()) - 1, c.world_from_prev, c.matches, motion);
-    map.refine(*c.road, c.matches, motion);
+    WindowEstimator estimator = *c.estimator;
+    LocalizedFrame localized = estimator.localize(c.last);
+    estimator.optimize(c.last, localized);
   });
 }
 
-void placement(State& state) {
-  const Chain& c = chain();
-  for (auto _ : state) {
-    state.PauseTiming();
-    MapOdometry map = *c.map;
-    MeasuredMotion motion = c.motion;
-    state.ResumeTiming();
-    map.place(static_cast<int>(c.images.size()) - 1, c.world_from_prev, c.matches, motion);
-    benchmark::DoNotOptimize(motion.num_inliers);
-  }
-}
-
-void map_refinement(State& state) { run_last_frame(state, Stage::kMapRefinement); }
+void localization(State& state) { run_last_frame(state, Stage::kLocalization); }
+void window_refinement(State& state) { run_last_frame(state, Stage::kWindowRefinement); }
 void road_scale(State& state) { run_last_frame(state, Stage::kRoadScale); }
 
 BENCHMARK(homography)->Unit(benchmark::kMillisecond);
@@ -89,8 +76,8 @@ BENCHMARK(essential)->Unit(benchmark::kMillisecond);
 BENCHMARK(two_view_refinement)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(two_view, initializing, true)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(two_view, tracking, false)->Unit(benchmark::kMillisecond);
-BENCHMARK(placement)->Unit(benchmark::kMillisecond);
-BENCHMARK(map_refinement)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(localization)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(window_refinement)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(road_scale)->UseManualTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace

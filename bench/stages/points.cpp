@@ -36,7 +36,7 @@ class Pictures {
   void advance(const Measured& measured) {
     if (next_ == 0 || next_ == prepared_.size()) {
       front_end_ = create_front_end(options_of("klt")).value();
-      front_end_->process(prepared_.front());
+      static_cast<void>(front_end_->process(prepared_.front(), 0));
       next_ = 1;
     }
     measured(*front_end_, prepared_[next_++]);
@@ -54,7 +54,7 @@ void run_klt(State& state, Stage stage) {
   Pictures pictures("klt");
   run_stage(state, stage, [&] {
     pictures.advance([](FrontEnd& front_end, const Prepared& picture) {
-      benchmark::DoNotOptimize(front_end.process(picture));
+      benchmark::DoNotOptimize(front_end.process(picture, 0));
     });
   });
 }
@@ -101,11 +101,11 @@ void orb_match(State& state) {
   std::size_t i = 0;
   run_stage(state, Stage::kTracking, [&] {
     if (i == 0) {
-      pictures.front_end().process(pictures.prepared().front());
+      static_cast<void>(pictures.front_end().process(pictures.prepared().front(), 0));
     }
     ++i;
     benchmark::DoNotOptimize(
-        pictures.front_end().process(pictures.prepared()[i % pictures.prepared().size()]));
+        pictures.front_end().process(pictures.prepared()[i % pictures.prepared().size()], 0));
   });
 }
 

@@ -69,10 +69,11 @@ void PairEstimator::measure_step(const TrackedFrame& frame) {
   }
   const bool has_step = motion_.state == FrameState::kTracking;
   const Rigid3& direction = motion_.cur_from_prev;
-  const double step = has_step ? last_step_ : 0.0;
-  last_step_ *= scale_.measure(frame.road.get(),
-                               Rigid3(direction.rotation, step * direction.translation));
-  motion_.step = has_step ? last_step_ : 0.0;
+  const int num_frames = frame.number - frame.matches.prev_frame;
+  const double step = has_step ? num_frames * last_step_ : 0.0;
+  last_step_ *=
+      scale_.measure(frame.road.get(), Rigid3(direction.rotation, step * direction.translation));
+  motion_.step = has_step ? num_frames * last_step_ : 0.0;
 }
 
 }  // namespace stemvo

@@ -60,8 +60,7 @@ inline std::filesystem::path drives_folder() {
 /// Renders a drive by these options of `stemvo synth`, or takes the one that is there. Returns the
 /// folder with sequences/00 and poses/00.txt. Read it only; copy what is to be broken.
 inline std::filesystem::path render_once(const std::string& name,
-                                         const DriveSize& size,
-                                         const std::optional<std::filesystem::path>& poses) {
+                                         const std::vector<std::string>& options) {
   namespace fs = std::filesystem;
   const fs::path parent = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
   fs::create_directories(parent);
@@ -70,12 +69,8 @@ inline std::filesystem::path render_once(const std::string& name,
   if (!fs::exists(drive)) {
     const fs::path unfinished = parent / (name + ".unfinished");
     fs::remove_all(unfinished);
-    std::vector<std::string> arguments = {
-        "synth",   unfinished.string(),           "--frames", std::to_string(size.frames),
-        "--width", std::to_string(size.width_px), "--height", std::to_string(size.height_px)};
-    if (poses) {
-      arguments.insert(arguments.end(), {"--trajectory", poses->string()});
-    }
+    std::vector<std::string> arguments = {"synth", unfinished.string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
     const ProgramResult result = run_stemvo(arguments);
     if (result.exit_code != 0) {
       throw std::runtime_error("stemvo synth failed: " + result.err);
@@ -83,6 +78,24 @@ inline std::filesystem::path render_once(const std::string& name,
     fs::rename(unfinished, drive);
   }
   return drive;
+}
+
+inline std::filesystem::path render_once(const std::string& name,
+                                         const DriveSize& size,
+                                         const std::optional<std::filesystem::path>& poses) {
+  std::vector<std::string> options = {"--frames", std::to_string(size.frames),
+                                      "--width",  std::to_string(size.width_px),
+                                      "--height", std::to_string(size.height_px)};
+  if (poses) {
+    options.insert(options.end(), {"--trajectory", poses->string()});
+  }
+  return render_once(name, options);
+}
+
+/// A walk with the camera in the hand, 640 x 480, 30 pictures a second.
+inline std::filesystem::path render_walk_once(int num_frames) {
+  return render_once("walk_" + std::to_string(num_frames),
+                     {"--walk", "--frames", std::to_string(num_frames)});
 }
 
 inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {

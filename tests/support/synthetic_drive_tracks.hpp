@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <map>
-#include <random>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "odometry/local_map.hpp"
 #include "stemvo/features/front_end.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
@@ -16,30 +16,63 @@
 
 namespace stemvo::testing {
 
-/// A drive past points on both sides, in metres, with perfect tracks plus noise.
+/// A camera's path past points, in metres, with perfect tracks plus noise.
 class DriveTracks {
  public:
+  /// A car's drive along a bend, past points on both sides.
   DriveTracks(int num_frames, double noise_px, std::uint64_t seed, double step_m = 1.0)
       : random_(seed), noise_px_(noise_px) {
-    Rigid3 pose;
-    for (int i = 0; i < num_frames; ++i) {
-      world_from_camera.push_back(pose);
-      pose = pose * Rigid3(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, step_m});
-    }
+    const Rigid3 motion(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, step_m});
+    world_from_camera = repeat(motion, num_frames);
     for (int i = 0; i < 1500; ++i) {
       const double side = random_.uniform(-1.0, 1.0);
       points.emplace_back(side * 12.0, random_.uniform(-4.0, 2.0), random_.uniform(5.0, 60.0));
     }
-    for (int i = 0; i < num_frames; ++i) {
-      observations.push_back(observe(i));
+    observe_all();
+  }
+
+  /// Along these poses, past these points.
+  DriveTracks(std::vector<Rigid3> path,
+              std::vector<Eigen::Vector3d> seen_points,
+              double noise_px,
+              std::uint64_t seed,
+              const Camera& seen_by = kitti_camera())
+      : camera(seen_by),
+        world_from_camera(std::move(path)),
+        points(std::move(seen_points)),
+        random_(seed),
+        noise_px_(noise_px) {
+    observe_all();
+  }
+
+  /// A path of equal motions (prev_from_cur).
+  [[nodiscard]] static std::vector<Rigid3> repeat(const Rigid3& motion, int num_frames) {
+    std::vector<Rigid3> path(1);
+    while (static_cast<int>(path.size()) < num_frames) {
+      path.push_back(path.back() * motion);
     }
+    return path;
+  }
+
+  [[nodiscard]] int num_frames() const { return static_cast<int>(world_from_camera.size()); }
+  [[nodiscard]] const Rigid3& pose(int i) const {
+    return world_from_camera[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] double length_m() const {
+    double sum = 0.0;
+    for (int i = 1; i < num_frames(); ++i) {
+      sum += (pose(i).translation - pose(i - 1).translation).norm();
+    }
+    return sum;
   }
 
   /// Matches of frame i - 1 to frame i under the points' numbers.
-  [[nodiscard]] Matches matches(int i) const {
+  [[nodiscard]] Matches matches(int i) const { return matches(i - 1, i); }
+  [[nodiscard]] Matches matches(int prev, int cur) const {
     Matches result;
-    for (const auto& [id, uv] : observations[static_cast<std::size_t>(i)]) {
-      const auto& before = observations[static_cast<std::size_t>(i - 1)];
+    result.prev_frame = prev;
+    for (const auto& [id, uv] : observations[static_cast<std::size_t>(cur)]) {
+      const auto& before = observations[static_cast<std::size_t>(prev)];
       if (const auto found = before.find(id); found != before.end()) {
         result.prev_uv.push_back(found->second);
         result.cur_uv.push_back(uv);
@@ -55,13 +88,22 @@ class DriveTracks {
   std::vector<std::map<int, Eigen::Vector2d>> observations;  ///< per frame: point -> pixel
 
  private:
+  void observe_all() {
+    for (int i = 0; i < num_frames(); ++i) {
+      observations.push_back(observe(i));
+    }
+  }
+
   std::map<int, Eigen::Vector2d> observe(int frame) {
     std::map<int, Eigen::Vector2d> seen;
-    const Rigid3 camera_from_world = world_from_camera[static_cast<std::size_t>(frame)].inverse();
+    const Rigid3 camera_from_world = pose(frame).inverse();
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector3d x = camera_from_world * points[i];
+      if (x.z() < 0.4) {
+        continue;
+      }
       const Eigen::Vector2d uv = camera.project(x);
-      if (x.z() > 2.0 && is_inside(camera, uv)) {
+      if (is_inside(camera, uv)) {
         const Eigen::Vector2d noise(random_.normal(noise_px_), random_.normal(noise_px_));
         seen.emplace(static_cast<int>(i), uv + noise);
       }
@@ -72,5 +114,37 @@ class DriveTracks {
   SceneRandom random_;
   double noise_px_;
 };
+
+/// Points on both sides of a path and ahead of it, as a street has them.
+inline std::vector<Eigen::Vector3d> points_along(const std::vector<Rigid3>& path,
+                                                 int num_points,
+                                                 std::uint64_t seed) {
+  SceneRandom random(seed);
+  std::vector<Eigen::Vector3d> points;
+  while (static_cast<int>(points.size()) < num_points) {
+    const auto at =
+        static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(path.size()) - 1e-6));
+    const double side = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+    const Eigen::Vector3d in_camera(side * random.uniform(3.0, 14.0), random.uniform(-4.0, 1.6),
+                                    random.uniform(5.0, 60.0));
+    points.push_back(path[at] * in_camera);
+  }
+  return points;
+}
+
+/// Points of a room around the origin: on its walls and on things before them.
+inline std::vector<Eigen::Vector3d> points_of_room(int num_points,
+                                                   double radius_m,
+                                                   std::uint64_t seed) {
+  SceneRandom random(seed);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < num_points; ++i) {
+    const double bearing = random.uniform(-3.14159, 3.14159);
+    const double distance = radius_m * random.uniform(0.5, 1.0);
+    points.emplace_back(distance * std::sin(bearing), random.uniform(-1.5, 1.5),
+                        distance * std::cos(bearing));
+  }
+  return points;
+}
 
 }  // namespace stemvo::testing

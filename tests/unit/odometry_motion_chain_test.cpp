@@ -106,17 +106,17 @@ TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
   EXPECT_EQ(chain.add(doubtful), FrameState::kGated);
 }
 
-TEST(MotionChain, CreepingKeepsTheDirectionAndStandingStays) {
+TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
   MotionChain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  MeasuredMotion creeping = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kLowParallax);
-  creeping.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
-  chain.add(creeping);
+  MeasuredMotion low_parallax = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kLowParallax);
+  low_parallax.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
+  chain.add(low_parallax);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 1.0 * kDeg, 1e-12);
-  MeasuredMotion standing;
-  standing.state = FrameState::kStationary;
-  chain.add(standing);
+  MeasuredMotion stationary;
+  stationary.state = FrameState::kStationary;
+  chain.add(stationary);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
 }
 

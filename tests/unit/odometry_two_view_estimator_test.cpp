@@ -87,10 +87,10 @@ TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
   EXPECT_LT(general.homography_ratio, 0.40);
 }
 
-TEST(TwoViewEstimator, StandingRotatingAndCreepingAreStates) {
-  const MeasuredMotion standing = measure(drive_scene({}, 0.05, 0.05, 5));
-  EXPECT_EQ(standing.state, FrameState::kStationary);
-  EXPECT_EQ(standing.cur_from_prev.translation.norm(), 0.0);
+TEST(TwoViewEstimator, StationaryRotatingAndLowParallaxAreStates) {
+  const MeasuredMotion stationary = measure(drive_scene({}, 0.05, 0.05, 5));
+  EXPECT_EQ(stationary.state, FrameState::kStationary);
+  EXPECT_EQ(stationary.cur_from_prev.translation.norm(), 0.0);
 
   const Rigid3 turn(so3_exp({0.0, 0.02, 0.0}), Eigen::Vector3d::Zero());
   const MeasuredMotion rotating = measure(drive_scene(turn, 0.05, 0.05, 6));
@@ -105,9 +105,9 @@ TEST(TwoViewEstimator, StandingRotatingAndCreepingAreStates) {
   EXPECT_LE(noisy.cur_from_prev.inverse().rotation.angularDistance(turn.rotation), 5e-4);
 
   const Rigid3 creep(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.0, 0.02});
-  const MeasuredMotion creeping = measure(drive_scene(creep, 0.05, 0.05, 7));
-  EXPECT_EQ(creeping.state, FrameState::kLowParallax);
-  EXPECT_LE(creeping.cur_from_prev.inverse().rotation.angularDistance(creep.rotation), 5e-4);
+  const MeasuredMotion low_parallax = measure(drive_scene(creep, 0.05, 0.05, 7));
+  EXPECT_EQ(low_parallax.state, FrameState::kLowParallax);
+  EXPECT_LE(low_parallax.cur_from_prev.inverse().rotation.angularDistance(creep.rotation), 5e-4);
 }
 
 TEST(TwoViewEstimator, TooFewRandomOrNotFiniteMatchesAreLostNotWrong) {

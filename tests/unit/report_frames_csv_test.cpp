@@ -44,7 +44,7 @@ TEST(FramesCsv, HoldsOneRowPerFrame) {
   ASSERT_TRUE(csv->close());
   EXPECT_EQ(read_all(folder / "frames.csv"),
             std::string(kHeader) +
-                "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,-\n"
+                "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,disabled\n"
                 "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
                 "1.250,12.500,3.000,0.0123,held\n");
 }

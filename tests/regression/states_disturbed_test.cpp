@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// Pictures that show something else than a street that stands still: none, darkness, others.
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "support/drives.hpp"
+#include "support/state_drives.hpp"
+#include "support/state_runs.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::kDeg;
+using test::StateDrive;
+using test::StateRun;
+
+class Disturbed : public ::testing::Test {
+ protected:
+  /// A copy of the drive that may be changed.
+  void copy(const std::string& name, const StateDrive& drive) {
+    const fs::path from = test::rendered_along(name, drive);
+    sequence_ = folder_.path() / "sequences" / "00";
+    fs::create_directories(sequence_.parent_path());
+    fs::copy(from, sequence_, fs::copy_options::recursive);
+  }
+  [[nodiscard]] fs::path picture_file(int frame) const {
+    char name[32];
+    std::snprintf(name, sizeof(name), "image_2/%06d.png", frame);
+    return sequence_ / name;
+  }
+  void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
+    for (int i = from; i < to; ++i) {
+      cv::Mat picture = cv::imread(picture_file(i).string(), cv::IMREAD_COLOR);
+      ASSERT_FALSE(picture.empty());
+      edit(i, picture);
+      ASSERT_TRUE(cv::imwrite(picture_file(i).string(), picture));
+    }
+  }
+  [[nodiscard]] StateRun run() const { return test::run_states(sequence_, "map", "camera_height"); }
+
+  test::TemporaryFolder folder_;
+  fs::path sequence_;
+};
+
+/// A thing with a texture of its own that goes from the left to the right over a third of the
+/// picture.
+struct Passing {
+  cv::Mat texture;
+  int first_frame;
+  int speed_px;
+
+  Passing(int first, int speed, const cv::Size& picture) : first_frame(first), speed_px(speed) {
+    texture.create(picture.height * 3 / 4, picture.width * 4 / 9, CV_8UC3);
+    cv::RNG random(7);
+    random.fill(texture, cv::RNG::UNIFORM, 0, 256);
+    cv::GaussianBlur(texture, texture, {}, 2.0);
+    cv::normalize(texture, texture, 20, 230, cv::NORM_MINMAX);
+  }
+  void draw(int frame, cv::Mat& picture) const {
+    const int left = (frame - first_frame) * speed_px - texture.cols / 2;
+    const cv::Rect place(left, picture.rows - texture.rows - 4, texture.cols, texture.rows);
+    const cv::Rect inside = place & cv::Rect({}, picture.size());
+    if (!inside.empty()) {
+      texture(cv::Rect(inside.tl() - place.tl(), inside.size())).copyTo(picture(inside));
+    }
+  }
+};
+
+constexpr double kStep_m = test::kDriveStep_m;
+const cv::Size kPicture(620, 188);
+
+TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
+  const StateDrive drive = test::steady_drive();
+  copy("steady", drive);
+  const int begin = 30;
+  const int end = 34;
+  cv::RNG random(3);
+  change(begin, end, [&](int, cv::Mat& picture) {
+    cv::Mat noise(picture.size(), CV_32FC3);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::Mat dark;
+    picture.convertTo(dark, CV_32FC3, 0.02);
+    dark += noise;
+    dark.convertTo(picture, CV_8UC3);
+  });
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  result.expect_states(begin, end, {"lost", "no_image"});
+  result.expect_states(end, end + 5, {"lost", "initializing", "tracking"});
+  result.expect_states(end + 5, 60, {"tracking"});
+  for (int i = begin; i < end; ++i) {
+    EXPECT_NE(result.roads[static_cast<std::size_t>(i)], "measured") << i;
+  }
+  for (const Trajectory* poses : result.trajectories()) {
+    test::expect_accurate(*poses, drive, 10, begin, 0.05, 0.3 * kDeg);
+    test::expect_accurate(*poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
+    // Over the dark too, by what was known before and after.
+    test::expect_accurate(*poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
+  }
+}
+
+TEST_F(Disturbed, MissingPicturesAreBridged) {
+  const StateDrive drive = test::steady_drive();
+  copy("steady", drive);
+  const int begin = 30;
+  const int end = 33;
+  for (int i = begin; i < end; ++i) {
+    fs::resize_file(picture_file(i), 200);
+  }
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  result.expect_states(begin, end, {"no_image"});
+  result.expect_states(end, end + 4, {"initializing", "tracking"});
+  result.expect_states(end + 4, 60, {"tracking"});
+  for (int i = begin; i < end; ++i) {
+    EXPECT_EQ(result.roads[static_cast<std::size_t>(i)], "held") << i;
+  }
+  for (const Trajectory* poses : result.trajectories()) {
+    test::expect_accurate(*poses, drive, 10, 60, 0.05, 0.3 * kDeg);
+  }
+}
+
+TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
+  const StateDrive drive = test::standing_drive();
+  copy("standing", drive);
+  const Passing passing(drive.event_begin + 2, 35, kPicture);
+  change(drive.event_begin + 2, drive.event_end,
+         [&](int i, cv::Mat& picture) { passing.draw(i, picture); });
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  result.expect_states(drive.event_begin, drive.event_end, {"stationary"});
+  const auto begin = static_cast<std::size_t>(drive.event_begin);
+  const auto end = static_cast<std::size_t>(drive.event_end);
+  const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
+  EXPECT_LE(moved.translation.norm(), 1e-6);
+  const int num_frames = static_cast<int>(result.poses.size());
+  for (const Trajectory* poses : result.trajectories()) {
+    test::expect_accurate(*poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+    test::expect_accurate(*poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
+  }
+}
+
+TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
+  const StateDrive drive = test::steady_drive();
+  copy("steady", drive);
+  const int begin = 15;
+  const int end = 45;
+  const Passing passing(begin, 26, kPicture);
+  change(begin, end, [&](int i, cv::Mat& picture) { passing.draw(i, picture); });
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  result.expect_states(begin, 60, {"tracking"});
+  for (const Trajectory* poses : result.trajectories()) {
+    test::expect_accurate(*poses, drive, 10, 60, 0.1, 0.5 * kDeg);
+  }
+  EXPECT_NEAR((result.poses[40].translation - result.poses[20].translation).norm(), 20 * kStep_m,
+              0.05 * 20 * kStep_m);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "odometry/estimator.hpp"
+#include "odometry/road_picture.hpp"
+#include "stemvo/config.hpp"
+#include "stemvo/geometry/alignment.hpp"
+#include "support/synthetic_drive_tracks.hpp"
+
+namespace stemvo::testing {
+
+/// Defaults without a road: a step that nothing measures is one unit.
+inline Config config_without_scale(const std::string& mode = "map") {
+  Config config;
+  config.odometry.mode = mode;
+  config.scale.source = "none";
+  return config;
+}
+
+/// Both halves of a frame.
+inline FrameResult add_frame(Estimator& estimator, const TrackedFrame& frame) {
+  LocalizedFrame localized = estimator.localize(frame);
+  estimator.optimize(frame, localized);
+  return localized.result;
+}
+
+/// Feeds an estimator with a drive's tracks, as a front end does: a track that it rejects ends, and
+/// its point is found again under another number.
+class EstimatorRun {
+ public:
+  EstimatorRun(Estimator& estimator, const DriveTracks& drive)
+      : picture(drive.camera.height_px, drive.camera.width_px, CV_8UC1, cv::Scalar(127)),
+        estimator_(estimator),
+        drive_(drive) {}
+
+  /// The next frame, which shows what the drive's frame `i` does.
+  FrameResult add(int i) {
+    return add_matches(last_ < 0 ? Matches() : drive_.matches(last_, i), i);
+  }
+  /// Frames [from, to) of the drive.
+  void add_range(int from, int to) {
+    for (int i = from; i < to; ++i) {
+      add(i);
+    }
+  }
+  void add_all() { add_range(0, drive_.num_frames()); }
+  /// A frame with these matches in place of the drive's own.
+  FrameResult add_matches(Matches matches, int i) {
+    TrackedFrame frame;
+    frame.number = static_cast<int>(results.size());
+    frame.has_image = true;
+    frame.image = picture;
+    frame.road = road ? road(i) : nullptr;
+    frame.matches = std::move(matches);
+    frame.matches.prev_frame = last_number_;
+    const std::vector<int> points = frame.matches.track_ids;
+    for (int& id : frame.matches.track_ids) {
+      id += kManyTracks * num_rejected_[id];
+    }
+    LocalizedFrame localized = estimator_.localize(frame);
+    inlier_mask = localized.inlier_mask;
+    point_ids = points;
+    for (std::size_t k = 0; k < inlier_mask.size(); ++k) {
+      num_rejected_[points[k]] += inlier_mask[k] == 0 ? 1 : 0;
+    }
+    estimator_.optimize(frame, localized);
+    last_ = i;
+    last_number_ = frame.number;
+    results.push_back(localized.result);
+    return results.back();
+  }
+  FrameResult add_missing() {
+    TrackedFrame frame;
+    frame.number = static_cast<int>(results.size());
+    results.push_back(add_frame(estimator_, frame));
+    return results.back();
+  }
+
+  [[nodiscard]] FrameState state(int i) const { return results[static_cast<std::size_t>(i)].state; }
+  [[nodiscard]] int count(FrameState state) const {
+    int number = 0;
+    for (const FrameResult& result : results) {
+      number += result.state == state ? 1 : 0;
+    }
+    return number;
+  }
+
+  cv::Mat picture;                                              ///< of the next frame
+  std::function<std::shared_ptr<const RoadPicture>(int)> road;  ///< of the drive's frames, or none
+  std::vector<FrameResult> results;
+  std::vector<char> inlier_mask;  ///< of the last frame
+  std::vector<int> point_ids;     ///< of the same matches
+
+ private:
+  static constexpr int kManyTracks = 1000000;
+
+  Estimator& estimator_;
+  const DriveTracks& drive_;
+  std::map<int, int> num_rejected_;  ///< times, by point
+  int last_ = -1;                    ///< frame of the drive
+  int last_number_ = -1;             ///< its number for the estimator
+};
+
+/// Greatest distance from the truth after a fit of scale, rotation and place, over the path's
+/// length.
+inline double fitted_error_share(std::span<const Rigid3> poses, std::span<const Rigid3> truth) {
+  std::vector<Eigen::Vector3d> from;
+  std::vector<Eigen::Vector3d> to;
+  double length = 0.0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    from.push_back(poses[i].translation);
+    to.push_back(truth[i].translation);
+    length += i > 0 ? (to[i] - to[i - 1]).norm() : 0.0;
+  }
+  const Similarity3 fit = align_positions(from, to, Alignment::kSim3);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const Eigen::Vector3d fitted = fit.scale * (fit.rotation * from[i]) + fit.translation;
+    worst = std::max(worst, (fitted - to[i]).norm());
+  }
+  return worst / length;
+}
+
+/// Greatest difference of rotations since the first of the poses, rad.
+inline double rotation_error_rad(std::span<const Rigid3> poses, std::span<const Rigid3> truth) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Eigen::Quaterniond estimated = poses[0].rotation.conjugate() * poses[i].rotation;
+    const Eigen::Quaterniond true_turn = truth[0].rotation.conjugate() * truth[i].rotation;
+    worst = std::max(worst, estimated.angularDistance(true_turn));
+  }
+  return worst;
+}
+
+/// Length from a to b over its true length.
+inline double length_ratio(std::span<const Rigid3> poses,
+                           std::span<const Rigid3> truth,
+                           int a,
+                           int b) {
+  const auto length = [&](std::span<const Rigid3> of) {
+    return (of[static_cast<std::size_t>(b)].translation -
+            of[static_cast<std::size_t>(a)].translation)
+        .norm();
+  };
+  return length(poses) / length(truth);
+}
+
+}  // namespace stemvo::testing

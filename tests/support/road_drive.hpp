@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "odometry/road_picture.hpp"
+#include "stemvo/config.hpp"
+#include "support/estimator_run.hpp"
+#include "support/road_scene.hpp"
+
+namespace stemvo::testing {
+
+/// Straight ahead along a road whose pictures are rendered, past points on both sides whose tracks
+/// are exact.
+struct RoadDrive {
+  static constexpr double kStep_m = 0.8;
+
+  RoadScene scene;
+  DriveTracks tracks;
+
+  explicit RoadDrive(int num_frames) : tracks(make_tracks(num_frames)) { scene.noise_gray = 1.0; }
+
+  [[nodiscard]] std::shared_ptr<const RoadPicture> road_picture(int frame, bool has_road) const {
+    RoadScene shown = scene;
+    shown.has_road = has_road;
+    const cv::Mat pixels =
+        render_road(shown, tracks.pose(frame).inverse(), static_cast<std::uint64_t>(frame));
+    return std::make_shared<RoadPicture>(make_road_picture({pixels, {}}, scene.camera));
+  }
+
+ private:
+  static DriveTracks make_tracks(int num_frames) {
+    SceneRandom random(11);
+    std::vector<Eigen::Vector3d> points;
+    for (int i = 0; i < 800; ++i) {
+      points.emplace_back(random.uniform(-12.0, 12.0), random.uniform(-4.0, 0.5),
+                          random.uniform(6.0, 60.0));
+    }
+    const Rigid3 step(Eigen::Quaterniond::Identity(), {0.0, 0.0, kStep_m});
+    return {DriveTracks::repeat(step, num_frames), points, 0.0, 11, RoadScene().camera};
+  }
+};
+
+inline Config metric_config(const std::string& mode = "map") {
+  Config config;
+  config.odometry.mode = mode;
+  config.scale.source = "camera_height";
+  return config;
+}
+
+}  // namespace stemvo::testing

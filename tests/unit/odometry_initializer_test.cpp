@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "odometry/initializer.hpp"
+#include "support/estimator_run.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+
+/// Goes on from frame 0, as the estimator does, until a frame decides.
+struct Decided {
+  int frame = -1;  ///< -1: none did
+  MeasuredMotion motion;
+  std::vector<FrameState> states;  ///< of the frames from 1 on
+  std::optional<Window> window;
+};
+
+View view_of(const Matches& matches, const Rigid3& pose, int frame) {
+  return {frame, pose, current_points(matches, std::vector<char>(matches.cur_uv.size(), 1))};
+}
+
+Decided initialize(const DriveTracks& drive, const Config& config = {}) {
+  Initializer initializer(config, drive.camera);
+  initializer.start({0, Rigid3(), {}});
+  Decided result;
+  for (int i = 1; i < drive.num_frames(); ++i) {
+    const Matches matches = drive.matches(i);
+    View now = view_of(matches, Rigid3(), i);
+    result.motion = initializer.measure(matches, now.points);
+    result.states.push_back(result.motion.state);
+    if (result.motion.state == FrameState::kTracking && result.motion.is_decisive) {
+      result.frame = i;
+      now.world_from_camera = result.motion.cur_from_prev.inverse();
+      result.window = initializer.open_window(now, {}, {});
+      return result;
+    }
+    initializer.wait(std::move(now));
+  }
+  return result;
+}
+
+void expect_true_motion(const Decided& decided, const DriveTracks& drive, double max_rad) {
+  ASSERT_GT(decided.frame, 0);
+  const Rigid3 truth = drive.pose(0).inverse() * drive.pose(decided.frame);
+  const Rigid3 estimate = decided.motion.cur_from_prev.inverse();
+  EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), max_rad);
+  EXPECT_LT((estimate.translation - truth.translation.normalized()).norm(), 5.0 * max_rad);
+}
+
+/// A camera in the hand, 30 pictures a second, 3 m from what it sees: 0.5 m/s to the right.
+DriveTracks sideways_walk(double noise_px, std::uint64_t seed) {
+  const Rigid3 step(so3_exp({0.0, 0.001, 0.0}), {0.5 / 30.0, 0.0, 0.0});
+  return {DriveTracks::repeat(step, 60), testing::points_of_room(1500, 4.0, seed), noise_px, seed};
+}
+
+TEST(Initializer, DecidesBetweenTheReferenceAndNowWhereNeighboursHaveNoParallax) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const DriveTracks walk = sideways_walk(0.2, seed);
+    const Decided decided = initialize(walk);
+    expect_true_motion(decided, walk, 0.01);
+    EXPECT_GT(decided.frame, 1);
+    EXPECT_LT(decided.frame, 30);
+  }
+}
+
+TEST(Initializer, OpensAWindowOfTheReferenceAndNowWithTheFramesBetween) {
+  const DriveTracks walk = sideways_walk(0.1, 4);
+  const Decided decided = initialize(walk);
+  ASSERT_TRUE(decided.window.has_value());
+  const Window& window = *decided.window;
+  ASSERT_EQ(window.keyframes.size(), 2U);
+  EXPECT_EQ(window.keyframes.front().frame, 0);
+  EXPECT_EQ(window.keyframes.back().frame, decided.frame);
+  EXPECT_GT(window.landmarks.size(), 100U);
+  const std::vector<FrameBetween>& between = window.keyframes.front().followers;
+  ASSERT_EQ(between.size(), static_cast<std::size_t>(decided.frame) - 1);
+  const double unit_m = (walk.pose(decided.frame).translation - walk.pose(0).translation).norm();
+  for (const FrameBetween& follower : between) {
+    const Rigid3 truth = walk.pose(0).inverse() * walk.pose(follower.frame);
+    const Rigid3& estimate = follower.keyframe_from_camera;
+    EXPECT_LT((unit_m * estimate.translation - truth.translation).norm(), 0.02) << follower.frame;
+    EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01) << follower.frame;
+  }
+}
+
+TEST(Initializer, APlanarSceneDecidesByTheHomography) {
+  int num_right = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    testing::SceneRandom random(seed);
+    std::vector<Eigen::Vector3d> wall;
+    for (int i = 0; i < 1200; ++i) {
+      const double x = random.uniform(-6.0, 6.0);
+      wall.emplace_back(x, random.uniform(-2.0, 2.0), 4.0 + 0.2 * x);
+    }
+    const Rigid3 step(so3_exp({0.0, -0.001, 0.0}), {0.03, 0.002, 0.0});
+    const DriveTracks walk(DriveTracks::repeat(step, 60), wall, 0.2, seed);
+    const Decided decided = initialize(walk);
+    if (decided.frame < 0) {
+      continue;  // a plane may be undecided, but not wrong
+    }
+    EXPECT_EQ(decided.motion.model, TwoViewModel::kHomography) << seed;
+    expect_true_motion(decided, walk, 0.02);
+    ++num_right;
+  }
+  EXPECT_GE(num_right, 4);
+}
+
+TEST(Initializer, WaitsWhileTheCameraOnlyTurns) {
+  const Rigid3 turn(so3_exp({0.0, 0.006, 0.0}), Eigen::Vector3d::Zero());
+  const DriveTracks drive(DriveTracks::repeat(turn, 40), testing::points_of_room(1500, 4.0, 7),
+                          0.15, 7);
+  const Decided decided = initialize(drive);
+  EXPECT_EQ(decided.frame, -1);
+  for (const FrameState state : decided.states) {
+    EXPECT_EQ(state, FrameState::kRotating) << to_string(state);
+  }
+}
+
+TEST(Initializer, WaitsWhileNothingMoves) {
+  const DriveTracks drive(std::vector<Rigid3>(15), testing::points_of_room(1500, 4.0, 8), 0.03, 8);
+  const Decided decided = initialize(drive);
+  EXPECT_EQ(decided.frame, -1);
+  for (const FrameState state : decided.states) {
+    EXPECT_EQ(state, FrameState::kStationary) << to_string(state);
+  }
+}
+
+TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
+  const DriveTracks walk = sideways_walk(0.0, 9);
+  Matches matches = walk.matches(1);
+  Initializer initializer({}, walk.camera);
+  initializer.start({0, Rigid3(), {}});
+  testing::SceneRandom random(9);
+  for (Eigen::Vector2d& uv : matches.cur_uv) {
+    uv = random.pixel(walk.camera);
+  }
+  const TrackPoints now = view_of(matches, Rigid3(), 1).points;
+  const MeasuredMotion motion = initializer.measure(matches, now);
+  EXPECT_FALSE(motion.state == FrameState::kTracking && motion.is_decisive);
+  initializer.start({0, Rigid3(), {}});
+  EXPECT_EQ(initializer.measure({}, {}).state, FrameState::kLost);
+}
+
+TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
+  const DriveTracks walk = sideways_walk(0.0, 10);
+  Initializer initializer({}, walk.camera);
+  TrackPoints points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
+  initializer.start({0, Rigid3(), points});
+  EXPECT_FALSE(initializer.is_worn_out(points));
+  points.resize(points.size() * 6 / 10);
+  EXPECT_FALSE(initializer.is_worn_out(points));
+  points.resize(points.size() / 4);
+  EXPECT_TRUE(initializer.is_worn_out(points));
+}
+
+TEST(Initializer, TheMaskIsOfAllMatchesAndKeepsThoseTheReferenceDoesNotSee) {
+  const DriveTracks walk = sideways_walk(0.05, 11);
+  Initializer initializer({}, walk.camera);
+  initializer.start({0, Rigid3(), {}});
+  static_cast<void>(initializer.measure(walk.matches(1), view_of(walk.matches(1), {}, 1).points));
+  Matches matches = walk.matches(20);
+  matches.track_ids[0] += 100000;  // begun since
+  const Eigen::Vector2d away(40.0, 60.0);
+  matches.cur_uv[1] += away;
+  const std::size_t num_matches = matches.cur_uv.size();
+  const MeasuredMotion motion = initializer.measure(matches, view_of(matches, Rigid3(), 20).points);
+  ASSERT_EQ(motion.inlier_mask.size(), num_matches);
+  EXPECT_EQ(motion.state, FrameState::kTracking);
+  EXPECT_EQ(motion.inlier_mask[0], 1);
+  EXPECT_EQ(motion.inlier_mask[1], 0);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include "odometry/localization.hpp"
+#include "support/synthetic_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Landmarks of a street, seen from a known place.
+struct Seen {
+  Camera camera = testing::kitti_camera();
+  Rigid3 world_from_camera{so3_exp({0.02, 0.4, -0.01}), {3.0, -0.2, 8.0}};
+  SeenLandmarks landmarks;
+
+  Seen(int count, double noise_px, double wrong_share) {
+    testing::SceneRandom random(3);
+    while (landmarks.size() < count) {
+      const Eigen::Vector2d uv = random.pixel(camera);
+      const Eigen::Vector3d x = random.uniform(4.0, 50.0) * camera.normalize(uv).homogeneous();
+      const bool is_wrong = random.uniform(0.0, 1.0) < wrong_share;
+      const Eigen::Vector2d noise(random.normal(noise_px), random.normal(noise_px));
+      landmarks.points.push_back(world_from_camera * x);
+      landmarks.uv.push_back(is_wrong ? random.pixel(camera) : Eigen::Vector2d(uv + noise));
+    }
+  }
+  [[nodiscard]] std::optional<Localization> from(const Rigid3& predicted) const {
+    return localize(landmarks, predicted, camera, {});
+  }
+  void expect_found(const std::optional<Localization>& found, double max_m) const {
+    ASSERT_TRUE(found.has_value());
+    EXPECT_LT((found->world_from_camera.translation - world_from_camera.translation).norm(), max_m);
+    EXPECT_LT(found->world_from_camera.rotation.angularDistance(world_from_camera.rotation), 1e-3);
+  }
+};
+
+TEST(Localization, FromAPredictionThatIsNear) {
+  const Seen seen(300, 0.2, 0.2);
+  const Rigid3 near = seen.world_from_camera * Rigid3(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.1, 0.3});
+  const auto found = seen.from(near);
+  seen.expect_found(found, 0.02);
+  EXPECT_GT(found->num_inliers, 220);
+  EXPECT_LT(found->num_inliers, 260);
+}
+
+TEST(Localization, APredictionThatIsWrongIsNoObstacle) {
+  const Seen seen(300, 0.2, 0.2);
+  seen.expect_found(seen.from(Rigid3()), 0.02);
+  const Rigid3 behind = seen.world_from_camera * Rigid3(so3_exp({0.0, 2.0, 0.0}), {0.0, 0.0, 90.0});
+  seen.expect_found(seen.from(behind), 0.02);
+}
+
+TEST(Localization, MostLandmarksMayBeWrong) {
+  const Seen seen(300, 0.2, 0.6);
+  seen.expect_found(seen.from(Rigid3()), 0.05);
+}
+
+TEST(Localization, TooFewOrContradictingLandmarksGiveNoPose) {
+  const Seen few(LocalizationOptions{}.min_landmarks - 1, 0.0, 0.0);
+  EXPECT_FALSE(few.from(few.world_from_camera).has_value());
+  const Seen wrong(300, 0.0, 1.0);
+  EXPECT_FALSE(wrong.from(wrong.world_from_camera).has_value());
+  EXPECT_FALSE(localize({}, Rigid3(), few.camera, {}).has_value());
+}
+
+TEST(Localization, SeesTheLandmarksThatTheFrameTracks) {
+  Window window;
+  window.landmarks = {{2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {9, {0.0, 0.0, 9.0}}};
+  const TrackPoints points{{1, {1.0, 0.0}}, {5, {5.0, 0.0}}, {7, {7.0, 0.0}}, {9, {9.0, 0.0}}};
+  const SeenLandmarks seen = find_seen_landmarks(window, points);
+  ASSERT_EQ(seen.size(), 2);
+  EXPECT_EQ(seen.points[0].z(), 5.0);
+  EXPECT_EQ(seen.uv[1].x(), 9.0);
+}
+
+}  // namespace
+}  // namespace stemvo

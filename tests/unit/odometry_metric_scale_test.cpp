@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "odometry/metric_scale.hpp"
+#include "odometry/pair_estimator.hpp"
+#include "odometry/window_estimator.hpp"
+#include "support/road_drive.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::EstimatorRun;
+using testing::metric_config;
+using testing::RoadDrive;
+
+constexpr double kStep_m = RoadDrive::kStep_m;
+
+std::unique_ptr<Estimator> make_estimator(const Config& config, const Camera& camera) {
+  if (config.odometry.mode == "two_frame") {
+    return std::make_unique<PairEstimator>(config, camera);
+  }
+  return std::make_unique<WindowEstimator>(config, camera);
+}
+
+double step_m(const EstimatorRun& run, int i) {
+  const auto last = static_cast<std::size_t>(i);
+  return (run.results[last].world_from_camera.translation -
+          run.results[last - 1].world_from_camera.translation)
+      .norm();
+}
+
+class MetricScaleOf : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
+  const RoadDrive drive(20);
+  const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
+  EstimatorRun run(*estimator, drive.tracks);
+  const int num_seen = 12;
+  run.road = [&](int i) { return drive.road_picture(i, i < num_seen); };
+  run.add_all();
+  const double unknown = run.results[0].scale_sigma.value();
+  EXPECT_EQ(run.results[0].road, RoadState::kNone);
+  EXPECT_EQ(run.results[0].road_reason, "first frame");
+  double last_sigma = unknown;
+  for (int i = 1; i < 20; ++i) {
+    const FrameResult& result = run.results[static_cast<std::size_t>(i)];
+    if (step_m(run, i) == 0.0) {  // waits for parallax
+      EXPECT_LT(i, 5);
+      EXPECT_EQ(result.state, FrameState::kInitializing) << i;
+      EXPECT_EQ(result.road, RoadState::kNone) << i;
+      EXPECT_EQ(result.road_reason, "no map") << i;
+    } else if (i < num_seen) {
+      EXPECT_EQ(result.road, RoadState::kMeasured) << i << ": " << result.road_reason;
+      EXPECT_EQ(result.road_reason, "");
+    } else {
+      EXPECT_EQ(result.road, RoadState::kHeld) << i;
+      EXPECT_NE(result.road_reason, "");
+      EXPECT_GT(result.scale_sigma.value(), last_sigma) << i;
+      EXPECT_NEAR(step_m(run, i), kStep_m, 0.03 * kStep_m) << i;
+    }
+    last_sigma = result.scale_sigma.value();
+  }
+  EXPECT_LT(last_sigma, (GetParam() == "map" ? 0.1 : 0.3) * unknown);
+}
+
+TEST_P(MetricScaleOf, ARoadThatIsNotAskedIsDisabled) {
+  const RoadDrive drive(4);
+  Config config = metric_config(GetParam());
+  config.scale.source = "constant";
+  const auto estimator = make_estimator(config, drive.scene.camera);
+  EstimatorRun run(*estimator, drive.tracks);
+  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.add_all();
+  for (const FrameResult& result : run.results) {
+    EXPECT_EQ(result.road, RoadState::kDisabled);
+    EXPECT_FALSE(result.scale_sigma.has_value());
+  }
+}
+
+TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
+  const RoadDrive drive(12);
+  const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
+  EstimatorRun run(*estimator, drive.tracks);
+  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.add_range(0, 10);
+  const FrameResult missing = run.add_missing();
+  EXPECT_EQ(missing.state, FrameState::kNoImage);
+  EXPECT_EQ(missing.road, RoadState::kHeld);
+  EXPECT_EQ(missing.road_reason, "no image");
+  EXPECT_NEAR(step_m(run, 10), kStep_m, 0.03 * kStep_m);  // the motion goes on
+  const FrameResult after = run.add(11);
+  EXPECT_EQ(after.road, RoadState::kMeasured) << after.road_reason;
+  EXPECT_NEAR(
+      after.world_from_camera.translation.z() - run.results[9].world_from_camera.translation.z(),
+      2.0 * kStep_m, 0.05 * kStep_m);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes,
+                         MetricScaleOf,
+                         ::testing::Values("map", "two_frame"),
+                         [](const auto& mode) { return mode.param; });
+
+// The first road multiplies the window, whose poses are as far from each other as they were; what
+// has left the window before keeps the length it had.
+TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
+  const int num_frames = 44;
+  const int first_road = 32;
+  const RoadDrive drive(num_frames);
+  WindowEstimator estimator(metric_config(), drive.scene.camera);
+  EstimatorRun run(estimator, drive.tracks);
+  run.road = [&](int i) { return drive.road_picture(i, i >= first_road); };
+  run.add_range(0, first_road);
+  EXPECT_EQ(run.results.back().road, RoadState::kNone);
+  const double unit_m = kStep_m / step_m(run, first_road - 1);
+  EXPECT_NEAR(step_m(run, first_road - 1), 1.0, 0.05);  // the assumed step
+  const int left_before = estimator.window().keyframes.front().frame;
+  ASSERT_GT(left_before, 2);
+  run.add_range(first_road, num_frames);
+  EXPECT_EQ(run.results.back().road, RoadState::kMeasured);
+  EXPECT_NEAR(step_m(run, num_frames - 1), kStep_m, 0.02 * kStep_m);
+  const std::vector<Rigid3> refined = estimator.refined_trajectory();
+  ASSERT_EQ(refined.size(), static_cast<std::size_t>(num_frames));
+  for (int i = 1; i < num_frames; ++i) {
+    const double ratio = testing::length_ratio(refined, drive.tracks.world_from_camera, i - 1, i);
+    if (i <= left_before) {
+      EXPECT_NEAR(ratio * unit_m, 1.0, 0.02) << i;
+    } else if (i > first_road + 3) {
+      EXPECT_NEAR(ratio, 1.0, 0.03) << i;
+    }
+  }
+}
+
+TEST(MetricScale, DisabledItChangesNothing) {
+  const RoadDrive drive(2);
+  Config config;
+  config.scale.source = "none";
+  MetricScale scale(config, drive.scene.camera);
+  const auto picture = drive.road_picture(0, true);
+  scale.restart(picture.get());
+  EXPECT_EQ(scale.measure(picture.get(), Rigid3()), 1.0);
+  scale.hold("no image");
+  FrameResult result;
+  scale.report(result);
+  EXPECT_EQ(result.road, RoadState::kDisabled);
+  EXPECT_EQ(result.road_reason, "");
+  EXPECT_FALSE(result.scale_sigma.has_value());
+}
+
+TEST(MetricScale, AFrameWithoutARoadPictureKeepsTheUnit) {
+  const RoadDrive drive(2);
+  MetricScale scale(metric_config(), drive.scene.camera);
+  EXPECT_EQ(scale.measure(nullptr, Rigid3()), 1.0);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include "odometry/pair_estimator.hpp"
+#include "support/estimator_run.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+using testing::EstimatorRun;
+
+struct Driven {
+  DriveTracks drive;
+  PairEstimator estimator{testing::config_without_scale("two_frame"), drive.camera};
+  EstimatorRun run{estimator, drive};
+
+  explicit Driven(DriveTracks tracks = DriveTracks(20, 0.1, 41)) : drive(std::move(tracks)) {}
+
+  [[nodiscard]] Rigid3 last_motion() const {
+    const std::vector<Rigid3>& poses = estimator.trajectory();
+    return poses[poses.size() - 2].inverse() * poses.back();
+  }
+};
+
+TEST(PairEstimator, EveryMeasuredStepIsOneUnit) {
+  Driven d;
+  d.run.add_all();
+  EXPECT_EQ(d.run.state(0), FrameState::kFirst);
+  EXPECT_EQ(d.run.state(1), FrameState::kInitializing);
+  EXPECT_EQ(d.run.count(FrameState::kTracking), 18);
+  EXPECT_LT(testing::fitted_error_share(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
+  EXPECT_LT(testing::rotation_error_rad(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
+  EXPECT_NEAR(d.last_motion().translation.norm(), 1.0, 1e-9);
+}
+
+TEST(PairEstimator, NothingIsRefinedAndThereAreNoLandmarks) {
+  Driven d;
+  d.run.add_range(0, 10);
+  const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
+  ASSERT_EQ(refined.size(), 10U);
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    EXPECT_EQ(refined[i].translation, d.estimator.trajectory()[i].translation);
+    EXPECT_EQ(refined[i].translation, d.run.results[i].world_from_camera.translation);
+  }
+  EXPECT_TRUE(d.estimator.landmarks().empty());
+}
+
+TEST(PairEstimator, ALossContinuesTheMotionAndTheChainGoesOn) {
+  Driven d;
+  d.run.add_range(0, 10);
+  const Rigid3 before = d.last_motion();
+  EXPECT_EQ(d.run.add_matches({}, 10).state, FrameState::kLost);
+  EXPECT_LT((d.last_motion().translation - before.translation).norm(), 1e-9);
+  EXPECT_EQ(d.run.add(11).state, FrameState::kTracking);
+}
+
+TEST(PairEstimator, AMissingImageIsBridged) {
+  Driven d;
+  d.run.add_range(0, 10);
+  const Rigid3 before = d.estimator.trajectory().back();
+  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+  EXPECT_NEAR(d.last_motion().translation.norm(), 1.0, 1e-9);
+  EXPECT_EQ(d.run.add(11).state, FrameState::kTracking);
+  const Rigid3 bridged = before.inverse() * d.estimator.trajectory().back();
+  EXPECT_NEAR(bridged.translation.norm(), 2.0, 1e-9);
+  const Rigid3 truth = d.drive.pose(9).inverse() * d.drive.pose(11);
+  EXPECT_LT(bridged.rotation.angularDistance(truth.rotation), 2e-3);
+}
+
+TEST(PairEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
+  Driven d;
+  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+  EXPECT_EQ(d.run.add(0).state, FrameState::kFirst);
+  EXPECT_EQ(d.run.add(1).state, FrameState::kInitializing);
+  EXPECT_EQ(d.run.add(2).state, FrameState::kTracking);
+}
+
+TEST(PairEstimator, StationaryAndTurningHoldThePosition) {
+  std::vector<Rigid3> path = DriveTracks::repeat(Rigid3({1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}), 8);
+  path.insert(path.end(), 4, path.back());
+  for (int i = 0; i < 4; ++i) {
+    path.push_back(path.back() * Rigid3(so3_exp({0.0, 0.04, 0.0}), Eigen::Vector3d::Zero()));
+  }
+  Driven d(DriveTracks(path, testing::points_along(path, 1500, 42), 0.02, 42));
+  d.run.add_all();
+  for (int i = 8; i < d.drive.num_frames(); ++i) {
+    EXPECT_EQ(d.run.state(i), i < 12 ? FrameState::kStationary : FrameState::kRotating) << i;
+    EXPECT_EQ((d.estimator.trajectory()[static_cast<std::size_t>(i)].translation -
+               d.estimator.trajectory()[7].translation)
+                  .norm(),
+              0.0);
+  }
+  EXPECT_NEAR(d.estimator.trajectory().back().angle_rad(), 0.16, 1e-3);
+}
+
+}  // namespace
+}  // namespace stemvo

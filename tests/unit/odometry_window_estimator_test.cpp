@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "odometry/window_estimator.hpp"
+#include "support/estimator_run.hpp"
+#include "support/road_drive.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+using testing::EstimatorRun;
+
+constexpr double kDeg = std::numbers::pi / 180.0;
+
+/// A street that winds a little, at a car's speed of `step_m` a frame.
+DriveTracks car_drive(double length_m, double step_m, double noise_px, std::uint64_t seed) {
+  std::vector<Rigid3> path(1);
+  for (double at = step_m; at <= length_m; at += step_m) {
+    const double bend = 0.02 * std::sin(0.1 * at);
+    path.push_back(path.back() * Rigid3(so3_exp({0.0, bend * step_m, 0.0}),
+                                        {0.5 * bend * step_m * step_m, 0.0, step_m}));
+  }
+  const auto points = testing::points_along(path, static_cast<int>(30.0 * length_m), seed);
+  return {path, points, noise_px, seed};
+}
+
+/// To and fro before the walls of a room, turning at the same time; 30 frames a second.
+DriveTracks hand_walk(int num_frames, double noise_px, std::uint64_t seed) {
+  std::vector<Rigid3> path;
+  for (int i = 0; i < num_frames; ++i) {
+    const double t = i / 30.0;
+    const Eigen::Vector3d position(0.6 * std::sin(0.8 * t), 0.02 * std::sin(11.0 * t),
+                                   0.3 * (1.0 - std::cos(0.7 * t)));
+    path.emplace_back(so3_exp({0.01 * std::sin(5.0 * t), 0.5 * std::sin(0.6 * t), 0.0}), position);
+  }
+  return {path, testing::points_of_room(2500, 4.0, seed), noise_px, seed};
+}
+
+/// An estimator with the defaults that was taken along.
+struct Driven {
+  DriveTracks drive;
+  WindowEstimator estimator{testing::config_without_scale(), drive.camera};
+  EstimatorRun run{estimator, drive};
+  std::set<int> keyframes;
+
+  explicit Driven(DriveTracks tracks) : drive(std::move(tracks)) {}
+
+  void add_range(int from, int to) {
+    for (int i = from; i < to; ++i) {
+      run.add(i);
+      for (const Keyframe& keyframe : estimator.window().keyframes) {
+        keyframes.insert(keyframe.frame);
+      }
+    }
+  }
+  [[nodiscard]] const Rigid3& pose(int i) const {
+    return estimator.trajectory()[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] double moved(int from, int to) const {
+    return (pose(to).translation - pose(from).translation).norm();
+  }
+  void expect_only(int from, int to, FrameState expected) const {
+    for (int i = from; i < to; ++i) {
+      EXPECT_EQ(run.state(i), expected) << i << ": " << to_string(run.state(i));
+    }
+  }
+};
+
+/// From the frame that opened the window on, against the truth, and all frames once refined.
+void expect_accurate(const Driven& d, double max_share, double max_rad) {
+  const std::vector<Rigid3>& truth = d.drive.world_from_camera;
+  const std::vector<Rigid3>& online = d.estimator.trajectory();
+  ASSERT_EQ(online.size(), truth.size());
+  std::size_t open = 1;
+  while (open < online.size() && (online[open].translation - online[0].translation).norm() == 0.0) {
+    ++open;
+  }
+  ASSERT_LT(open, online.size() / 3);
+  const auto since_open = [&](const std::vector<Rigid3>& poses) {
+    return std::span(poses).subspan(open);
+  };
+  EXPECT_LT(testing::fitted_error_share(since_open(online), since_open(truth)), max_share);
+  EXPECT_LT(testing::rotation_error_rad(since_open(online), since_open(truth)), max_rad);
+  const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
+  ASSERT_EQ(refined.size(), truth.size());
+  EXPECT_LT(testing::fitted_error_share(refined, truth), max_share);
+  EXPECT_LT(testing::rotation_error_rad(refined, truth), max_rad);
+}
+
+void expect_tracking_since_opening(const Driven& d) {
+  bool is_open = false;
+  EXPECT_EQ(d.run.state(0), FrameState::kFirst);
+  for (int i = 1; i < d.drive.num_frames(); ++i) {
+    const FrameState state = d.run.state(i);
+    is_open = is_open || state == FrameState::kTracking;
+    EXPECT_TRUE(is_open ? state == FrameState::kTracking
+                        : state == FrameState::kInitializing || state == FrameState::kLowParallax)
+        << i << ": " << to_string(state);
+  }
+  EXPECT_TRUE(is_open);
+}
+
+TEST(WindowEstimator, ACarAtTenFramesASecond) {
+  Driven d(car_drive(60.0, 1.0, 0.2, 1));
+  d.add_range(0, d.drive.num_frames());
+  expect_tracking_since_opening(d);
+  expect_accurate(d, 0.01, 0.3 * kDeg);
+}
+
+TEST(WindowEstimator, ACarAtThirtyFramesASecond) {
+  Driven d(car_drive(60.0, 1.0 / 3.0, 0.2, 1));
+  d.add_range(0, d.drive.num_frames());
+  expect_tracking_since_opening(d);
+  expect_accurate(d, 0.01, 0.3 * kDeg);
+}
+
+TEST(WindowEstimator, ACameraInTheHand) {
+  Driven d(hand_walk(240, 0.2, 1));
+  d.add_range(0, d.drive.num_frames());
+  EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+  EXPECT_GT(d.run.count(FrameState::kTracking), 190);
+  expect_accurate(d, 0.02, 0.5 * kDeg);
+}
+
+TEST(WindowEstimator, KeyframesComeByParallaxAndNotByCount) {
+  Driven fast(car_drive(24.0, 1.0, 0.1, 2));
+  Driven slow(car_drive(24.0, 0.1, 0.1, 2));
+  fast.add_range(0, fast.drive.num_frames());
+  slow.add_range(0, slow.drive.num_frames());
+  const auto per_frame = [](const Driven& d) {
+    return static_cast<double>(d.keyframes.size()) / d.drive.num_frames();
+  };
+  EXPECT_LT(per_frame(slow), 0.4 * per_frame(fast));
+  EXPECT_GT(slow.keyframes.size(), 8U);
+}
+
+TEST(WindowEstimator, KeepsTheScaleOfItsFirstStep) {
+  Driven d(DriveTracks(25, 0.1, 5, 0.8));
+  d.add_range(0, 25);
+  EXPECT_EQ(d.run.state(1), FrameState::kInitializing);
+  EXPECT_NEAR(d.moved(0, 1), 1.0, 1e-9);  // the unit
+  const std::vector<Rigid3>& truth = d.drive.world_from_camera;
+  const double unit_m = truth[1].translation.norm();
+  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), truth, 0, 24) * unit_m, 1.0, 0.02);
+  EXPECT_LE(d.pose(24).rotation.angularDistance(truth[24].rotation), 2e-3);
+}
+
+TEST(WindowEstimator, FramesThatWaitedForParallaxAreSetRightAfterwards) {
+  Driven d(hand_walk(60, 0.1, 3));
+  d.add_range(0, 60);
+  int open = 1;
+  while (open < 60 && d.moved(0, open) == 0.0) {
+    EXPECT_NE(d.run.state(open), FrameState::kTracking) << open;
+    ++open;
+  }
+  ASSERT_GT(open, 2);
+  ASSERT_LT(open, 40);
+  const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
+  const std::vector<Rigid3>& truth = d.drive.world_from_camera;
+  const double unit_m = 1.0 / testing::length_ratio(refined, truth, 0, open);
+  for (std::size_t i = 1; i < static_cast<std::size_t>(open); ++i) {
+    const Rigid3 estimate = refined[0].inverse() * refined[i];
+    const Rigid3 motion = truth[0].inverse() * truth[i];
+    EXPECT_LT((unit_m * estimate.translation - motion.translation).norm(), 0.015) << i;
+    EXPECT_LT(estimate.rotation.angularDistance(motion.rotation), 0.3 * kDeg) << i;
+  }
+}
+
+/// Drives 20 frames, lets `event` happen for some frames, and drives 20 more.
+std::vector<Rigid3> path_with(const Rigid3& event, int num_frames) {
+  const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
+  std::vector<Rigid3> path = DriveTracks::repeat(step, 20);
+  for (int i = 0; i < num_frames; ++i) {
+    path.push_back(path.back() * event);
+  }
+  for (int i = 0; i < 20; ++i) {
+    path.push_back(path.back() * step);
+  }
+  return path;
+}
+
+/// The second drive is as long, in units, as the first: the scale was kept.
+void expect_scale_kept(const Driven& d, int event_end) {
+  const std::vector<Rigid3>& truth = d.drive.world_from_camera;
+  const int last = d.drive.num_frames() - 1;
+  const int begin = 5;  // the first frames may have waited for parallax
+  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), truth, event_end, last) /
+                  testing::length_ratio(d.estimator.trajectory(), truth, begin, 19),
+              1.0, 0.02);
+}
+
+TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
+  const std::vector<Rigid3> path = path_with(Rigid3(), 40);
+  Driven d(DriveTracks(path, testing::points_along(path, 2000, 4), 0.04, 4));
+  d.add_range(0, 20);
+  const int oldest = d.estimator.window().keyframes.front().frame;
+  const std::size_t num_landmarks = d.estimator.window().landmarks.size();
+  d.add_range(20, 60);
+  d.expect_only(20, 60, FrameState::kStationary);
+  for (int i = 20; i < 60; ++i) {
+    EXPECT_EQ(d.moved(19, i), 0.0) << i;
+    EXPECT_EQ(d.pose(i).rotation.angularDistance(d.pose(19).rotation), 0.0) << i;
+  }
+  EXPECT_EQ(d.estimator.window().keyframes.front().frame, oldest);
+  EXPECT_EQ(d.estimator.window().landmarks.size(), num_landmarks);
+  d.add_range(60, 80);
+  d.expect_only(60, 80, FrameState::kTracking);
+  expect_scale_kept(d, 59);
+}
+
+TEST(WindowEstimator, TurningOnTheSpotHoldsThePosition) {
+  const std::vector<Rigid3> path =
+      path_with(Rigid3(so3_exp({0.0, 2.0 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 10);
+  Driven d(DriveTracks(path, testing::points_along(path, 3000, 5), 0.1, 5));
+  d.add_range(0, d.drive.num_frames());
+  d.expect_only(20, 30, FrameState::kRotating);
+  for (int i = 20; i < 30; ++i) {
+    EXPECT_EQ(d.moved(19, i), 0.0) << i;
+  }
+  const Rigid3 turn = d.pose(19).inverse() * d.pose(29);
+  EXPECT_NEAR(turn.angle_rad(), 20.0 * kDeg, 0.1 * kDeg);
+  d.expect_only(31, 50, FrameState::kTracking);
+  expect_scale_kept(d, 29);
+}
+
+TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
+  const std::vector<Rigid3> path =
+      path_with(Rigid3(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 44);
+  std::vector<Eigen::Vector3d> points = testing::points_along(path, 3000, 6);
+  Driven d(DriveTracks(path, points, 0.1, 6));
+  d.add_range(0, d.drive.num_frames());
+  d.expect_only(20, 64, FrameState::kRotating);
+  EXPECT_EQ(d.moved(19, 63), 0.0);
+  const Rigid3 turn = d.pose(19).inverse() * d.pose(63);
+  EXPECT_NEAR(turn.angle_rad(), 110.0 * kDeg, 0.5 * kDeg);
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+  EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+}
+
+TEST(WindowEstimator, StandingFromTheStartWaitsForTheDrive) {
+  std::vector<Rigid3> path(15);
+  const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
+  for (int i = 0; i < 15; ++i) {
+    path.push_back(path.back() * step);
+  }
+  Driven d(DriveTracks(path, testing::points_along(path, 1500, 7), 0.04, 7));
+  d.add_range(0, d.drive.num_frames());
+  d.expect_only(1, 15, FrameState::kStationary);
+  EXPECT_EQ(d.moved(0, 14), 0.0);
+  EXPECT_EQ(d.run.state(15), FrameState::kInitializing);
+  d.expect_only(17, 30, FrameState::kTracking);
+  EXPECT_LT(testing::fitted_error_share(std::span(d.estimator.trajectory()).subspan(15),
+                                        std::span(path).subspan(15)),
+            0.01);
+}
+
+TEST(WindowEstimator, MissingImagesAreBridgedAndTheMapServesOn) {
+  Driven d(car_drive(30.0, 0.8, 0.1, 8));
+  d.add_range(0, 15);
+  const Rigid3 motion = d.pose(13).inverse() * d.pose(14);
+  for (int i = 15; i < 17; ++i) {
+    EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+    const Rigid3 extrapolated = d.pose(i - 1) * motion;
+    EXPECT_LT((d.pose(i).translation - extrapolated.translation).norm(), 1e-9);
+  }
+  const int oldest = d.estimator.window().keyframes.front().frame;
+  d.add_range(17, d.drive.num_frames());
+  d.expect_only(17, d.drive.num_frames(), FrameState::kTracking);
+  EXPECT_LT(oldest, 15);
+  expect_accurate(d, 0.01, 0.3 * kDeg);
+}
+
+TEST(WindowEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
+  Driven d(car_drive(10.0, 0.8, 0.1, 9));
+  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+  EXPECT_EQ(d.run.add(0).state, FrameState::kFirst);
+  EXPECT_EQ(d.run.add(1).state, FrameState::kInitializing);
+  d.add_range(2, 8);
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+  EXPECT_EQ(d.estimator.refined_trajectory().size(), 9U);
+}
+
+TEST(WindowEstimator, AMissingImageWhileInitializingIsNoEnd) {
+  Driven d(hand_walk(90, 0.1, 10));
+  d.add_range(0, 4);
+  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+  d.add_range(5, 90);
+  EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+}
+
+// A cut to another place: the road's scale belonged to the map before.
+TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
+  const testing::RoadDrive drive(24);
+  WindowEstimator estimator(testing::metric_config(), drive.scene.camera);
+  EstimatorRun run(estimator, drive.tracks);
+  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.add_range(0, 10);
+  EXPECT_EQ(run.results.back().road, RoadState::kMeasured);
+  const FrameResult lost = run.add_matches({}, 10);
+  EXPECT_EQ(lost.state, FrameState::kLost);
+  EXPECT_EQ(lost.num_inliers, 0);
+  EXPECT_NE(lost.road, RoadState::kMeasured);  // a motion that was not measured measures no road
+  EXPECT_GE(lost.scale_sigma.value(), run.results[9].scale_sigma.value());
+  bool is_new_map = false;
+  for (int i = 11; i < 24; ++i) {
+    Matches matches = drive.tracks.matches(i);
+    for (int& id : matches.track_ids) {
+      id += 100000;
+    }
+    const FrameResult result = run.add_matches(matches, i);
+    EXPECT_NE(result.state, FrameState::kLost) << i;
+    if (result.state == FrameState::kInitializing) {  // the old map's scale is not the new one's
+      EXPECT_NE(result.road, RoadState::kHeld) << i;
+    }
+    if (!is_new_map && result.state == FrameState::kTracking) {
+      is_new_map = true;
+      EXPECT_EQ(run.results[static_cast<std::size_t>(i) - 1].state, FrameState::kInitializing);
+    }
+  }
+  EXPECT_TRUE(is_new_map);
+  EXPECT_EQ(run.results.back().road, RoadState::kMeasured) << run.results.back().road_reason;
+  const double step = (run.results[23].world_from_camera.translation -
+                       run.results[22].world_from_camera.translation)
+                          .norm();
+  EXPECT_NEAR(step, testing::RoadDrive::kStep_m, 0.03 * testing::RoadDrive::kStep_m);
+}
+
+TEST(WindowEstimator, TheSameTracksGiveTheSamePoses) {
+  Driven a(car_drive(12.0, 0.8, 0.3, 11));
+  Driven b(car_drive(12.0, 0.8, 0.3, 11));
+  a.add_range(0, a.drive.num_frames());
+  b.add_range(0, b.drive.num_frames());
+  for (int i = 0; i < a.drive.num_frames(); ++i) {
+    EXPECT_EQ(a.pose(i).translation, b.pose(i).translation) << i;
+    EXPECT_EQ(a.pose(i).rotation.coeffs(), b.pose(i).rotation.coeffs()) << i;
+  }
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: MIT
+// What a bad frame does to a window that was fine before.
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "odometry/window_estimator.hpp"
+#include "support/estimator_run.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+using testing::EstimatorRun;
+
+constexpr int kBadFrame = 12;
+
+std::vector<Rigid3> path_with_a_jerk(const Rigid3& jerk) {
+  std::vector<Rigid3> path(1);
+  const Rigid3 motion(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, 1.0});
+  for (int i = 1; i < 20; ++i) {
+    path.push_back(path.back() * (i == kBadFrame ? jerk : motion));
+  }
+  return path;
+}
+
+/// Driven up to kBadFrame.
+struct Driven {
+  DriveTracks drive;
+  WindowEstimator estimator{testing::config_without_scale(), drive.camera};
+  EstimatorRun run{estimator, drive};
+  int first_keyframe = 0;
+
+  explicit Driven(DriveTracks tracks = DriveTracks(20, 0.2, 31)) : drive(std::move(tracks)) {
+    run.add_range(0, kBadFrame);
+    EXPECT_EQ(run.results.back().state, FrameState::kTracking);
+    first_keyframe = estimator.window().keyframes.front().frame;
+  }
+  [[nodiscard]] double unit_m() const {
+    return 1.0 /
+           testing::length_ratio(estimator.trajectory(), drive.world_from_camera, 0, kBadFrame - 1);
+  }
+  [[nodiscard]] bool keeps_map() const {
+    const auto& keyframes = estimator.window().keyframes;
+    return !keyframes.empty() && keyframes.front().frame < kBadFrame - 1;
+  }
+  /// The step to the last frame fed, against that of the drive from `before` to `i`.
+  void expect_true_step(int before, int i) const {
+    const std::vector<Rigid3>& poses = estimator.trajectory();
+    const Rigid3 step = drive.pose(before).inverse() * drive.pose(i);
+    const Rigid3 estimate = poses[static_cast<std::size_t>(before)].inverse() * poses.back();
+    EXPECT_LT((unit_m() * estimate.translation - step.translation).norm(), 0.05);
+    EXPECT_LT(estimate.rotation.angularDistance(step.rotation), 2e-3);
+  }
+};
+
+TEST(WindowRecovery, AMotionThatNobodyExpectedDoesNotTakeTheMapDown) {
+  // To the side, turning the other way.
+  const Rigid3 jerk(so3_exp({0.02, -0.15, 0.05}), {0.6, -0.1, 0.3});
+  const std::vector<Rigid3> path = path_with_a_jerk(jerk);
+  Driven d(DriveTracks(path, testing::points_along(path, 1500, 31), 0.2, 31));
+  EXPECT_EQ(d.run.add(kBadFrame).state, FrameState::kTracking);
+  EXPECT_TRUE(d.keeps_map());
+  d.expect_true_step(kBadFrame - 1, kBadFrame);
+  EXPECT_EQ(d.run.add(kBadFrame + 1).state, FrameState::kTracking);
+  d.expect_true_step(kBadFrame, kBadFrame + 1);
+}
+
+TEST(WindowRecovery, ManyWrongTracksAreOutvoted) {
+  Driven d;
+  Matches matches = d.drive.matches(kBadFrame);
+  testing::SceneRandom random(5);
+  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+    if (matches.track_ids[i] % 10 < 6) {
+      matches.cur_uv[i] = random.pixel(d.drive.camera);
+    }
+  }
+  EXPECT_EQ(d.run.add_matches(matches, kBadFrame).state, FrameState::kTracking);
+  d.expect_true_step(kBadFrame - 1, kBadFrame);
+  int num_kept = 0;
+  int num_right = 0;
+  int num_wrong_kept = 0;
+  for (std::size_t i = 0; i < d.run.inlier_mask.size(); ++i) {
+    const bool is_right = d.run.point_ids[i] % 10 >= 6;
+    num_right += is_right ? 1 : 0;
+    num_kept += is_right && d.run.inlier_mask[i] != 0 ? 1 : 0;
+    num_wrong_kept += !is_right && d.run.inlier_mask[i] != 0 ? 1 : 0;
+  }
+  EXPECT_GT(num_kept, num_right * 95 / 100);
+  EXPECT_LT(num_wrong_kept, num_right / 20);  // those near their epipolar lines
+}
+
+TEST(WindowRecovery, TracksThatEndAnywhereAreLostAndTheOldMapServesAgain) {
+  Driven d;
+  const std::vector<Rigid3> before = d.estimator.trajectory();
+  Matches matches = d.drive.matches(kBadFrame);
+  testing::SceneRandom random(6);
+  for (Eigen::Vector2d& uv : matches.cur_uv) {
+    uv = random.pixel(d.drive.camera);
+  }
+  const FrameResult lost = d.run.add_matches(matches, kBadFrame);
+  EXPECT_EQ(lost.state, FrameState::kLost);
+  EXPECT_EQ(lost.num_inliers, 0);
+  // The motion goes on as it was.
+  d.expect_true_step(kBadFrame - 1, kBadFrame);
+}
+
+/// The views of kBadFrame and later under numbers that nobody has seen.
+Matches of_other_things(const DriveTracks& drive, int i) {
+  Matches matches = drive.matches(i);
+  for (int& id : matches.track_ids) {
+    id += 100000;
+  }
+  return matches;
+}
+
+TEST(WindowRecovery, AfterALossANewMapIsMadeInAUnitOfItsOwn) {
+  Driven d;
+  EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
+  bool was_initializing = false;
+  for (int i = kBadFrame + 1; i < 20; ++i) {
+    const FrameResult result = d.run.add_matches(of_other_things(d.drive, i), i);
+    EXPECT_TRUE(result.state == FrameState::kInitializing || result.state == FrameState::kTracking)
+        << i << ": " << to_string(result.state);
+    was_initializing = was_initializing || result.state == FrameState::kInitializing;
+    EXPECT_GT(result.num_inliers, 100) << i;
+  }
+  EXPECT_TRUE(was_initializing);
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+  EXPECT_GE(d.estimator.window().keyframes.front().frame, kBadFrame);
+  // As long as the steps before: the last one measured is the new unit.
+  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), d.drive.world_from_camera, 18, 19) *
+                  d.unit_m(),
+              1.0, 0.1);
+}
+
+TEST(WindowRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewWithoutAGap) {
+  Driven d;
+  const FrameResult first = d.run.add_matches(of_other_things(d.drive, kBadFrame), kBadFrame);
+  EXPECT_EQ(first.state, FrameState::kInitializing);
+  EXPECT_EQ(d.estimator.window().keyframes.size(), 2U);
+  EXPECT_EQ(d.estimator.window().keyframes.front().frame, kBadFrame - 1);
+  EXPECT_NEAR(
+      (first.world_from_camera.translation - d.estimator.trajectory()[kBadFrame - 1].translation)
+              .norm() *
+          d.unit_m(),
+      1.0, 0.1);  // as long as the step before
+  const FrameResult second =
+      d.run.add_matches(of_other_things(d.drive, kBadFrame + 1), kBadFrame + 1);
+  EXPECT_EQ(second.state, FrameState::kTracking);
+  d.expect_true_step(kBadFrame, kBadFrame + 1);
+}
+
+}  // namespace
+}  // namespace stemvo

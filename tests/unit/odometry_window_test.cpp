@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "odometry/bundle_adjustment.hpp"
+#include "odometry/landmarks.hpp"
+#include "odometry/reprojection_cost.hpp"
+#include "odometry/window.hpp"
+#include "support/synthetic_drive_tracks.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+
+Window window_of(const DriveTracks& drive, const WindowOptions& options) {
+  Window window;
+  for (std::size_t i = 0; i < drive.world_from_camera.size(); ++i) {
+    Keyframe keyframe{static_cast<int>(i), drive.world_from_camera[i], {}, {}};
+    for (const auto& [id, uv] : drive.observations[i]) {
+      keyframe.points.push_back({id, uv});
+    }
+    add_keyframe(window, std::move(keyframe), options);
+    triangulate_landmarks(window, drive.camera, options);
+  }
+  return window;
+}
+
+TEST(Window, TheWindowForgetsOldKeyframesAndTheirLandmarks) {
+  WindowOptions options;
+  options.num_keyframes = 5;
+  const DriveTracks drive(12, 0.0, 1);
+  const Window window = window_of(drive, options);
+  ASSERT_EQ(window.keyframes.size(), 5U);
+  EXPECT_EQ(window.keyframes.front().frame, 7);
+  ASSERT_GT(window.landmarks.size(), 100U);
+  for (const auto& [id, point] : window.landmarks) {
+    EXPECT_LE((point - drive.points[static_cast<std::size_t>(id)]).norm(), 1e-6);
+    bool is_seen = false;
+    for (const Keyframe& keyframe : window.keyframes) {
+      is_seen = is_seen || find_point(keyframe.points, id) != nullptr;
+    }
+    EXPECT_TRUE(is_seen) << "landmark " << id;
+  }
+}
+
+TEST(Landmarks, WrongPlacesAreCulled) {
+  const WindowOptions options;
+  const DriveTracks drive(6, 0.0, 2);
+  Window window = window_of(drive, options);
+  const std::size_t num_landmarks = window.landmarks.size();
+  window.landmarks.begin()->second += Eigen::Vector3d(3.0, 0.0, 0.0);
+  window.landmarks.rbegin()->second.z() = -10.0;
+  cull_landmarks(window, drive.camera, options);
+  EXPECT_EQ(window.landmarks.size(), num_landmarks - 2);
+}
+
+/// At a change of the rotation that is nothing, tiny (the series) and large.
+TEST(ReprojectionCost, DerivativesAgreeWithNumericOnes) {
+  const Camera camera = testing::kitti_camera();
+  const Eigen::Matrix3d rotation = so3_exp({0.1, -0.2, 0.05}).toRotationMatrix();
+  const ReprojectionCost cost(camera, rotation, {600.0, 180.0});
+  Eigen::Vector3d x(2.0, -1.0, 12.0);
+  for (const double size : {0.0, 1e-5, 0.3}) {
+    Eigen::Matrix<double, 6, 1> pose;
+    pose << size * Eigen::Vector3d(0.5, -0.4, 0.7), 0.3, -0.1, 0.4;
+    const double* parameters[] = {pose.data(), x.data()};
+    Eigen::Vector2d residual;
+    Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
+    Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_x;
+    double* jacobians[] = {by_pose.data(), by_x.data()};
+    ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), jacobians));
+    const auto check = [&](double* block, const auto& jacobian) {
+      for (int i = 0; i < jacobian.cols(); ++i) {
+        const double before = block[i];
+        const double step = 1e-6;
+        Eigen::Vector2d plus;
+        Eigen::Vector2d minus;
+        block[i] = before + step;
+        ASSERT_TRUE(cost.Evaluate(parameters, plus.data(), nullptr));
+        block[i] = before - step;
+        ASSERT_TRUE(cost.Evaluate(parameters, minus.data(), nullptr));
+        block[i] = before;
+        const Eigen::Vector2d numeric = (plus - minus) / (2.0 * step);
+        EXPECT_LE((numeric - jacobian.col(i)).norm(), 1e-5 * (1.0 + numeric.norm()))
+            << "rotation by " << size << ", parameter " << i;
+      }
+    };
+    check(pose.data(), by_pose);
+    check(x.data(), by_x);
+  }
+}
+
+TEST(ReprojectionCost, APointBehindTheCameraIsRefused) {
+  const Camera camera = testing::kitti_camera();
+  const Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  const ReprojectionCost cost(camera, rotation, {600.0, 180.0});
+  const Eigen::Matrix<double, 6, 1> pose = Eigen::Matrix<double, 6, 1>::Zero();
+  const Eigen::Vector3d x(0.0, 0.0, -1.0);
+  const double* parameters[] = {pose.data(), x.data()};
+  Eigen::Vector2d residual;
+  EXPECT_FALSE(cost.Evaluate(parameters, residual.data(), nullptr));
+}
+
+TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
+  const WindowOptions options;
+  const DriveTracks drive(8, 0.0, 3);
+  Window window = window_of(drive, options);
+  for (std::size_t i = 2; i < window.keyframes.size(); ++i) {
+    Rigid3& pose = window.keyframes[i].world_from_camera;
+    pose = pose * Rigid3(so3_exp({0.001, -0.002, 0.001}), {0.01, -0.02, 0.03});
+  }
+  BundleAdjustmentOptions refinement;
+  refinement.max_iterations = 30;
+  const BundleAdjustmentReport report = refine_window(window, drive.camera, refinement);
+  ASSERT_TRUE(report.is_usable);
+  EXPECT_LT(report.final_cost, 0.01 * report.initial_cost);
+  for (std::size_t i = 0; i < window.keyframes.size(); ++i) {
+    const Rigid3& truth = drive.world_from_camera[i];
+    const Rigid3& pose = window.keyframes[i].world_from_camera;
+    EXPECT_LE((pose.translation - truth.translation).norm(), i < 2 ? 1e-12 : 1e-3) << i;
+    EXPECT_LE(pose.rotation.angularDistance(truth.rotation), i < 2 ? 1e-7 : 1e-4) << i;
+  }
+}
+
+TEST(BundleAdjustment, ALandmarkBehindAKeyframeDoesNotStopTheRest) {
+  const DriveTracks drive(8, 0.0, 3);
+  Window window = window_of(drive, {});
+  const int behind = window.landmarks.begin()->first;
+  window.landmarks.begin()->second.z() = -5.0;
+  window.keyframes.back().world_from_camera.translation.x() += 0.02;
+  const BundleAdjustmentReport report = refine_window(window, drive.camera, {});
+  ASSERT_TRUE(report.is_usable);
+  EXPECT_LT(report.final_cost, 0.1 * report.initial_cost);
+  EXPECT_EQ(window.landmarks.at(behind).z(), -5.0);
+}
+
+TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
+  const DriveTracks drive(2, 0.0, 4);
+  Window window = window_of(drive, {});
+  EXPECT_FALSE(refine_window(window, drive.camera, {}).is_usable);
+  Window empty;
+  EXPECT_FALSE(refine_window(empty, drive.camera, {}).is_usable);
+}
+
+}  // namespace
+}  // namespace stemvo
