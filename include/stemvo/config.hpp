@@ -34,10 +34,10 @@ struct TwoViewOptions {
 struct OdometryOptions {
   std::string mode = "map";           ///< `two_frame` chains pairs; `map` adds a local map
   std::string composition = "right";  ///< `right`: R_c R; `paper`: R R_c
-  std::string gate = "translation";   ///< `translation`, `paper` (drops the rotation too), `off`
-  int min_inliers = 20;               ///< fewer: the frame is lost
-  double stationary_flow_px = 0.15;     ///< median flow below it: standing still
-  double min_parallax_px = 0.6;       ///< median rotation-free flow below it: creeping
+  std::string gate = "off";  ///< two_frame: `translation`, `paper` (drops the rotation too), `off`
+  int min_inliers = 20;      ///< fewer: the frame is lost
+  double stationary_flow_px = 0.15;  ///< median flow below it: stationary
+  double min_parallax_px = 0.6;      ///< median rotation-free flow below it: low parallax
 };
 
 /// Keys `refine.*`: bundle adjustment of the local map (odometry.mode: map).

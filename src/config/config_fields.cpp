@@ -120,17 +120,20 @@ std::vector<Field> two_view_fields(TwoViewOptions& o) {
 std::vector<Field> odometry_fields(OdometryOptions& o) {
   return {
       {"odometry", "mode", &o.mode, one_of({"two_frame", "map"}),
-       "two_frame: motions of pairs of frames are chained; map: each frame is placed against "
-       "landmarks of the last keyframes, which are refined together"},
+       "two_frame: motions of pairs of frames are chained; map: each frame is localized "
+       "against landmarks of the last keyframes, which are refined together"},
       {"odometry", "composition", &o.composition, one_of({"right", "paper"}),
        "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)"},
       {"odometry", "gate", &o.gate, one_of({"translation", "paper", "off"}),
-       "what a step that does not go forward loses: its translation, paper: its rotation too"},
+       "two_frame: what a step that does not go forward loses: its translation, paper: its "
+       "rotation "
+       "too; off: nothing"},
       {"odometry", "min_inliers", &o.min_inliers, at_least(5), "fewer: the frame is lost"},
       {"odometry", "stationary_flow_px", &o.stationary_flow_px, at_least(0),
-       "median flow below it: standing still, input pixels"},
+       "median flow below it: stationary, input pixels"},
       {"odometry", "min_parallax_px", &o.min_parallax_px, at_least(0),
-       "median flow without the rotation's below it: too slow to see a direction, input pixels"},
+       "median flow without the rotation's below it: low parallax, too little to see a direction, "
+       "input pixels"},
   };
 }
 

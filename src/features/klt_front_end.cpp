@@ -66,7 +66,8 @@ std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& 
 Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
   auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
   STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
-  if (last_.picture != nullptr && last_.picture->image.pixels.size() != picture->image.pixels.size()) {
+  if (last_.picture != nullptr &&
+      last_.picture->image.pixels.size() != picture->image.pixels.size()) {
     last_ = {};
     last_good_ = {};
   }

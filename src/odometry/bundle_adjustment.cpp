@@ -101,13 +101,13 @@ std::deque<ReprojectionCost> add_residuals(const Window& window,
                                            Unknowns& unknowns,
                                            ceres::Problem& problem) {
   std::deque<ReprojectionCost> costs;
-  for_each_observation(
-      window, unknowns.points,
-      [&](std::size_t keyframe, const TrackPoint& observation, PointBlock& point) {
-        PoseBlock& pose = unknowns.poses[keyframe];
-        problem.AddResidualBlock(&costs.emplace_back(camera, pose.rotation, observation.uv), loss,
-                                 pose.change.data(), point.point.data());
-      });
+  for_each_observation(window, unknowns.points,
+                       [&](std::size_t keyframe, const TrackPoint& observation, PointBlock& point) {
+                         PoseBlock& pose = unknowns.poses[keyframe];
+                         problem.AddResidualBlock(
+                             &costs.emplace_back(camera, pose.rotation, observation.uv), loss,
+                             pose.change.data(), point.point.data());
+                       });
   return costs;
 }
 
@@ -166,9 +166,8 @@ BundleAdjustmentReport refine_window(Window& window,
     return report;
   }
   Unknowns unknowns = read_unknowns(window, options);
-  ceres::CauchyLoss loss(
-      std::max(options.loss_scale_px,
-               options.loss_share * median_error_px(window, camera, unknowns)));
+  ceres::CauchyLoss loss(std::max(options.loss_scale_px,
+                                  options.loss_share * median_error_px(window, camera, unknowns)));
   ceres::Problem::Options problem_options;
   problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;

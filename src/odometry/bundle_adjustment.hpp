@@ -7,8 +7,8 @@
 namespace stemvo {
 
 struct BundleAdjustmentOptions {
-  /// The oldest. Two hold the gauge, scale included; with one the length of the window is kept, from
-  /// the oldest keyframe to the last but one.
+  /// The oldest. Two hold the gauge, scale included; with one the length of the window is kept,
+  /// from the oldest keyframe to the last but one.
   int num_fixed_keyframes = 2;
   int max_iterations = 4;
   /// Cauchy scale on the reprojection error: at least this ..
@@ -16,7 +16,7 @@ struct BundleAdjustmentOptions {
   /// .. and so many times the median error: a lens or a shutter that the camera model does not know
   /// makes every observation worse.
   double loss_share = 2.0;
-  int min_observations = 3;    ///< of a landmark that takes part
+  int min_observations = 3;  ///< of a landmark that takes part
 };
 
 struct BundleAdjustmentReport {

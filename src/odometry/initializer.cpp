@@ -60,7 +60,10 @@ bool is_same(const Rigid3& a, const Rigid3& b) {
 }  // namespace
 
 Initializer::Initializer(const Config& config, const Camera& camera)
-    : camera_(camera), loss_px_(config.two_view.refine_loss_px), two_view_(config, camera), seed_(config.seed) {}
+    : camera_(camera),
+      loss_px_(config.two_view.refine_loss_px),
+      two_view_(config, camera),
+      seed_(config.seed) {}
 
 void Initializer::start(View reference) {
   reference_ = std::move(reference);
@@ -85,8 +88,8 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   }
   std::vector<char> mask = all;
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    const auto pair = std::lower_bound(pairs.track_ids.begin(), pairs.track_ids.end(),
-                                       matches.track_ids[i]);
+    const auto pair =
+        std::lower_bound(pairs.track_ids.begin(), pairs.track_ids.end(), matches.track_ids[i]);
     if (pair != pairs.track_ids.end() && *pair == matches.track_ids[i]) {
       mask[i] = motion.inlier_mask[static_cast<std::size_t>(pair - pairs.track_ids.begin())];
     }

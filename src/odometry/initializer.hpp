@@ -47,7 +47,8 @@ class Initializer {
   void wait(View view);
 
  private:
-  /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as well.
+  /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
+  /// well.
   void choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const;
 
   Camera camera_;

@@ -34,10 +34,9 @@ std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
                                           const Rigid3& camera_from_world,
                                           const Camera& camera,
                                           const LocalizationOptions& options) {
-  const AbsolutePose first =
-      refine_absolute_pose(camera_from_world, seen.points, seen.uv, camera,
-                           {.loss_scale_px = options.first_loss_px,
-                            .inlier_bound_px = 2.0 * options.inlier_bound_px});
+  const AbsolutePose first = refine_absolute_pose(
+      camera_from_world, seen.points, seen.uv, camera,
+      {.loss_scale_px = options.first_loss_px, .inlier_bound_px = 2.0 * options.inlier_bound_px});
   if (first.num_inliers < options.min_landmarks) {
     return std::nullopt;
   }
@@ -82,8 +81,8 @@ std::optional<Localization> localize(const SeenLandmarks& seen,
   if (num_inliers >= options.min_agreement * seen.size()) {
     return best;
   }
-  const std::optional<Rigid3> start = estimate_absolute_pose(
-      seen.points, seen.uv, camera, options.inlier_bound_px, options.seed);
+  const std::optional<Rigid3> start =
+      estimate_absolute_pose(seen.points, seen.uv, camera, options.inlier_bound_px, options.seed);
   if (start.has_value()) {
     const auto found = optimize_pose(seen, *start, camera, options);
     if (found.has_value() && found->num_inliers > num_inliers) {

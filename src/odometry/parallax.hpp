@@ -14,9 +14,9 @@ namespace stemvo {
 
 // Of matches in input pixels. Medians: up to half of the matches may be wrong.
 
-/// Median length of noise in two images over its median distance from epipolar lines: 2.5 where it is
-/// equal in all directions (1.177 sqrt(2) / 0.6745), 3-4.5 on rendered turns of 18 px a frame. The
-/// slowest steps that can be seen have 10 and more.
+/// Median length of noise in two images over its median distance from epipolar lines: 2.5 where it
+/// is equal in all directions (1.177 sqrt(2) / 0.6745), 3-4.5 on rendered turns of 18 px a frame.
+/// The slowest steps that can be seen have 10 and more.
 inline constexpr double kNoiseParallax = 5.0;
 
 /// Length of the flow.

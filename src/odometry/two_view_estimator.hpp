@@ -28,7 +28,7 @@ struct MeasuredMotion {
   bool is_decisive = false;        ///< enough points, parallax, and no close second hypothesis
   double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess
   int num_inliers = 0;
-  std::vector<char> inlier_mask;  ///< one per match
+  std::vector<char> inlier_mask;              ///< one per match
   std::optional<Eigen::Matrix3d> homography;  ///< pixels; the models that were scored
   std::optional<Eigen::Matrix3d> essential;   ///< normalised coordinates
 };

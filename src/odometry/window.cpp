@@ -12,10 +12,10 @@ void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& option
     window.keyframes.pop_front();
   }
   std::erase_if(window.landmarks, [&](const auto& landmark) {
-    return std::none_of(
-        window.keyframes.rbegin(), window.keyframes.rend(), [&](const Keyframe& seen_from) {
-          return find_point(seen_from.points, landmark.first) != nullptr;
-        });
+    return std::none_of(window.keyframes.rbegin(), window.keyframes.rend(),
+                        [&](const Keyframe& seen_from) {
+                          return find_point(seen_from.points, landmark.first) != nullptr;
+                        });
   });
 }
 

@@ -109,8 +109,8 @@ FrameState WindowEstimator::accept(const TrackedFrame& frame,
   }
   // The position is held until there is a map.
   const Rigid3& reference = initializer_.reference().world_from_camera;
-  world_from_camera_ = Rigid3(reference.rotation * motion.cur_from_prev.rotation.conjugate(),
-                              reference.translation);
+  world_from_camera_ =
+      Rigid3(reference.rotation * motion.cur_from_prev.rotation.conjugate(), reference.translation);
   initializer_.wait({frame.number, world_from_camera_, points});
   return motion.state == FrameState::kTracking ? FrameState::kInitializing : motion.state;
 }
@@ -121,10 +121,10 @@ bool WindowEstimator::open_window(const TrackedFrame& frame,
   const View& reference = initializer_.reference();
   const Rigid3 direction = motion.cur_from_prev.inverse();
   const double length = step_ * (frame.number - reference.frame);
-  View view{frame.number,
-            reference.world_from_camera *
-                Rigid3(direction.rotation, length * direction.translation),
-            std::move(points)};
+  View view{
+      frame.number,
+      reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation),
+      std::move(points)};
   std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
   if (!window.has_value()) {
     return false;
@@ -210,8 +210,7 @@ std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_came
       refine_rotation(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_).cur_from_prev;
   const double parallax_px =
       median_parallax_px(turn.rotation, pairs.prev_uv, pairs.cur_uv, camera_);
-  const double noise_px =
-      median_epipolar_px(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_);
+  const double noise_px = median_epipolar_px(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_);
   if (parallax_px >= options_.stationary_flow_px &&
       parallax_px >= std::min(kNoiseParallax * noise_px, options_.min_parallax_px)) {
     return std::nullopt;
@@ -250,9 +249,8 @@ std::vector<char> WindowEstimator::judge_matches(const Matches& matches,
     for (const std::size_t i : indices) {
       cur_uv.push_back(matches.cur_uv[i]);
     }
-    const std::vector<char> inliers = epipolar_inliers(camera_from_world * world_from_prev,
-                                                       prev_uv, cur_uv, camera_,
-                                                       epipolar_bound_px_);
+    const std::vector<char> inliers = epipolar_inliers(camera_from_world * world_from_prev, prev_uv,
+                                                       cur_uv, camera_, epipolar_bound_px_);
     for (std::size_t k = 0; k < indices.size(); ++k) {
       mask[indices[k]] = inliers[k];
     }
@@ -304,7 +302,8 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   triangulate_landmarks(window_, camera_, window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
-    refinement_.num_fixed_keyframes = num_keyframes_ < window_options_.num_keyframes ? 1 : window_options_.num_keyframes / 2;
+    refinement_.num_fixed_keyframes =
+        num_keyframes_ < window_options_.num_keyframes ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera_, refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     anchor_.world_from_camera = world_from_camera_;
@@ -324,8 +323,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame) {
     // The road was last seen where the camera was then.
     const Rigid3& before =
         has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
-    const double factor =
-        scale_.measure(frame.road.get(), world_from_camera_.inverse() * before);
+    const double factor = scale_.measure(frame.road.get(), world_from_camera_.inverse() * before);
     rescale_map(factor, before.translation);
   }
 }

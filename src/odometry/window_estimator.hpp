@@ -20,8 +20,8 @@
 
 namespace stemvo {
 
-/// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is localized
-/// against its landmarks. It alone owns pose, window and scale (docs/architecture.md).
+/// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is
+/// localized against its landmarks. It alone owns pose, window and scale (docs/architecture.md).
 class WindowEstimator final : public Estimator {
  public:
   WindowEstimator(const Config& config, const Camera& camera);

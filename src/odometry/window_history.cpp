@@ -43,8 +43,8 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
     if (landmark == window.landmarks.end()) {
       continue;
     }
-    const auto oldest =
-        std::find_if(window.keyframes.begin(), window.keyframes.end(), [&](const Keyframe& keyframe) {
+    const auto oldest = std::find_if(
+        window.keyframes.begin(), window.keyframes.end(), [&](const Keyframe& keyframe) {
           return find_point(keyframe.points, observation.track_id) != nullptr;
         });
     track.max_parallax_rad =

@@ -22,8 +22,8 @@ struct RefinedMotion {
   Rigid3 prev_from_cur;
 };
 
-/// What the window leaves behind. Motions are kept, not poses: the window is rescaled and moved as a
-/// whole later on, and what has left must not be torn from it. For the same reason a landmark is
+/// What the window leaves behind. Motions are kept, not poses: the window is rescaled and moved as
+/// a whole later on, and what has left must not be torn from it. For the same reason a landmark is
 /// kept in the camera of the last keyframe that saw it.
 class WindowHistory {
  public:

@@ -49,9 +49,7 @@ class OdometryStages {
       frame.prepared = odometry_.prepare(*frame.pixels);
     }
   }
-  void track(std::size_t index) {
-    odometry_.track(std::move(next(num_tracked_, index).prepared));
-  }
+  void track(std::size_t index) { odometry_.track(std::move(next(num_tracked_, index).prepared)); }
   void localize(std::size_t index) {
     next(num_localized_, index);
     odometry_.localize();

@@ -13,8 +13,8 @@ namespace stemvo {
 namespace {
 
 constexpr std::array<std::string_view, kNumStages> kNames = {
-    "read and decode",     "stem",      "stretch",        "pyramid",    "description",
-    "road picture",        "detection", "tracking",       "homography", "epipolar geometry",
+    "read and decode",     "stem",         "stretch",           "pyramid",    "description",
+    "road picture",        "detection",    "tracking",          "homography", "epipolar geometry",
     "two-view refinement", "localization", "window refinement", "road scale", "frame files",
     "result files"};
 
