@@ -21,6 +21,8 @@ constexpr double kConverged_px = 0.015;  ///< an iteration's step, picture pixel
 /// Windows of 5x5 pixels lose the road: t_rel 0.85 for 0.31 on a rendered drive, whatever their
 /// size in the input.
 constexpr int kMinReach_px = 3;
+/// A smaller share of the points tracked: the image is of no use, or of another place.
+constexpr double kMinTracked = 0.1;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
 
@@ -64,42 +66,73 @@ std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& 
 Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
   auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
   STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
-  Matches matches;
-  if (last_ != nullptr && last_->image.pixels.size() == picture->image.pixels.size()) {
-    replenish(*last_);
-    matches = track(*last_, *picture);
-  } else {
-    points_.clear();
+  if (last_.picture != nullptr && last_.picture->image.pixels.size() != picture->image.pixels.size()) {
+    last_ = {};
+    last_good_ = {};
   }
-  matches.prev_frame = std::exchange(last_frame_, frame);
-  last_ = std::move(picture);
+  Matches matches;
+  View now{std::move(picture), {}, frame};
+  if (last_.picture != nullptr) {
+    replenish(last_);
+    matches = track(last_, now);
+    if (is_lost(matches, last_)) {
+      track_from_last_good(now, matches);
+    } else {
+      last_good_ = {};
+    }
+  }
+  last_ = std::move(now);
   return matches;
 }
 
+/// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
+/// tells more than the last one, its tracks go on.
+void KltFrontEnd::track_from_last_good(View& now, Matches& matches) {
+  if (last_good_.picture == nullptr) {
+    last_good_ = std::move(last_);
+    return;
+  }
+  View again{now.picture, {}, now.frame};
+  Matches found = track(last_good_, again);
+  if (!is_lost(found, last_good_)) {
+    now = std::move(again);
+    matches = std::move(found);
+    last_good_ = {};
+  }
+}
+
+bool KltFrontEnd::is_lost(const Matches& matches, const View& from) {
+  return static_cast<double>(matches.cur_uv.size()) <
+         kMinTracked * static_cast<double>(from.points.size());
+}
+
 void KltFrontEnd::keep(const std::vector<char>& is_good) {
-  if (is_good.size() != points_.size()) {
+  if (is_good.size() != last_.points.size()) {
     return;
   }
   std::vector<Point> kept;
-  kept.reserve(points_.size());
-  for (std::size_t i = 0; i < points_.size(); ++i) {
+  kept.reserve(is_good.size());
+  for (std::size_t i = 0; i < is_good.size(); ++i) {
     if (is_good[i] != 0) {
-      kept.push_back(points_[i]);
+      kept.push_back(last_.points[i]);
     }
   }
-  points_ = std::move(kept);
+  last_.points = std::move(kept);
 }
 
-Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
+Matches KltFrontEnd::track(const View& from, View& to) const {
   const StageTimer timer(Stage::kTracking);
+  const Picture& prev = *from.picture;
+  const Picture& cur = *to.picture;
   Matches matches;
-  matches.num_keypoints = static_cast<int>(points_.size());
-  if (points_.empty()) {
+  matches.prev_frame = from.frame;
+  matches.num_keypoints = static_cast<int>(from.points.size());
+  if (from.points.empty()) {
     return matches;
   }
   std::vector<cv::Point2f> prev_uv;
-  prev_uv.reserve(points_.size());
-  for (const Point& point : points_) {
+  prev_uv.reserve(from.points.size());
+  for (const Point& point : from.points) {
     prev_uv.push_back(point.uv);
   }
   const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, kMaxIterations,
@@ -115,9 +148,8 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
                            cur.window, std::min(cur.last_level(), kBackLevels - 1), criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW);
 
-  std::vector<Point> followed;
-  followed.reserve(points_.size());
-  for (std::size_t i = 0; i < points_.size(); ++i) {
+  to.points.reserve(from.points.size());
+  for (std::size_t i = 0; i < from.points.size(); ++i) {
     const bool is_good = found[i] != 0 && found_back[i] != 0 &&
                          is_inside(cur_uv[i], cur.image.pixels.size()) &&
                          input_distance_px(prev.image.map, prev_uv[i], back_uv[i]) <=
@@ -125,19 +157,19 @@ Matches KltFrontEnd::track(const Picture& prev, const Picture& cur) {
     if (!is_good) {
       continue;
     }
-    followed.push_back({cur_uv[i], points_[i].id});
+    to.points.push_back({cur_uv[i], from.points[i].id});
     matches.prev_uv.push_back(to_input(prev.image.map, prev_uv[i]));
     matches.cur_uv.push_back(to_input(cur.image.map, cur_uv[i]));
-    matches.track_ids.push_back(points_[i].id);
+    matches.track_ids.push_back(from.points[i].id);
   }
-  points_ = std::move(followed);
   return matches;
 }
 
 /// Corners are looked for one level up, at half the size: the window that follows them is several
 /// pixels wide, and any pixel of a corner will do.
-void KltFrontEnd::replenish(const Picture& picture) {
+void KltFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
+  const Picture& picture = *view.picture;
   const bool is_halved = picture.last_level() > 0;
   const cv::Mat& pixels = picture.pyramid[is_halved ? kNextLevel : 0];
   const float to_pixels = is_halved ? 2.0F : 1.0F;
@@ -146,8 +178,8 @@ void KltFrontEnd::replenish(const Picture& picture) {
   GridQuota quota(options_, picture.image.pixels.size());
   cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
   std::vector<Point> kept;
-  kept.reserve(points_.size());
-  for (const Point& point : points_) {
+  kept.reserve(view.points.size());
+  for (const Point& point : view.points) {
     const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
                            std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
     if (mask.at<unsigned char>(center) == 0) {
@@ -157,14 +189,14 @@ void KltFrontEnd::replenish(const Picture& picture) {
     quota.take(point.uv);
     kept.push_back(point);
   }
-  points_ = std::move(kept);
+  view.points = std::move(kept);
 
   std::vector<cv::Point2f> corners;
   cv::goodFeaturesToTrack(pixels, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
                           mask, /*blockSize=*/3);
   for (const cv::Point2f& corner : corners) {  // strongest first
     if (quota.take(corner * to_pixels)) {
-      points_.push_back({corner * to_pixels, next_id_++});
+      view.points.push_back({corner * to_pixels, next_id_++});
     }
   }
 }

@@ -32,13 +32,21 @@ class KltFrontEnd : public FrontEnd {
   /// With its pyramid and the derivatives of every level, which both directions use.
   struct Picture;
 
-  [[nodiscard]] Matches track(const Picture& prev, const Picture& cur);
-  void replenish(const Picture& picture);
+  /// An image and its points.
+  struct View {
+    std::shared_ptr<const Picture> picture;
+    std::vector<Point> points;
+    int frame = -1;
+  };
+
+  [[nodiscard]] Matches track(const View& from, View& to) const;
+  void track_from_last_good(View& now, Matches& matches);
+  [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
+  void replenish(View& view);
 
   FeatureOptions options_;
-  std::shared_ptr<const Picture> last_;
-  std::vector<Point> points_;  ///< on the last picture
-  int last_frame_ = -1;
+  View last_;
+  View last_good_;  ///< the one before nearly every track ended; none otherwise
   int next_id_ = 0;
 };
 

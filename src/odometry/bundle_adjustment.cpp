@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/bundle_adjustment.hpp"
 
+#include <algorithm>
 #include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <ceres/ceres.h>
@@ -78,6 +80,19 @@ Unknowns read_unknowns(const Window& window, const BundleAdjustmentOptions& opti
   return unknowns;
 }
 
+/// Reprojection error before the solve, the newest keyframe's included.
+double median_error_px(const Window& window, const Camera& camera, Unknowns& unknowns) {
+  std::vector<double> errors;
+  for_each_observation(
+      window, unknowns.points,
+      [&](std::size_t keyframe, const TrackPoint& observation, const PointBlock& point) {
+        const PoseBlock& pose = unknowns.poses[keyframe];
+        const Eigen::Vector3d x = pose.rotation * point.point + pose.change.tail<3>();
+        errors.push_back((camera.project(x) - observation.uv).norm());
+      });
+  return median(std::move(errors));
+}
+
 /// Adds a residual per observation; every block's order is fixed, so the result is too. Returns the
 /// costs, which must outlive the problem: it would keep a tree of those it had to free.
 std::deque<ReprojectionCost> add_residuals(const Window& window,
@@ -151,17 +166,9 @@ BundleAdjustmentReport refine_window(Window& window,
     return report;
   }
   Unknowns unknowns = read_unknowns(window, options);
-  std::vector<double> errors;
-  for_each_observation(window, unknowns.points,
-                       [&](std::size_t keyframe, const TrackPoint& observation, PointBlock& point) {
-                         const PoseBlock& pose = unknowns.poses[keyframe];
-                         const Eigen::Vector3d x = pose.rotation * point.point + pose.change.tail<3>();
-                         errors.push_back((camera.project(x) - observation.uv).norm());
-                       });
-  const double typical_px = median(std::move(errors));
-  if (getenv("DBG2")) fprintf(stderr, "median %.3f\n", typical_px);
-  const double k = getenv("KLOSS") ? atof(getenv("KLOSS")) : 1.0;
-  ceres::CauchyLoss loss(std::max(options.loss_scale_px, k * typical_px));
+  ceres::CauchyLoss loss(
+      std::max(options.loss_scale_px,
+               options.loss_share * median_error_px(window, camera, unknowns)));
   ceres::Problem::Options problem_options;
   problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;

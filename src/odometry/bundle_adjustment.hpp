@@ -11,7 +11,11 @@ struct BundleAdjustmentOptions {
   /// the oldest keyframe to the last but one.
   int num_fixed_keyframes = 2;
   int max_iterations = 4;
-  double loss_scale_px = 0.2;  ///< Cauchy scale on the reprojection error
+  /// Cauchy scale on the reprojection error: at least this ..
+  double loss_scale_px = 0.2;
+  /// .. and so many times the median error: a lens or a shutter that the camera model does not know
+  /// makes every observation worse.
+  double loss_share = 2.0;
   int min_observations = 3;    ///< of a landmark that takes part
 };
 

@@ -2,19 +2,65 @@
 #include "odometry/initializer.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
+
+#include "stemvo/geometry/decomposition.hpp"
+#include "stemvo/geometry/relative_pose_refinement.hpp"
+#include "stemvo/geometry/two_view_motion.hpp"
 
 namespace stemvo {
 namespace {
 
 /// So many frames can be localized afterwards; earlier ones stay where the reference is.
 constexpr std::size_t kMaxWaiting = 300;
-constexpr double kMinLiving = 0.5;
+constexpr double kMinLiving = 0.3;
+/// A window that opens with fewer would soon be lost.
+constexpr int kMinLandmarks = 50;
+
+/// Hypotheses with fewer than this share of the most good points are out.
+constexpr double kMinGoodShare = 0.75;
+/// The second best hypothesis costs so many times the best: the parallax decides.
+constexpr double kMinMargin = 1.2;
+/// As ORB-SLAM2's, but the share is of all matches here, outliers included, half the parallax will
+/// do, and other hypotheses are told apart by their cost.
+constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5,
+                                        .min_parallax_deg = 0.5,
+                                        .max_runner_up_homography = 1.1,
+                                        .max_runner_up_essential = 1.1};
+/// Refined hypotheses nearer than this are one.
+constexpr double kSameAngle_rad = 0.1;
+
+struct Hypothesis {
+  TwoViewModel model;
+  Rigid3 cur_from_prev;
+  double cost;
+};
+
+std::vector<Hypothesis> list_hypotheses(const MeasuredMotion& motion, const Camera& camera) {
+  std::vector<Hypothesis> hypotheses;
+  if (motion.homography.has_value()) {
+    for (const PlanarMotion& planar : decompose_homography(*motion.homography, camera)) {
+      hypotheses.push_back({TwoViewModel::kHomography, planar.cur_from_prev, 0.0});
+    }
+  }
+  if (motion.essential.has_value()) {
+    for (const Rigid3& cur_from_prev : decompose_essential(*motion.essential)) {
+      hypotheses.push_back({TwoViewModel::kEssential, cur_from_prev, 0.0});
+    }
+  }
+  return hypotheses;
+}
+
+bool is_same(const Rigid3& a, const Rigid3& b) {
+  return a.rotation.angularDistance(b.rotation) < kSameAngle_rad &&
+         a.translation.dot(b.translation) > std::cos(kSameAngle_rad);
+}
 
 }  // namespace
 
 Initializer::Initializer(const Config& config, const Camera& camera)
-    : camera_(camera), two_view_(config, camera), seed_(config.seed) {}
+    : camera_(camera), loss_px_(config.two_view.refine_loss_px), two_view_(config, camera), seed_(config.seed) {}
 
 void Initializer::start(View reference) {
   reference_ = std::move(reference);
@@ -34,6 +80,9 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   const PointPairs pairs = common_points(reference_.points, now);
   MeasuredMotion motion =
       two_view_.measure(pairs.prev_uv, pairs.cur_uv, /*is_initializing=*/true, seed_);
+  if (motion.state == FrameState::kTracking) {
+    choose_motion(pairs, motion);
+  }
   std::vector<char> mask = all;
   for (std::size_t i = 0; i < mask.size(); ++i) {
     const auto pair = std::lower_bound(pairs.track_ids.begin(), pairs.track_ids.end(),
@@ -46,6 +95,50 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   return motion;
 }
 
+void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const {
+  std::vector<Hypothesis> hypotheses = list_hypotheses(motion, camera_);
+  const auto num_good = [&](const Hypothesis& hypothesis) {
+    return test_points(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_).num_good;
+  };
+  int most_good = 0;
+  std::vector<int> good;
+  for (const Hypothesis& hypothesis : hypotheses) {
+    good.push_back(num_good(hypothesis));
+    most_good = std::max(most_good, good.back());
+  }
+  std::vector<Hypothesis> refined;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    if (good[i] >= kMinGoodShare * most_good) {
+      const RelativePoseRefinement refinement =
+          refine_relative_pose(hypotheses[i].cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_,
+                               {.loss_scale_px = loss_px_});
+      refined.push_back({hypotheses[i].model, refinement.cur_from_prev, refinement.final_cost});
+    }
+  }
+  std::sort(refined.begin(), refined.end(),
+            [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
+  motion.is_decisive = false;
+  if (refined.empty()) {
+    return;
+  }
+  const Hypothesis& best = refined.front();
+  const PointTestResult test =
+      test_points(best.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_);
+  TwoViewMotion chosen;
+  chosen.model = best.model;
+  chosen.num_good = test.num_good;
+  chosen.parallax_deg = test.parallax_deg;
+  const auto rival = std::find_if(refined.begin(), refined.end(), [&](const Hypothesis& other) {
+    return !is_same(other.cur_from_prev, best.cur_from_prev);
+  });
+  motion.model = best.model;
+  motion.cur_from_prev = best.cur_from_prev;
+  motion.inlier_mask = test.good_mask;
+  two_view_.refine(pairs.prev_uv, pairs.cur_uv, motion);
+  motion.is_decisive = is_decisive(chosen, pairs.size(), kAcceptance) &&
+                       (rival == refined.end() || rival->cost > kMinMargin * best.cost);
+}
+
 std::optional<Window> Initializer::open_window(const View& now,
                                                const WindowOptions& window_options,
                                                const LocalizationOptions& localization) const {
@@ -54,7 +147,7 @@ std::optional<Window> Initializer::open_window(const View& now,
                window_options);
   add_keyframe(window, {now.frame, now.world_from_camera, now.points, {}}, window_options);
   triangulate_landmarks(window, camera_, window_options);
-  if (static_cast<int>(window.landmarks.size()) < localization.min_landmarks) {
+  if (static_cast<int>(window.landmarks.size()) < kMinLandmarks) {
     return std::nullopt;
   }
   Rigid3 predicted = reference_.world_from_camera;

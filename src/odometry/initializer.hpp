@@ -47,7 +47,11 @@ class Initializer {
   void wait(View view);
 
  private:
+  /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as well.
+  void choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const;
+
   Camera camera_;
+  double loss_px_;
   TwoViewEstimator two_view_;
   std::uint64_t seed_;
   View reference_;

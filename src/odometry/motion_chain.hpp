@@ -28,6 +28,11 @@ class MotionChain {
   /// A frame without a picture, or without a motion: the last motion goes on. With a picture the
   /// next motion starts here, without one it starts at the last picture.
   void extrapolate(bool has_picture);
+  /// The next motion starts at an earlier picture, `num_frames` before the next frame.
+  void go_back(const Rigid3& world_from_picture, int num_frames) {
+    world_from_picture_ = world_from_picture;
+    frames_since_picture_ = num_frames - 1;
+  }
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
   /// Pose of the last picture: where the next motion starts.

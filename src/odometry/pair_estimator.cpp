@@ -25,9 +25,14 @@ LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
   if (is_first_) {
     chain_.start();
   } else if (frame.has_image) {
+    if (frame.matches.prev_frame >= 0 && frame.matches.prev_frame != last_image_) {
+      chain_.go_back(trajectory_[static_cast<std::size_t>(frame.matches.prev_frame)],
+                     frame.number - frame.matches.prev_frame);
+    }
     motion_ = two_view_.measure(frame.matches.prev_uv, frame.matches.cur_uv,
                                 chain_.is_initializing(), seed_);
   }
+  last_image_ = frame.has_image ? frame.number : last_image_;
   LocalizedFrame localized;
   localized.inlier_mask = motion_.inlier_mask;
   localized.result.num_matches = static_cast<int>(frame.matches.cur_uv.size());

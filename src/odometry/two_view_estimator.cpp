@@ -59,7 +59,7 @@ MeasuredMotion TwoViewEstimator::measure(std::span<const Eigen::Vector2d> prev_u
   if (static_cast<int>(prev_uv.size()) < odometry_.min_inliers) {
     return result;
   }
-  const Models models = score_models(prev_uv, cur_uv, is_initializing, seed, result);
+  score_models(prev_uv, cur_uv, is_initializing, seed, result);
   if (median_flow_px(prev_uv, cur_uv) < odometry_.stationary_flow_px) {
     result.state = FrameState::kStationary;
     result.inlier_mask.assign(prev_uv.size(), 1);
@@ -67,14 +67,14 @@ MeasuredMotion TwoViewEstimator::measure(std::span<const Eigen::Vector2d> prev_u
     return result;
   }
   const PointTestOptions test{.sigma_px = options_.sigma_px};
-  const bool use_homography = is_initializing && models.homography.has_value() &&
+  const bool use_homography = is_initializing && result.homography.has_value() &&
                               result.homography_ratio > options_.homography_ratio;
   std::optional<TwoViewMotion> motion;
   if (use_homography) {
-    motion = motion_from_homography(*models.homography, prev_uv, cur_uv, camera_, test);
+    motion = motion_from_homography(*result.homography, prev_uv, cur_uv, camera_, test);
   }
-  if (!motion.has_value() && models.essential.has_value()) {
-    motion = motion_from_essential(*models.essential, prev_uv, cur_uv, camera_, test);
+  if (!motion.has_value() && result.essential.has_value()) {
+    motion = motion_from_essential(*result.essential, prev_uv, cur_uv, camera_, test);
   }
   if (!motion.has_value()) {
     return result;
@@ -88,40 +88,38 @@ MeasuredMotion TwoViewEstimator::measure(std::span<const Eigen::Vector2d> prev_u
   return result;
 }
 
-TwoViewEstimator::Models TwoViewEstimator::score_models(std::span<const Eigen::Vector2d> prev_uv,
-                                                        std::span<const Eigen::Vector2d> cur_uv,
-                                                        bool is_initializing,
-                                                        std::uint64_t seed,
-                                                        MeasuredMotion& result) const {
-  Models models;
+void TwoViewEstimator::score_models(std::span<const Eigen::Vector2d> prev_uv,
+                                    std::span<const Eigen::Vector2d> cur_uv,
+                                    bool is_initializing,
+                                    std::uint64_t seed,
+                                    MeasuredMotion& result) const {
   TwoViewOptions homography_options = options_;
   if (!is_initializing) {
     homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
     homography_options.estimator = kRecordEstimator;
   }
-  models.homography = estimate_homography(prev_uv, cur_uv, homography_options, seed);
+  result.homography = estimate_homography(prev_uv, cur_uv, homography_options, seed);
   std::optional<Eigen::Matrix3d> fundamental;
   if (is_initializing) {
     fundamental = estimate_fundamental(prev_uv, cur_uv, options_, seed);
     if (fundamental.has_value()) {
-      models.essential = essential_from_fundamental(*fundamental, camera_);
+      result.essential = essential_from_fundamental(*fundamental, camera_);
     }
   } else {
-    models.essential = estimate_essential(prev_uv, cur_uv, camera_, options_, seed);
-    if (models.essential.has_value()) {
-      fundamental = fundamental_from_essential(*models.essential, camera_);
+    result.essential = estimate_essential(prev_uv, cur_uv, camera_, options_, seed);
+    if (result.essential.has_value()) {
+      fundamental = fundamental_from_essential(*result.essential, camera_);
     }
   }
-  if (models.homography.has_value()) {
+  if (result.homography.has_value()) {
     result.homography_score =
-        score_homography(*models.homography, prev_uv, cur_uv, options_.sigma_px).score;
+        score_homography(*result.homography, prev_uv, cur_uv, options_.sigma_px).score;
   }
   if (fundamental.has_value()) {
     result.fundamental_score =
         score_fundamental(*fundamental, prev_uv, cur_uv, options_.sigma_px).score;
   }
   result.homography_ratio = homography_ratio(result.homography_score, result.fundamental_score);
-  return models;
 }
 
 void TwoViewEstimator::refine(std::span<const Eigen::Vector2d> prev_uv,

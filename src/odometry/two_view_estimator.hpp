@@ -29,6 +29,8 @@ struct MeasuredMotion {
   double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess
   int num_inliers = 0;
   std::vector<char> inlier_mask;  ///< one per match
+  std::optional<Eigen::Matrix3d> homography;  ///< pixels; the models that were scored
+  std::optional<Eigen::Matrix3d> essential;   ///< normalised coordinates
 };
 
 /// Two-frame motion, paper section 3.5-3.7: score H against F while initialising, the essential
@@ -42,20 +44,17 @@ class TwoViewEstimator {
                                        std::span<const Eigen::Vector2d> cur_uv,
                                        bool is_initializing,
                                        std::uint64_t seed) const;
-
- private:
-  struct Models {
-    std::optional<Eigen::Matrix3d> homography;
-    std::optional<Eigen::Matrix3d> essential;
-  };
-  [[nodiscard]] Models score_models(std::span<const Eigen::Vector2d> prev_uv,
-                                    std::span<const Eigen::Vector2d> cur_uv,
-                                    bool is_initializing,
-                                    std::uint64_t seed,
-                                    MeasuredMotion& result) const;
+  /// Refines a motion on its inliers, and finds inliers, parallax and state anew.
   void refine(std::span<const Eigen::Vector2d> prev_uv,
               std::span<const Eigen::Vector2d> cur_uv,
               MeasuredMotion& result) const;
+
+ private:
+  void score_models(std::span<const Eigen::Vector2d> prev_uv,
+                    std::span<const Eigen::Vector2d> cur_uv,
+                    bool is_initializing,
+                    std::uint64_t seed,
+                    MeasuredMotion& result) const;
 
   TwoViewOptions options_;
   OdometryOptions odometry_;

@@ -20,6 +20,8 @@ constexpr double kKeyframeParallax_px = 5.0;
 constexpr double kFocal_px = 718.0;
 /// .. or less than this share of its tracks left.
 constexpr double kMinOverlap = 0.6;
+/// A track farther from its epipolar line, in inlier thresholds, is dropped.
+constexpr double kTrackBound = 4.0;
 /// An anchor with fewer of its tracks left is renewed where the camera is.
 constexpr double kMinLiving = 0.5;
 /// More parallax than this is no noise, pixels.
@@ -38,7 +40,7 @@ WindowEstimator::WindowEstimator(const Config& config, const Camera& camera)
     : camera_(camera),
       options_(config.odometry),
       refine_every_(config.refine.every),
-      epipolar_bound_px_(2.0 * config.two_view.inlier_threshold_px),
+      epipolar_bound_px_(kTrackBound * config.two_view.inlier_threshold_px),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config, camera),
       scale_(config, camera),
@@ -155,7 +157,6 @@ FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& loc
   const std::optional<Localization> found =
       stemvo::localize(find_seen_landmarks(window_, all), world_from_camera_ * prev_from_cur_,
                        camera_, localization_);
-  if (getenv("DBG")) fprintf(stderr, "f %d matches %zu seen %d found %d kf %zu lm %zu lastkf %d\n", frame.number, all.size(), find_seen_landmarks(window_, all).size(), found?found->num_inliers:-1, window_.keyframes.size(), window_.landmarks.size(), window_.keyframes.back().frame); //DBG
   if (!found.has_value()) {
     return start_new_map(frame, localized);
   }
@@ -303,7 +304,7 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   triangulate_landmarks(window_, camera_, window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
-    refinement_.num_fixed_keyframes = num_keyframes_ < window_options_.num_keyframes ? 1 : (getenv("NFIX") ? atoi(getenv("NFIX")) : 2);
+    refinement_.num_fixed_keyframes = num_keyframes_ < window_options_.num_keyframes ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera_, refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     anchor_.world_from_camera = world_from_camera_;
