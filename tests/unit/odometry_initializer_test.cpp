@@ -51,9 +51,10 @@ void expect_true_motion(const Decided& decided, const DriveTracks& drive, double
   EXPECT_LT((estimate.translation - truth.translation.normalized()).norm(), 5.0 * max_rad);
 }
 
-/// A camera in the hand, 30 pictures a second, 3 m from what it sees: 0.5 m/s to the right.
+/// A camera in the hand, 30 pictures a second, 3 m from what it sees: 0.1 m/s to the right, less
+/// than a pixel a frame.
 DriveTracks sideways_walk(double noise_px, std::uint64_t seed) {
-  const Rigid3 step(so3_exp({0.0, 0.001, 0.0}), {0.5 / 30.0, 0.0, 0.0});
+  const Rigid3 step(so3_exp({0.0, 0.0005, 0.0}), {0.1 / 30.0, 0.0, 0.0});
   return {DriveTracks::repeat(step, 60), testing::points_of_room(1500, 4.0, seed), noise_px, seed};
 }
 
@@ -63,7 +64,7 @@ TEST(Initializer, DecidesBetweenTheReferenceAndNowWhereNeighboursHaveNoParallax)
     const Decided decided = initialize(walk);
     expect_true_motion(decided, walk, 0.01);
     EXPECT_GT(decided.frame, 1);
-    EXPECT_LT(decided.frame, 30);
+    EXPECT_LT(decided.frame, 45);
   }
 }
 
@@ -82,7 +83,8 @@ TEST(Initializer, OpensAWindowOfTheReferenceAndNowWithTheFramesBetween) {
   for (const FrameBetween& follower : between) {
     const Rigid3 truth = walk.pose(0).inverse() * walk.pose(follower.frame);
     const Rigid3& estimate = follower.keyframe_from_camera;
-    EXPECT_LT((unit_m * estimate.translation - truth.translation).norm(), 0.02) << follower.frame;
+    EXPECT_LT((unit_m * estimate.translation - truth.translation).norm(), 0.15 * unit_m)
+        << follower.frame;
     EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01) << follower.frame;
   }
 }

@@ -152,7 +152,9 @@ TEST(WindowEstimator, KeepsTheScaleOfItsFirstStep) {
 }
 
 TEST(WindowEstimator, FramesThatWaitedForParallaxAreSetRightAfterwards) {
-  Driven d(hand_walk(60, 0.1, 3));
+  const Rigid3 step(so3_exp({0.0, 0.0005, 0.0}), {0.003, 0.0, 0.0005});
+  Driven d(
+      DriveTracks(DriveTracks::repeat(step, 60), testing::points_of_room(2500, 4.0, 3), 0.1, 3));
   d.add_range(0, 60);
   int open = 1;
   while (open < 60 && d.moved(0, open) == 0.0) {
@@ -160,14 +162,16 @@ TEST(WindowEstimator, FramesThatWaitedForParallaxAreSetRightAfterwards) {
     ++open;
   }
   ASSERT_GT(open, 2);
-  ASSERT_LT(open, 40);
+  ASSERT_LT(open, 50);
   const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
   const std::vector<Rigid3>& truth = d.drive.world_from_camera;
   const double unit_m = 1.0 / testing::length_ratio(refined, truth, 0, open);
   for (std::size_t i = 1; i < static_cast<std::size_t>(open); ++i) {
     const Rigid3 estimate = refined[0].inverse() * refined[i];
     const Rigid3 motion = truth[0].inverse() * truth[i];
-    EXPECT_LT((unit_m * estimate.translation - motion.translation).norm(), 0.015) << i;
+    EXPECT_LT((unit_m * estimate.translation - motion.translation).norm(),
+              0.15 * truth[static_cast<std::size_t>(open)].translation.norm())
+        << i;
     EXPECT_LT(estimate.rotation.angularDistance(motion.rotation), 0.3 * kDeg) << i;
   }
 }
@@ -241,6 +245,28 @@ TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   EXPECT_NEAR(turn.angle_rad(), 110.0 * kDeg, 0.5 * kDeg);
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
   EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+}
+
+// A turn from the first frame on: nothing of it is in view in the end.
+TEST(WindowEstimator, AReferenceThatIsWornOutIsRenewed) {
+  const Rigid3 turn(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero());
+  const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.4});
+  std::vector<Rigid3> path = DriveTracks::repeat(turn, 45);
+  for (int i = 0; i < 20; ++i) {
+    path.push_back(path.back() * step);
+  }
+  std::vector<Eigen::Vector3d> points = testing::points_along(path, 2500, 12);
+  const std::vector<Eigen::Vector3d> room = testing::points_of_room(1500, 14.0, 12);
+  points.insert(points.end(), room.begin(), room.end());
+  Driven d(DriveTracks(path, points, 0.1, 12));
+  d.add_range(0, d.drive.num_frames());
+  d.expect_only(1, 45, FrameState::kRotating);
+  EXPECT_EQ(d.moved(0, 44), 0.0);
+  const Rigid3 turned = d.pose(0).inverse() * d.pose(44);
+  EXPECT_NEAR(turned.angle_rad(), 110.0 * kDeg, 0.5 * kDeg);
+  EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+  EXPECT_LT(testing::rotation_error_rad(d.estimator.trajectory(), path), 1.0 * kDeg);
 }
 
 TEST(WindowEstimator, StandingFromTheStartWaitsForTheDrive) {
