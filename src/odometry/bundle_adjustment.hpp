@@ -16,7 +16,7 @@ struct BundleAdjustmentOptions {
   /// .. and so many times the median error: a lens or a shutter that the camera model does not know
   /// makes every observation worse.
   double loss_share = 2.0;
-  int min_observations = 3;  ///< of a landmark that takes part
+  int min_observations = 2;  ///< of a landmark that takes part
 };
 
 struct BundleAdjustmentReport {

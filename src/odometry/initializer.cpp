@@ -19,7 +19,7 @@ constexpr double kMinLiving = 0.3;
 constexpr int kMinLandmarks = 50;
 
 /// Hypotheses with fewer than this share of the most good points are out.
-constexpr double kMinGoodShare = 0.75;
+constexpr double kMinGoodShare = 0.85;
 /// The second best hypothesis costs so many times the best: the parallax decides.
 constexpr double kMinMargin = 1.2;
 /// As ORB-SLAM2's, but the share is of all matches here, outliers included, half the parallax will

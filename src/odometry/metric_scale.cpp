@@ -27,12 +27,6 @@ void MetricScale::restart(const RoadPicture* road) {
   }
 }
 
-void MetricScale::start_new_unit() {
-  if (road_.has_value()) {
-    road_->start_new_unit();
-  }
-}
-
 double MetricScale::measure(const RoadPicture* road, const Rigid3& cur_from_prev) {
   if (!road_.has_value() || road == nullptr) {
     return 1.0;
@@ -50,6 +44,13 @@ double MetricScale::measure(const RoadPicture* road, const Rigid3& cur_from_prev
 void MetricScale::hold(std::string_view reason) {
   if (road_.has_value()) {
     state_ = state_ == RoadState::kMeasured ? RoadState::kHeld : state_;
+    reason_ = reason;
+  }
+}
+
+void MetricScale::wait(std::string_view reason) {
+  if (road_.has_value()) {
+    state_ = RoadState::kNone;
     reason_ = reason;
   }
 }

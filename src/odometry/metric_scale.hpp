@@ -22,13 +22,13 @@ class MetricScale {
 
   /// The first image, or one that nothing connects with the ones before.
   void restart(const RoadPicture* road);
-  /// The unit of the next motion is unknown, the images go on.
-  void start_new_unit();
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the
   /// factor that makes a unit a metre; the caller multiplies its lengths by it.
   [[nodiscard]] double measure(const RoadPicture* road, const Rigid3& cur_from_prev);
   /// A frame on which the road cannot be measured.
   void hold(std::string_view reason);
+  /// A frame without a map to scale.
+  void wait(std::string_view reason);
 
   /// State, reason and sigma of the last frame given.
   void report(FrameResult& result) const;

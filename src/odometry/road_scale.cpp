@@ -41,13 +41,6 @@ void RoadScale::restart() {
   frames_unmeasured_ = 0;
 }
 
-void RoadScale::start_new_unit() {
-  filter_.restart();
-  path_.restart();
-  frames_unmeasured_ = 0;
-  past_.resize(std::min<std::size_t>(past_.size(), 1));
-}
-
 const RoadScale::Past* RoadScale::pick_past() const {
   if (past_.empty() || !(past_.front().now_from_past.translation.norm() > 0.0)) {
     return nullptr;

@@ -36,9 +36,6 @@ class RoadScale {
   RoadScaleEstimate update(RoadPicture picture, const Rigid3& cur_from_prev);
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);
-  /// The next motion comes in a unit of its own, but from the last picture: what is known of the
-  /// scale is forgotten, the picture is not.
-  void start_new_unit();
   /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
   void restart();
 

@@ -24,6 +24,8 @@ constexpr double kMinOverlap = 0.6;
 constexpr double kTrackBound = 4.0;
 /// An anchor with fewer of its tracks left is renewed where the camera is.
 constexpr double kMinLiving = 0.5;
+/// A camera that was still is believed to move from so many times the bounds on.
+constexpr double kHysteresis = 2.0;
 /// More parallax than this is no noise, pixels.
 constexpr double kSureParallax_px = 2.0;
 
@@ -61,32 +63,37 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
     world_from_camera_ = world_from_camera_ * prev_from_cur_;
     result.state = FrameState::kNoImage;
   } else if (last_.frame < 0) {
-    start_map({frame.number, world_from_camera_, {}}, frame.road.get());
+    start_reference({frame.number, world_from_camera_, {}}, frame.road);
+    scale_.restart(frame.road.get());
     result.state = FrameState::kFirst;
-  } else if (is_initializing()) {
+  } else if (is_initializing_) {
     result.state = initialize(frame, localized);
   } else {
     const StageTimer timer(Stage::kLocalization);
     result.state = track(frame, localized);
   }
+  is_held_ = result.state == FrameState::kStationary || result.state == FrameState::kRotating;
   result.num_matches = static_cast<int>(localized.inlier_mask.size());
   result.num_inliers = static_cast<int>(
       std::count(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{1}));
   return localized;
 }
 
-/// The reference is the first keyframe of a map to be.
-void WindowEstimator::start_map(View reference, const RoadPicture* road) {
-  history_.close(window_);
-  window_.clear();
+/// The reference is the first keyframe of a map to be. The window, if there is one, stays until the
+/// map is: a frame may see it again.
+void WindowEstimator::start_reference(View reference, std::shared_ptr<const RoadPicture> road) {
   initializer_.start(std::move(reference));
-  scale_.restart(road);
+  reference_road_ = std::move(road);
+  is_initializing_ = true;
 }
 
 FrameState WindowEstimator::initialize(const TrackedFrame& frame, LocalizedFrame& localized) {
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  if (const std::optional<Localization> found = localize_in_window(now)) {
+    return accept_localization(frame, *found, localized);
+  }
   if (initializer_.is_worn_out(now)) {
-    start_map({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_.get());
+    start_reference({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_);
   }
   return accept(frame, initializer_.measure(frame.matches, now), localized);
 }
@@ -98,7 +105,7 @@ FrameState WindowEstimator::accept(const TrackedFrame& frame,
   add_scores(motion, localized.result);
   localized.inlier_mask = motion.inlier_mask;
   if (motion.state == FrameState::kLost) {
-    start_map({frame.number, world_from_camera_ * prev_from_cur_, {}}, frame.road.get());
+    start_reference({frame.number, world_from_camera_ * prev_from_cur_, {}}, frame.road);
     return lose(localized);
   }
   const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
@@ -129,7 +136,15 @@ bool WindowEstimator::open_window(const TrackedFrame& frame,
   if (!window.has_value()) {
     return false;
   }
+  if (!window_.keyframes.empty()) {  // the frames since belong to the new one
+    std::erase_if(window_.keyframes.back().followers,
+                  [&](const FrameBetween& follower) { return follower.frame > reference.frame; });
+    history_.close(window_);
+  }
   window_ = std::move(*window);
+  scale_.restart(reference_road_.get());
+  road_pose_ = reference.world_from_camera;
+  is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
   anchor_ = std::move(view);
   num_keyframes_ = 2;
@@ -154,13 +169,21 @@ FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& loc
     keep_anchor_alive(frame, all);
     return FrameState::kStationary;
   }
-  const std::optional<Localization> found =
-      stemvo::localize(find_seen_landmarks(window_, all), world_from_camera_ * prev_from_cur_,
-                       camera_, localization_);
-  if (!found.has_value()) {
-    return start_new_map(frame, localized);
-  }
-  world_from_camera_ = found->world_from_camera;
+  const std::optional<Localization> found = localize_in_window(all);
+  return found.has_value() ? accept_localization(frame, *found, localized)
+                           : start_new_map(frame, localized);
+}
+
+std::optional<Localization> WindowEstimator::localize_in_window(const TrackPoints& now) const {
+  return stemvo::localize(find_seen_landmarks(window_, now), world_from_camera_ * prev_from_cur_,
+                          camera_, localization_);
+}
+
+FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
+                                                const Localization& found,
+                                                LocalizedFrame& localized) {
+  is_initializing_ = false;
+  world_from_camera_ = found.world_from_camera;
   localized.inlier_mask = judge_matches(frame.matches, world_from_camera_);
   TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   if (const std::optional<Rigid3> turned = turned_pose(world_from_camera_, now)) {
@@ -172,27 +195,24 @@ FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& loc
   return FrameState::kTracking;
 }
 
-/// The landmarks are out of view, or the frame shows another place. The window is kept for a frame
-/// that may see it again until another map is begun.
+/// The landmarks are out of view, or the frame shows another place.
 FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFrame& localized) {
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  View before{frame.matches.prev_frame, last_.world_from_camera, {}};
-  initializer_.start(before);
+  start_reference({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_);
   const MeasuredMotion motion = initializer_.measure(frame.matches, now);
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
-  if (motion.state == FrameState::kLost ||
-      motion.num_inliers < localization_.min_agreement * num_matches) {
-    return lose(localized);
+  if (motion.num_inliers < localization_.min_agreement * num_matches) {
+    MeasuredMotion lost = motion;
+    lost.state = FrameState::kLost;
+    return accept(frame, lost, localized);
   }
-  View reference = initializer_.reference();
-  start_map(std::move(reference), last_road_.get());
   return accept(frame, motion, localized);
 }
 
 bool WindowEstimator::is_stationary(const TrackPoints& now) const {
   const PointPairs pairs = common_points(anchor_.points, now);
   return pairs.size() >= options_.min_inliers &&
-         median_flow_px(pairs.prev_uv, pairs.cur_uv) < options_.stationary_flow_px;
+         median_flow_px(pairs.prev_uv, pairs.cur_uv) < hysteresis() * options_.stationary_flow_px;
 }
 
 std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_camera,
@@ -211,12 +231,14 @@ std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_came
   const double parallax_px =
       median_parallax_px(turn.rotation, pairs.prev_uv, pairs.cur_uv, camera_);
   const double noise_px = median_epipolar_px(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_);
-  if (parallax_px >= options_.stationary_flow_px &&
-      parallax_px >= std::min(kNoiseParallax * noise_px, options_.min_parallax_px)) {
+  if (parallax_px >= hysteresis() * options_.stationary_flow_px &&
+      parallax_px >= hysteresis() * std::min(kNoiseParallax * noise_px, options_.min_parallax_px)) {
     return std::nullopt;
   }
   return anchor_.world_from_camera * turn.inverse();
 }
+
+double WindowEstimator::hysteresis() const { return is_held_ ? kHysteresis : 1.0; }
 
 void WindowEstimator::keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now) {
   const auto living = static_cast<double>(common_points(anchor_.points, now).size());
@@ -266,7 +288,7 @@ std::vector<char> WindowEstimator::judge_matches(const Matches& matches,
 
 void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
-  if (!is_initializing() && frame.has_image) {
+  if (!is_initializing_ && frame.has_image) {
     Keyframe& newest = window_.keyframes.back();
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
@@ -275,7 +297,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
-  measure_scale(frame);
+  measure_scale(frame, result.state);
   finish_frame(frame, result.state);
   scale_.report(result);
   result.world_from_camera = world_from_camera_;
@@ -312,19 +334,20 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   history_.observe(window_, frame.image);
 }
 
-void WindowEstimator::measure_scale(const TrackedFrame& frame) {
+void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state) {
   if (!frame.has_image) {
     scale_.hold("no image");
-  } else if (is_initializing()) {
-    if (initializer_.reference().frame != frame.number) {
-      scale_.hold("no map");
+  } else if (state == FrameState::kLost) {
+    scale_.hold("lost");
+  } else if (is_initializing_) {
+    if (state != FrameState::kFirst) {
+      scale_.wait("no map");
     }
   } else {
-    // The road was last seen where the camera was then.
-    const Rigid3& before =
-        has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
-    const double factor = scale_.measure(frame.road.get(), world_from_camera_.inverse() * before);
-    rescale_map(factor, before.translation);
+    const double factor =
+        scale_.measure(frame.road.get(), world_from_camera_.inverse() * road_pose_);
+    rescale_map(factor, road_pose_.translation);
+    road_pose_ = world_from_camera_;
   }
 }
 
@@ -341,7 +364,7 @@ void WindowEstimator::rescale_map(double factor, const Eigen::Vector3d& center) 
 /// The pose is final, but for the refined trajectory.
 void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) {
   if (frame.has_image) {
-    if (state != FrameState::kLost && last_.frame >= 0 && !is_initializing()) {
+    if (state != FrameState::kLost && last_.frame >= 0 && !is_initializing_) {
       const Rigid3& before =
           has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
       const int frame_before = has_opened_ ? initializer_.reference().frame : last_.frame;
@@ -353,7 +376,7 @@ void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) 
     last_ = {frame.number, world_from_camera_, {}};
     last_road_ = frame.road;
   }
-  if (!is_initializing() && window_.keyframes.back().frame != frame.number) {
+  if (!window_.keyframes.empty() && window_.keyframes.back().frame != frame.number) {
     Keyframe& newest = window_.keyframes.back();
     newest.followers.push_back(
         {frame.number, newest.world_from_camera.inverse() * world_from_camera_});

@@ -36,8 +36,6 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] const Window& window() const { return window_; }
 
  private:
-  [[nodiscard]] bool is_initializing() const { return window_.keyframes.empty(); }
-
   // While there are no landmarks.
   FrameState initialize(const TrackedFrame& frame, LocalizedFrame& localized);
   FrameState accept(const TrackedFrame& frame,
@@ -46,16 +44,22 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] bool open_window(const TrackedFrame& frame,
                                  const MeasuredMotion& motion,
                                  TrackPoints points);
-  void start_map(View reference, const RoadPicture* road);
+  void start_reference(View reference, std::shared_ptr<const RoadPicture> road);
   FrameState lose(LocalizedFrame& localized);
 
   // Against landmarks.
   FrameState track(const TrackedFrame& frame, LocalizedFrame& localized);
+  [[nodiscard]] std::optional<Localization> localize_in_window(const TrackPoints& now) const;
+  FrameState accept_localization(const TrackedFrame& frame,
+                                 const Localization& found,
+                                 LocalizedFrame& localized);
   FrameState start_new_map(const TrackedFrame& frame, LocalizedFrame& localized);
   [[nodiscard]] bool is_stationary(const TrackPoints& now) const;
   /// The pose that only turns since the anchor, where that explains the tracks too.
   [[nodiscard]] std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
                                                   const TrackPoints& now) const;
+  /// Factor of the bounds on what counts as motion.
+  [[nodiscard]] double hysteresis() const;
   void keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now);
   /// Epipolar test against the newest keyframe, else against the frame before.
   [[nodiscard]] std::vector<char> judge_matches(const Matches& matches,
@@ -64,7 +68,7 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const TrackedFrame& frame);
-  void measure_scale(const TrackedFrame& frame);
+  void measure_scale(const TrackedFrame& frame, FrameState state);
   void rescale_map(double factor, const Eigen::Vector3d& center);
   void finish_frame(const TrackedFrame& frame, FrameState state);
 
@@ -78,7 +82,8 @@ class WindowEstimator final : public Estimator {
   double keyframe_parallax_px_;
 
   Initializer initializer_;
-  Window window_;  ///< empty: initializing
+  bool is_initializing_ = true;
+  Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;
   MetricScale scale_;
   Rigid3 world_from_camera_;  ///< of the frame in work
@@ -87,6 +92,9 @@ class WindowEstimator final : public Estimator {
   View last_;                 ///< the last frame with an image, without its points
   View anchor_;               ///< the last frame that was seen to move
   std::shared_ptr<const RoadPicture> last_road_;
+  std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
+  Rigid3 road_pose_;       ///< of the last frame whose road was measured
+  bool is_held_ = false;   ///< the last frame was stationary or rotating
   int num_keyframes_ = 0;  ///< since the window was opened
   int keyframes_since_refinement_ = 0;
   bool has_opened_ = false;  ///< the frame in work opened the window
