@@ -25,7 +25,7 @@ constexpr double kTrackBound = 4.0;
 /// An anchor with fewer of its tracks left is renewed where the camera is.
 constexpr double kMinLiving = 0.5;
 /// A camera that was still is believed to move from so many times the bounds on.
-constexpr double kHysteresis = 2.0;
+constexpr double kHysteresis = 1.5;
 /// More parallax than this is no noise, pixels.
 constexpr double kSureParallax_px = 2.0;
 

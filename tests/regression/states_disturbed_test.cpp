@@ -91,7 +91,8 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   });
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
-  result.expect_states(begin, end, {"lost", "no_image"});
+  // Two dark frames in a row have the same faint picture: tracks between them are no map.
+  result.expect_states(begin, end, {"lost", "no_image", "initializing"});
   result.expect_states(end, end + 5, {"lost", "initializing", "tracking"});
   result.expect_states(end + 5, 60, {"tracking"});
   for (int i = begin; i < end; ++i) {

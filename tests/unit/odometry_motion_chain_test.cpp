@@ -81,7 +81,7 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
 }
 
 TEST(MotionChain, GateNeverDropsTheRotation) {
-  MotionChain chain = make_chain();
+  MotionChain chain = make_chain({.gate = "translation"});
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 5.0 * kDeg, 1e-12);
@@ -99,7 +99,7 @@ TEST(MotionChain, ThePapersGateDropsBoth) {
 }
 
 TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
-  MotionChain chain = make_chain();
+  MotionChain chain = make_chain({.gate = "translation"});
   EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
   MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
   doubtful.runner_up_ratio = 0.9;
