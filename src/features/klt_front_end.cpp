@@ -89,8 +89,11 @@ Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, in
 /// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
 /// tells more than the last one, its tracks go on.
 void KltFrontEnd::track_from_last_good(View& now, Matches& matches) {
-  if (last_good_.picture == nullptr) {
+  if (last_good_.picture == nullptr && !last_.points.empty()) {
     last_good_ = std::move(last_);
+    return;
+  }
+  if (last_good_.picture == nullptr) {
     return;
   }
   View again{now.picture, {}, now.frame};
@@ -103,7 +106,7 @@ void KltFrontEnd::track_from_last_good(View& now, Matches& matches) {
 }
 
 bool KltFrontEnd::is_lost(const Matches& matches, const View& from) {
-  return static_cast<double>(matches.cur_uv.size()) <
+  return static_cast<double>(matches.cur_uv.size()) <=
          kMinTracked * static_cast<double>(from.points.size());
 }
 

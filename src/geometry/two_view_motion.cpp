@@ -68,11 +68,11 @@ class PointTest {
 };
 
 /// ORB-SLAM2 takes the 51st smallest cosine: a few wrong points cannot feign parallax.
-double robust_parallax_deg(std::vector<double>& cosines) {
+double robust_parallax_deg(std::vector<double>& cosines, int rank) {
   if (cosines.empty()) {
     return 0.0;
   }
-  const std::size_t index = std::min<std::size_t>(50, cosines.size() - 1);
+  const std::size_t index = std::min(static_cast<std::size_t>(rank - 1), cosines.size() - 1);
   const auto nth = cosines.begin() + static_cast<std::ptrdiff_t>(index);
   std::nth_element(cosines.begin(), nth, cosines.end());
   return kDegPerRad * std::acos(std::clamp(*nth, -1.0, 1.0));
@@ -148,7 +148,7 @@ PointTestResult test_points(const Rigid3& cur_from_prev,
     result.num_with_parallax += verdict == PointVerdict::kGoodWithParallax ? 1 : 0;
   }
   result.num_good = static_cast<int>(cosines.size());
-  result.parallax_deg = robust_parallax_deg(cosines);
+  result.parallax_deg = robust_parallax_deg(cosines, options.parallax_rank);
   return result;
 }
 

@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kMaxWaiting = 300;
 constexpr double kMinLiving = 0.3;
 /// A window that opens with fewer would soon be lost.
-constexpr int kMinLandmarks = 50;
+constexpr int kMinLandmarks = 25;
 
 /// Hypotheses with fewer than this share of the most good points are out.
 constexpr double kMinGoodShare = 0.85;
@@ -24,7 +24,8 @@ constexpr double kMinGoodShare = 0.85;
 constexpr double kMinMargin = 1.2;
 /// As ORB-SLAM2's, but the share is of all matches here, outliers included, half the parallax will
 /// do, and other hypotheses are told apart by their cost.
-constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5,
+constexpr AcceptanceOptions kAcceptance{.min_good = 30,
+                                        .min_good_share = 0.5,
                                         .min_parallax_deg = 0.5,
                                         .max_runner_up_homography = 1.1,
                                         .max_runner_up_essential = 1.1};
@@ -125,8 +126,10 @@ void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion)
     return;
   }
   const Hypothesis& best = refined.front();
+  // Of few tracks a quarter must do.
+  const PointTestOptions options{.parallax_rank = std::clamp(pairs.size() / 4, 1, 51)};
   const PointTestResult test =
-      test_points(best.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_);
+      test_points(best.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_, options);
   TwoViewMotion chosen;
   chosen.model = best.model;
   chosen.num_good = test.num_good;
@@ -167,8 +170,9 @@ std::optional<Window> Initializer::open_window(const View& now,
 }
 
 void Initializer::wait(View view) {
-  if (waiting_.size() < kMaxWaiting) {
-    waiting_.push_back(std::move(view));
+  waiting_.push_back(std::move(view));
+  if (waiting_.size() > kMaxWaiting) {
+    waiting_.pop_front();
   }
 }
 

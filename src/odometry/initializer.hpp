@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -31,7 +32,7 @@ class Initializer {
   /// The frame that the next ones are compared with. Its points may lack those that begin there.
   void start(View reference);
   [[nodiscard]] const View& reference() const { return reference_; }
-  /// Fewer than half of its tracks live: it will not decide any more.
+  /// Too few of its tracks live: it will not decide any more.
   [[nodiscard]] bool is_worn_out(const TrackPoints& now) const;
 
   /// The motion from the reference to a frame. `inlier_mask` is one per match of the frame; a match
@@ -56,7 +57,7 @@ class Initializer {
   TwoViewEstimator two_view_;
   std::uint64_t seed_;
   View reference_;
-  std::vector<View> waiting_;
+  std::deque<View> waiting_;
 };
 
 }  // namespace stemvo

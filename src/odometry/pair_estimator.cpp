@@ -32,6 +32,7 @@ LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
     motion_ = two_view_.measure(frame.matches.prev_uv, frame.matches.cur_uv,
                                 chain_.is_initializing(), seed_);
   }
+  image_before_ = last_image_;
   last_image_ = frame.has_image ? frame.number : last_image_;
   LocalizedFrame localized;
   localized.inlier_mask = motion_.inlier_mask;
@@ -64,6 +65,10 @@ void PairEstimator::measure_step(const TrackedFrame& frame) {
     return;
   }
   if (motion_.state == FrameState::kLost) {
+    scale_.restart(frame.road.get());
+    return;
+  }
+  if (frame.matches.prev_frame != image_before_) {  // the road was last seen elsewhere
     scale_.restart(frame.road.get());
     return;
   }

@@ -34,6 +34,7 @@ class PairEstimator final : public Estimator {
   bool asks_road_;
   std::uint64_t seed_;
   double last_step_;       ///< of one frame that was tracked; its length is the unit
+  int image_before_ = -1;  ///< the one before the frame in work
   int last_image_ = -1;    ///< number of the last frame that had one
   bool is_first_ = false;  ///< the frame in work starts the chain
   MeasuredMotion motion_;  ///< of the frame in work

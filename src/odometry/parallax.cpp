@@ -37,6 +37,9 @@ double median_epipolar_px(const Rigid3& cur_from_prev,
                           std::span<const Eigen::Vector2d> prev_uv,
                           std::span<const Eigen::Vector2d> cur_uv,
                           const Camera& camera) {
+  if (!(cur_from_prev.translation.norm() > 0.0)) {
+    return 0.0;
+  }
   const Eigen::Matrix3d fundamental =
       fundamental_from_essential(essential_from_motion(cur_from_prev), camera);
   std::vector<double> distances;

@@ -72,7 +72,9 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
     const StageTimer timer(Stage::kLocalization);
     result.state = track(frame, localized);
   }
-  is_held_ = result.state == FrameState::kStationary || result.state == FrameState::kRotating;
+  if (frame.has_image) {
+    is_held_ = result.state == FrameState::kStationary || result.state == FrameState::kRotating;
+  }
   result.num_matches = static_cast<int>(localized.inlier_mask.size());
   result.num_inliers = static_cast<int>(
       std::count(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{1}));
@@ -87,13 +89,20 @@ void WindowEstimator::start_reference(View reference, std::shared_ptr<const Road
   is_initializing_ = true;
 }
 
+/// Where the matches start: the frame before, or the last one before trouble.
+void WindowEstimator::start_reference_before(const Matches& matches) {
+  const int frame = std::max(matches.prev_frame, 0);
+  start_reference({frame, trajectory_[static_cast<std::size_t>(frame)], {}},
+                  frame == last_.frame ? last_road_ : nullptr);
+}
+
 FrameState WindowEstimator::initialize(const TrackedFrame& frame, LocalizedFrame& localized) {
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   if (const std::optional<Localization> found = localize_in_window(now)) {
     return accept_localization(frame, *found, localized);
   }
   if (initializer_.is_worn_out(now)) {
-    start_reference({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_);
+    start_reference_before(frame.matches);
   }
   return accept(frame, initializer_.measure(frame.matches, now), localized);
 }
@@ -142,8 +151,13 @@ bool WindowEstimator::open_window(const TrackedFrame& frame,
     history_.close(window_);
   }
   window_ = std::move(*window);
-  scale_.restart(reference_road_.get());
-  road_pose_ = reference.world_from_camera;
+  if (reference_road_ != nullptr) {
+    scale_.restart(reference_road_.get());
+    road_pose_ = reference.world_from_camera;
+  } else {
+    scale_.restart(frame.road.get());
+    road_pose_ = view.world_from_camera;
+  }
   is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
   anchor_ = std::move(view);
@@ -198,7 +212,7 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
 /// The landmarks are out of view, or the frame shows another place.
 FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFrame& localized) {
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  start_reference({frame.matches.prev_frame, last_.world_from_camera, {}}, last_road_);
+  start_reference_before(frame.matches);
   const MeasuredMotion motion = initializer_.measure(frame.matches, now);
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
   if (motion.num_inliers < localization_.min_agreement * num_matches) {
@@ -364,7 +378,8 @@ void WindowEstimator::rescale_map(double factor, const Eigen::Vector3d& center) 
 /// The pose is final, but for the refined trajectory.
 void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) {
   if (frame.has_image) {
-    if (state != FrameState::kLost && last_.frame >= 0 && !is_initializing_) {
+    const bool is_localized = state != FrameState::kLost && !is_initializing_;
+    if (is_localized && (has_opened_ || is_last_localized_)) {
       const Rigid3& before =
           has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
       const int frame_before = has_opened_ ? initializer_.reference().frame : last_.frame;
@@ -373,6 +388,7 @@ void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) 
       const double step = prev_from_cur_.translation.norm();
       step_ = step > 0.0 && state == FrameState::kTracking ? step : step_;
     }
+    is_last_localized_ = is_localized;
     last_ = {frame.number, world_from_camera_, {}};
     last_road_ = frame.road;
   }

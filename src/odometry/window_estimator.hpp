@@ -37,6 +37,7 @@ class WindowEstimator final : public Estimator {
 
  private:
   // While there are no landmarks.
+  void start_reference_before(const Matches& matches);
   FrameState initialize(const TrackedFrame& frame, LocalizedFrame& localized);
   FrameState accept(const TrackedFrame& frame,
                     const MeasuredMotion& motion,
@@ -93,9 +94,10 @@ class WindowEstimator final : public Estimator {
   View anchor_;               ///< the last frame that was seen to move
   std::shared_ptr<const RoadPicture> last_road_;
   std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
-  Rigid3 road_pose_;       ///< of the last frame whose road was measured
-  bool is_held_ = false;   ///< the last frame was stationary or rotating
-  int num_keyframes_ = 0;  ///< since the window was opened
+  Rigid3 road_pose_;                ///< of the last frame whose road was measured
+  bool is_last_localized_ = false;  ///< last_ has a pose that was measured
+  bool is_held_ = false;            ///< the last frame was stationary or rotating
+  int num_keyframes_ = 0;           ///< since the window was opened
   int keyframes_since_refinement_ = 0;
   bool has_opened_ = false;  ///< the frame in work opened the window
   std::vector<Rigid3> trajectory_;

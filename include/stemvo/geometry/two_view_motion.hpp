@@ -19,13 +19,15 @@ enum class TwoViewModel { kNone, kHomography, kEssential };
 struct PointTestOptions {
   double sigma_px = 1.0;              ///< reprojection bound is 2 sigma in either image
   double max_cos_parallax = 0.99998;  ///< points with less parallax cannot vote on the depth sign
+  int parallax_rank =
+      51;  ///< parallax_deg is that of this rank among good points, the largest first
 };
 
 struct PointTestResult {
   /// Reprojected well, and in front of both cameras or without the parallax to tell.
   int num_good = 0;
   int num_with_parallax = 0;    ///< of those, the ones below max_cos_parallax
-  double parallax_deg = 0.0;    ///< of the 51st largest (or the smallest, of fewer) good point
+  double parallax_deg = 0.0;    ///< of the ranked good point (the smallest, of fewer)
   std::vector<char> good_mask;  ///< one per match: 1 where counted in num_good
 };
 
