@@ -32,22 +32,16 @@ constexpr AcceptanceOptions kAcceptance{.min_good = 30,
 /// Refined hypotheses nearer than this are one.
 constexpr double kSameAngle_rad = 0.1;
 
-struct Hypothesis {
-  TwoViewModel model;
-  Rigid3 cur_from_prev;
-  double cost;
-};
-
-std::vector<Hypothesis> list_hypotheses(const MeasuredMotion& motion, const Camera& camera) {
-  std::vector<Hypothesis> hypotheses;
+std::vector<InitialHypothesis> list_hypotheses(const MeasuredMotion& motion, const Camera& camera) {
+  std::vector<InitialHypothesis> hypotheses;
   if (motion.homography.has_value()) {
     for (const PlanarMotion& planar : decompose_homography(*motion.homography, camera)) {
-      hypotheses.push_back({TwoViewModel::kHomography, planar.cur_from_prev, 0.0});
+      hypotheses.push_back({TwoViewModel::kHomography, planar.cur_from_prev});
     }
   }
   if (motion.essential.has_value()) {
     for (const Rigid3& cur_from_prev : decompose_essential(*motion.essential)) {
-      hypotheses.push_back({TwoViewModel::kEssential, cur_from_prev, 0.0});
+      hypotheses.push_back({TwoViewModel::kEssential, cur_from_prev});
     }
   }
   return hypotheses;
@@ -56,6 +50,35 @@ std::vector<Hypothesis> list_hypotheses(const MeasuredMotion& motion, const Came
 bool is_same(const Rigid3& a, const Rigid3& b) {
   return a.rotation.angularDistance(b.rotation) < kSameAngle_rad &&
          a.translation.dot(b.translation) > std::cos(kSameAngle_rad);
+}
+
+/// Those with nearly the most good points.
+std::vector<InitialHypothesis> plausible_hypotheses(const MeasuredMotion& motion,
+                                                    const PointPairs& pairs,
+                                                    const Camera& camera) {
+  std::vector<InitialHypothesis> hypotheses = list_hypotheses(motion, camera);
+  int most_good = 0;
+  for (InitialHypothesis& hypothesis : hypotheses) {
+    hypothesis.num_good =
+        test_points(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera).num_good;
+    most_good = std::max(most_good, hypothesis.num_good);
+  }
+  std::erase_if(hypotheses, [&](const InitialHypothesis& hypothesis) {
+    return hypothesis.num_good < kMinGoodShare * most_good;
+  });
+  return hypotheses;
+}
+
+PointPairs select(const PointPairs& pairs, const std::vector<char>& mask) {
+  PointPairs selected;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] != 0) {
+      selected.track_ids.push_back(pairs.track_ids[i]);
+      selected.prev_uv.push_back(pairs.prev_uv[i]);
+      selected.cur_uv.push_back(pairs.cur_uv[i]);
+    }
+  }
+  return selected;
 }
 
 }  // namespace
@@ -99,33 +122,37 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   return motion;
 }
 
-void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const {
-  std::vector<Hypothesis> hypotheses = list_hypotheses(motion, camera_);
-  const auto num_good = [&](const Hypothesis& hypothesis) {
-    return test_points(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_).num_good;
-  };
-  int most_good = 0;
-  std::vector<int> good;
-  for (const Hypothesis& hypothesis : hypotheses) {
-    good.push_back(num_good(hypothesis));
-    most_good = std::max(most_good, good.back());
-  }
-  std::vector<Hypothesis> refined;
-  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    if (good[i] >= kMinGoodShare * most_good) {
-      const RelativePoseRefinement refinement =
-          refine_relative_pose(hypotheses[i].cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_,
-                               {.loss_scale_px = loss_px_});
-      refined.push_back({hypotheses[i].model, refinement.cur_from_prev, refinement.final_cost});
-    }
+std::vector<InitialHypothesis> Initializer::refined(
+    const std::vector<InitialHypothesis>& hypotheses, const PointPairs& pairs) const {
+  std::vector<InitialHypothesis> refined;
+  for (const InitialHypothesis& hypothesis : hypotheses) {
+    const RelativePoseRefinement refinement =
+        refine_relative_pose(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_,
+                             {.loss_scale_px = loss_px_});
+    refined.push_back({hypothesis.model, refinement.cur_from_prev, refinement.final_cost});
   }
   std::sort(refined.begin(), refined.end(),
-            [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
+            [](const InitialHypothesis& a, const InitialHypothesis& b) { return a.cost < b.cost; });
+  return refined;
+}
+
+void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const {
   motion.is_decisive = false;
-  if (refined.empty()) {
+  const std::vector<InitialHypothesis> hypotheses =
+      refined(plausible_hypotheses(motion, pairs, camera_), pairs);
+  if (hypotheses.empty()) {
     return;
   }
-  const Hypothesis& best = refined.front();
+  // Wrong matches cost every hypothesis the same: they are compared on what the best one explains.
+  const PointTestResult first =
+      test_points(hypotheses.front().cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_);
+  const std::vector<InitialHypothesis> compared =
+      refined(hypotheses, select(pairs, first.good_mask));
+  const InitialHypothesis& best = compared.front();
+  const auto rival =
+      std::find_if(compared.begin(), compared.end(), [&](const InitialHypothesis& other) {
+        return !is_same(other.cur_from_prev, best.cur_from_prev);
+      });
   // Of few tracks a quarter must do.
   const PointTestOptions options{.parallax_rank = std::clamp(pairs.size() / 4, 1, 51)};
   const PointTestResult test =
@@ -134,15 +161,12 @@ void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion)
   chosen.model = best.model;
   chosen.num_good = test.num_good;
   chosen.parallax_deg = test.parallax_deg;
-  const auto rival = std::find_if(refined.begin(), refined.end(), [&](const Hypothesis& other) {
-    return !is_same(other.cur_from_prev, best.cur_from_prev);
-  });
   motion.model = best.model;
   motion.cur_from_prev = best.cur_from_prev;
   motion.inlier_mask = test.good_mask;
   two_view_.refine(pairs.prev_uv, pairs.cur_uv, motion);
   motion.is_decisive = is_decisive(chosen, pairs.size(), kAcceptance) &&
-                       (rival == refined.end() || rival->cost > kMinMargin * best.cost);
+                       (rival == compared.end() || rival->cost > kMinMargin * best.cost);
 }
 
 std::optional<Window> Initializer::open_window(const View& now,

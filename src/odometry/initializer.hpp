@@ -23,6 +23,14 @@ struct View {
   TrackPoints points;
 };
 
+/// A motion that one of the models allows.
+struct InitialHypothesis {
+  TwoViewModel model = TwoViewModel::kNone;
+  Rigid3 cur_from_prev;
+  double cost = 0.0;  ///< of the refined one
+  int num_good = 0;
+};
+
 /// Finds the first landmarks: the paper's H/F selection between a reference frame and the newest
 /// one, once there is parallax to decide (paper section 3.5-3.6).
 class Initializer {
@@ -48,6 +56,8 @@ class Initializer {
   void wait(View view);
 
  private:
+  [[nodiscard]] std::vector<InitialHypothesis> refined(
+      const std::vector<InitialHypothesis>& hypotheses, const PointPairs& pairs) const;
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.
   void choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const;

@@ -21,7 +21,7 @@ constexpr double kFocal_px = 718.0;
 /// .. or less than this share of its tracks left.
 constexpr double kMinOverlap = 0.6;
 /// A track farther from its epipolar line, in inlier thresholds, is dropped.
-constexpr double kTrackBound = 4.0;
+constexpr double kTrackBound = 2.0;
 /// An anchor with fewer of its tracks left is renewed where the camera is.
 constexpr double kMinLiving = 0.5;
 /// A camera that was still is believed to move from so many times the bounds on.
