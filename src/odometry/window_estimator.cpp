@@ -26,8 +26,6 @@ constexpr double kTrackBound = 2.0;
 constexpr double kMinLiving = 0.5;
 /// A camera that was still is believed to move from so many times the bounds on.
 constexpr double kHysteresis = 1.5;
-/// More parallax than this is no noise, pixels.
-constexpr double kSureParallax_px = 2.0;
 
 Rigid3 motion_of_one_frame(const Rigid3& motion, int num_frames) {
   if (num_frames <= 1) {
@@ -236,10 +234,6 @@ std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_came
     return std::nullopt;
   }
   const Rigid3 cur_from_anchor = world_from_camera.inverse() * anchor_.world_from_camera;
-  if (median_parallax_px(cur_from_anchor.rotation, pairs.prev_uv, pairs.cur_uv, camera_) >
-      kSureParallax_px) {
-    return std::nullopt;
-  }
   const Rigid3 turn =
       refine_rotation(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_).cur_from_prev;
   const double parallax_px =
