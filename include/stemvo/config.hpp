@@ -44,7 +44,7 @@ struct OdometryOptions {
 struct RefineOptions {
   int every = 1;   ///< keyframes between refinements, the paper's m; 0: never
   int window = 8;  ///< keyframes refined together
-  int max_iterations = 4;
+  int max_iterations = 10;
   double loss_px = 0.2;  ///< Cauchy scale on the reprojection error
 };
 

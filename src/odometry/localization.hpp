@@ -25,7 +25,7 @@ struct SeenLandmarks {
 struct LocalizationOptions {
   double first_loss_px = 2.0;  ///< Cauchy scale of the first round: the prediction may be far off
   double loss_px = 0.2;        ///< of the second, on the inliers of the first
-  double inlier_bound_px = 2.0;
+  double inlier_bound_px = 4.0;
   int min_landmarks = 10;      ///< that agree with a pose; fewer: there is none
   double min_agreement = 0.5;  ///< share of the landmarks seen; less: the prediction was wrong
   std::uint64_t seed = 1;      ///< of the search without a prediction

@@ -45,8 +45,7 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
   const Eigen::Vector3d direction = prev_from_cur.translation;
   const int num_frames = frames_since_picture_ + 1;
-  const bool is_step_known = motion.step > 0.0;
-  const double full_step_m = is_step_known ? motion.step : assumed_step_ * num_frames;
+  const double full_step_m = motion.step > 0.0 ? motion.step : assumed_step_ * num_frames;
   FrameState state = motion.state;
   if (state == FrameState::kTracking) {
     if (!passes_gate(direction, motion)) {
@@ -63,10 +62,6 @@ FrameState MotionChain::add(const MeasuredMotion& motion) {
       apply(prev_from_cur, full_step_m);
       break;
     case FrameState::kLowParallax:
-      if (is_step_known) {  // placed against landmarks: the direction is measured too
-        apply(prev_from_cur, full_step_m);
-        break;
-      }
       // The flow is proportional to the step: a creeping frame moves by its share of a full one.
       apply({prev_from_cur.rotation, last_direction_},
             full_step_m * motion.parallax_px / options_.min_parallax_px);
@@ -97,8 +92,7 @@ void MotionChain::apply(const Rigid3& prev_from_cur, double step_m) {
                                           ? prev_from_cur.rotation * world_from_picture_.rotation
                                           : world_from_picture_.rotation * prev_from_cur.rotation;
   const int num_frames = frames_since_picture_ + 1;
-  last_prev_from_cur_ = {so3_exp(so3_log(prev_from_cur.rotation) / num_frames),
-                         step_in_prev / num_frames};
+  last_prev_from_cur_ = motion_of_one_frame({prev_from_cur.rotation, step_in_prev}, num_frames);
   world_from_picture_ = {rotation, position};
   world_from_camera_ = world_from_picture_;
   frames_since_picture_ = 0;

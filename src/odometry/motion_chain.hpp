@@ -3,17 +3,13 @@
 
 #include <Eigen/Core>
 
+#include "odometry/frame_motion.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/config.hpp"
 #include "stemvo/geometry/rigid3.hpp"
 #include "stemvo/odometry/odometry.hpp"
 
 namespace stemvo {
-
-/// Length of a step that nothing measures: one unit where no scale is asked for.
-[[nodiscard]] inline double assumed_step(const ScaleOptions& scale) {
-  return scale.source == "none" ? 1.0 : scale.constant_m;
-}
 
 /// Chains two-frame motions into poses: gate, step length, composition (paper eq. (11) and (12)).
 class MotionChain {
@@ -35,8 +31,6 @@ class MotionChain {
   }
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
-  /// Pose of the last picture: where the next motion starts.
-  [[nodiscard]] const Rigid3& world_from_picture() const { return world_from_picture_; }
   /// True until a first motion was accepted: decisive by the point test.
   [[nodiscard]] bool is_initializing() const { return is_initializing_; }
   [[nodiscard]] bool has_picture() const { return has_picture_; }

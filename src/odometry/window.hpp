@@ -31,11 +31,6 @@ struct Keyframe {
 struct Window {
   std::deque<Keyframe> keyframes;            ///< oldest first
   std::map<int, Eigen::Vector3d> landmarks;  ///< track id -> point in the world
-
-  void clear() {
-    keyframes.clear();
-    landmarks.clear();
-  }
 };
 
 struct WindowOptions {
@@ -43,7 +38,7 @@ struct WindowOptions {
   /// Of a new landmark, between its first and last keyframe: only the direction of distant ones is
   /// known, but that holds the rotation.
   double min_parallax_deg = 0.1;
-  double max_reprojection_error_px = 1.5;  ///< of a landmark in any keyframe
+  double max_reprojection_error_px = 4.0;  ///< of a landmark in any keyframe
 };
 
 /// Appends the keyframe, drops the oldest beyond the window's length, and landmarks that no

@@ -5,11 +5,10 @@
 #include <cmath>
 #include <utility>
 
+#include "odometry/frame_motion.hpp"
 #include "odometry/landmarks.hpp"
-#include "odometry/motion_chain.hpp"
 #include "odometry/parallax.hpp"
-#include "stemvo/check.hpp"
-#include "stemvo/geometry/relative_pose_refinement.hpp"
+#include "odometry/stationary.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -20,19 +19,8 @@ constexpr double kKeyframeParallax_px = 5.0;
 constexpr double kFocal_px = 718.0;
 /// .. or less than this share of its tracks left.
 constexpr double kMinOverlap = 0.6;
-/// A track farther from its epipolar line, in inlier thresholds, is dropped.
-constexpr double kTrackBound = 2.0;
-/// An anchor with fewer of its tracks left is renewed where the camera is.
-constexpr double kMinLiving = 0.5;
-/// A camera that was still is believed to move from so many times the bounds on.
-constexpr double kHysteresis = 1.5;
-
-Rigid3 motion_of_one_frame(const Rigid3& motion, int num_frames) {
-  if (num_frames <= 1) {
-    return motion;
-  }
-  return {so3_exp(so3_log(motion.rotation) / num_frames), motion.translation / num_frames};
-}
+/// .. or, where the camera moves, less than this share of the tracks are landmarks.
+constexpr double kMinLandmarkShare = 0.3;
 
 }  // namespace
 
@@ -40,7 +28,6 @@ WindowEstimator::WindowEstimator(const Config& config, const Camera& camera)
     : camera_(camera),
       options_(config.odometry),
       refine_every_(config.refine.every),
-      epipolar_bound_px_(kTrackBound * config.two_view.inlier_threshold_px),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config, camera),
       scale_(config, camera),
@@ -69,9 +56,6 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
   } else {
     const StageTimer timer(Stage::kLocalization);
     result.state = track(frame, localized);
-  }
-  if (frame.has_image) {
-    is_held_ = result.state == FrameState::kStationary || result.state == FrameState::kRotating;
   }
   result.num_matches = static_cast<int>(localized.inlier_mask.size());
   result.num_inliers = static_cast<int>(
@@ -172,16 +156,15 @@ FrameState WindowEstimator::lose(LocalizedFrame& localized) {
 }
 
 FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& localized) {
-  const TrackPoints all = current_points(frame.matches, localized.inlier_mask);
+  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   if (frame.matches.prev_frame == anchor_.frame) {
     add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
   }
-  if (is_stationary(all)) {
+  if (is_stationary(anchor_.points, now, options_)) {
     world_from_camera_ = anchor_.world_from_camera;
-    keep_anchor_alive(frame, all);
     return FrameState::kStationary;
   }
-  const std::optional<Localization> found = localize_in_window(all);
+  const std::optional<Localization> found = localize_in_window(now);
   return found.has_value() ? accept_localization(frame, *found, localized)
                            : start_new_map(frame, localized);
 }
@@ -196,15 +179,14 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
                                                 LocalizedFrame& localized) {
   is_initializing_ = false;
   world_from_camera_ = found.world_from_camera;
-  localized.inlier_mask = judge_matches(frame.matches, world_from_camera_);
+  mark_outliers(frame.matches, localized.inlier_mask);
   TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  if (const std::optional<Rigid3> turned = turned_pose(world_from_camera_, now)) {
-    world_from_camera_ = *turned;
-    keep_anchor_alive(frame, now);
-    return FrameState::kRotating;
-  }
+  const std::optional<Rigid3> turned = turned_pose(
+      world_from_camera_, anchor_.world_from_camera.translation, find_seen_landmarks(window_, now),
+      camera_, options_.stationary_flow_px, localization_.inlier_bound_px);
+  world_from_camera_ = turned.value_or(world_from_camera_);
   anchor_ = {frame.number, world_from_camera_, std::move(now)};
-  return FrameState::kTracking;
+  return turned.has_value() ? FrameState::kRotating : FrameState::kTracking;
 }
 
 /// The landmarks are out of view, or the frame shows another place.
@@ -221,77 +203,20 @@ FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFr
   return accept(frame, motion, localized);
 }
 
-bool WindowEstimator::is_stationary(const TrackPoints& now) const {
-  const PointPairs pairs = common_points(anchor_.points, now);
-  return pairs.size() >= options_.min_inliers &&
-         median_flow_px(pairs.prev_uv, pairs.cur_uv) < hysteresis() * options_.stationary_flow_px;
-}
-
-std::optional<Rigid3> WindowEstimator::turned_pose(const Rigid3& world_from_camera,
-                                                   const TrackPoints& now) const {
-  const PointPairs pairs = common_points(anchor_.points, now);
-  if (pairs.size() < options_.min_inliers) {
-    return std::nullopt;
+void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
+  const Rigid3 camera_from_world = world_from_camera_.inverse();
+  if (matches.prev_frame == last_.frame) {
+    mask = epipolar_inliers(camera_from_world * last_.world_from_camera, matches.prev_uv,
+                            matches.cur_uv, camera_, localization_.inlier_bound_px);
   }
-  const Rigid3 cur_from_anchor = world_from_camera.inverse() * anchor_.world_from_camera;
-  const Rigid3 turn =
-      refine_rotation(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_).cur_from_prev;
-  const double parallax_px =
-      median_parallax_px(turn.rotation, pairs.prev_uv, pairs.cur_uv, camera_);
-  const double noise_px = median_epipolar_px(cur_from_anchor, pairs.prev_uv, pairs.cur_uv, camera_);
-  if (parallax_px >= hysteresis() * options_.stationary_flow_px &&
-      parallax_px >= hysteresis() * std::min(kNoiseParallax * noise_px, options_.min_parallax_px)) {
-    return std::nullopt;
-  }
-  return anchor_.world_from_camera * turn.inverse();
-}
-
-double WindowEstimator::hysteresis() const { return is_held_ ? kHysteresis : 1.0; }
-
-void WindowEstimator::keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now) {
-  const auto living = static_cast<double>(common_points(anchor_.points, now).size());
-  if (living < kMinLiving * static_cast<double>(anchor_.points.size())) {
-    anchor_ = {frame.number, world_from_camera_, now};
-  }
-}
-
-std::vector<char> WindowEstimator::judge_matches(const Matches& matches,
-                                                 const Rigid3& world_from_camera) const {
-  const Keyframe& keyframe = window_.keyframes.back();
-  const Rigid3 camera_from_world = world_from_camera.inverse();
-  const std::size_t num_matches = matches.cur_uv.size();
-  std::vector<char> mask(num_matches, 1);
-  std::vector<std::size_t> of_keyframe;
-  std::vector<std::size_t> of_last;
-  std::vector<Eigen::Vector2d> keyframe_uv;
-  for (std::size_t i = 0; i < num_matches; ++i) {
-    if (const TrackPoint* point = find_point(keyframe.points, matches.track_ids[i])) {
-      of_keyframe.push_back(i);
-      keyframe_uv.push_back(point->uv);
-    } else if (matches.prev_frame == last_.frame) {
-      of_last.push_back(i);
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    const auto landmark = window_.landmarks.find(matches.track_ids[i]);
+    if (landmark != window_.landmarks.end()) {
+      const Eigen::Vector3d x = camera_from_world * landmark->second;
+      mask[i] = x.z() > 0.0 &&
+                (camera_.project(x) - matches.cur_uv[i]).norm() <= localization_.inlier_bound_px;
     }
   }
-  const auto judge = [&](const std::vector<std::size_t>& indices,
-                         const std::vector<Eigen::Vector2d>& prev_uv,
-                         const Rigid3& world_from_prev) {
-    std::vector<Eigen::Vector2d> cur_uv;
-    for (const std::size_t i : indices) {
-      cur_uv.push_back(matches.cur_uv[i]);
-    }
-    const std::vector<char> inliers = epipolar_inliers(camera_from_world * world_from_prev, prev_uv,
-                                                       cur_uv, camera_, epipolar_bound_px_);
-    for (std::size_t k = 0; k < indices.size(); ++k) {
-      mask[indices[k]] = inliers[k];
-    }
-  };
-  judge(of_keyframe, keyframe_uv, keyframe.world_from_camera);
-  std::vector<Eigen::Vector2d> last_uv;
-  for (const std::size_t i : of_last) {
-    last_uv.push_back(matches.prev_uv[i]);
-  }
-  judge(of_last, last_uv, last_.world_from_camera);
-  return mask;
 }
 
 void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
@@ -301,7 +226,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
     }
-    if (result.state == FrameState::kTracking && is_keyframe(anchor_)) {
+    if (anchor_.frame == frame.number && is_keyframe(anchor_, result.state)) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
@@ -311,10 +236,15 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
   result.world_from_camera = world_from_camera_;
 }
 
-bool WindowEstimator::is_keyframe(const View& view) const {
+bool WindowEstimator::is_keyframe(const View& view, FrameState state) const {
   const Keyframe& newest = window_.keyframes.back();
   const PointPairs pairs = common_points(newest.points, view.points);
   if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(newest.points.size())) {
+    return true;
+  }
+  const int num_landmarks = find_seen_landmarks(window_, view.points).size();
+  if (state == FrameState::kTracking &&
+      num_landmarks < kMinLandmarkShare * static_cast<double>(view.points.size())) {
     return true;
   }
   const Rigid3 cur_from_newest = view.world_from_camera.inverse() * newest.world_from_camera;

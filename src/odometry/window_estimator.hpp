@@ -55,19 +55,11 @@ class WindowEstimator final : public Estimator {
                                  const Localization& found,
                                  LocalizedFrame& localized);
   FrameState start_new_map(const TrackedFrame& frame, LocalizedFrame& localized);
-  [[nodiscard]] bool is_stationary(const TrackPoints& now) const;
-  /// The pose that only turns since the anchor, where that explains the tracks too.
-  [[nodiscard]] std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
-                                                  const TrackPoints& now) const;
-  /// Factor of the bounds on what counts as motion.
-  [[nodiscard]] double hysteresis() const;
-  void keep_anchor_alive(const TrackedFrame& frame, const TrackPoints& now);
-  /// Epipolar test against the newest keyframe, else against the frame before.
-  [[nodiscard]] std::vector<char> judge_matches(const Matches& matches,
-                                                const Rigid3& world_from_camera) const;
+  /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
+  void mark_outliers(const Matches& matches, std::vector<char>& mask) const;
 
   // After localization.
-  [[nodiscard]] bool is_keyframe(const View& view) const;
+  [[nodiscard]] bool is_keyframe(const View& view, FrameState state) const;
   void add_keyframe(const TrackedFrame& frame);
   void measure_scale(const TrackedFrame& frame, FrameState state);
   void rescale_map(double factor, const Eigen::Vector3d& center);
@@ -79,7 +71,6 @@ class WindowEstimator final : public Estimator {
   BundleAdjustmentOptions refinement_;
   LocalizationOptions localization_;
   int refine_every_;
-  double epipolar_bound_px_;
   double keyframe_parallax_px_;
 
   Initializer initializer_;
@@ -91,12 +82,11 @@ class WindowEstimator final : public Estimator {
   Rigid3 prev_from_cur_;      ///< the last motion of one frame
   double step_;               ///< length of the last step measured, per frame
   View last_;                 ///< the last frame with an image, without its points
-  View anchor_;               ///< the last frame that was seen to move
+  View anchor_;               ///< the last frame that was not stationary
   std::shared_ptr<const RoadPicture> last_road_;
   std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
-  bool is_held_ = false;            ///< the last frame was stationary or rotating
   int num_keyframes_ = 0;           ///< since the window was opened
   int keyframes_since_refinement_ = 0;
   bool has_opened_ = false;  ///< the frame in work opened the window
