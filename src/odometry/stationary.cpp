@@ -10,6 +10,7 @@
 namespace stemvo {
 namespace {
 
+constexpr int kMinPoints = 20;
 constexpr std::size_t kMinLandmarks = 10;
 
 using Points = std::vector<Eigen::Vector2d>;
@@ -34,12 +35,9 @@ double rms_parallax_px(const Eigen::Quaterniond& rotation,
 
 }  // namespace
 
-bool is_stationary(const TrackPoints& before,
-                   const TrackPoints& now,
-                   const OdometryOptions& options) {
+bool is_stationary(const TrackPoints& before, const TrackPoints& now, double min_flow_px) {
   const PointPairs pairs = common_points(before, now);
-  return pairs.size() >= options.min_inliers &&
-         median_flow_px(pairs.prev_uv, pairs.cur_uv) < options.stationary_flow_px;
+  return pairs.size() >= kMinPoints && median_flow_px(pairs.prev_uv, pairs.cur_uv) < min_flow_px;
 }
 
 std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,

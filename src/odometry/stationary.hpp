@@ -7,16 +7,15 @@
 
 #include "odometry/localization.hpp"
 #include "odometry/track_points.hpp"
-#include "stemvo/config.hpp"
 #include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
 
 namespace stemvo {
 
-/// The tracks stay where they were (median flow).
+/// The tracks stay where they were: their median flow is less than `min_flow_px`.
 [[nodiscard]] bool is_stationary(const TrackPoints& before,
                                  const TrackPoints& now,
-                                 const OdometryOptions& options);
+                                 double min_flow_px);
 
 /// world_from_camera with the position held, if it explains the image too: the way from there to
 /// the frame's own position moves its landmarks in the image by less than `min_flow_px` (root mean

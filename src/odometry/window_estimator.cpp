@@ -21,6 +21,10 @@ constexpr double kFocal_px = 718.0;
 constexpr double kMinOverlap = 0.6;
 /// .. or, where the camera moves, less than this share of the tracks are landmarks.
 constexpr double kMinLandmarkShare = 0.3;
+/// A camera that was still is believed to move from so many times the flow on.
+constexpr double kHysteresis = 1.5;
+/// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
+constexpr double kTurnFlow = 3.0;
 
 }  // namespace
 
@@ -56,6 +60,9 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
   } else {
     const StageTimer timer(Stage::kLocalization);
     result.state = track(frame, localized);
+  }
+  if (frame.has_image) {
+    is_held_ = result.state != FrameState::kTracking;
   }
   result.num_matches = static_cast<int>(localized.inlier_mask.size());
   result.num_inliers = static_cast<int>(
@@ -160,7 +167,7 @@ FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& loc
   if (frame.matches.prev_frame == anchor_.frame) {
     add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
   }
-  if (is_stationary(anchor_.points, now, options_)) {
+  if (is_stationary(anchor_.points, now, min_flow_px())) {
     world_from_camera_ = anchor_.world_from_camera;
     return FrameState::kStationary;
   }
@@ -181,12 +188,19 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
   world_from_camera_ = found.world_from_camera;
   mark_outliers(frame.matches, localized.inlier_mask);
   TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  const std::optional<Rigid3> turned = turned_pose(
-      world_from_camera_, anchor_.world_from_camera.translation, find_seen_landmarks(window_, now),
-      camera_, options_.stationary_flow_px, localization_.inlier_bound_px);
+  const Rigid3 before = anchor_.world_from_camera;
+  const double bound_px = kTurnFlow * min_flow_px();
+  const std::optional<Rigid3> turned =
+      turned_pose(world_from_camera_, before.translation, find_seen_landmarks(window_, now),
+                  camera_, bound_px, localization_.inlier_bound_px);
   world_from_camera_ = turned.value_or(world_from_camera_);
   anchor_ = {frame.number, world_from_camera_, std::move(now)};
-  return turned.has_value() ? FrameState::kRotating : FrameState::kTracking;
+  if (!turned.has_value()) {
+    return FrameState::kTracking;
+  }
+  const double turn_px =
+      camera_.mean_focal_px() * before.rotation.angularDistance(turned->rotation);
+  return turn_px < bound_px ? FrameState::kLowParallax : FrameState::kRotating;
 }
 
 /// The landmarks are out of view, or the frame shows another place.
@@ -201,6 +215,10 @@ FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFr
     return accept(frame, lost, localized);
   }
   return accept(frame, motion, localized);
+}
+
+double WindowEstimator::min_flow_px() const {
+  return (is_held_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
 }
 
 void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
@@ -226,7 +244,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
     }
-    if (anchor_.frame == frame.number && is_keyframe(anchor_, result.state)) {
+    if (result.state == FrameState::kTracking && is_keyframe(anchor_)) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
@@ -236,15 +254,14 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
   result.world_from_camera = world_from_camera_;
 }
 
-bool WindowEstimator::is_keyframe(const View& view, FrameState state) const {
+bool WindowEstimator::is_keyframe(const View& view) const {
   const Keyframe& newest = window_.keyframes.back();
   const PointPairs pairs = common_points(newest.points, view.points);
   if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(newest.points.size())) {
     return true;
   }
   const int num_landmarks = find_seen_landmarks(window_, view.points).size();
-  if (state == FrameState::kTracking &&
-      num_landmarks < kMinLandmarkShare * static_cast<double>(view.points.size())) {
+  if (num_landmarks < kMinLandmarkShare * static_cast<double>(view.points.size())) {
     return true;
   }
   const Rigid3 cur_from_newest = view.world_from_camera.inverse() * newest.world_from_camera;

@@ -55,11 +55,13 @@ class WindowEstimator final : public Estimator {
                                  const Localization& found,
                                  LocalizedFrame& localized);
   FrameState start_new_map(const TrackedFrame& frame, LocalizedFrame& localized);
+  /// What counts as motion in the image.
+  [[nodiscard]] double min_flow_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
   void mark_outliers(const Matches& matches, std::vector<char>& mask) const;
 
   // After localization.
-  [[nodiscard]] bool is_keyframe(const View& view, FrameState state) const;
+  [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const TrackedFrame& frame);
   void measure_scale(const TrackedFrame& frame, FrameState state);
   void rescale_map(double factor, const Eigen::Vector3d& center);
@@ -87,6 +89,7 @@ class WindowEstimator final : public Estimator {
   std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
+  bool is_held_ = false;            ///< the last frame was stationary or rotating
   int num_keyframes_ = 0;           ///< since the window was opened
   int keyframes_since_refinement_ = 0;
   bool has_opened_ = false;  ///< the frame in work opened the window
