@@ -25,7 +25,7 @@ constexpr double kMinMargin = 1.2;
 /// As ORB-SLAM2's, but the share is of all matches here, outliers included, half the parallax will
 /// do, and other hypotheses are told apart by their cost.
 constexpr AcceptanceOptions kAcceptance{.min_good = 30,
-                                        .min_good_share = 0.5,
+                                        .min_good_share = 0.3,
                                         .min_parallax_deg = 0.5,
                                         .max_runner_up_homography = 1.1,
                                         .max_runner_up_essential = 1.1};

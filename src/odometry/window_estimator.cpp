@@ -112,10 +112,13 @@ FrameState WindowEstimator::accept(const TrackedFrame& frame,
       return FrameState::kInitializing;
     }
   }
-  // The position is held until there is a map.
-  const Rigid3& reference = initializer_.reference().world_from_camera;
+  // Until there is a first map, the position is held; later the camera goes on as fast as it was.
+  const View& reference = initializer_.reference();
+  const bool goes_on = num_keyframes_ > 0 && motion.state == FrameState::kTracking;
+  const double length = goes_on ? step_ * (frame.number - reference.frame) : 0.0;
+  const Rigid3 direction = motion.cur_from_prev.inverse();
   world_from_camera_ =
-      Rigid3(reference.rotation * motion.cur_from_prev.rotation.conjugate(), reference.translation);
+      reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
   initializer_.wait({frame.number, world_from_camera_, points});
   return motion.state == FrameState::kTracking ? FrameState::kInitializing : motion.state;
 }
