@@ -52,15 +52,22 @@ void expect_accurate_drive(const StateRun& result, const StateDrive& drive, int 
   }
 }
 
+StateRun run_event(const std::string& name, const StateDrive& drive, const std::string& event) {
+  StateRun result = test::run_states(test::rendered_along(name, drive), "map", "camera_height");
+  expect_event(result, drive, event);
+  return result;
+}
+
+Rigid3 motion_between(const StateRun& result, int from, int to) {
+  return result.poses[static_cast<std::size_t>(from)].inverse() *
+         result.poses[static_cast<std::size_t>(to)];
+}
+
 TEST(StatesAtThirtyFrames, StandingInTheMiddle) {
   const StateDrive drive = test::standing_drive(kRate);
-  const StateRun result =
-      test::run_states(test::rendered_along("standing_30", drive), "map", "camera_height");
-  expect_event(result, drive, "stationary");
-  const auto begin = static_cast<std::size_t>(drive.event_begin);
-  const auto end = static_cast<std::size_t>(drive.event_end);
+  const StateRun result = run_event("standing_30", drive, "stationary");
   ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
-  const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
+  const Rigid3 moved = motion_between(result, drive.event_begin, drive.event_end - 1);
   EXPECT_LE(moved.translation.norm(), 1e-6);
   EXPECT_LE(moved.angle_rad(), 1e-6);
   expect_accurate_drive(result, drive, drive.event_end - 1);
@@ -68,13 +75,9 @@ TEST(StatesAtThirtyFrames, StandingInTheMiddle) {
 
 TEST(StatesAtThirtyFrames, TurningOnTheSpot) {
   const StateDrive drive = test::turning_drive(kRate);
-  const StateRun result =
-      test::run_states(test::rendered_along("turning_30", drive), "map", "camera_height");
-  expect_event(result, drive, "rotating");
-  const auto begin = static_cast<std::size_t>(drive.event_begin);
-  const auto end = static_cast<std::size_t>(drive.event_end);
+  const StateRun result = run_event("turning_30", drive, "rotating");
   ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
-  const Rigid3 turned = result.poses[begin - 1].inverse() * result.poses[end - 1];
+  const Rigid3 turned = motion_between(result, drive.event_begin - 1, drive.event_end - 1);
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
   EXPECT_LE(turned.translation.norm(), 1e-6);
   expect_accurate_drive(result, drive, drive.event_end - 1);

@@ -93,15 +93,18 @@ TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
 }
 
 TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
-  SyntheticDriveOptions options = small(3);
-  cv::setNumThreads(1);
-  ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
-  cv::setNumThreads(2);
-  ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
-  EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3));
-  options.seed = 2;
-  ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
-  EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3));
+  for (const bool is_walk : {false, true}) {
+    SyntheticDriveOptions options = small(3);
+    options.walk = is_walk;
+    cv::setNumThreads(1);
+    ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
+    cv::setNumThreads(2);
+    ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
+    EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3)) << is_walk;
+    options.seed = 2;
+    ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
+    EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3)) << is_walk;
+  }
 }
 
 TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
@@ -221,19 +224,6 @@ TEST_F(SyntheticDriveTest, WalkIsASequenceWithACameraFile) {
             "distortion_model: none\ndistortion_coefficients: []\nrate_hz: 30\n");
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
   EXPECT_FALSE(fs::exists(folder / "camera.yaml")) << "of the walk that was there before";
-}
-
-TEST_F(SyntheticDriveTest, SameWalkForAnyNumberOfThreadsAndAnotherForAnotherSeed) {
-  SyntheticDriveOptions options = small(3);
-  options.walk = true;
-  cv::setNumThreads(1);
-  ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
-  cv::setNumThreads(2);
-  ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
-  EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3));
-  options.seed = 2;
-  ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
-  EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3));
 }
 
 TEST_F(SyntheticDriveTest, ContradictionsAreOneLine) {

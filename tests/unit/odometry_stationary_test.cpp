@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "odometry/stationary.hpp"
+#include "support/synthetic_scene.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr double kDeg = std::numbers::pi / 180.0;
+constexpr double kBound_px = 4.0;
+
+/// Landmarks that a camera sees `way` after it stood at `held`.
+struct Moved {
+  Camera camera = testing::kitti_camera();
+  Rigid3 held{so3_exp({0.02, 0.4, -0.01}), {3.0, -0.2, 8.0}};
+  Rigid3 world_from_camera;
+  SeenLandmarks seen;
+
+  Moved(const Rigid3& way, double min_depth_m, double noise_px, int count = 200)
+      : world_from_camera(held * way) {
+    testing::SceneRandom random(5);
+    for (int i = 0; i < count; ++i) {
+      const Eigen::Vector2d uv = random.pixel(camera);
+      const double depth_m = random.uniform(min_depth_m, 2.0 * min_depth_m);
+      seen.points.push_back(world_from_camera * (depth_m * camera.normalize(uv).homogeneous()));
+      seen.uv.push_back(uv + Eigen::Vector2d(random.normal(noise_px), random.normal(noise_px)));
+    }
+  }
+  [[nodiscard]] std::optional<Rigid3> turned(double min_flow_px) const {
+    return turned_pose(world_from_camera, held.translation, seen, camera, min_flow_px, kBound_px);
+  }
+};
+
+TEST(TurnedPose, ATurnOnTheSpotKeepsThePosition) {
+  // The pose found is a little off, as noise makes it.
+  Moved turn({so3_exp({0.0, 5.0 * kDeg, 0.0}), Eigen::Vector3d::Zero()}, 10.0, 0.2);
+  const Rigid3 truth = turn.world_from_camera;
+  turn.world_from_camera = truth * Rigid3(so3_exp({0.0, 1e-4, 0.0}), {0.003, 0.0, 0.003});
+  const auto turned = turn.turned(0.45);
+  ASSERT_TRUE(turned.has_value());
+  EXPECT_EQ(turned->translation, turn.held.translation);
+  EXPECT_LT(turned->rotation.angularDistance(truth.rotation), 0.01 * kDeg);
+}
+
+TEST(TurnedPose, AStepThatMovesTheImageIsNone) {
+  const Rigid3 aside(so3_exp({0.0, 5.0 * kDeg, 0.0}), {0.05, 0.0, 0.0});
+  // A shift to the side looks like a turn but for the differences in depth: 718 px * 0.05 m / Z.
+  EXPECT_FALSE(Moved(aside, 10.0, 0.2).turned(0.45).has_value());
+  EXPECT_TRUE(Moved(aside, 100.0, 0.2).turned(0.45).has_value());
+  const Rigid3 ahead(Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.5});
+  EXPECT_FALSE(Moved(ahead, 10.0, 0.2).turned(0.45).has_value());
+}
+
+TEST(TurnedPose, FewLandmarksTellNothingAndFarOnesAreLeftOut) {
+  const Rigid3 none;
+  EXPECT_TRUE(Moved(none, 10.0, 0.2, 10).turned(0.45).has_value());
+  EXPECT_FALSE(Moved(none, 10.0, 0.2, 9).turned(0.45).has_value());
+  Moved wrong(none, 10.0, 0.2, 10);
+  wrong.seen.uv.front().x() += 2.0 * kBound_px;
+  EXPECT_FALSE(wrong.turned(0.45).has_value());
+}
+
+TEST(IsStationary, ByTheMedianFlowOfTwentyTracks) {
+  TrackPoints before;
+  TrackPoints now;
+  for (int i = 0; i < 21; ++i) {
+    const Eigen::Vector2d uv(10.0 * i, 50.0);
+    before.push_back({i, uv});
+    now.push_back({i, uv + Eigen::Vector2d(i < 10 ? 30.0 : 0.1, 0.0)});  // others pass by
+  }
+  EXPECT_TRUE(is_stationary(before, now, 0.15));
+  EXPECT_FALSE(is_stationary(before, now, 0.05));
+  now[10].uv.x() += 30.0;
+  EXPECT_FALSE(is_stationary(before, now, 0.15));
+  now[10].uv.x() -= 30.0;
+  now.resize(19);
+  EXPECT_FALSE(is_stationary(before, now, 0.15));
+}
+
+}  // namespace
+}  // namespace stemvo
