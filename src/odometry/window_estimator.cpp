@@ -210,12 +210,10 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
 FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFrame& localized) {
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   start_reference_before(frame.matches);
-  const MeasuredMotion motion = initializer_.measure(frame.matches, now);
+  MeasuredMotion motion = initializer_.measure(frame.matches, now);
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
   if (motion.num_inliers < localization_.min_agreement * num_matches) {
-    MeasuredMotion lost = motion;
-    lost.state = FrameState::kLost;
-    return accept(frame, lost, localized);
+    motion.state = FrameState::kLost;
   }
   return accept(frame, motion, localized);
 }
