@@ -54,7 +54,7 @@ class Keys {
       return fail(
           fmt::format("{}:{}: expected the keys of a camera (image_width, image_height, "
                       "intrinsics, ..), found none",
-                      file.string(), root->Mark().line + 1));
+                      file.string(), std::max(root->Mark().line, 0) + 1));
     }
     for (const auto& entry : *root) {
       const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";

@@ -10,7 +10,7 @@ struct BundleAdjustmentOptions {
   /// The oldest. Two hold the gauge, scale included; with one the length of the window is kept,
   /// from the oldest keyframe to the last but one.
   int num_fixed_keyframes = 2;
-  int max_iterations = 4;
+  int max_iterations = 10;
   /// Cauchy scale on the reprojection error: at least this ..
   double loss_scale_px = 0.2;
   /// .. and so many times the median error: a lens or a shutter that the camera model does not know

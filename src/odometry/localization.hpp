@@ -39,7 +39,7 @@ struct Localization {
 /// Pose of a frame by the landmarks it sees: motion-only optimization (Cauchy loss) from a
 /// predicted pose, in two rounds, outliers left out between them. Where fewer than
 /// `min_agreement` agree, it is searched without a prediction (P3P consensus) and the better one
-/// counts. nullopt: fewer than `min_landmarks` agree with any pose.
+/// counts, however few that are. nullopt: fewer than `min_landmarks` agree with any pose.
 [[nodiscard]] std::optional<Localization> localize(const SeenLandmarks& seen,
                                                    const Rigid3& predicted_world_from_camera,
                                                    const Camera& camera,

@@ -21,6 +21,9 @@ constexpr double kFocal_px = 718.0;
 constexpr double kMinOverlap = 0.6;
 /// .. or, where the camera moves, less than this share of the tracks are landmarks.
 constexpr double kMinLandmarkShare = 0.3;
+/// A motion that explains less than this share of the matches is none: the frame shows another
+/// place.
+constexpr double kMinExplained = 0.5;
 /// A camera that was still is believed to move from so many times the flow on.
 constexpr double kHysteresis = 1.5;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
@@ -75,6 +78,7 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
 void WindowEstimator::start_reference(View reference, std::shared_ptr<const RoadPicture> road) {
   initializer_.start(std::move(reference));
   reference_road_ = std::move(road);
+  frames_still_ = 0;
   is_initializing_ = true;
 }
 
@@ -90,7 +94,10 @@ FrameState WindowEstimator::initialize(const TrackedFrame& frame, LocalizedFrame
   if (const std::optional<Localization> found = localize_in_window(now)) {
     return accept_localization(frame, *found, localized);
   }
-  if (initializer_.is_worn_out(now)) {
+  const View& reference = initializer_.reference();
+  const bool starts_elsewhere =
+      reference.points.empty() && frame.matches.prev_frame != reference.frame;
+  if (starts_elsewhere || initializer_.is_worn_out(now)) {
     start_reference_before(frame.matches);
   }
   return accept(frame, initializer_.measure(frame.matches, now), localized);
@@ -113,26 +120,30 @@ FrameState WindowEstimator::accept(const TrackedFrame& frame,
     }
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
-  const View& reference = initializer_.reference();
+  const Rigid3 guess = guessed_pose(frame.number, motion);
   const bool goes_on = num_keyframes_ > 0 && motion.state == FrameState::kTracking;
-  const double length = goes_on ? step_ * (frame.number - reference.frame) : 0.0;
-  const Rigid3 direction = motion.cur_from_prev.inverse();
   world_from_camera_ =
-      reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
+      Rigid3(guess.rotation, goes_on ? guess.translation : world_from_camera_.translation);
+  const bool is_still =
+      motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
+  frames_still_ += is_still ? 1 : 0;
   initializer_.wait({frame.number, world_from_camera_, points});
   return motion.state == FrameState::kTracking ? FrameState::kInitializing : motion.state;
+}
+
+/// The length of the way since the reference is not known: as many steps as frames that moved.
+Rigid3 WindowEstimator::guessed_pose(int frame, const MeasuredMotion& motion) const {
+  const View& reference = initializer_.reference();
+  const Rigid3 direction = motion.cur_from_prev.inverse();
+  const double length = step_ * (frame - reference.frame - frames_still_);
+  return reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
 }
 
 bool WindowEstimator::open_window(const TrackedFrame& frame,
                                   const MeasuredMotion& motion,
                                   TrackPoints points) {
   const View& reference = initializer_.reference();
-  const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = step_ * (frame.number - reference.frame);
-  View view{
-      frame.number,
-      reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation),
-      std::move(points)};
+  View view{frame.number, guessed_pose(frame.number, motion), std::move(points)};
   std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
   if (!window.has_value()) {
     return false;
@@ -193,9 +204,11 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
   TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   const Rigid3 before = anchor_.world_from_camera;
   const double bound_px = kTurnFlow * min_flow_px();
-  const std::optional<Rigid3> turned =
-      turned_pose(world_from_camera_, before.translation, find_seen_landmarks(window_, now),
-                  camera_, bound_px, localization_.inlier_bound_px);
+  std::optional<Rigid3> turned;
+  if (is_last_localized_) {
+    turned = turned_pose(world_from_camera_, before.translation, find_seen_landmarks(window_, now),
+                         camera_, bound_px, localization_.inlier_bound_px);
+  }
   world_from_camera_ = turned.value_or(world_from_camera_);
   anchor_ = {frame.number, world_from_camera_, std::move(now)};
   if (!turned.has_value()) {
@@ -212,7 +225,7 @@ FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFr
   start_reference_before(frame.matches);
   MeasuredMotion motion = initializer_.measure(frame.matches, now);
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
-  if (motion.num_inliers < localization_.min_agreement * num_matches) {
+  if (motion.num_inliers < kMinExplained * num_matches) {
     motion.state = FrameState::kLost;
   }
   return accept(frame, motion, localized);
@@ -224,7 +237,7 @@ double WindowEstimator::min_flow_px() const {
 
 void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
-  if (matches.prev_frame == last_.frame) {
+  if (is_last_localized_ && matches.prev_frame == last_.frame) {
     mask = epipolar_inliers(camera_from_world * last_.world_from_camera, matches.prev_uv,
                             matches.cur_uv, camera_, localization_.inlier_bound_px);
   }

@@ -46,6 +46,7 @@ class WindowEstimator final : public Estimator {
                                  const MeasuredMotion& motion,
                                  TrackPoints points);
   void start_reference(View reference, std::shared_ptr<const RoadPicture> road);
+  [[nodiscard]] Rigid3 guessed_pose(int frame, const MeasuredMotion& motion) const;
   FrameState lose(LocalizedFrame& localized);
 
   // Against landmarks.
@@ -89,7 +90,8 @@ class WindowEstimator final : public Estimator {
   std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
-  bool is_held_ = false;            ///< the last frame was stationary or rotating
+  bool is_held_ = false;            ///< the last image did not show new motion
+  int frames_still_ = 0;            ///< since the initializer's reference: stationary, rotating
   int num_keyframes_ = 0;           ///< since the window was opened
   int keyframes_since_refinement_ = 0;
   bool has_opened_ = false;  ///< the frame in work opened the window

@@ -134,6 +134,24 @@ TEST(WindowRecovery, AfterALossANewMapIsMadeInAUnitOfItsOwn) {
               1.0, 0.1);
 }
 
+TEST(WindowRecovery, StandingStillAfterALossDoesNotLengthenTheUnit) {
+  Driven d;
+  EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
+  Matches still = of_other_things(d.drive, kBadFrame);
+  still.prev_uv = still.cur_uv;
+  for (int k = 0; k < 40; ++k) {
+    EXPECT_EQ(d.run.add_matches(still, kBadFrame).state, FrameState::kStationary) << k;
+  }
+  for (int i = kBadFrame + 1; i < 20; ++i) {
+    d.run.add_matches(of_other_things(d.drive, i), i);
+  }
+  EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
+  const std::vector<Rigid3>& poses = d.estimator.trajectory();
+  const double last_step = (poses.back().translation - poses.end()[-2].translation).norm();
+  const double true_step = (d.drive.pose(19).translation - d.drive.pose(18).translation).norm();
+  EXPECT_NEAR(last_step * d.unit_m() / true_step, 1.0, 0.1);
+}
+
 TEST(WindowRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewWithoutAGap) {
   Driven d;
   const FrameResult first = d.run.add_matches(of_other_things(d.drive, kBadFrame), kBadFrame);
