@@ -33,7 +33,8 @@ struct PointBlock {
   int track_id;
   Eigen::Vector3d point;
   int num_observations = 0;
-  bool is_in_front = true;  ///< of every keyframe that sees it
+  bool is_in_front = true;    ///< of every keyframe that sees it
+  bool moves_a_pose = false;  ///< seen from a keyframe that is not fixed
 };
 
 /// Everything the solver changes; the window takes it over only where it succeeds.
@@ -72,10 +73,13 @@ Unknowns read_unknowns(const Window& window, const BundleAdjustmentOptions& opti
         const PoseBlock& pose = unknowns.poses[keyframe];
         const double depth = pose.rotation.row(2).dot(point.point) + pose.change[5];
         point.is_in_front = point.is_in_front && depth > ReprojectionCost::kMinDepth;
+        point.moves_a_pose =
+            point.moves_a_pose || static_cast<int>(keyframe) >= options.num_fixed_keyframes;
         ++point.num_observations;
       });
   std::erase_if(unknowns.points, [&](const PointBlock& point) {  // the solver must start somewhere
-    return point.num_observations < options.min_observations || !point.is_in_front;
+    return point.num_observations < options.min_observations || !point.is_in_front ||
+           !point.moves_a_pose;
   });
   return unknowns;
 }

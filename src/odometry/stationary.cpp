@@ -18,7 +18,7 @@ using Points = std::vector<Eigen::Vector2d>;
 Eigen::Quaterniond rotation_between(const Points& prev_uv,
                                     const Points& cur_uv,
                                     const Camera& camera) {
-  return refine_rotation({}, prev_uv, cur_uv, camera).cur_from_prev.rotation;
+  return refine_rotation({}, prev_uv, cur_uv, camera, {.max_iterations = 5}).cur_from_prev.rotation;
 }
 
 double rms_parallax_px(const Eigen::Quaterniond& rotation,
