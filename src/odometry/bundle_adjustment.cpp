@@ -123,7 +123,7 @@ ceres::Solver::Options solver_options(const BundleAdjustmentOptions& options,
   solver.max_num_iterations = options.max_iterations;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
-  // What a tight turn needs ten steps for, a straight road reaches in three.
+  // Tight turns need several times the steps of a straight road.
   solver.function_tolerance = 5e-3;
   // Turns, shifts and points are of like size here, and it would pass twice over the Jacobian.
   solver.jacobi_scaling = false;
