@@ -11,13 +11,13 @@
 namespace stemvo {
 namespace {
 
-struct View {
+struct Sighting {
   const Keyframe* keyframe;
   const TrackPoint* observation;
 };
 
-std::vector<View> views_of(const Window& window, int track_id) {
-  std::vector<View> views;
+std::vector<Sighting> views_of(const Window& window, int track_id) {
+  std::vector<Sighting> views;
   for (const Keyframe& keyframe : window.keyframes) {
     if (const TrackPoint* observation = find_point(keyframe.points, track_id)) {
       views.push_back({&keyframe, observation});
@@ -27,18 +27,18 @@ std::vector<View> views_of(const Window& window, int track_id) {
 }
 
 bool is_seen_well(const Eigen::Vector3d& point_in_world,
-                  const View& view,
+                  const Sighting& sighting,
                   const Camera& camera,
                   double bound_px) {
-  const Eigen::Vector3d point = view.keyframe->world_from_camera.inverse() * point_in_world;
-  return point.z() > 0.0 && (camera.project(point) - view.observation->uv).norm() <= bound_px;
+  return is_near(sighting.keyframe->world_from_camera.inverse(), point_in_world,
+                 sighting.observation->uv, camera, bound_px);
 }
 
-std::optional<Eigen::Vector3d> triangulate_views(const std::vector<View>& views,
+std::optional<Eigen::Vector3d> triangulate_views(const std::vector<Sighting>& views,
                                                  const Camera& camera,
                                                  const WindowOptions& options) {
-  const View& first = views.front();
-  const View& last = views.back();
+  const Sighting& first = views.front();
+  const Sighting& last = views.back();
   const Rigid3 last_from_first =
       last.keyframe->world_from_camera.inverse() * first.keyframe->world_from_camera;
   const TriangulatedPoint point =
@@ -49,7 +49,7 @@ std::optional<Eigen::Vector3d> triangulate_views(const std::vector<View>& views,
     return std::nullopt;
   }
   const Eigen::Vector3d in_world = first.keyframe->world_from_camera * point.in_prev;
-  for (const View& view : views) {
+  for (const Sighting& view : views) {
     if (!is_seen_well(in_world, view, camera, options.max_reprojection_error_px)) {
       return std::nullopt;
     }
@@ -67,7 +67,7 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
     if (window.landmarks.contains(observation.track_id)) {
       continue;
     }
-    const std::vector<View> views = views_of(window, observation.track_id);
+    const std::vector<Sighting> views = views_of(window, observation.track_id);
     if (views.size() < 2) {
       continue;
     }
@@ -80,7 +80,7 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
   std::erase_if(window.landmarks, [&](const auto& landmark) {
     const auto& [track_id, point_in_world] = landmark;
-    for (const View& view : views_of(window, track_id)) {
+    for (const Sighting& view : views_of(window, track_id)) {
       if (!is_seen_well(point_in_world, view, camera, options.max_reprojection_error_px)) {
         return true;
       }

@@ -24,8 +24,7 @@ int count_inliers(const SeenLandmarks& seen,
                   double bound_px) {
   int count = 0;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
-    const Eigen::Vector3d x = camera_from_world * seen.points[i];
-    count += x.z() > 0.0 && (camera.project(x) - seen.uv[i]).norm() <= bound_px ? 1 : 0;
+    count += is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px) ? 1 : 0;
   }
   return count;
 }

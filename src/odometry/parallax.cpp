@@ -9,6 +9,23 @@
 #include "stemvo/geometry/two_view_scores.hpp"
 
 namespace stemvo {
+namespace {
+
+/// What is left of the flow once the rotation is taken out, of each match.
+std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
+                                  std::span<const Eigen::Vector2d> prev_uv,
+                                  std::span<const Eigen::Vector2d> cur_uv,
+                                  const Camera& camera) {
+  std::vector<double> lengths;
+  lengths.reserve(prev_uv.size());
+  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
+    const Eigen::Vector3d ray = rotation * camera.normalize(prev_uv[i]).homogeneous();
+    lengths.push_back((cur_uv[i] - camera.project(ray)).norm());
+  }
+  return lengths;
+}
+
+}  // namespace
 
 double median_flow_px(std::span<const Eigen::Vector2d> prev_uv,
                       std::span<const Eigen::Vector2d> cur_uv) {
@@ -24,13 +41,18 @@ double median_parallax_px(const Eigen::Quaterniond& rotation,
                           std::span<const Eigen::Vector2d> prev_uv,
                           std::span<const Eigen::Vector2d> cur_uv,
                           const Camera& camera) {
-  std::vector<double> lengths;
-  lengths.reserve(prev_uv.size());
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    const Eigen::Vector3d ray = rotation * camera.normalize(prev_uv[i]).homogeneous();
-    lengths.push_back((cur_uv[i] - camera.project(ray)).norm());
+  return median(parallaxes_px(rotation, prev_uv, cur_uv, camera));
+}
+
+double rms_parallax_px(const Eigen::Quaterniond& rotation,
+                       std::span<const Eigen::Vector2d> prev_uv,
+                       std::span<const Eigen::Vector2d> cur_uv,
+                       const Camera& camera) {
+  double sum = 0.0;
+  for (const double length : parallaxes_px(rotation, prev_uv, cur_uv, camera)) {
+    sum += length * length;
   }
-  return median(std::move(lengths));
+  return std::sqrt(sum / static_cast<double>(prev_uv.size()));
 }
 
 double median_epipolar_px(const Rigid3& cur_from_prev,

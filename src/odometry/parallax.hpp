@@ -29,6 +29,12 @@ inline constexpr double kNoiseParallax = 5.0;
                                         std::span<const Eigen::Vector2d> cur_uv,
                                         const Camera& camera);
 
+/// The same, root mean square: every match counts, so wrong ones must be out.
+[[nodiscard]] double rms_parallax_px(const Eigen::Quaterniond& rotation,
+                                     std::span<const Eigen::Vector2d> prev_uv,
+                                     std::span<const Eigen::Vector2d> cur_uv,
+                                     const Camera& camera);
+
 /// Distance to the epipolar lines in both images (Sampson).
 [[nodiscard]] double median_epipolar_px(const Rigid3& cur_from_prev,
                                         std::span<const Eigen::Vector2d> prev_uv,

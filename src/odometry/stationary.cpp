@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/stationary.hpp"
 
-#include <cmath>
 #include <vector>
 
 #include "odometry/parallax.hpp"
@@ -10,7 +9,6 @@
 namespace stemvo {
 namespace {
 
-constexpr int kMinPoints = 20;
 constexpr std::size_t kMinLandmarks = 10;
 
 using Points = std::vector<Eigen::Vector2d>;
@@ -21,23 +19,14 @@ Eigen::Quaterniond rotation_between(const Points& prev_uv,
   return refine_rotation({}, prev_uv, cur_uv, camera, {.max_iterations = 5}).cur_from_prev.rotation;
 }
 
-double rms_parallax_px(const Eigen::Quaterniond& rotation,
-                       const Points& prev_uv,
-                       const Points& cur_uv,
-                       const Camera& camera) {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    const Eigen::Vector3d ray = rotation * camera.normalize(prev_uv[i]).homogeneous();
-    sum += (camera.project(ray) - cur_uv[i]).squaredNorm();
-  }
-  return std::sqrt(sum / static_cast<double>(prev_uv.size()));
-}
-
 }  // namespace
 
-bool is_stationary(const TrackPoints& before, const TrackPoints& now, double min_flow_px) {
+bool is_stationary(const TrackPoints& before,
+                   const TrackPoints& now,
+                   double min_flow_px,
+                   int min_tracks) {
   const PointPairs pairs = common_points(before, now);
-  return pairs.size() >= kMinPoints && median_flow_px(pairs.prev_uv, pairs.cur_uv) < min_flow_px;
+  return pairs.size() >= min_tracks && median_flow_px(pairs.prev_uv, pairs.cur_uv) < min_flow_px;
 }
 
 std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
@@ -53,11 +42,10 @@ std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
   Points seen_uv;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     const Eigen::Vector3d in_held = held * seen.points[i];
-    const Eigen::Vector3d in_moved = camera_from_world * seen.points[i];
-    if (in_held.z() > 0.0 && in_moved.z() > 0.0 &&
-        (camera.project(in_moved) - seen.uv[i]).norm() <= bound_px) {
+    if (in_held.z() > 0.0 &&
+        is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px)) {
       held_uv.push_back(camera.project(in_held));
-      moved_uv.push_back(camera.project(in_moved));
+      moved_uv.push_back(camera.project(camera_from_world * seen.points[i]));
       seen_uv.push_back(seen.uv[i]);
     }
   }

@@ -12,10 +12,12 @@
 
 namespace stemvo {
 
-/// The tracks stay where they were: their median flow is less than `min_flow_px`.
+/// The tracks stay where they were: their median flow is less than `min_flow_px`. False where the
+/// two share fewer than `min_tracks`.
 [[nodiscard]] bool is_stationary(const TrackPoints& before,
                                  const TrackPoints& now,
-                                 double min_flow_px);
+                                 double min_flow_px,
+                                 int min_tracks);
 
 /// world_from_camera with the position held, if it explains the image too: the way from there to
 /// the frame's own position moves its landmarks in the image by less than `min_flow_px` (root mean

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "odometry/track_points.hpp"
+#include "stemvo/geometry/camera.hpp"
 #include "stemvo/geometry/rigid3.hpp"
 
 namespace stemvo {
@@ -40,6 +41,16 @@ struct WindowOptions {
   double min_parallax_deg = 0.1;
   double max_reprojection_error_px = 4.0;  ///< of a landmark in any keyframe
 };
+
+/// A landmark is where the camera sees it: in front of it and within `bound_px` of `uv`.
+[[nodiscard]] inline bool is_near(const Rigid3& camera_from_world,
+                                  const Eigen::Vector3d& point_in_world,
+                                  const Eigen::Vector2d& uv,
+                                  const Camera& camera,
+                                  double bound_px) {
+  const Eigen::Vector3d point = camera_from_world * point_in_world;
+  return point.z() > 0.0 && (camera.project(point) - uv).norm() <= bound_px;
+}
 
 /// Appends the keyframe, drops the oldest beyond the window's length, and landmarks that no
 /// keyframe sees any more.

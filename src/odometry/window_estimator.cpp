@@ -114,10 +114,9 @@ FrameState WindowEstimator::accept(const TrackedFrame& frame,
     return lose(localized);
   }
   const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
-  if (motion.state == FrameState::kTracking) {
-    if (motion.is_decisive && open_window(frame, motion, points)) {
-      return FrameState::kInitializing;
-    }
+  if (motion.state == FrameState::kTracking && motion.is_decisive &&
+      open_window(frame, motion, points)) {
+    return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
   const Rigid3 guess = guessed_pose(frame.number, motion);
@@ -181,7 +180,7 @@ FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& loc
   if (frame.matches.prev_frame == anchor_.frame) {
     add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
   }
-  if (is_stationary(anchor_.points, now, min_flow_px())) {
+  if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
     world_from_camera_ = anchor_.world_from_camera;
     return FrameState::kStationary;
   }
@@ -244,9 +243,8 @@ void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& m
   for (std::size_t i = 0; i < mask.size(); ++i) {
     const auto landmark = window_.landmarks.find(matches.track_ids[i]);
     if (landmark != window_.landmarks.end()) {
-      const Eigen::Vector3d x = camera_from_world * landmark->second;
-      mask[i] = x.z() > 0.0 &&
-                (camera_.project(x) - matches.cur_uv[i]).norm() <= localization_.inlier_bound_px;
+      mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera_,
+                        localization_.inlier_bound_px);
     }
   }
 }

@@ -71,13 +71,13 @@ TEST(IsStationary, ByTheMedianFlowOfTwentyTracks) {
     before.push_back({i, uv});
     now.push_back({i, uv + Eigen::Vector2d(i < 10 ? 30.0 : 0.1, 0.0)});  // others pass by
   }
-  EXPECT_TRUE(is_stationary(before, now, 0.15));
-  EXPECT_FALSE(is_stationary(before, now, 0.05));
+  EXPECT_TRUE(is_stationary(before, now, 0.15, 20));
+  EXPECT_FALSE(is_stationary(before, now, 0.05, 20));
   now[10].uv.x() += 30.0;
-  EXPECT_FALSE(is_stationary(before, now, 0.15));
+  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
   now[10].uv.x() -= 30.0;
   now.resize(19);
-  EXPECT_FALSE(is_stationary(before, now, 0.15));
+  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
 }
 
 }  // namespace
