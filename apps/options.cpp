@@ -65,11 +65,11 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
                   "' and '" + assignment + "'");
     }
     if (const Status status = apply_override(config, assignment); !status) {
-      return tl::unexpected(status.error());
+      return status.error();
     }
   }
   if (const Status status = validate(config); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return config;
 }

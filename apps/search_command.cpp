@@ -49,9 +49,8 @@ Status check_overrides(const ConfigArguments& config) {
         std::pair("stem.filter", "--filters")}) {
     for (const std::string& assignment : config.overrides) {
       if (assignment.substr(0, assignment.find('=')) == key) {
-        return tl::unexpected(
-            Error{fmt::format("--set {}: expected {}, which says what a search runs, found '{}'",
-                              key, option, assignment)});
+        return Error{fmt::format("--set {}: expected {}, which says what a search runs, found '{}'",
+                                 key, option, assignment)};
       }
     }
   }
@@ -65,11 +64,11 @@ Expected<SearchReport> search(Arguments& arguments) {
     return merge_searches(arguments.merge, request.out_dir, request.models_dir);
   }
   if (const Status overrides = check_overrides(arguments.config); !overrides) {
-    return tl::unexpected(overrides.error());
+    return overrides.error();
   }
   const Expected<Config> config = read_config(arguments.config, search_defaults());
   if (!config) {
-    return tl::unexpected(config.error());
+    return config.error();
   }
   request.config = *config;
   request.baselines = !arguments.no_baselines;

@@ -114,10 +114,10 @@ Expected<BenchmarkReport> run_benchmark(const BenchmarkRequest& request,
                                         const BenchmarkCallback& callback) {
   const Expected<std::vector<std::string>> names = find_sequences(request);
   if (!names) {
-    return tl::unexpected(names.error());
+    return names.error();
   }
   if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
-    return tl::unexpected(made.error());
+    return made.error();
   }
   BenchmarkReport report;
   report.stemvo_version = version();
@@ -138,7 +138,7 @@ Expected<BenchmarkReport> run_benchmark(const BenchmarkRequest& request,
     // A stop after the last frame of all leaves nothing to be done.
     report.interrupted = reporter.is_stopped() && has_pending(report);
     if (const Status written = benchmark::write_files(request, report, sequence); !written) {
-      return tl::unexpected(written.error());
+      return written.error();
     }
     if (report.interrupted) {
       break;

@@ -48,7 +48,7 @@ Expected<std::vector<NamedTrajectory>> paths_to_draw(const BenchmarkRequest& req
     const fs::path file = run_folder(request.out_dir, sequence.name, *run) / "trajectory_kitti.txt";
     Expected<Trajectory> poses = read_kitti_trajectory(file);
     if (!poses) {
-      return tl::unexpected(poses.error());
+      return poses.error();
     }
     paths.push_back({run->configuration, std::move(*poses)});
     subtitle += fmt::format("{}{}: {}", subtitle.empty() ? "" : "   ", run->configuration,
@@ -67,7 +67,7 @@ Status write_picture(const BenchmarkRequest& request, const BenchmarkSequence& s
   plot.title = fmt::format("{}, {}", sequence.name, describe_frames(sequence));
   auto paths = paths_to_draw(request, sequence, plot.subtitle);
   if (!paths || paths->empty()) {
-    return paths ? Status() : tl::unexpected(paths.error());
+    return paths ? Status() : paths.error();
   }
   plot.estimate = std::move(paths->front().trajectory);
   plot.estimate_name = paths->front().name;

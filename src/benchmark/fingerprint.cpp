@@ -90,7 +90,7 @@ Expected<std::string> files_identity(const std::vector<fs::path>& files) {
   for (const fs::path& file : files) {
     const auto bytes = read_bytes(file);
     if (!bytes) {
-      return tl::unexpected(bytes.error());
+      return bytes.error();
     }
     text += fmt::format("{} {}\n", bytes->size(), *bytes);
   }
@@ -112,11 +112,11 @@ Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
   }
   const auto calibration = files_identity({sequence_dir / "calib.txt", sequence_dir / "times.txt"});
   if (!calibration) {
-    return tl::unexpected(calibration.error());
+    return calibration.error();
   }
   const auto ground_truth = files_identity(truth);
   if (!ground_truth) {
-    return tl::unexpected(ground_truth.error());
+    return ground_truth.error();
   }
   return SequenceHashes{sha256_hex(frames_identity(sequence, frames)), sha256_hex(*calibration),
                         sha256_hex(*ground_truth)};
@@ -134,15 +134,15 @@ Expected<Fingerprint> make_fingerprint(const Config& config,
                                        const fs::path& models_dir) {
   const auto program = hash_program();
   if (!program) {
-    return tl::unexpected(program.error());
+    return program.error();
   }
   const auto model = hash_model(config, models_dir);
   if (!model) {
-    return tl::unexpected(model.error());
+    return model.error();
   }
   const auto inputs = hash_sequence(sequence, sequence_dir, FrameIdentity::kNamesAndSizes);
   if (!inputs) {
-    return tl::unexpected(inputs.error());
+    return inputs.error();
   }
   return Fingerprint{.configuration = sha256_hex(dump_config(config)),
                      .program = *program,
@@ -163,7 +163,7 @@ Status write_fingerprint(const fs::path& run_dir, const Fingerprint& of) {
 Expected<Fingerprint> read_fingerprint(const fs::path& run_dir) {
   const Expected<std::string> text = read_text_file(run_dir / kFile);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   try {
     const nlohmann::json json = nlohmann::json::parse(*text);

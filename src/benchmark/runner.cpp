@@ -64,8 +64,7 @@ void run_now(const RunRequest& request,
   }
   // What is reported is what was written, so that a kept result gives the same report.
   const Expected<MetricsReport> report = read_metrics_json(request.out_dir / "metrics.json");
-  const Status kept =
-      report ? write_fingerprint(request.out_dir, fingerprint) : tl::unexpected(report.error());
+  const Status kept = report ? write_fingerprint(request.out_dir, fingerprint) : report.error();
   if (!kept) {
     return finish(run, BenchmarkState::kFailed, kept.error().message);
   }

@@ -148,14 +148,14 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
       request.sequence_dir,
       {request.config.input.camera, request.frames, std::nullopt, calibration_file(request)});
   if (!sequence) {
-    return tl::unexpected(sequence.error());
+    return sequence.error();
   }
   if (const Status status = check_request(request); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   Expected<Odometry> odometry = create_odometry(request, sequence->camera());
   if (!odometry) {
-    return tl::unexpected(odometry.error());
+    return odometry.error();
   }
   CalibrationReport report;
   report.given = report.refined = sequence->camera();
@@ -183,10 +183,10 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   const Expected<std::string> text =
       calibration::rewrite_calibration(calibration_file(request), report.given, report.refined);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   if (const Status status = calibration::replace_file(request.out_file, *text); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   report.written = true;
   return report;

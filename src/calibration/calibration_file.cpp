@@ -55,7 +55,7 @@ Expected<std::string> rewrite_calibration(const fs::path& file,
                                           const Camera& refined) {
   const Expected<std::vector<std::string>> lines = read_lines(file);
   if (!lines) {
-    return tl::unexpected(lines.error());
+    return lines.error();
   }
   std::string text;
   for (const std::string& line : *lines) {

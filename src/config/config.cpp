@@ -53,12 +53,12 @@ std::string read_assigned(const std::string& text, const config::Field& field) {
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
   const Expected<YAML::Node> root = read_yaml(file);
   if (!root) {
-    return tl::unexpected(root.error());
+    return root.error();
   }
   Config result = base;
   std::vector<config::Field> fields = config::fields_of(result);
   if (Status status = config::read_document(*root, file.string(), fields); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return result;
 }
@@ -66,7 +66,7 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
 Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& file) {
   const Expected<YAML::Node> root = read_yaml(file);
   if (!root) {
-    return tl::unexpected(root.error());
+    return root.error();
   }
   Config config;
   std::vector<std::string> keys;

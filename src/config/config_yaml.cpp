@@ -112,7 +112,7 @@ class MapReader {
     const std::string shown = quote(key);
     return shown.size() == key.size() + 2 ? shown.substr(1, key.size()) : shown;
   }
-  tl::unexpected<Error> error(const YAML::Node& node, const std::string& message) const {
+  Error error(const YAML::Node& node, const std::string& message) const {
     return fail(fmt::format("{}:{}: {}", source_, line_of(node), message));
   }
 

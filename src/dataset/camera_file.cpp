@@ -42,12 +42,12 @@ class Keys {
     }
     const Expected<std::string> text = read_text_file(file);
     if (!text) {
-      return tl::unexpected(text.error());
+      return text.error();
     }
     const Expected<YAML::Node> root =
         config::parse_document(without_opencv_directive(*text), file.string());
     if (!root) {
-      return tl::unexpected(root.error());
+      return root.error();
     }
     Keys keys(file);
     if (!root->IsMap()) {
@@ -67,12 +67,11 @@ class Keys {
   }
 
   [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
-  [[nodiscard]] tl::unexpected<Error> missing(std::string_view expected) const {
+  [[nodiscard]] Error missing(std::string_view expected) const {
     return fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected));
   }
   /// "<file>:<line>: <key>: <problem>"
-  [[nodiscard]] tl::unexpected<Error> refuse(const std::string& key,
-                                             const std::string& problem) const {
+  [[nodiscard]] Error refuse(const std::string& key, const std::string& problem) const {
     return fail(fmt::format("{}: {}", where(key), problem));
   }
 
@@ -99,7 +98,7 @@ class Keys {
     for (const YAML::Node& element : value) {
       const Expected<double> number = number_of(key, element);
       if (!number) {
-        return tl::unexpected(number.error());
+        return number.error();
       }
       result.push_back(*number);
     }
@@ -147,7 +146,7 @@ Status read_size(const Keys& keys, Camera& camera) {
   } else if (keys.has("resolution")) {
     const auto sides = keys.numbers("resolution", {2}, "[width, height]");
     if (!sides) {
-      return tl::unexpected(sides.error());
+      return sides.error();
     }
     width = check("resolution", sides->front());
     height = check("resolution", sides->back());
@@ -155,7 +154,7 @@ Status read_size(const Keys& keys, Camera& camera) {
     return keys.missing("image_width and image_height, or resolution: [width, height]");
   }
   if (!width || !height) {
-    return tl::unexpected(width ? height.error() : width.error());
+    return width ? height.error() : width.error();
   }
   camera.width_px = *width;
   camera.height_px = *height;
@@ -168,7 +167,7 @@ Status read_intrinsics(const Keys& keys, Camera& camera) {
     if (!model || *model != "pinhole") {
       return model ? keys.refuse("camera_model",
                                  fmt::format("expected pinhole, found {}", config::quote(*model)))
-                   : tl::unexpected(model.error());
+                   : model.error();
     }
   }
   if (!keys.has("intrinsics")) {
@@ -176,7 +175,7 @@ Status read_intrinsics(const Keys& keys, Camera& camera) {
   }
   const auto numbers = keys.numbers("intrinsics", {4}, "[fx, fy, cx, cy]");
   if (!numbers) {
-    return tl::unexpected(numbers.error());
+    return numbers.error();
   }
   camera.fx_px = (*numbers)[0];
   camera.fy_px = (*numbers)[1];
@@ -202,7 +201,7 @@ Expected<Distortion> read_model(const Keys& keys) {
   }
   const auto name = keys.word("distortion_model");
   if (!name) {
-    return tl::unexpected(name.error());
+    return name.error();
   }
   if (*name == "none") {
     return Distortion::kNone;
@@ -221,7 +220,7 @@ Status read_distortion(const Keys& keys, Lens& lens) {
   constexpr const char* kKey = "distortion_coefficients";
   const auto model = read_model(keys);
   if (!model) {
-    return tl::unexpected(model.error());
+    return model.error();
   }
   lens.distortion = *model;
   if (*model == Distortion::kNone && !keys.has(kKey)) {
@@ -239,7 +238,7 @@ Status read_distortion(const Keys& keys, Lens& lens) {
                            ? read({4}, "[k1, k2, k3, k4]")
                            : read({4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
   if (!numbers) {
-    return tl::unexpected(numbers.error());
+    return numbers.error();
   }
   std::copy(numbers->begin(), numbers->end(), lens.coefficients.begin());
   return {};
@@ -255,7 +254,7 @@ Expected<std::optional<double>> read_positive(const Keys& keys,
   }
   const auto number = keys.number(key);
   if (!number) {
-    return tl::unexpected(number.error());
+    return number.error();
   }
   if (!(*number > 0.0 && *number <= max)) {
     return keys.refuse(
@@ -269,19 +268,19 @@ Expected<std::optional<double>> read_positive(const Keys& keys,
 Expected<CameraFile> read_camera_file(const std::filesystem::path& file) {
   const Expected<Keys> keys = Keys::read(file);
   if (!keys) {
-    return tl::unexpected(keys.error());
+    return keys.error();
   }
   CameraFile result;
   Status status = read_size(*keys, result.lens.camera);
   status = status ? read_intrinsics(*keys, result.lens.camera) : status;
   status = status ? read_distortion(*keys, result.lens) : status;
   if (!status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   const auto rate_hz = read_positive(*keys, "rate_hz", kMaxRate_hz, "frames per second");
   const auto height_m = read_positive(*keys, "camera_height", 1000.0, "metres");
   if (!rate_hz || !height_m) {
-    return tl::unexpected(rate_hz ? height_m.error() : rate_hz.error());
+    return rate_hz ? height_m.error() : rate_hz.error();
   }
   result.rate_hz = *rate_hz;
   result.camera_height_m = *height_m;

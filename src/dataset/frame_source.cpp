@@ -27,7 +27,7 @@ bool looks_like_kitti(const fs::path& folder) {
 }
 
 /// No camera file is given.
-tl::unexpected<Error> refuse(const fs::path& path) {
+Error refuse(const fs::path& path) {
   if (dataset::is_pattern(path)) {
     return fail(
         fmt::format("{}: expected --camera FILE beside a pattern, found none", path.string()));
@@ -47,7 +47,7 @@ tl::unexpected<Error> refuse(const fs::path& path) {
 template <typename Source>
 Expected<std::unique_ptr<const FrameSource>> to_pointer(Expected<Source> source) {
   if (!source) {
-    return tl::unexpected(source.error());
+    return source.error();
   }
   return std::make_unique<const Source>(std::move(*source));
 }

@@ -51,7 +51,7 @@ Expected<Trajectory> read_poses(const fs::path& file,
                                 std::size_t num_pictures) {
   const auto poses = read_kitti_trajectory(file);
   if (!poses) {
-    return tl::unexpected(poses.error());
+    return poses.error();
   }
   if (poses->size() != num_pictures) {
     return fail(fmt::format("{}: expected a pose for each of {} pictures, found {} poses",
@@ -67,7 +67,7 @@ Expected<bool> check_pictures(const std::vector<fs::path>& files,
                               const Camera& camera) {
   const auto kind = vote_on_pictures<PictureKind>(files, read_picture_kind);
   if (!kind) {
-    return tl::unexpected(kind.error());
+    return kind.error();
   }
   if (kind->size != cv::Size(camera.width_px, camera.height_px)) {
     return fail(fmt::format("{}: expected pictures of {}x{} pixels, as {} says, found {}x{}",
@@ -84,11 +84,11 @@ Expected<FrameList> list_frames(const FrameSourceRequest& request,
   const std::size_t num_pictures = pictures.files.size();
   const auto range = resolve_range(request.frames, num_pictures, request.path);
   if (!range) {
-    return tl::unexpected(range.error());
+    return range.error();
   }
   const auto times_s = find_times(request, rate_hz, num_pictures);
   if (!times_s) {
-    return tl::unexpected(times_s.error());
+    return times_s.error();
   }
   FrameList frames;
   frames.name = absolute_folder(pictures.folder).filename().string();
@@ -99,7 +99,7 @@ Expected<FrameList> list_frames(const FrameSourceRequest& request,
   if (request.ground_truth) {
     auto poses = read_poses(*request.ground_truth, *range, num_pictures);
     if (!poses) {
-      return tl::unexpected(poses.error());
+      return poses.error();
     }
     frames.ground_truth = std::move(*poses);
     frames.ground_truth_file = request.ground_truth;
@@ -113,20 +113,20 @@ Expected<PictureFolder> PictureFolder::open(const FrameSourceRequest& request) {
   STEMVO_CHECK(request.camera_file.has_value(), "a camera file is given");
   const auto camera_file = read_camera_file(*request.camera_file);
   if (!camera_file) {
-    return tl::unexpected(camera_file.error());
+    return camera_file.error();
   }
   const auto pictures = list_pictures(request.path);
   if (!pictures) {
-    return tl::unexpected(pictures.error());
+    return pictures.error();
   }
   auto frames = list_frames(request, *pictures, camera_file->rate_hz);
   if (!frames) {
-    return tl::unexpected(frames.error());
+    return frames.error();
   }
   const auto is_color = check_pictures(frames->files, pictures->folder, *request.camera_file,
                                        camera_file->lens.camera);
   if (!is_color) {
-    return tl::unexpected(is_color.error());
+    return is_color.error();
   }
   auto undistortion = Undistortion::create(camera_file->lens);
   if (!undistortion) {
@@ -144,7 +144,7 @@ Expected<cv::Mat> PictureFolder::read(std::size_t index) const {
     return picture;
   }
   if (const Status status = check_size(file(index), *picture, camera()); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return undistortion_.apply(*picture);
 }

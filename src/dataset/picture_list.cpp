@@ -129,7 +129,7 @@ bool is_pattern(const fs::path& path) {
 Expected<PictureList> list_pictures(const fs::path& folder_or_pattern) {
   const Expected<Place> place = find_place(folder_or_pattern);
   if (!place) {
-    return tl::unexpected(place.error());
+    return place.error();
   }
   std::vector<std::string> names;
   std::error_code code;

@@ -94,7 +94,7 @@ Expected<Undistortion> Undistortion::create(const Lens& lens) {
   }
   const Expected<double> scale = find_scale(lens);
   if (!scale) {
-    return tl::unexpected(scale.error());
+    return scale.error();
   }
   result.camera_ = scaled(lens.camera, *scale);
   cv::Mat map(lens.camera.height_px, lens.camera.width_px, CV_32FC2);

@@ -43,9 +43,7 @@ Expected<Rigid3> pose_from_quaternion_row(const std::vector<double>& n) {
   return Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]));
 }
 
-tl::unexpected<Error> fail_at(const std::filesystem::path& file,
-                              std::size_t index,
-                              const Error& error) {
+Error fail_at(const std::filesystem::path& file, std::size_t index, const Error& error) {
   return fail(fmt::format("{}:{}: {}", file.string(), index + 1, error.message));
 }
 
@@ -56,7 +54,7 @@ void drop_empty_tail(std::vector<std::string_view>& lines) {
   }
 }
 
-tl::unexpected<Error> fail_empty(const std::filesystem::path& file) {
+Error fail_empty(const std::filesystem::path& file) {
   return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
 }
 
@@ -65,7 +63,7 @@ tl::unexpected<Error> fail_empty(const std::filesystem::path& file) {
 Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   std::vector<std::string_view> lines = split_lines(*text);
   drop_empty_tail(lines);
@@ -87,7 +85,7 @@ Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
 Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   const std::vector<std::string_view> lines = split_lines(*text);
   TimedTrajectory result;

@@ -15,7 +15,7 @@ namespace stemvo {
 Expected<ChannelOdometry> ChannelOdometry::create(const Config& config, const Camera& camera) {
   Expected<std::unique_ptr<FrontEnd>> front_end = create_front_end(config.features);
   if (!front_end.has_value()) {
-    return tl::unexpected<Error>(front_end.error());
+    return front_end.error();
   }
   return ChannelOdometry(config, camera, std::move(front_end.value()));
 }

@@ -21,16 +21,16 @@ Expected<Odometry> Odometry::create(const Config& config,
                                     const std::filesystem::path& models_dir) {
   Expected<Stem> stem = Stem::create(config.stem, models_dir);
   if (!stem.has_value()) {
-    return tl::unexpected<Error>(stem.error());
+    return stem.error();
   }
   // A model that cannot take this camera's frames is found before work starts.
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
   if (const Expected<Channel> channel = stem->apply(blank); !channel.has_value()) {
-    return tl::unexpected<Error>(channel.error());
+    return channel.error();
   }
   Expected<ChannelOdometry> channel_odometry = ChannelOdometry::create(config, camera);
   if (!channel_odometry.has_value()) {
-    return tl::unexpected<Error>(channel_odometry.error());
+    return channel_odometry.error();
   }
   return Odometry(std::make_unique<Impl>(
       Impl{camera, std::move(stem.value()), std::move(channel_odometry.value())}));

@@ -37,7 +37,7 @@ class ChannelWriter {
   Status write(const cv::Mat& frame, std::size_t number) {
     const Expected<std::vector<Channel>> channels = stem_.apply_all(frame);
     if (!channels) {
-      return tl::unexpected(channels.error());
+      return channels.error();
     }
     std::vector<cv::Mat> pictures;
     std::vector<std::string> captions = {fmt::format("input, frame {}", number)};
@@ -73,36 +73,36 @@ class ChannelWriter {
 Expected<std::size_t> write_channel_pictures(const ChannelPicturesRequest& request,
                                              const ChannelProgress& progress) {
   if (const Status status = validate(request.config); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   const auto opened = open_source({.path = request.sequence_dir,
                                    .kitti_camera = request.config.input.camera,
                                    .frames = request.frames,
                                    .camera_file = request.camera_file});
   if (!opened) {
-    return tl::unexpected(opened.error());
+    return opened.error();
   }
   const FrameSource& sequence = **opened;
   const Expected<Stem> stem = Stem::create(request.config.stem, request.models_dir);
   if (!stem) {
-    return tl::unexpected(stem.error());
+    return stem.error();
   }
   const Expected<FrameRange> filters = resolve_filters(request.filters, stem->info());
   if (!filters) {
-    return tl::unexpected(filters.error());
+    return filters.error();
   }
   if (const Status status = pipeline::create_out_folder(request.out_dir); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   ChannelWriter writer(request, *stem, *filters);
   bool go_on = true;
   for (std::size_t i = 0; i < sequence.size() && go_on; ++i) {
     const Expected<cv::Mat> frame = sequence.read(i);
     if (!frame) {
-      return tl::unexpected(frame.error());
+      return frame.error();
     }
     if (const Status status = writer.write(*frame, sequence.range().begin + i); !status) {
-      return tl::unexpected(status.error());
+      return status.error();
     }
     go_on = !progress || progress(i + 1, sequence.size());
   }

@@ -214,14 +214,14 @@ Expected<RunSummary> run_source(const RunRequest& request,
   Expected<Odometry> odometry =
       Odometry::create(request.config, sequence.camera(), request.models_dir);
   if (!odometry) {
-    return tl::unexpected(odometry.error());
+    return odometry.error();
   }
   if (const Status status = prepare_out_folder(request); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
   if (!csv) {
-    return tl::unexpected(csv.error());
+    return csv.error();
   }
 
   std::optional<StageRecorder> recorder;
@@ -246,7 +246,7 @@ Expected<RunSummary> run_source(const RunRequest& request,
 
 Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
   if (const Status status = validate(request.config); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   if (request.write_map && request.config.odometry.mode != "map") {
     return fail(fmt::format("--map: expected odometry.mode map, which makes one, found {}",
@@ -255,7 +255,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   const pipeline::ThreadScope threads(request.num_threads);
   const auto sequence = open_sequence(request);
   if (!sequence) {
-    return tl::unexpected(sequence.error());
+    return sequence.error();
   }
   RunRequest effective = request;
   effective.config = with_camera_height(request.config, request, **sequence);

@@ -68,7 +68,7 @@ Expected<std::vector<Bound>> parse_bounds(const std::filesystem::path& file,
 Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   YAML::Node root;
   try {
@@ -104,7 +104,7 @@ Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) 
 Expected<nlohmann::json> read_metrics(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   try {
     nlohmann::json json = nlohmann::json::parse(*text);
@@ -162,11 +162,11 @@ Expected<std::vector<ThresholdResult>> check_metrics(const std::filesystem::path
                                                      const std::filesystem::path& thresholds_file) {
   const Expected<std::vector<Bound>> bounds = read_thresholds(thresholds_file);
   if (!bounds) {
-    return tl::unexpected(bounds.error());
+    return bounds.error();
   }
   const Expected<nlohmann::json> metrics = read_metrics(metrics_file);
   if (!metrics) {
-    return tl::unexpected(metrics.error());
+    return metrics.error();
   }
   std::vector<ThresholdResult> results;
   for (const Bound& bound : *bounds) {

@@ -37,7 +37,7 @@ Expected<Trajectory> read_poses(const std::filesystem::path& file) {
   if (text && looks_like_tum(*text)) {
     Expected<TimedTrajectory> timed = read_tum_trajectory(file);
     if (!timed) {
-      return tl::unexpected(timed.error());
+      return timed.error();
     }
     return std::move(timed->world_from_camera);
   }
@@ -81,7 +81,7 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
   const Expected<Trajectory> truth = read_poses(request.ground_truth);
   if (!truth) {
-    return tl::unexpected(truth.error());
+    return truth.error();
   }
   EvaluationReport report;
   report.ground_truth = request.ground_truth.string();
@@ -90,7 +90,7 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
   for (const std::filesystem::path& file : request.estimates) {
     const Expected<Trajectory> estimate = read_poses(file);
     if (!estimate) {
-      return tl::unexpected(estimate.error());
+      return estimate.error();
     }
     if (estimate->size() != truth->size()) {
       return fail(

@@ -71,7 +71,7 @@ MetricsReport report_of(const nlohmann::json& json) {
 Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   try {
     return report_of(nlohmann::json::parse(*text));

@@ -41,7 +41,7 @@ Expected<KittiSequence> open_first(const Folders& folders, const SearchIdentity&
                    [](const SequenceIdentity& sequence) { return !sequence.is_held_out; });
   const Expected<Config> config = load_config(folders.out_dir / "config.yaml");
   if (!config) {
-    return tl::unexpected(config.error());
+    return config.error();
   }
   return KittiSequence::open(
       first->directory,
@@ -87,15 +87,15 @@ Expected<cv::Mat> draw_channels(const Folders& folders,
   for (const ShownFilter& one : shown) {
     const Expected<Config> config = config_of(folders.out_dir, identity, one.row->key);
     if (!config) {
-      return tl::unexpected(config.error());
+      return config.error();
     }
     const Expected<Stem> stem = Stem::create(config->stem, folders.models_dir);
     if (!stem) {
-      return tl::unexpected(stem.error());
+      return stem.error();
     }
     const Expected<Channel> channel = stem->apply(*frame);
     if (!channel) {
-      return tl::unexpected(channel.error());
+      return channel.error();
     }
     channels.push_back(channel->values);
     captions.push_back(caption_of(one));
@@ -134,7 +134,7 @@ Status write_contact_sheet(const Folders& folders,
   }
   const Expected<KittiSequence> sequence = open_first(folders, identity);
   if (!sequence) {
-    return tl::unexpected(sequence.error());
+    return sequence.error();
   }
   const std::filesystem::path plot_file = folders.out_dir / "trajectories.png";
   if (const Status status = write_trajectories(plot_file, *sequence, shown); !status) {
@@ -142,7 +142,7 @@ Status write_contact_sheet(const Folders& folders,
   }
   const Expected<cv::Mat> channels = draw_channels(folders, identity, *sequence, shown);
   if (!channels) {
-    return tl::unexpected(channels.error());
+    return channels.error();
   }
   cv::Mat plot = cv::imread(plot_file.string(), cv::IMREAD_COLOR);
   if (plot.empty()) {

@@ -85,7 +85,7 @@ Status write_records(const fs::path& out_dir,
     return fail(fmt::format("{}: expected a folder without a search, found one", file.string()));
   }
   auto writer = search::RecordWriter::create(file, identity);
-  return writer ? writer->append(records) : tl::unexpected(writer.error());
+  return writer ? writer->append(records) : writer.error();
 }
 
 }  // namespace
@@ -99,7 +99,7 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
   for (const fs::path& part : parts) {
     auto content = read_part(part);
     if (!content) {
-      return tl::unexpected(content.error());
+      return content.error();
     }
     if (identity.layers.empty()) {
       identity = content->identity;
@@ -113,12 +113,12 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
     layers.insert(layers.end(), content->identity.layers.begin(), content->identity.layers.end());
     add_frames(content->identity, identity);
     if (const Status added = joined.add(part, content->records); !added) {
-      return tl::unexpected(added.error());
+      return added.error();
     }
   }
   auto records = joined.all(identity);
   if (!records) {
-    return tl::unexpected(records.error());
+    return records.error();
   }
   identity.layers = join_layers(std::move(layers));
   identity.schedule =
@@ -129,7 +129,7 @@ Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
     status = write_records(out_dir, identity, *records);
   }
   if (!status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return search::finish({out_dir, models_dir}, identity, *records, {});
 }

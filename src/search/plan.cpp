@@ -69,7 +69,7 @@ Status add_sequence(const SearchRequest& request,
                     SearchPlan& plan) {
   Expected<KittiSequence> sequence = open_sequence(request, directory, is_held_out);
   if (!sequence) {
-    return tl::unexpected(sequence.error());
+    return sequence.error();
   }
   const FrameRange range = sequence->range();
   SequenceIdentity identity;
@@ -85,7 +85,7 @@ Status add_sequence(const SearchRequest& request,
       *sequence, directory,
       is_run ? benchmark::FrameIdentity::kContents : benchmark::FrameIdentity::kNamesAndSizes);
   if (!hashes) {
-    return tl::unexpected(hashes.error());
+    return hashes.error();
   }
   identity.frames = is_run ? hashes->frames : std::string();
   identity.calibration = hashes->calibration;
@@ -146,13 +146,13 @@ Schedule schedule_of(const SearchPlan& plan, bool exhaustive) {
 Status add_hashes(const SearchRequest& request, SearchPlan& plan) {
   const auto program = benchmark::hash_program();
   if (!program) {
-    return tl::unexpected(program.error());
+    return program.error();
   }
   plan.identity.program = *program;
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
     const auto model = benchmark::hash_model(plan.layers[i].config, request.models_dir);
     if (!model) {
-      return tl::unexpected(model.error());
+      return model.error();
     }
     plan.identity.layers[i].hash = *model;
   }
@@ -172,11 +172,11 @@ std::size_t SearchPlan::num_frames(bool held_out) const {
 Expected<SearchPlan> make_plan(const SearchRequest& request) {
   Status status = check_request(request);
   if (!status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   Expected<std::vector<PlanLayer>> layers = plan_layers(request);
   if (!layers) {
-    return tl::unexpected(layers.error());
+    return layers.error();
   }
   SearchPlan plan;
   plan.layers = std::move(*layers);
@@ -194,7 +194,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
     status = check_sequences(plan.identity);
   }
   if (!status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   plan.identity.only_sequence = request.only_sequence;
   Config common = request.config;

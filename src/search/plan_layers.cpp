@@ -84,14 +84,14 @@ Expected<PlanLayer> make_layer(Config config,
                                bool all_filters) {
   Expected<Stem> stem = Stem::create(config.stem, request.models_dir);
   if (!stem) {
-    return tl::unexpected(stem.error());
+    return stem.error();
   }
   Expected<FrameRange> filters = filters_of(request, stem->info());
   if (all_filters) {
     filters = FrameRange{0, static_cast<std::size_t>(stem->info().num_filters)};
   }
   if (!filters) {
-    return tl::unexpected(filters.error());
+    return filters.error();
   }
   return PlanLayer{model,
                    layer,
@@ -113,18 +113,18 @@ Status add_model(const SearchRequest& request, std::vector<PlanLayer>& layers) {
                               fmt::join(request.layers, ",")));
     }
     Expected<PlanLayer> layer = make_layer(config, request.model, kInputLayer, request, false);
-    return layer ? (layers.push_back(std::move(*layer)), Status()) : tl::unexpected(layer.error());
+    return layer ? (layers.push_back(std::move(*layer)), Status()) : layer.error();
   }
   const auto entries = find_entries(request);
   if (!entries) {
-    return tl::unexpected(entries.error());
+    return entries.error();
   }
   for (const ModelEntry& entry : *entries) {
     config.stem.layer = entry.layer;
     config.stem.sampling_px = sampling_of(request.config.stem.sampling_px, entry);
     Expected<PlanLayer> layer = make_layer(config, entry.name, entry.layer, request, false);
     if (!layer) {
-      return tl::unexpected(layer.error());
+      return layer.error();
     }
     layers.push_back(std::move(*layer));
   }
@@ -150,7 +150,7 @@ Status add_baselines(const SearchRequest& request, std::vector<PlanLayer>& layer
     }
     Expected<PlanLayer> layer = make_layer(config, model, kInputLayer, request, true);
     if (!layer) {
-      return tl::unexpected(layer.error());
+      return layer.error();
     }
     layer->is_baseline = true;
     layers.push_back(std::move(*layer));
@@ -167,7 +167,7 @@ Expected<std::vector<PlanLayer>> plan_layers(const SearchRequest& request) {
     status = add_baselines(request, layers);
   }
   if (!status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   for (std::size_t i = 0; i < layers.size(); ++i) {  // gray and R, G, B take no pass: one for all
     const bool goes_on = i > 0 && is_input(layers[i].model) && is_input(layers[i - 1].model);

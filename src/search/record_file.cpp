@@ -41,7 +41,7 @@ struct RecordWriter::Descriptor {
 Expected<RecordFileContent> read_records(const std::filesystem::path& file) {
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   RecordFileContent content;
   std::size_t line_number = 0;
@@ -79,11 +79,11 @@ Expected<RecordWriter> RecordWriter::create(const std::filesystem::path& file,
     return fail(fmt::format("{}: cannot be created: {}", file.string(), std::strerror(errno)));
   }
   if (const Status locked = lock(descriptor->number, file); !locked) {
-    return tl::unexpected(locked.error());
+    return locked.error();
   }
   RecordWriter writer(file, std::move(descriptor));
   if (const Status status = writer.write(identity_line(identity) + '\n'); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return writer;
 }
@@ -94,7 +94,7 @@ Expected<RecordWriter> RecordWriter::go_on(const std::filesystem::path& file,
   const auto size = static_cast<off_t>(num_good_bytes);
   if (descriptor->number >= 0) {
     if (const Status locked = lock(descriptor->number, file); !locked) {
-      return tl::unexpected(locked.error());
+      return locked.error();
     }
   }
   if (descriptor->number < 0 || ::ftruncate(descriptor->number, size) != 0 ||

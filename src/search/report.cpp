@@ -70,7 +70,7 @@ Expected<SearchReport> finish(const Folders& folders,
   }
   report.rows = rank_filters(records, identity.schedule.size());
   if (const Status status = write_tables(folders.out_dir, identity, report); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   if (const Status status = write_contact_sheet(folders, identity, report); !status) {
     report.warnings.push_back("no sheet.png: " + status.error().message);

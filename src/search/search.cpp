@@ -26,9 +26,11 @@ struct Start {
 };
 
 Expected<Start> start_new(const fs::path& file, const search::SearchIdentity& identity) {
-  return RecordWriter::create(file, identity).map([](RecordWriter&& writer) {
-    return Start{std::move(writer), {}};
-  });
+  auto writer = RecordWriter::create(file, identity);
+  if (!writer) {
+    return writer.error();
+  }
+  return Start{std::move(*writer), {}};
 }
 
 Expected<Start> start(const SearchRequest& request, const search::SearchIdentity& identity) {
@@ -44,7 +46,7 @@ Expected<Start> start(const SearchRequest& request, const search::SearchIdentity
   }
   auto content = search::read_records(file);
   if (!content) {
-    return tl::unexpected(content.error());
+    return content.error();
   }
   if (content->num_good_bytes == 0) {  // killed before its first line was written
     fs::remove(file, code);
@@ -55,9 +57,11 @@ Expected<Start> start(const SearchRequest& request, const search::SearchIdentity
     return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
                             file.string(), change));
   }
-  return RecordWriter::go_on(file, content->num_good_bytes).map([&](RecordWriter&& writer) {
-    return Start{std::move(writer), std::move(content->records)};
-  });
+  auto writer = RecordWriter::go_on(file, content->num_good_bytes);
+  if (!writer) {
+    return writer.error();
+  }
+  return Start{std::move(*writer), std::move(content->records)};
 }
 
 }  // namespace
@@ -66,18 +70,18 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   const pipeline::ThreadScope threads(request.num_threads);
   const Expected<search::SearchPlan> plan = search::make_plan(request);
   if (!plan) {
-    return tl::unexpected(plan.error());
+    return plan.error();
   }
   if (const Status status = pipeline::create_out_folder(request.out_dir); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   Expected<Start> begun = start(request, plan->identity);
   if (!begun) {
-    return tl::unexpected(begun.error());
+    return begun.error();
   }
   search::Race race(*plan, request, progress, std::move(begun->writer), std::move(begun->records));
   if (const Status status = race.run(); !status) {
-    return tl::unexpected(status.error());
+    return status.error();
   }
   return search::finish({request.out_dir, request.models_dir}, plan->identity, race.records(),
                         race.warnings());

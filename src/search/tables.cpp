@@ -126,7 +126,7 @@ Status write_tables(const std::filesystem::path& out_dir,
   const FilterRow& best = report.rows.front();
   const Expected<Config> config = config_of(out_dir, identity, best.key);
   if (!config) {
-    return tl::unexpected(config.error());
+    return config.error();
   }
   return write_text_file(
       out_dir / "best.yaml",

@@ -290,11 +290,11 @@ Expected<YAML::Node> models_of(const std::filesystem::path& file, const std::str
 Expected<std::vector<ModelEntry>> load_manifest(const std::filesystem::path& file) {
   const auto text = internal::read_bytes(file);
   if (!text) {
-    return tl::unexpected<Error>(text.error());
+    return text.error();
   }
   const auto models = models_of(file, *text);
   if (!models) {
-    return tl::unexpected<Error>(models.error());
+    return models.error();
   }
   std::vector<ModelEntry> entries;
   for (const YAML::Node& node : *models) {

@@ -34,7 +34,7 @@ Expected<std::vector<ModelEntry>> find_by_path(const std::filesystem::path& file
   }
   const auto entries = load_manifest(manifest);
   if (!entries) {
-    return tl::unexpected<Error>(entries.error());
+    return entries.error();
   }
   std::vector<ModelEntry> found;
   std::copy_if(entries->begin(), entries->end(), std::back_inserter(found),
@@ -96,7 +96,7 @@ Expected<ModelEntry> find_model(const std::string& model,
                                 const std::filesystem::path& models_dir) {
   auto layers = find_layers(model, models_dir);
   if (!layers) {
-    return tl::unexpected<Error>(std::move(layers).error());
+    return layers.error();
   }
   std::vector<std::string> known;
   for (ModelEntry& entry : *layers) {
@@ -127,7 +127,7 @@ Expected<OnnxSession> open_model(const ModelEntry& entry) {
   const std::string file = entry.file.string();
   const auto bytes = read_bytes(entry.file);
   if (!bytes) {
-    return tl::unexpected<Error>(bytes.error());
+    return bytes.error();
   }
   if (const std::string hash = sha256_hex(*bytes); hash != entry.sha256) {
     return fail(fmt::format("{}: expected sha256 {} as in the manifest, found {}", file,
@@ -145,7 +145,7 @@ Expected<OnnxSession> open_model(const ModelEntry& entry) {
   Status status = entry.native_sampling_only ? check_sizes(file, *session, native)
                                              : check_window(file, *session, native);
   if (!status) {
-    return tl::unexpected<Error>(std::move(status).error());
+    return status.error();
   }
   return session;
 }
@@ -165,7 +165,7 @@ Status check_model(const ModelEntry& entry) {
   if (const auto folded = internal::folded_entry(entry); session && folded) {
     session = internal::open_model(*folded);
   }
-  return session ? Status() : tl::unexpected<Error>(session.error());
+  return session ? Status() : session.error();
 }
 
 }  // namespace stemvo

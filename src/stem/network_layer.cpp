@@ -36,7 +36,7 @@ class NetworkLayer final : public FilterLayer {
                                                      int first,
                                                      int last) const override {
     if (Status status = check_size(frame.size()); !status) {
-      return tl::unexpected<Error>(std::move(status).error());
+      return status.error();
     }
     const std::lock_guard lock(mutex_);
     fill_planes(frame);
@@ -46,7 +46,7 @@ class NetworkLayer final : public FilterLayer {
       channel.map = plan_.map();
     }
     if (Status status = run_passes(first, channels); !status) {
-      return tl::unexpected<Error>(std::move(status).error());
+      return status.error();
     }
     return channels;
   }

@@ -33,7 +33,7 @@ Status to_status(const OrtApi& api, const std::string& label, OrtStatus* raw) {
 #define STEMVO_ORT_TRY(api, label, call)                          \
   do {                                                            \
     if (Status status_ = to_status(api, label, call); !status_) { \
-      return tl::unexpected<Error>(std::move(status_).error());   \
+      return status_.error();                                     \
     }                                                             \
   } while (false)
 
@@ -109,7 +109,7 @@ Expected<TensorInfo> read_tensor_info(const OrtApi& api,
   const OrtTensorTypeAndShapeInfo* tensor = nullptr;  // part of `type`
   STEMVO_ORT_TRY(api, label, api.CastTypeInfoToTensorInfo(raw_type, &tensor));
   if (Status status = read_shape(api, label, tensor, info); !status) {
-    return tl::unexpected<Error>(std::move(status).error());
+    return status.error();
   }
   return info;
 }
@@ -157,7 +157,7 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label,
                                           const std::string& layer) {
   const auto found = find_api();
   if (!found) {
-    return tl::unexpected<Error>(found.error());
+    return found.error();
   }
   const OrtApi& api = **found;
   // Fatal only: whatever goes wrong comes back as a status, and must not be printed twice.
@@ -170,7 +170,7 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label,
   OnnxHandle<OrtMemoryInfo> memory(raw_memory, api.ReleaseMemoryInfo);
   auto options = make_options(api, label);
   if (!options) {
-    return tl::unexpected<Error>(std::move(options).error());
+    return options.error();
   }
   OrtSession* raw_session = nullptr;
   STEMVO_ORT_TRY(api, label,
@@ -184,7 +184,7 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label,
     status = session.choose_output(layer);
   }
   if (!status) {
-    return tl::unexpected<Error>(std::move(status).error());
+    return status.error();
   }
   return session;
 }
@@ -197,7 +197,7 @@ Status OnnxSession::check_input() {
   }
   const auto input = read_tensor_info(*api_, label_, session_.get(), true, 0);
   if (!input) {
-    return tl::unexpected<Error>(input.error());
+    return input.error();
   }
   const bool is_gray = fits(*input, kInputName, {1, 1, -1, -1});
   if (!is_gray && !fits(*input, kInputName, {1, 3, -1, -1})) {
@@ -217,7 +217,7 @@ Status OnnxSession::choose_output(const std::string& layer) {
   for (std::size_t i = 0; i < count; ++i) {
     const auto output = read_tensor_info(*api_, label_, session_.get(), false, i);
     if (!output) {
-      return tl::unexpected<Error>(output.error());
+      return output.error();
     }
     known.push_back(describe(*output));
     if (output->name != layer && (count > 1 || output->name != kOnlyOutput)) {
@@ -257,7 +257,7 @@ Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
   const OnnxHandle<OrtTensorTypeAndShapeInfo> info(raw_info, api_->ReleaseTensorTypeAndShapeInfo);
   TensorInfo found;
   if (Status status = read_shape(*api_, label_, raw_info, found); !status) {
-    return tl::unexpected<Error>(std::move(status).error());
+    return status.error();
   }
   return cv::Size(static_cast<int>(found.shape.at(3)), static_cast<int>(found.shape.at(2)));
 }

@@ -84,7 +84,7 @@ Expected<std::unique_ptr<FilterLayer>> load_folded(const ModelEntry& entry,
   }
   auto session = internal::open_model(*folded);
   if (!session) {
-    return tl::unexpected<Error>(std::move(session).error());
+    return session.error();
   }
   return internal::make_network_layer(folded->file.string(), *std::move(session),
                                       internal::SamplingPlan(*folded, sampling));
@@ -94,23 +94,23 @@ Expected<LoadedLayer> load_network(const StemOptions& options,
                                    const std::filesystem::path& models_dir) {
   const auto entry = internal::find_model(options.model, options.layer, models_dir);
   if (!entry) {
-    return tl::unexpected<Error>(entry.error());
+    return entry.error();
   }
   const auto sampling = choose_sampling(options.sampling_px, *entry);
   if (!sampling) {
-    return tl::unexpected<Error>(sampling.error());
+    return sampling.error();
   }
   const auto filter = choose_filter(options, entry->num_filters, entry->default_filter);
   if (!filter) {
-    return tl::unexpected<Error>(filter.error());
+    return filter.error();
   }
   auto session = internal::open_model(*entry);
   if (!session) {
-    return tl::unexpected<Error>(std::move(session).error());
+    return session.error();
   }
   auto folded = load_folded(*entry, *filter, *sampling);
   if (!folded) {
-    return tl::unexpected<Error>(std::move(folded).error());
+    return folded.error();
   }
   const internal::SamplingPlan plan(*entry, *sampling);
   if (plan.needs_margin() && !session->fixed_size().empty()) {
@@ -143,14 +143,14 @@ Expected<LoadedLayer> load_layer(const StemOptions& options,
         fmt::format("stem.layer: expected none for {}, found '{}'", options.model, options.layer));
   }
   if (const auto sampling = choose_sampling(options.sampling_px, 1); !sampling) {
-    return tl::unexpected<Error>(sampling.error());
+    return sampling.error();
   }
   LoadedLayer loaded;
   loaded.info.model = options.model;
   loaded.info.num_filters = is_gray ? 1 : 3;
   const auto filter = choose_filter(options, loaded.info.num_filters, 0);
   if (!filter) {
-    return tl::unexpected<Error>(filter.error());
+    return filter.error();
   }
   loaded.info.filter = *filter;
   loaded.layer = is_gray ? internal::make_gray_layer() : internal::make_input_layer();
@@ -167,7 +167,7 @@ Stem::~Stem() = default;
 Expected<Stem> Stem::create(const StemOptions& options, const std::filesystem::path& models_dir) {
   auto loaded = load_layer(options, models_dir);
   if (!loaded) {
-    return tl::unexpected<Error>(std::move(loaded).error());
+    return loaded.error();
   }
   auto impl = std::make_unique<Impl>();
   impl->info = std::move(loaded->info);
@@ -184,7 +184,7 @@ Expected<Channel> Stem::apply(const cv::Mat& frame) const {
                       ? impl_->folded->apply(frame, 0, 1)
                       : impl_->layer->apply(frame, impl_->info.filter, impl_->info.filter + 1);
   if (!channels) {
-    return tl::unexpected<Error>(std::move(channels).error());
+    return channels.error();
   }
   return std::move(channels->front());
 }

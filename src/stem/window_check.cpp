@@ -56,7 +56,7 @@ class Probe {
     const auto area = static_cast<std::size_t>(channel_.area());
     std::vector<float> channels(area * static_cast<std::size_t>(session_.num_filters()));
     if (Status status = session_.run(planes.data(), frame_, channels.data(), channel_); !status) {
-      return tl::unexpected<Error>(std::move(status).error());
+      return status.error();
     }
     std::vector<float> values;
     for (std::size_t i = 0; i < static_cast<std::size_t>(session_.num_filters()); ++i) {
@@ -105,7 +105,7 @@ Status check_dependence(const std::string& label,
   base(window).copyTo(outside(window));
   const auto with_other_outside = probe.run(outside);
   if (!expected || !with_other_outside) {
-    return tl::unexpected<Error>(expected ? with_other_outside.error() : expected.error());
+    return expected ? with_other_outside.error() : expected.error();
   }
   if (differ(*expected, *with_other_outside)) {
     return fail(fmt::format(
@@ -124,7 +124,7 @@ Status check_dependence(const std::string& label,
     other(edge).copyTo(changed(edge));
     const auto values = probe.run(changed);
     if (!values) {
-      return tl::unexpected<Error>(values.error());
+      return values.error();
     }
     if (!differ(*expected, *values)) {
       return fail(fmt::format(
@@ -171,7 +171,7 @@ Status check_sizes(const std::string& label,
       session.fixed_size().empty() ? small + cv::Size(1, native.y.stride) : small;
   for (const cv::Size frame : {small, other}) {
     if (const auto size = channel_size_as_planned(label, session, native, frame); !size) {
-      return tl::unexpected<Error>(size.error());
+      return size.error();
     }
   }
   return {};
@@ -184,7 +184,7 @@ Status check_window(const std::string& label,
                        probe_size(native.y, session.fixed_size().height));
   const auto found = channel_size_as_planned(label, session, native, frame);
   if (!found) {
-    return tl::unexpected<Error>(found.error());
+    return found.error();
   }
   const cv::Point output(probe_output(native.x), probe_output(native.y));
   const cv::Rect window = window_of(native, output);

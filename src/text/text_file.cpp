@@ -69,7 +69,7 @@ Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file)
   }
   const Expected<std::string> text = read_text_file(file);
   if (!text) {
-    return tl::unexpected(text.error());
+    return text.error();
   }
   const std::vector<std::string_view> lines = split_lines(*text);
   return std::vector<std::string>(lines.begin(), lines.end());
