@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "benchmark/benchmark.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "install_paths.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "stemvo/benchmark/benchmark.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -21,7 +22,7 @@ constexpr const char* kFooter =
 the default configuration and the paper's, each with metres from the camera's height (no ground
 truth, no alignment) and with true steps (the paper's protocol).
 
---out receives benchmark.md and benchmark.json, a picture NN.png per sequence, speed.json, and all files
+--out receives benchmark.md and benchmark.json, a figure NN.png per sequence, speed.json, and all files
 of every run under runs/. The paper's and other published numbers stand beside a sequence where all of
 its official frames ran.
 
@@ -39,75 +40,46 @@ struct Arguments {
   bool is_quiet = false;
 };
 
-/// One line of progress per run that is not kept.
-class Console {
- public:
-  explicit Console(bool is_quiet) : is_quiet_(is_quiet) {}
-
-  bool update(const BenchmarkProgress& at) {
-    if (at.frames_done == 0) {
-      progress_ = std::make_unique<Progress>("frames", is_quiet_);
-      if (!is_quiet_) {
-        const std::string note = at.note.empty() ? "" : fmt::format(" (again: {})", at.note);
-        const std::string line =
-            fmt::format("{}/{} {}, {}, {}{}\n", at.run + 1, at.num_runs, at.sequence,
-                        at.configuration, to_string(at.protocol), note);
-        std::fwrite(line.data(), 1, line.size(), stderr);
-      }
-      return !is_interrupted();
-    }
-    return progress_->update(at.frames_done, at.num_frames);
-  }
-
- private:
-  bool is_quiet_;
-  std::unique_ptr<Progress> progress_;
-};
-
-void print_problems(const BenchmarkReport& report) {
-  for (const BenchmarkSequence& sequence : report.sequences) {
-    if (!sequence.problem.empty()) {
-      print_error(fmt::format("{}: {}", sequence.name, sequence.problem));
-    }
-    for (const BenchmarkRun& run : sequence.runs) {
-      const std::string name =
-          fmt::format("{}, {}, {}: ", sequence.name, run.configuration, to_string(run.protocol));
-      if (run.state == BenchmarkState::kFailed) {
-        print_error(name + run.problem);
-      }
-      for (const std::string& warning : run.warnings) {
-        print_warning(name + warning);
-      }
-    }
-  }
-}
-
 int benchmark(Arguments& arguments) {
   BenchmarkRequest& request = arguments.request;
   request.models_dir = data_folder("models");
-  request.configurations.push_back({"default", Config{}});
+  request.published = data_folder("config") / "published.json";
   const Expected<Config> paper = load_config(data_folder("config") / "paper.yaml");
   if (!paper) {
     print_error(paper.error().message);
     return kExitFailed;
   }
-  request.configurations.push_back({"paper", *paper});
-  Console console(arguments.is_quiet);
-  const Expected<BenchmarkReport> report = run_benchmark(
-      request, [&console](const BenchmarkProgress& at) { return console.update(at); });
-  if (!report) {
-    print_error(report.error().message);
+  request.configurations = {{"default", Config{}}, {"paper", *paper}};
+  std::optional<Progress> progress;
+  const auto start_run = [&](const std::string& run) {
+    if (!arguments.is_quiet) {
+      fmt::print(stderr, "{}\n", run);
+    }
+    progress.emplace("frames", arguments.is_quiet);
+    return !is_interrupted();
+  };
+  const Expected<BenchmarkSummary> summary = run_benchmark(
+      request, {.on_run = start_run, .on_frame = [&](std::size_t done, std::size_t total) {
+                  return progress->update(done, total);
+                }});
+  if (!summary) {
+    print_error(summary.error().message);
     return kExitFailed;
   }
-  print_problems(*report);
-  if (report->interrupted) {
+  for (const std::string& failure : summary->failures) {
+    print_error(failure);
+  }
+  for (const std::string& warning : summary->warnings) {
+    print_warning(warning);
+  }
+  if (summary->interrupted) {
     print_warning("interrupted; what is done is kept, the same command goes on from there");
     return kExitInterrupted;
   }
   if (!arguments.is_quiet) {
     print(fmt::format("report: {}\n", (request.out_dir / "benchmark.md").string()));
   }
-  return has_failures(*report) ? kExitFailed : kExitDone;
+  return summary->failures.empty() ? kExitDone : kExitFailed;
 }
 
 }  // namespace

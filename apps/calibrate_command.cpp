@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "calibration/calibrate.hpp"
 #include "commands.hpp"
 #include "console.hpp"
 #include "install_paths.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "stemvo/calibration/calibrate.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -30,27 +31,6 @@ struct Arguments {
   ConfigArguments config;
   std::string calibration;
   bool is_quiet = false;
-};
-
-/// One line of progress per stage.
-class TwoStages {
- public:
-  explicit TwoStages(bool is_quiet) : is_quiet_(is_quiet), tracking_("frames", is_quiet) {}
-
-  bool update(CalibrationStage stage, std::size_t done, std::size_t total) {
-    if (stage == CalibrationStage::kTracking) {
-      return tracking_.update(done, total);
-    }
-    if (!solving_) {
-      solving_ = std::make_unique<Progress>("solver steps", is_quiet_);
-    }
-    return solving_->update(done, total);
-  }
-
- private:
-  bool is_quiet_;
-  Progress tracking_;
-  std::unique_ptr<Progress> solving_;
 };
 
 int report(const Arguments& arguments, const CalibrationReport& report) {
@@ -90,10 +70,17 @@ int calibrate(Arguments& arguments) {
   if (!arguments.calibration.empty()) {
     request.calibration = arguments.calibration;
   }
-  TwoStages progress(arguments.is_quiet);
-  const Expected<CalibrationReport> result = calibrate_sequence(
-      request, [&progress](CalibrationStage stage, std::size_t done, std::size_t total) {
-        return progress.update(stage, done, total);
+  Progress tracking("frames", arguments.is_quiet);
+  std::optional<Progress> solving;
+  const Expected<CalibrationReport> result =
+      calibrate_sequence(request, [&](CalibrationStage stage, std::size_t done, std::size_t total) {
+        if (stage == CalibrationStage::kTracking) {
+          return tracking.update(done, total);
+        }
+        if (!solving) {  // its clock starts with the stage
+          solving.emplace("solver steps", arguments.is_quiet);
+        }
+        return solving->update(done, total);
       });
   if (!result) {
     print_error(result.error().message);

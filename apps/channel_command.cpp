@@ -9,8 +9,8 @@
 #include "install_paths.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
+#include "pipeline/channel_pictures.hpp"
 #include "progress.hpp"
-#include "stemvo/pipeline/channel_pictures.hpp"
 
 namespace stemvo::apps {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "stemvo/report/check.hpp"
+#include "report/check.hpp"
 
 namespace stemvo::apps {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "stemvo/report/evaluate_report.hpp"
+#include "report/evaluate_report.hpp"
 
 namespace stemvo::apps {
 namespace {

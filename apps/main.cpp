@@ -6,9 +6,9 @@
 #include <opencv2/core/utils/logger.hpp>
 
 #include "commands.hpp"
+#include "config/config.hpp"
 #include "console.hpp"
 #include "interrupt.hpp"
-#include "stemvo/config.hpp"
 #include "stemvo/version.hpp"
 
 namespace stemvo::apps {

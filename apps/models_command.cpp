@@ -8,7 +8,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "install_paths.hpp"
-#include "stemvo/stem/manifest.hpp"
+#include "models/manifest.hpp"
 
 namespace stemvo::apps {
 namespace {

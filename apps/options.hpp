@@ -8,8 +8,8 @@
 
 #include <CLI/CLI.hpp>
 
-#include "stemvo/config.hpp"
-#include "stemvo/dataset/frame_source.hpp"
+#include "config/config.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::apps {

@@ -10,8 +10,8 @@
 #include "console.hpp"
 #include "install_paths.hpp"
 #include "options.hpp"
+#include "pipeline/run.hpp"
 #include "progress.hpp"
-#include "stemvo/pipeline/run.hpp"
 
 namespace stemvo::apps {
 namespace {

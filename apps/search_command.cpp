@@ -13,13 +13,13 @@
 #include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "stemvo/search/search.hpp"
+#include "search/search.hpp"
 
 namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(Every filter of the model (and, for comparison, ORB on the gray picture and the input's R, G and B)
+    R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
 is given an odometry of its own and ranked by t_rel, each step having its true length. Ground truth is
 needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
 
@@ -36,9 +36,7 @@ Examples:
 struct Arguments {
   SearchRequest request;
   ConfigArguments config;
-  std::string held_out;
   std::vector<std::filesystem::path> merge;
-  bool no_baselines = false;
   bool is_quiet = false;
 };
 
@@ -71,10 +69,6 @@ Expected<SearchReport> search(Arguments& arguments) {
     return config.error();
   }
   request.config = *config;
-  request.baselines = !arguments.no_baselines;
-  if (!arguments.held_out.empty()) {
-    request.held_out_dir = arguments.held_out;
-  }
   Progress progress("filter-frames", arguments.is_quiet);
   return run_search(request, [&progress](std::size_t done, std::size_t total) {
     return progress.update(done, total) && !is_interrupted();
@@ -83,21 +77,18 @@ Expected<SearchReport> search(Arguments& arguments) {
 
 void print_summary(const SearchReport& report, const std::filesystem::path& out_dir) {
   if (report.is_part) {
-    print(
-        fmt::format("part: {} filters on one sequence; 'stemvo search --merge' joins it with the "
-                    "others\n",
-                    report.num_filters));
+    print(fmt::format(
+        "part: {} filters on one sequence; 'stemvo search --merge' joins it with the others\n",
+        report.num_filters));
     return;
   }
-  print(format_search_table(report));
   const SearchWork& work = report.work;
-  print(
-      fmt::format("work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\n",
-                  work.filter_frames,
-                  100.0 * static_cast<double>(work.filter_frames) /
-                      static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1)),
-                  work.baseline_filter_frames));
-  print(fmt::format("table: {}\n", (out_dir / "filters.csv").string()));
+  const double share = static_cast<double>(work.filter_frames) /
+                       static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1));
+  print(fmt::format(
+      "{}work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
+      format_search_table(report), work.filter_frames, 100.0 * share, work.baseline_filter_frames,
+      (out_dir / "filters.csv").string()));
 }
 
 int run(Arguments& arguments) {
@@ -106,7 +97,7 @@ int run(Arguments& arguments) {
     print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
     return kExitUsage;
   }
-  if (arguments.held_out.empty() && arguments.request.held_out_frames) {
+  if (!arguments.request.held_out_dir && arguments.request.held_out_frames) {
     print_error("expected --held-out with --held-out-frames (see 'stemvo search --help')");
     return kExitUsage;
   }
@@ -161,7 +152,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
                    "Filters A to B-1 of each layer; default: all");
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 of each sequence");
   command
-      .add_option("--held-out", arguments.held_out, "A sequence that is reported, not ranked by")
+      .add_option("--held-out", request.held_out_dir, "A sequence that is reported, not ranked by")
       ->type_name("DIR");
   add_range_option(command, "--held-out-frames", request.held_out_frames,
                    "Frames A to B-1 of the held-out sequence");
@@ -172,7 +163,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
       ->type_name("K")
       ->check(in_range(0, 100000));
   command.add_flag("--resume", request.resume, "Go on with the search in --out, if there is one");
-  command.add_flag("--no-baselines", arguments.no_baselines, "Only the model's filters");
+  command.add_flag_callback(
+      "--no-baselines", [&request] { request.baselines = false; }, "Only the model's filters");
   command
       .add_option("--merge", arguments.merge,
                   "Join parts of one exhaustive search (folders --out) into --out")

@@ -10,7 +10,7 @@
 #include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
-#include "stemvo/dataset/synthetic_drive.hpp"
+#include "synth/synth.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -28,14 +28,10 @@ Examples:
 
 struct Arguments {
   std::filesystem::path out_dir;
-  std::filesystem::path trajectory;
   SyntheticDriveOptions options;
 };
 
-int render(Arguments& arguments) {
-  if (!arguments.trajectory.empty()) {
-    arguments.options.trajectory = arguments.trajectory;
-  }
+int render(const Arguments& arguments) {
   Progress progress("frames", /*is_quiet=*/false);
   const Status status = render_synthetic_drive(
       arguments.out_dir, arguments.options, [&progress](int done, int total) {
@@ -64,7 +60,7 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
       ->type_name("");
   CLI::Option* trajectory =
       command
-          ->add_option("--trajectory", arguments->trajectory,
+          ->add_option("--trajectory", options.trajectory,
                        "Drive along these KITTI poses; default: a curve of its own")
           ->type_name("POSES");
   command
@@ -73,7 +69,7 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
       ->excludes(trajectory);
   command
       ->add_option("--rate", options.rate_hz,
-                   "Pictures per second, 1 to 1000; default 10, of a walk 30")
+                   "Frames per second, 1 to 1000; default 10, of a walk 30")
       ->type_name("HZ");
   command
       ->add_option("--speed", options.speed_m_s,

@@ -11,8 +11,7 @@ install(DIRECTORY include/stemvo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY models config DESTINATION share/stemvo)
 install(FILES LICENSE DESTINATION share/doc/stemvo)
 
-set_target_properties(stemvo_geometry PROPERTIES EXPORT_NAME geometry)
-install(TARGETS stemvo stemvo_geometry EXPORT stemvoTargets)
+install(TARGETS stemvo EXPORT stemvoTargets)
 install(EXPORT stemvoTargets NAMESPACE stemvo:: DESTINATION ${package_dir})
 
 if(TARGET stemvo_app)

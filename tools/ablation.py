@@ -46,7 +46,7 @@ ROWS = (
     Row("map without refinement", ("refine.every=0",)),
     Row("road: dense alignment only", ("scale.estimators=dense",), ROAD),
     Row("road: tracked points only", ("scale.estimators=points",), ROAD),
-    Row("road: frames not joined", ("scale.joining=false",), ROAD),
+    Row("road: no temporal filter", ("scale.temporal_filter=false",), ROAD),
 )
 
 

@@ -9,8 +9,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "odometry/road_picture.hpp"
-#include "stemvo/dataset/synthetic_drive.hpp"
+#include "models/manifest.hpp"
+#include "odometry/road/image.hpp"
+#include "synth/synth.hpp"
 
 namespace stemvo::bench {
 namespace {
@@ -75,7 +76,7 @@ Chain run_chain() {
   const Config& config = result.config;
   const Stem stem = load_stem(config.stem);
   ChannelStretch stretch(config.stem);
-  const auto front_end = value_of(create_front_end(config.features));
+  const auto front_end = create_front_end(config.features);
   result.estimator = std::make_unique<WindowEstimator>(config, result.camera);
   const int last = static_cast<int>(frames().pixels.size()) - 1;
   for (int i = 0; i <= last; ++i) {
@@ -86,8 +87,7 @@ Chain run_chain() {
     frame.number = i;
     frame.has_image = true;
     frame.image = pixels;
-    frame.road =
-        std::make_shared<RoadPicture>(make_road_picture(result.images.back(), result.camera));
+    frame.road = std::make_shared<RoadImage>(make_road_image(result.images.back(), result.camera));
     frame.matches = front_end->process(result.images.back(), i);
     if (i == last) {
       result.matches = frame.matches;
@@ -104,7 +104,7 @@ Chain run_chain() {
 }  // namespace
 
 Stem load_stem(const StemOptions& options) {
-  return value_of(Stem::create(options, STEMVO_MODELS_DIR));
+  return value_of(create_stem(options, STEMVO_MODELS_DIR));
 }
 
 const Frames& frames() {

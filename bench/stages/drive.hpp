@@ -7,12 +7,12 @@
 
 #include <opencv2/core.hpp>
 
+#include "config/config.hpp"
+#include "dataset/sequence.hpp"
+#include "features/front_end.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/window_estimator.hpp"
-#include "stemvo/config.hpp"
-#include "stemvo/dataset/sequence.hpp"
-#include "stemvo/features/front_end.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::bench {
 

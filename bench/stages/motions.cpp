@@ -7,7 +7,6 @@
 #include "odometry/two_view_estimator.hpp"
 #include "stages/drive.hpp"
 #include "stages/run_stage.hpp"
-#include "stemvo/geometry/relative_pose_refinement.hpp"
 
 namespace stemvo::bench {
 namespace {
@@ -17,15 +16,15 @@ using benchmark::State;
 void homography(State& state) {
   const Chain& c = chain();
   for (auto _ : state) {
-    benchmark::DoNotOptimize(
-        estimate_homography(c.matches.prev_uv, c.matches.cur_uv, c.config.two_view, c.config.seed));
+    benchmark::DoNotOptimize(estimate_homography({c.matches.prev_uv, c.matches.cur_uv},
+                                                 c.config.two_view, c.config.seed));
   }
 }
 
 void fundamental(State& state) {
   const Chain& c = chain();
   for (auto _ : state) {
-    benchmark::DoNotOptimize(estimate_fundamental(c.matches.prev_uv, c.matches.cur_uv,
+    benchmark::DoNotOptimize(estimate_fundamental({c.matches.prev_uv, c.matches.cur_uv},
                                                   c.config.two_view, c.config.seed));
   }
 }
@@ -33,7 +32,7 @@ void fundamental(State& state) {
 void essential(State& state) {
   const Chain& c = chain();
   for (auto _ : state) {
-    benchmark::DoNotOptimize(estimate_essential(c.matches.prev_uv, c.matches.cur_uv, c.camera,
+    benchmark::DoNotOptimize(estimate_essential({c.matches.prev_uv, c.matches.cur_uv}, c.camera,
                                                 c.config.two_view, c.config.seed));
   }
 }
@@ -42,8 +41,8 @@ void two_view_refinement(State& state) {
   const Chain& c = chain();
   const TwoViewEstimator estimator(c.config, c.camera);
   run_stage(state, Stage::kTwoViewRefinement, [&] {
-    benchmark::DoNotOptimize(estimator.measure(c.matches.prev_uv, c.matches.cur_uv,
-                                               /*is_initializing=*/false, c.config.seed));
+    benchmark::DoNotOptimize(
+        estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, /*is_initializing=*/false));
   });
 }
 
@@ -52,7 +51,7 @@ void two_view(State& state, bool is_initializing) {
   const TwoViewEstimator estimator(c.config, c.camera);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
-        estimator.measure(c.matches.prev_uv, c.matches.cur_uv, is_initializing, c.config.seed));
+        estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, is_initializing));
   }
 }
 

@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "dataset/png_file.hpp"
+#include "io/image_file.hpp"
 #include "stages/drive.hpp"
 
 namespace stemvo::bench {
@@ -38,7 +38,7 @@ std::filesystem::path file_of_kind(bool as_color) {
 void decode(State& state, bool as_color) {
   const auto file = file_of_kind(as_color);
   for (auto _ : state) {
-    auto image = dataset::read_png(file, as_color);
+    auto image = io::read_png(file, as_color);
     if (!image) {
       state.SkipWithError(image.error().message.c_str());
       return;
@@ -76,7 +76,7 @@ void stretch(State& state) {
 }
 
 void pyramid(State& state) {
-  const auto front_end = create_front_end(chain().config.features).value();
+  const auto front_end = create_front_end(chain().config.features);
   for (auto _ : state) {
     benchmark::DoNotOptimize(front_end->prepare(chain().images.back()));
   }
@@ -84,7 +84,7 @@ void pyramid(State& state) {
 
 void road_picture(State& state) {
   for (auto _ : state) {
-    benchmark::DoNotOptimize(make_road_picture(chain().images.back(), chain().camera));
+    benchmark::DoNotOptimize(make_road_image(chain().images.back(), chain().camera));
   }
 }
 

@@ -16,7 +16,7 @@ namespace {
 using benchmark::State;
 using Prepared = std::shared_ptr<const PreparedPicture>;
 
-FeatureOptions options_of(const std::string& method) {
+FeatureOptions options_of(FeatureMethod method) {
   FeatureOptions options = chain().config.features;
   options.method = method;
   return options;
@@ -25,8 +25,7 @@ FeatureOptions options_of(const std::string& method) {
 /// All pictures, prepared; then over and over from the first to the last, as in a drive.
 class Pictures {
  public:
-  explicit Pictures(const std::string& method)
-      : front_end_(create_front_end(options_of(method)).value()) {
+  explicit Pictures(FeatureMethod method) : front_end_(create_front_end(options_of(method))) {
     for (const ChannelImage& image : chain().images) {
       prepared_.push_back(front_end_->prepare(image));
     }
@@ -35,7 +34,7 @@ class Pictures {
   template <typename Measured>
   void advance(const Measured& measured) {
     if (next_ == 0 || next_ == prepared_.size()) {
-      front_end_ = create_front_end(options_of("klt")).value();
+      front_end_ = create_front_end(options_of(FeatureMethod::kKlt));
       static_cast<void>(front_end_->process(prepared_.front(), 0));
       next_ = 1;
     }
@@ -51,7 +50,7 @@ class Pictures {
 };
 
 void run_klt(State& state, Stage stage) {
-  Pictures pictures("klt");
+  Pictures pictures(FeatureMethod::kKlt);
   run_stage(state, stage, [&] {
     pictures.advance([](FrontEnd& front_end, const Prepared& picture) {
       benchmark::DoNotOptimize(front_end.process(picture, 0));
@@ -90,14 +89,14 @@ void klt_forward(State& state) {
 }
 
 void orb_detect_and_describe(State& state) {
-  const auto front_end = create_front_end(options_of("orb")).value();
+  const auto front_end = create_front_end(options_of(FeatureMethod::kOrb));
   for (auto _ : state) {
     benchmark::DoNotOptimize(front_end->prepare(chain().images.back()));
   }
 }
 
 void orb_match(State& state) {
-  Pictures pictures("orb");
+  Pictures pictures(FeatureMethod::kOrb);
   std::size_t i = 0;
   run_stage(state, Stage::kTracking, [&] {
     if (i == 0) {

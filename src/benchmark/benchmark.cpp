@@ -1,150 +1,388 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/benchmark/benchmark.hpp"
+#include "benchmark/benchmark.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include "benchmark/files.hpp"
-#include "benchmark/official.hpp"
-#include "benchmark/runner.hpp"
+#include "benchmark/markdown.hpp"
+#include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
-#include "stemvo/check.hpp"
+#include "report/metrics_keys.hpp"
+#include "report/trajectory_plot.hpp"
+#include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
+constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
+constexpr double kLengthTolerance_m = 1.5;
 
 Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& request) {
   const fs::path folder = request.kitti_root / "sequences";
   std::vector<std::string> names;
   std::error_code code;
-  fs::directory_iterator entry(folder, code);
-  for (; !code && entry != fs::directory_iterator(); entry.increment(code)) {
-    if (entry->is_directory(code)) {
-      names.push_back(entry->path().filename().string());
-    }
-  }
-  if (code) {
-    return fail(fmt::format("{}: expected a folder of sequences, found: {}", folder.string(),
-                            code.message()));
-  }
-  if (!request.sequences.empty()) {
-    std::vector<std::string> asked;  // one that is not there is a row with its reason
-    for (const std::string& name : request.sequences) {
-      if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
-        return fail(fmt::format("{}: expected the names of folders in it, found '{}'",
-                                folder.string(), name));
-      }
-      if (std::find(asked.begin(), asked.end(), name) == asked.end()) {
-        asked.push_back(name);
+  if (request.sequences.empty()) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
+      if (entry.is_directory()) {
+        names.push_back(entry.path().filename().string());
       }
     }
-    return asked;
+    std::sort(names.begin(), names.end());
+  }
+  for (const std::string& name : request.sequences) {  // one that is not there is a row
+    if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
+      return fail(fmt::format("{}: expected the names of folders in it, found '{}'",
+                              folder.string(), name));
+    }
+    if (std::find(names.begin(), names.end(), name) == names.end()) {
+      names.push_back(name);
+    }
   }
   if (names.empty()) {
-    return fail(fmt::format("{}: expected a folder per sequence, found none", folder.string()));
+    return fail(fmt::format("{}: expected a folder per sequence, found: {}", folder.string(),
+                            code ? code.message() : "none"));
   }
-  std::sort(names.begin(), names.end());
   return names;
 }
 
-BenchmarkSequence plan_sequence(const BenchmarkRequest& request, const std::string& name) {
-  BenchmarkSequence result;
-  result.name = name;
-  const auto official = benchmark::find_official(name);
-  if (official) {
-    result.official_frames = official->num_frames;
-  }
-  const Expected<KittiSequence> sequence =
-      KittiSequence::open(request.kitti_root / "sequences" / name);
-  if (!sequence) {
-    result.problem = sequence.error().message;
-    return result;
-  }
-  result.frames = sequence->range();
-  result.has_ground_truth = sequence->ground_truth().has_value();
-  result.is_complete = official && benchmark::is_official(*official, *sequence);
-  for (const BenchmarkConfiguration& configuration : request.configurations) {
-    for (const ScaleProtocol protocol :
-         {ScaleProtocol::kCameraHeight, ScaleProtocol::kGroundTruthSteps}) {
-      BenchmarkRun run;
-      run.configuration = configuration.name;
-      run.protocol = protocol;
-      result.runs.push_back(run);
+/// All official frames, at their size, along the official path: a clip, a drive rendered at another
+/// size, or other frames of the same name are not.
+bool is_official(const Json& official, const KittiSequence& sequence) {
+  const Camera& camera = sequence.camera();
+  const auto& truth = sequence.ground_truth();
+  return sequence.range().begin == 0 && sequence.size() == official.at("frames") &&
+         camera.width_px == official.at("width_px") &&
+         camera.height_px == official.at("height_px") && truth &&
+         std::abs(evaluate(*truth, *truth).path_length_m - official.at("length_m").get<double>()) <=
+             kLengthTolerance_m;
+}
+
+/// A row per publication that has a number for the sequence.
+Json published_rows(const Json& publications, const std::string& sequence) {
+  Json rows = Json::array();
+  for (Json row : publications) {
+    bool has_number = false;
+    for (auto& [key, value] : row.items()) {
+      if (value.is_object()) {
+        value = Json(value.value(sequence, Json()));
+        has_number = has_number || value.is_number();
+      }
+    }
+    if (has_number) {
+      rows.push_back(std::move(row));
     }
   }
-  return result;
+  return rows;
 }
 
-bool has_pending(const BenchmarkReport& report) {
-  return std::any_of(report.sequences.begin(), report.sequences.end(), [](const auto& sequence) {
-    return std::any_of(sequence.runs.begin(), sequence.runs.end(),
-                       [](const auto& run) { return run.state == BenchmarkState::kPending; });
-  });
+/// Hashes of everything a result depends on.
+Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
+  const auto program = pipeline::hash_program();
+  const auto model = pipeline::hash_model(run.config, run.models_dir);
+  const auto files =
+      pipeline::hash_sequence(sequence, run.sequence_dir, pipeline::FrameIdentity::kNamesAndSizes);
+  if (!program || !model || !files) {
+    return !program ? program.error() : !model ? model.error() : files.error();
+  }
+  return Json{{"configuration", internal::sha256_hex(dump_config(run.config))},
+              {"program", *program},
+              {"model", *model},
+              {"frames", files->frames},
+              {"calibration", files->calibration},
+              {"ground_truth", files->ground_truth}};
 }
 
-const BenchmarkConfiguration& configuration_of(const BenchmarkRequest& request,
-                                               const BenchmarkRun& run) {
-  const auto found = std::find_if(
-      request.configurations.begin(), request.configurations.end(),
-      [&](const auto& configuration) { return configuration.name == run.configuration; });
-  STEMVO_CHECK(found != request.configurations.end(), "each run has a configuration");
-  return *found;
+/// The result of an earlier call where nothing changed; else says in `note` what did.
+std::optional<MetricsReport> kept_result(const fs::path& folder,
+                                         const Json& inputs,
+                                         std::string& note) {
+  const Expected<std::string> text = read_text_file(folder / kInputsFile);
+  if (!text) {
+    return std::nullopt;  // never completed
+  }
+  const Json before = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  std::vector<std::string> changed;
+  for (const auto& [part, hash] : inputs.items()) {
+    if (!before.contains(part) || before[part] != hash) {
+      changed.push_back(part);
+    }
+  }
+  if (!changed.empty()) {
+    note = fmt::format(" (again: {} changed)", fmt::join(changed, ", "));
+    return std::nullopt;
+  }
+  const Expected<MetricsReport> report = read_metrics_json(folder / "metrics.json");
+  if (!report) {
+    note = fmt::format(" (again: {})", report.error().message);
+    return std::nullopt;
+  }
+  return *report;
 }
+
+/// benchmark.json grows while the runs are done; the other files are made of it.
+class Benchmark {
+ public:
+  Benchmark(const BenchmarkRequest& request, const BenchmarkCallbacks& callbacks)
+      : request_(request), callbacks_(callbacks) {
+    report_["stemvo_version"] = version();
+    report_["interrupted"] = false;
+  }
+
+  /// A row for the sequence, with all runs to be done. Throws Json::exception where `published` is
+  /// not what it should be.
+  void plan(const std::string& name, const Json& published) {
+    const auto opened = KittiSequence::open(sequence_dir(name));
+    const Json official = published.at("sequences").value(name, Json::object());
+    const Json publications = published_rows(published.at("published"), name);
+    const bool is_complete = opened && !official.empty() && is_official(official, *opened);
+    Json& sequence = report_["sequences"].emplace_back();
+    sequence["name"] = name;
+    sequence["problem"] = opened ? Json() : Json(opened.error().message);
+    sequence["first_frame"] = opened ? opened->range().begin : 0;
+    sequence["frames"] = opened ? opened->size() : 0;
+    sequence["official_frames"] = official.value("frames", Json());
+    sequence["is_complete"] = is_complete;
+    sequence["runs"] = opened ? pending_runs() : Json::array();
+    sequence["never_moving"]["average_offset_m"] = nullptr;
+    sequence["published"] = is_complete ? publications : Json::array();
+    num_runs_ += sequence["runs"].size();
+    if (!opened) {
+      summary_.failures.push_back(fmt::format("{}: {}", name, opened.error().message));
+    }
+  }
+
+  Expected<BenchmarkSummary> run() {
+    for (Json& sequence : report_["sequences"]) {
+      for (std::size_t i = 0; i < sequence["runs"].size() && !summary_.interrupted; ++i) {
+        complete(sequence, request_.configurations[i / 2], sequence["runs"][i]);
+      }
+      report_["interrupted"] = summary_.interrupted;
+      const Status written = write_files(sequence);
+      if (!written) {
+        return written.error();
+      }
+      if (summary_.interrupted) {
+        break;
+      }
+    }
+    return summary_;
+  }
+
+ private:
+  [[nodiscard]] fs::path sequence_dir(const std::string& name) const {
+    return request_.kitti_root / "sequences" / name;
+  }
+
+  [[nodiscard]] fs::path run_dir(const Json& sequence, const Json& run) const {
+    return request_.out_dir / "runs" / text_of(sequence["name"]) /
+           (text_of(run["configuration"]) + "_" + text_of(run["scale_source"]));
+  }
+
+  static const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
+
+  [[nodiscard]] Json pending_runs() const {
+    Json runs = Json::array();
+    for (const BenchmarkConfiguration& configuration : request_.configurations) {
+      for (const char* scale_source : kScaleSources) {
+        Json& run = runs.emplace_back();
+        run["configuration"] = configuration.name;
+        run["scale_source"] = scale_source;
+        run["alignment"] = "none";
+        run["state"] = "pending";
+        run["problem"] = nullptr;
+        run["tracked_fraction"] = nullptr;
+        add_metrics(run, std::nullopt);
+      }
+    }
+    return runs;
+  }
+
+  /// A run that is stopped stays pending.
+  void complete(Json& sequence, const BenchmarkConfiguration& with, Json& run) {
+    const std::string title = fmt::format("{}, {}, {}", text_of(sequence["name"]), with.name,
+                                          text_of(run["scale_source"]));
+    ++num_begun_;
+    const Expected<std::optional<MetricsReport>> result = result_of(sequence, with, title, run);
+    if (!result) {
+      run["problem"] = result.error().message;
+      if (run["state"] == "pending") {
+        run["state"] = "failed";
+        summary_.failures.push_back(fmt::format("{}: {}", title, result.error().message));
+      }
+      return;
+    }
+    if (!*result) {
+      summary_.interrupted = true;
+      return;
+    }
+    const MetricsReport& report = **result;
+    run["state"] = "done";
+    run["tracked_fraction"] = report.tracked_fraction;
+    add_metrics(run, report.metrics);
+    if (report.metrics) {
+      sequence["never_moving"]["average_offset_m"] = report.metrics->null_offset_m;
+    }
+    speed_.push_back({{"sequence", sequence["name"]},
+                      {"configuration", with.name},
+                      {"scale_source", run["scale_source"]},
+                      {"fps", report.fps}});
+  }
+
+  /// Of an earlier call, or of a run now; nothing where it was stopped. Marks a run that is not
+  /// possible.
+  Expected<std::optional<MetricsReport>> result_of(const Json& sequence,
+                                                   const BenchmarkConfiguration& with,
+                                                   const std::string& title,
+                                                   Json& run) {
+    RunRequest one;
+    one.sequence_dir = sequence_dir(sequence["name"]);
+    one.out_dir = run_dir(sequence, run);
+    one.models_dir = request_.models_dir;
+    one.config = with.config;
+    one.config.scale.source = run["scale_source"] == "ground_truth" ? ScaleSource::kGroundTruth
+                                                                    : ScaleSource::kCameraHeight;
+    one.num_threads = request_.num_threads;
+    const auto opened = KittiSequence::open(one.sequence_dir, {.camera = one.config.input.camera});
+    if (!opened) {
+      return opened.error();
+    }
+    if (one.config.scale.source == ScaleSource::kGroundTruth && !opened->ground_truth()) {
+      run["state"] = "not possible";
+      return fail("no ground truth");
+    }
+    const Expected<Json> inputs = hash_inputs(one, *opened);
+    if (!inputs) {
+      return inputs.error();
+    }
+    std::string note;
+    if (std::optional<MetricsReport> kept = kept_result(one.out_dir, *inputs, note)) {
+      return kept;
+    }
+    if (callbacks_.on_run &&
+        !callbacks_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, note))) {
+      return std::optional<MetricsReport>();
+    }
+    return run_now(one, *inputs, title);
+  }
+
+  Expected<std::optional<MetricsReport>> run_now(RunRequest& one,
+                                                 const Json& inputs,
+                                                 const std::string& title) {
+    std::error_code ignored;
+    fs::remove(one.out_dir / kInputsFile, ignored);  // an interrupted run must not pass for done
+    one.started = std::chrono::steady_clock::now();
+    const Expected<RunSummary> done = run_sequence(one, callbacks_.on_frame);
+    if (!done || !done->written) {
+      return done ? done->written.error() : done.error();
+    }
+    if (done->interrupted) {
+      return std::optional<MetricsReport>();
+    }
+    for (const std::string& warning : done->warnings) {
+      summary_.warnings.push_back(fmt::format("{}: {}", title, warning));
+    }
+    const Status kept = write_text_file(one.out_dir / kInputsFile, inputs.dump(2) + '\n');
+    if (!kept) {
+      return kept.error();
+    }
+    return std::optional(done->report);
+  }
+
+  [[nodiscard]] Status write_files(const Json& last) const {
+    for (const auto& [name, text] : {std::pair("benchmark.md", benchmark::format_markdown(report_)),
+                                     std::pair("benchmark.json", to_text(report_)),
+                                     std::pair("speed.json", to_text(speed_))}) {
+      if (const Status written = write_text_file(request_.out_dir / name, text); !written) {
+        return written;
+      }
+    }
+    return write_figure(last);
+  }
+
+  /// NN.png: the truth and, of each configuration, the trajectory without ground truth for the
+  /// first and with per-step ground-truth scale for the others; the other one where it is not done.
+  [[nodiscard]] Status write_figure(const Json& sequence) const {
+    const std::string& name = text_of(sequence["name"]);
+    const fs::path file = request_.out_dir / (name + ".png");
+    std::error_code ignored;
+    fs::remove(file, ignored);  // an older one must not pass for this one's
+    TrajectoryPlot plot;
+    plot.title = fmt::format("{}, {}", name, benchmark::describe_frames(sequence));
+    const Json& runs = sequence["runs"];
+    for (std::size_t i = 0; i < runs.size(); i += 2) {
+      const std::size_t wanted = i == 0 ? 0 : i + 1;
+      const Json& run = runs[wanted]["state"] == "done" ? runs[wanted] : runs[wanted ^ 1U];
+      if (run["state"] != "done") {
+        continue;
+      }
+      auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
+      if (!poses) {
+        return poses.error();
+      }
+      plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
+      plot.subtitle +=
+          fmt::format("{}{}: {}", plot.subtitle.empty() ? "" : "   ", plot.others.back().name,
+                      benchmark::words_for(run["scale_source"]));
+    }
+    if (plot.others.empty()) {
+      return {};
+    }
+    plot.estimate_name = plot.others.front().name;
+    plot.estimate = std::move(plot.others.front().trajectory);
+    plot.others.erase(plot.others.begin());
+    if (const auto opened = KittiSequence::open(sequence_dir(name))) {
+      plot.ground_truth = opened->ground_truth();
+    }
+    return write_trajectory_png(file, plot);
+  }
+
+  const BenchmarkRequest& request_;
+  const BenchmarkCallbacks& callbacks_;
+  Json report_;
+  Json speed_ = Json::array();
+  std::size_t num_runs_ = 0;
+  std::size_t num_begun_ = 0;
+  BenchmarkSummary summary_;
+};
 
 }  // namespace
 
-std::string_view to_string(ScaleProtocol protocol) {
-  return protocol == ScaleProtocol::kCameraHeight ? "camera_height" : "ground_truth";
-}
-
-bool has_failures(const BenchmarkReport& report) {
-  return std::any_of(report.sequences.begin(), report.sequences.end(), [](const auto& sequence) {
-    return !sequence.problem.empty() ||
-           std::any_of(sequence.runs.begin(), sequence.runs.end(),
-                       [](const auto& run) { return run.state == BenchmarkState::kFailed; });
-  });
-}
-
-Expected<BenchmarkReport> run_benchmark(const BenchmarkRequest& request,
-                                        const BenchmarkCallback& callback) {
+Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
+                                         const BenchmarkCallbacks& callbacks) {
   const Expected<std::vector<std::string>> names = find_sequences(request);
   if (!names) {
     return names.error();
   }
+  const Expected<std::string> published = read_text_file(request.published);
+  if (!published) {
+    return published.error();
+  }
   if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
     return made.error();
   }
-  BenchmarkReport report;
-  report.stemvo_version = version();
-  std::size_t num_runs = 0;
-  for (const std::string& name : *names) {
-    report.sequences.push_back(plan_sequence(request, name));
-    num_runs += report.sequences.back().runs.size();
+  Benchmark benchmark(request, callbacks);
+  try {
+    const Json json = Json::parse(*published, nullptr, true, /*ignore_comments=*/true);
+    for (const std::string& name : *names) {
+      benchmark.plan(name, json);
+    }
+  } catch (const Json::exception& error) {
+    return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",
+                            request.published.string(), error.what()));
   }
-  benchmark::Reporter reporter(callback, num_runs);
-  for (BenchmarkSequence& sequence : report.sequences) {
-    for (BenchmarkRun& run : sequence.runs) {
-      if (!reporter.is_stopped()) {
-        reporter.start(sequence.name, run);
-        benchmark::complete_run(request, configuration_of(request, run), sequence.name, reporter,
-                                run);
-      }
-    }
-    // A stop after the last frame of all leaves nothing to be done.
-    report.interrupted = reporter.is_stopped() && has_pending(report);
-    if (const Status written = benchmark::write_files(request, report, sequence); !written) {
-      return written.error();
-    }
-    if (report.interrupted) {
-      break;
-    }
-  }
-  return report;
+  return benchmark.run();
 }
 
 }  // namespace stemvo

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MIT
+#include "benchmark/markdown.hpp"
+
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "benchmark/files.hpp"
-#include "benchmark/names.hpp"
-#include "benchmark/published.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/text_table.hpp"
 
 namespace stemvo::benchmark {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr std::string_view kHead =
     R"(# Benchmark
@@ -23,9 +25,9 @@ judged, scale is not. *Never moving*: what a trajectory scores that stays at the
 )";
 
 /// Names come from folders: nothing in them may end a cell or a line.
-std::string safe(std::string_view text) {
+std::string safe(const Json& json) {
   std::string result;
-  for (const char c : text) {
+  for (const char c : json.get<std::string>()) {
     if (c == '|') {
       result += '\\';
     }
@@ -34,132 +36,119 @@ std::string safe(std::string_view text) {
   return result;
 }
 
-std::string number(const std::optional<double>& value, int decimals) {
-  return value && std::isfinite(*value) ? fmt::format("{:.{}f}", *value, decimals) : "-";
+std::string number(const Json& value, int decimals) {
+  return value.is_number() && std::isfinite(value.get<double>())
+             ? fmt::format("{:.{}f}", value.get<double>(), decimals)
+             : "-";
 }
 
 std::string row(const std::vector<std::string>& cells) {
   return fmt::format("| {} |\n", fmt::join(cells, " | "));
 }
 
-std::string rule(std::size_t num_columns) {
-  return fmt::format("|{}\n", fmt::join(std::vector<std::string>(num_columns, "---|"), ""));
+std::string head_row(const std::vector<std::string>& cells) {
+  const std::vector<std::string> rule(cells.size(), "---|");
+  return row(cells) + fmt::format("|{}\n", fmt::join(rule, ""));
 }
 
-std::string triple(const std::optional<double>& t_rel,
-                   const std::optional<double>& r_rel,
-                   const std::optional<double>& offset) {
-  return fmt::format("{} / {} / {}", number(t_rel, 2), number(r_rel, 2), number(offset, 2));
+bool has_metrics(const Json& run) { return !run["segments"].is_null(); }
+
+/// t_rel, r_rel and offset.
+std::vector<std::string> errors(const Json& numbers, int r_rel_decimals) {
+  return {number(numbers["t_rel_percent"], 2),
+          number(numbers["r_rel_deg_per_100m"], r_rel_decimals),
+          number(numbers["average_offset_m"], 2)};
 }
 
 /// The cell of a run in the table over all sequences.
-std::string short_cell(const BenchmarkRun& run) {
-  if (run.report && run.report->metrics) {
-    const Metrics& m = *run.report->metrics;
-    return triple(m.t_rel_percent, m.r_rel_deg_per_100m, m.average_offset_m);
-  }
-  switch (run.state) {
-    case BenchmarkState::kPending:
-      return "not run yet";
-    case BenchmarkState::kFailed:
-      return "failed";
-    default:
-      return "-";
-  }
+std::string short_cell(const Json& run) {
+  return has_metrics(run)            ? fmt::format("{}", fmt::join(errors(run, 2), " / "))
+         : run["state"] == "pending" ? "not run yet"
+         : run["state"] == "failed"  ? "failed"
+                                     : "-";
 }
 
-std::string overview(const BenchmarkReport& report) {
-  std::vector<std::string> names = {""};
-  std::vector<std::string> frames = {"t_rel / r_rel / offset"};
-  std::vector<std::string> never = {"never moving"};
-  std::vector<std::vector<std::string>> rows;
-  for (const BenchmarkSequence& sequence : report.sequences) {
-    if (!sequence.problem.empty()) {
+std::string overview(const Json& report) {
+  std::vector<std::vector<std::string>> rows = {{""}, {"t_rel / r_rel / offset"}};
+  std::vector<std::string> baseline = {"never moving"};
+  for (const Json& sequence : report["sequences"]) {
+    if (!sequence["problem"].is_null()) {
       continue;
     }
-    names.push_back(safe(sequence.name));
-    frames.push_back(describe_frames(sequence));
-    const Metrics* metrics = any_metrics(sequence);
-    never.push_back(metrics != nullptr ? triple({}, {}, metrics->null_offset_m) : "-");
-    rows.resize(sequence.runs.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (rows[i].empty()) {
-        rows[i].push_back(safe(title_of(sequence.runs[i])));
+    const Json& runs = sequence["runs"];
+    rows.resize(2 + runs.size());
+    rows[0].push_back(safe(sequence["name"]));
+    rows[1].push_back(describe_frames(sequence));
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      if (rows[2 + i].empty()) {
+        rows[2 + i].push_back(fmt::format("{}, {}", safe(runs[i]["configuration"]),
+                                          words_for(runs[i]["scale_source"])));
       }
-      rows[i].push_back(short_cell(sequence.runs[i]));
+      rows[2 + i].push_back(short_cell(runs[i]));
     }
+    const Json& offset_m = sequence["never_moving"]["average_offset_m"];
+    baseline.push_back(offset_m.is_null() ? "-" : fmt::format("- / - / {}", number(offset_m, 2)));
   }
-  if (names.size() == 1) {
+  if (rows[0].size() == 1) {
     return {};
   }
-  std::string text = "\n## All sequences\n\n" + row(names) + rule(names.size()) + row(frames);
-  for (const auto& cells : rows) {
-    text += row(cells);
-  }
-  return text + row(never);
+  std::string text = "\n## All sequences\n\n" + head_row(rows[0]);
+  std::for_each(rows.begin() + 1, rows.end(), [&](const auto& cells) { text += row(cells); });
+  return text + row(baseline);
 }
 
-std::string explain(const BenchmarkRun& run) {
-  if (!run.problem.empty()) {
-    return safe(run.problem);
+std::string explain(const Json& run) {
+  if (!run["problem"].is_null()) {
+    return safe(run["problem"]);
   }
-  if (!run.report) {
+  if (run["state"] == "pending") {
     return "not run yet";
   }
-  const std::string measured =
-      fmt::format("{} % of the frames measured", number(100.0 * run.report->tracked_fraction, 1));
-  return run.report->metrics ? measured : measured + "; no ground truth";
+  return fmt::format("{:.1f} % of the frames measured{}",
+                     100.0 * run["tracked_fraction"].get<double>(),
+                     has_metrics(run) ? "" : "; no ground truth");
 }
 
-std::string run_row(const BenchmarkRun& run) {
-  std::vector<std::string> cells = {safe(run.configuration), std::string(words_for(run.protocol)),
-                                    "none"};
-  if (run.report && run.report->metrics) {
-    const Metrics& m = *run.report->metrics;
-    cells.insert(cells.end(), {number(m.t_rel_percent, 2), number(m.r_rel_deg_per_100m, 3),
-                               number(m.average_offset_m, 2), number(m.ate_rmse.sim3_m, 2)});
-  } else {
-    cells.insert(cells.end(), 4, "-");
-  }
-  cells.push_back(explain(run));
-  return row(cells);
+std::string run_row(const Json& run) {
+  const Json& ate = run["ate_rmse_m"];
+  return row({safe(run["configuration"]), std::string(words_for(run["scale_source"])), "none",
+              fmt::format("{}", fmt::join(errors(run, 3), " | ")),
+              ate.is_null() ? "-" : number(ate["sim3"], 2), explain(run)});
 }
 
-std::string published_row(const PublishedNumbers& p) {
-  return row({std::string(p.method), std::string(p.scale), std::string(p.alignment),
-              number(p.t_rel_percent, 2), number(p.r_rel_deg_per_100m, 2),
-              number(p.average_offset_m, 2), number(p.ate_rmse_m, 2),
-              "published: " + std::string(p.source)});
+std::string published_row(const Json& numbers) {
+  return row({numbers["method"], numbers["scale_source"], numbers["alignment"],
+              fmt::format("{}", fmt::join(errors(numbers, 2), " | ")),
+              number(numbers["ate_rmse_m"], 2),
+              "published: " + numbers["source"].get<std::string>()});
 }
 
-std::string section(const BenchmarkSequence& sequence) {
-  std::string text = fmt::format("\n## {}\n\n", safe(sequence.name));
-  if (!sequence.problem.empty()) {
-    return text + fmt::format("Not run: {}\n", safe(sequence.problem));
+std::string section(const Json& sequence) {
+  const std::string name = safe(sequence["name"]);
+  std::string text = fmt::format("\n## {}\n\n", name);
+  if (!sequence["problem"].is_null()) {
+    return text + fmt::format("Not run: {}\n", safe(sequence["problem"]));
   }
   text += describe_frames(sequence);
-  const Metrics* metrics = any_metrics(sequence);
-  if (metrics != nullptr) {
-    text += fmt::format(", {:.0f} m; {} segments of {}", metrics->path_length_m,
-                        metrics->num_segments, length_range(*metrics));
+  const Json& runs = sequence["runs"];
+  const auto any = std::find_if(runs.begin(), runs.end(), has_metrics);
+  if (any != runs.end()) {
+    text += fmt::format(", {:.0f} m; {} segments of {}", (*any)["path_length_m"].get<double>(),
+                        (*any)["segments"].get<int>(), length_range((*any)["segment_lengths_m"]));
   }
-  text +=
-      fmt::format(".\n\n![the map of {}](<{}.png>)\n\n", safe(sequence.name), safe(sequence.name));
-  const std::vector<std::string> heads = {"",      "scale from", "alignment", "t_rel",
-                                          "r_rel", "offset",     "ATE",       ""};
-  text += row(heads) + rule(heads.size());
-  for (const BenchmarkRun& run : sequence.runs) {
+  text += fmt::format(".\n\n![the map of {}](<{}.png>)\n\n", name, name);
+  text += head_row({"", "scale from", "alignment", "t_rel", "r_rel", "offset", "ATE", ""});
+  for (const Json& run : runs) {
     text += run_row(run);
   }
-  if (metrics != nullptr) {
+  if (any != runs.end()) {
     text +=
-        row({"never moving", "-", "none", "-", "-", number(metrics->null_offset_m, 2), "-", ""});
+        row({"never moving", "-", "none", "-", "-", number((*any)["null_offset_m"], 2), "-", ""});
   }
-  if (sequence.is_complete) {
-    for (const PublishedNumbers& published : published_numbers(sequence.name)) {
-      text += published_row(published);
-    }
-  } else if (sequence.official_frames) {
+  for (const Json& numbers : sequence["published"]) {
+    text += published_row(numbers);
+  }
+  if (sequence["published"].empty() && !sequence["official_frames"].is_null()) {
     text += "\nPublished numbers are of all official frames, and stand here when those ran.\n";
   }
   return text;
@@ -167,9 +156,27 @@ std::string section(const BenchmarkSequence& sequence) {
 
 }  // namespace
 
-std::string format_markdown(const BenchmarkReport& report) {
-  std::string text = fmt::format(fmt::runtime(kHead), report.stemvo_version) + overview(report);
-  for (const BenchmarkSequence& sequence : report.sequences) {
+std::string_view words_for(const Json& scale_source) {
+  return scale_source == "camera_height" ? "camera height" : "true steps";
+}
+
+std::string describe_frames(const Json& sequence) {
+  const auto begin = sequence["first_frame"].get<std::size_t>();
+  const auto num_frames = sequence["frames"].get<std::size_t>();
+  const Json& official = sequence["official_frames"];
+  if (sequence["is_complete"] == true) {
+    return fmt::format("all {} frames", num_frames);
+  }
+  if (!official.is_null()) {
+    return fmt::format("clip {}:{} of {}", begin, begin + num_frames, official.get<std::size_t>());
+  }
+  return fmt::format("frames {}:{}", begin, begin + num_frames);
+}
+
+std::string format_markdown(const Json& report) {
+  std::string text = fmt::format(fmt::runtime(kHead), report["stemvo_version"].get<std::string>()) +
+                     overview(report);
+  for (const Json& sequence : report["sequences"]) {
     text += section(sequence);
   }
   return text;

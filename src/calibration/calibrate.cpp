@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/calibration/calibrate.hpp"
+#include "calibration/calibrate.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "calibration/calibration_file.hpp"
 #include "calibration/refine_camera.hpp"
-#include "calibration/segment_builder.hpp"
-#include "geometry/degrees.hpp"
+#include "calibration/segments.hpp"
+#include "dataset/kitti_text.hpp"
+#include "odometry/phased_odometry.hpp"
+#include "options/option_fields.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "stemvo/odometry/odometry.hpp"
+#include "report/text_table.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -24,8 +27,6 @@ using calibration::Segment;
 
 constexpr int kTrackWindow = 15;  ///< of KLT, px
 constexpr int kNumTracks = 1000;
-/// Bounds the time of the solver on long drives.
-constexpr std::size_t kMaxSegments = 30;
 /// Fewer do not tell how well they agree.
 constexpr std::size_t kMinSegments = 3;
 
@@ -38,18 +39,18 @@ Status check_request(const CalibrationRequest& request) {
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  if (request.config.features.method != "klt") {
+  if (request.config.features.method != FeatureMethod::kKlt) {
     return fail(
         fmt::format("features.method: expected klt, whose tracks calibration needs, "
                     "found '{}'",
-                    request.config.features.method));
+                    options::to_string(request.config.features.method)));
   }
   std::error_code code;
   if (fs::equivalent(request.out_file, calibration_file(request), code)) {
     return fail(fmt::format("{}: expected another file than the calibration to start from",
                             request.out_file.string()));
   }
-  return calibration::check_can_write(request.out_file);
+  return check_can_replace(request.out_file);
 }
 
 cv::Mat to_gray(const cv::Mat& frame) {
@@ -60,12 +61,12 @@ cv::Mat to_gray(const cv::Mat& frame) {
   return gray;
 }
 
-/// Runs the odometry over the sequence; segments without the ones too many.
+/// Runs the odometry over the sequence.
 std::vector<Segment> track(const KittiSequence& sequence,
-                           Odometry& odometry,
+                           PhasedOdometry& odometry,
                            const CalibrationProgress& progress,
                            CalibrationReport& report) {
-  calibration::SegmentBuilder builder(sequence.camera(), {});
+  calibration::SegmentBuilder builder(sequence.camera());
   const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
     const std::size_t number = sequence.range().begin + i;
     calibration::TrackedFrame tracked;
@@ -75,7 +76,7 @@ std::vector<Segment> track(const KittiSequence& sequence,
       }
       tracked = {to_gray(*frame), result.world_from_camera,
                  is_measured(result.state) && result.state != FrameState::kFirst,
-                 odometry.matches(), odometry.inlier_mask()};
+                 odometry.frames().matches(), odometry.frames().inlier_mask()};
     } else {
       report.warnings.push_back(frame.error().message);
       tracked.world_from_camera = result.world_from_camera;
@@ -85,59 +86,18 @@ std::vector<Segment> track(const KittiSequence& sequence,
     return !report.interrupted;
   };
   pipeline::run_frames(sequence, odometry, visit);
-  std::vector<Segment> segments = builder.finish();
-  calibration::keep_turns(segments, kMaxSegments);
-  return segments;
+  return builder.complete();
 }
 
-void describe(const std::vector<Segment>& segments, CalibrationReport& report) {
-  report.num_segments = segments.size();
-  for (const Segment& segment : segments) {
-    report.turned_deg += kDegPerRad * calibration::turned_rad(segment);
-    report.num_landmarks += segment.landmarks.size();
-    for (const calibration::Landmark& landmark : segment.landmarks) {
-      report.num_observations += landmark.observations.size();
-    }
-  }
-}
-
-void describe(const calibration::RefinedCamera& refined,
-              const calibration::RefinementOptions& options,
-              CalibrationReport& report) {
-  const calibration::SharedVector given = calibration::shared_of(report.given);
-  const std::array<const char*, 3> names = {"focal length", "principal point x",
-                                            "principal point y"};
-  for (int i = 0; i < calibration::kNumIntrinsics; ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    const double unit = i == 0 ? report.given.mean_focal_px() : 1.0;
-    report.parameters[at] = {names[at],
-                             given[i],
-                             refined.shared[i],
-                             refined.deviation[i],
-                             unit * options.max_deviation[at],
-                             refined.is_determined[at]};
-  }
-  report.distortion = {refined.shared[3], refined.shared[4]};
-  report.distortion_deviation = {refined.deviation[3], refined.deviation[4]};
-  report.refined = calibration::with_shared(report.given, refined.shared);
-  report.given_error_px = refined.given_error_px;
-  report.refined_error_px = refined.refined_error_px;
-}
-
-bool any_determined(const CalibrationReport& report) {
-  return std::any_of(report.parameters.begin(), report.parameters.end(),
-                     [](const CalibratedParameter& parameter) { return parameter.is_determined; });
-}
-
-Expected<Odometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
+Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
   Config config = request.config;
-  config.odometry.mode = "map";
-  config.scale.source = "constant";
+  config.odometry.mode = OdometryMode::kMap;
+  config.scale.source = ScaleSource::kConstant;
   // Long tracks count here, and their bias does not: every observation is aligned anew.
   config.features.klt_window = std::max(config.features.klt_window, kTrackWindow);
   config.features.max_features = std::max(config.features.max_features, kNumTracks);
-  config.stem.upsample = "bicubic";
-  return Odometry::create(config, camera, request.models_dir);
+  config.stem.upsample = Upsample::kBicubic;
+  return pipeline::create_odometry(config, camera, request.models_dir);
 }
 
 }  // namespace
@@ -153,7 +113,7 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   if (const Status status = check_request(request); !status) {
     return status.error();
   }
-  Expected<Odometry> odometry = create_odometry(request, sequence->camera());
+  Expected<PhasedOdometry> odometry = create_odometry(request, sequence->camera());
   if (!odometry) {
     return odometry.error();
   }
@@ -169,27 +129,54 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
         "tracks, found {} in {} frames",
         request.sequence_dir.string(), kMinSegments, segments.size(), sequence->size()));
   }
-  const calibration::RefinementOptions options;
-  const calibration::RefinedCamera refined = calibration::refine_camera(
-      segments, sequence->camera(), options, [&progress](std::size_t done, std::size_t total) {
+  std::vector<std::string> warnings = std::move(report.warnings);
+  report = calibration::refine_camera(
+      segments, sequence->camera(), [&progress](std::size_t done, std::size_t total) {
         return !progress || progress(CalibrationStage::kSolving, done, total);
       });
-  report.interrupted = refined.stopped;
-  describe(segments, report);
-  describe(refined, options, report);
-  if (report.interrupted || !any_determined(report)) {
+  report.warnings = std::move(warnings);
+  report.num_segments = segments.size();
+  const bool is_any_determined = std::any_of(report.parameters.begin(), report.parameters.end(),
+                                             std::mem_fn(&CalibratedParameter::is_determined));
+  if (report.interrupted || !is_any_determined) {
     return report;
   }
   const Expected<std::string> text =
-      calibration::rewrite_calibration(calibration_file(request), report.given, report.refined);
+      dataset::replace_kitti_camera(calibration_file(request), report.given, report.refined);
   if (!text) {
     return text.error();
   }
-  if (const Status status = calibration::replace_file(request.out_file, *text); !status) {
+  if (const Status status = replace_text_file(request.out_file, *text); !status) {
     return status.error();
   }
   report.written = true;
   return report;
+}
+
+std::string format_calibration_table(const CalibrationReport& report) {
+  const auto& [f, cx, cy, k1, k2] = report.parameters;
+  TextTable table("lrrrl");
+  table.add({"px", "given", "refined", "deviation", "change"});
+  table.rule();
+  for (const CalibratedParameter* number : {&f, &cx, &cy}) {
+    table.add(
+        {number->name, fmt::format("{:.2f}", number->given), fmt::format("{:.2f}", number->refined),
+         std::isfinite(number->deviation) ? fmt::format("{:.2f}", number->deviation) : "unknown",
+         number->is_determined ? fmt::format("{:+.2f} ({:+.2f} %)", number->refined - number->given,
+                                             100.0 * (number->refined / number->given - 1.0))
+                               : fmt::format("undetermined (deviation above {:.2f}): as given",
+                                             number->max_deviation)});
+  }
+  table.rule();
+  table.add({"reprojection error", fmt::format("{:.4f}", report.given_error_px),
+             fmt::format("{:.4f}", report.refined_error_px)});
+  return table.str() +
+         fmt::format(
+             "from {} observations of {} landmarks in {} stretches that turn {:.0f} degrees in "
+             "all\nradial distortion left in the frames, which calib.txt cannot hold: k1 {:+.4f} "
+             "+- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
+             report.num_observations, report.num_landmarks, report.num_segments, report.turned_deg,
+             k1.refined, k1.deviation, k2.refined, k2.deviation);
 }
 
 }  // namespace stemvo

@@ -1,135 +1,43 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/joint_adjustment.hpp"
 
-#include <algorithm>
 #include <limits>
 #include <memory>
-#include <span>
 
+#include <Eigen/SparseCholesky>
 #include <ceres/ceres.h>
-
-#include "calibration/information.hpp"
 
 namespace stemvo::calibration {
 namespace {
 
-using Cost = ceres::AutoDiffCostFunction<SharedCameraCost, 2, kNumShared, 4, 3, 4>;
+constexpr double kMinDepth = 1e-6;
+constexpr double kTolerance = 1e-6;  ///< relative change of the cost
+constexpr std::size_t kMinObservations = 3;
 
-/// The numbers of all segments in one array: Ceres eliminates blocks in the order of their
-/// addresses, which must not depend on where segments happen to lie in memory.
-class Numbers {
- public:
-  Numbers(std::span<const Segment> segments, const SharedVector& shared) {
-    std::size_t size = kNumShared;
-    for (const Segment& segment : segments) {
-      landmarks_.push_back(size);
-      size += 4 * segment.landmarks.size();
-      poses_.push_back(size);
-      size += 7 * segment.camera_from_first.size();
+/// Reprojection error (px) of a homogeneous landmark. Parameters: the shared camera,
+/// camera_from_first as unit quaternion (x, y, z, w) and translation, the point.
+struct Residual {
+  Eigen::Vector2d focal_share;
+  Eigen::Vector2d uv;
+
+  template <typename T>
+  bool operator()(
+      const T* shared, const T* rotation, const T* translation, const T* point, T* residual) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
+    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t(translation);
+    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> direction(point);
+    const Eigen::Matrix<T, 3, 1> x = q * direction + point[3] * t;
+    if (!(x.z() > T(kMinDepth))) {
+      return false;  // the solver takes a shorter step
     }
-    values_.resize(size);
-    std::copy_n(shared.data(), kNumShared, values_.data());
-    for (std::size_t s = 0; s < segments.size(); ++s) {
-      for (std::size_t i = 0; i < segments[s].landmarks.size(); ++i) {
-        std::copy_n(segments[s].landmarks[i].point.data(), 4, landmark(s, i));
-      }
-      for (std::size_t k = 0; k < segments[s].camera_from_first.size(); ++k) {
-        const Rigid3& pose = segments[s].camera_from_first[k];
-        std::copy_n(pose.rotation.coeffs().data(), 4, rotation(s, k));
-        std::copy_n(pose.translation.data(), 3, translation(s, k));
-      }
-    }
+    Eigen::Map<Eigen::Matrix<T, 2, 1>> error(residual);
+    error = project_shared(focal_share, shared, x) - uv.template cast<T>();
+    return true;
   }
-  double* shared() { return values_.data(); }
-  double* landmark(std::size_t s, std::size_t i) { return &values_[landmarks_[s] + 4 * i]; }
-  double* rotation(std::size_t s, std::size_t k) { return &values_[poses_[s] + 7 * k]; }
-  double* translation(std::size_t s, std::size_t k) { return rotation(s, k) + 4; }
-
-  void write_back(std::span<Segment> segments, SharedVector& shared_out) {
-    std::copy_n(shared(), kNumShared, shared_out.data());
-    for (std::size_t s = 0; s < segments.size(); ++s) {
-      for (std::size_t i = 0; i < segments[s].landmarks.size(); ++i) {
-        segments[s].landmarks[i].point = Eigen::Map<const Eigen::Vector4d>(landmark(s, i));
-      }
-      for (std::size_t k = 0; k < segments[s].camera_from_first.size(); ++k) {
-        segments[s].camera_from_first[k] =
-            Rigid3(Eigen::Quaterniond(Eigen::Map<const Eigen::Quaterniond>(rotation(s, k))),
-                   Eigen::Map<const Eigen::Vector3d>(translation(s, k)));
-      }
-    }
-  }
-
- private:
-  std::vector<double> values_;
-  std::vector<std::size_t> landmarks_;  ///< per segment: where they begin
-  std::vector<std::size_t> poses_;
 };
+using Cost = ceres::AutoDiffCostFunction<Residual, 2, kNumShared, 4, 3, 4>;
 
-/// A Ceres problem over numbers, with what it needs to live.
-struct Problem {
-  Problem(std::span<const Segment> segments, const SharedVector& shared, double loss_scale_px)
-      : numbers(segments, shared), loss(loss_scale_px), problem(ownership()) {}
-  static ceres::Problem::Options ownership() {
-    ceres::Problem::Options options;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    return options;
-  }
-
-  Numbers numbers;
-  ceres::CauchyLoss loss;
-  ceres::EigenQuaternionManifold quaternions;
-  ceres::SphereManifold<4> homogeneous;
-  std::array<ceres::SubsetManifold, 3> without_axis = {
-      ceres::SubsetManifold(3, {0}), ceres::SubsetManifold(3, {1}), ceres::SubsetManifold(3, {2})};
-  std::unique_ptr<ceres::SubsetManifold> free_shared;
-  ceres::Problem problem;
-};
-
-/// The first keyframe and one coordinate of the last one stay: the gauge.
-void fix_gauge(const Segment& segment, std::size_t s, Problem& all) {
-  for (std::size_t k = 0; k < segment.camera_from_first.size(); ++k) {
-    double* rotation = all.numbers.rotation(s, k);
-    double* translation = all.numbers.translation(s, k);
-    if (!all.problem.HasParameterBlock(translation)) {
-      continue;
-    }
-    all.problem.SetManifold(rotation, &all.quaternions);
-    if (k == 0) {
-      all.problem.SetParameterBlockConstant(rotation);
-      all.problem.SetParameterBlockConstant(translation);
-    } else if (k + 1 == segment.camera_from_first.size()) {
-      Eigen::Index longest = 0;
-      segment.camera_from_first[k].translation.cwiseAbs().maxCoeff(&longest);
-      all.problem.SetManifold(translation, &all.without_axis[static_cast<std::size_t>(longest)]);
-    }
-  }
-}
-
-/// Residuals in order of landmarks, then of their observations.
-std::vector<ceres::ResidualBlockId> add_segment(const Segment& segment,
-                                                std::size_t s,
-                                                const Camera& given,
-                                                Problem& all) {
-  const Eigen::Vector2d focal_share = focal_shares(given);
-  std::vector<ceres::ResidualBlockId> residuals;
-  for (std::size_t i = 0; i < segment.landmarks.size(); ++i) {
-    double* point = all.numbers.landmark(s, i);
-    for (const Observation& seen : segment.landmarks[i].observations) {
-      const auto k = static_cast<std::size_t>(seen.keyframe);
-      residuals.push_back(all.problem.AddResidualBlock(
-          new Cost(new SharedCameraCost{focal_share, seen.uv}), &all.loss, all.numbers.shared(),
-          all.numbers.rotation(s, k), all.numbers.translation(s, k), point));
-    }
-    if (all.problem.HasParameterBlock(point)) {
-      all.problem.SetManifold(point, &all.homogeneous);
-    }
-  }
-  fix_gauge(segment, s, all);
-  return residuals;
-}
-
-void hold_shared(const SharedMask& is_free, Problem& all) {
+void hold_shared(const SharedMask& is_free, double* shared, ceres::Problem& problem) {
   std::vector<int> held;
   for (int i = 0; i < kNumShared; ++i) {
     if (!is_free[static_cast<std::size_t>(i)]) {
@@ -137,110 +45,207 @@ void hold_shared(const SharedMask& is_free, Problem& all) {
     }
   }
   if (static_cast<int>(held.size()) == kNumShared) {
-    all.problem.SetParameterBlockConstant(all.numbers.shared());
+    problem.SetParameterBlockConstant(shared);
   } else if (!held.empty()) {
-    all.free_shared = std::make_unique<ceres::SubsetManifold>(kNumShared, held);
-    all.problem.SetManifold(all.numbers.shared(), all.free_shared.get());
+    problem.SetManifold(shared, new ceres::SubsetManifold(kNumShared, held));
   }
-}
-
-/// Landmarks are eliminated first.
-std::shared_ptr<ceres::ParameterBlockOrdering> order(std::span<const Segment> segments,
-                                                     Problem& all) {
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  const auto add = [&](double* block, int group) {
-    if (all.problem.HasParameterBlock(block)) {
-      ordering->AddElementToGroup(block, group);
-    }
-  };
-  for (std::size_t s = 0; s < segments.size(); ++s) {
-    for (std::size_t i = 0; i < segments[s].landmarks.size(); ++i) {
-      add(all.numbers.landmark(s, i), 0);
-    }
-    for (std::size_t k = 0; k < segments[s].camera_from_first.size(); ++k) {
-      add(all.numbers.rotation(s, k), 1);
-      add(all.numbers.translation(s, k), 1);
-    }
-  }
-  add(all.numbers.shared(), 1);
-  return ordering;
 }
 
 class StopCallback : public ceres::IterationCallback {
  public:
   explicit StopCallback(const JointAdjustment::Callback& callback) : callback_(callback) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& /*summary*/) override {
-    return !callback_ || callback_() ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
+    return callback_() ? ceres::SOLVER_CONTINUE : ceres::SOLVER_ABORT;
   }
 
  private:
   const JointAdjustment::Callback& callback_;
 };
 
+/// The Jacobian of the shared numbers, which come last, with what the others explain taken out:
+/// the Schur complement's factor (Triggs et al., "Bundle adjustment - a modern synthesis", 6).
+Eigen::MatrixXd without_the_rest(const ceres::CRSMatrix& rows) {
+  using Sparse = Eigen::SparseMatrix<double>;
+  const Sparse jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+      rows.num_rows, rows.num_cols, static_cast<Eigen::Index>(rows.values.size()), rows.rows.data(),
+      rows.cols.data(), rows.values.data());
+  const Sparse rest = jacobian.leftCols(jacobian.cols() - kNumShared);
+  const Eigen::MatrixXd shared = jacobian.rightCols(kNumShared);
+  Sparse normal = rest.transpose() * rest;
+  // Directions that nothing is known of (a landmark without parallax) stay invertible.
+  constexpr double kDamping = 1e-12;
+  normal.diagonal() *= 1.0 + kDamping;
+  return shared - rest * Eigen::SimplicialLDLT<Sparse>(normal).solve(rest.transpose() * shared);
+}
+
 }  // namespace
 
-bool JointAdjustment::solve(const AdjustmentOptions& options, const Callback& callback) {
-  Problem all(segments_, shared_, options.loss_scale_px);
-  for (std::size_t s = 0; s < segments_.size(); ++s) {
-    add_segment(segments_[s], s, given_, all);
+JointAdjustment::JointAdjustment(const std::vector<Segment>& segments, const Camera& given)
+    : shared(shared_of(given)), focal_share_(focal_shares(given)) {
+  for (const Segment& segment : segments) {
+    const int first = static_cast<int>(poses_.size());
+    poses_.insert(poses_.end(), segment.camera_from_first.begin(), segment.camera_from_first.end());
+    ends_.push_back(poses_.size());
+    for (Landmark landmark : segment.landmarks) {
+      for (Observation& seen : landmark.observations) {
+        seen.keyframe += first;
+      }
+      landmarks_.push_back(std::move(landmark));
+    }
   }
-  if (all.problem.NumResidualBlocks() == 0) {
-    return false;
+}
+
+std::vector<ceres::ResidualBlockId> JointAdjustment::build(double loss_scale_px,
+                                                           ceres::Problem& problem) {
+  std::vector<ceres::ResidualBlockId> residuals;
+  for (Landmark& landmark : landmarks_) {
+    for (const Observation& seen : landmark.observations) {
+      Rigid3& pose = poses_[static_cast<std::size_t>(seen.keyframe)];
+      residuals.push_back(problem.AddResidualBlock(new Cost(new Residual{focal_share_, seen.uv}),
+                                                   new ceres::CauchyLoss(loss_scale_px),
+                                                   shared.data(), pose.rotation.coeffs().data(),
+                                                   pose.translation.data(), landmark.point.data()));
+    }
+    problem.SetManifold(landmark.point.data(), new ceres::SphereManifold<4>);
   }
-  hold_shared(options.is_free, all);
+  std::size_t begin = 0;
+  for (const std::size_t end : ends_) {
+    for (std::size_t k = begin; k < end; ++k) {
+      double* rotation = poses_[k].rotation.coeffs().data();
+      double* translation = poses_[k].translation.data();
+      if (!problem.HasParameterBlock(translation)) {
+        continue;
+      }
+      problem.SetManifold(rotation, new ceres::EigenQuaternionManifold);
+      if (k == begin) {
+        problem.SetParameterBlockConstant(rotation);
+        problem.SetParameterBlockConstant(translation);
+      } else if (k + 1 == end) {
+        int longest = 0;
+        poses_[k].translation.cwiseAbs().maxCoeff(&longest);
+        problem.SetManifold(translation, new ceres::SubsetManifold(3, {longest}));
+      }
+    }
+    begin = end;
+  }
+  return residuals;
+}
+
+std::vector<double*> JointAdjustment::pose_blocks(const ceres::Problem& problem) {
+  std::vector<double*> blocks;
+  for (Rigid3& pose : poses_) {
+    for (double* block : {pose.rotation.coeffs().data(), pose.translation.data()}) {
+      if (problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block)) {
+        blocks.push_back(block);
+      }
+    }
+  }
+  return blocks;
+}
+
+void JointAdjustment::solve(const SharedMask& is_free,
+                            double loss_scale_px,
+                            const Callback& callback) {
+  ceres::Problem problem;
+  if (build(loss_scale_px, problem).empty()) {
+    return;
+  }
+  hold_shared(is_free, shared.data(), problem);
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (Landmark& landmark : landmarks_) {
+    ordering->AddElementToGroup(landmark.point.data(), 0);  // eliminated first
+  }
+  for (double* block : pose_blocks(problem)) {
+    ordering->AddElementToGroup(block, 1);
+  }
+  ordering->AddElementToGroup(shared.data(), 2);
   StopCallback stop(callback);
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
-  solver.linear_solver_ordering = order(segments_, all);
-  solver.max_num_iterations = options.max_iterations;
+  solver.linear_solver_ordering = ordering;
+  solver.max_num_iterations = kMaxIterations;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
-  solver.function_tolerance = options.tolerance;
+  solver.function_tolerance = kTolerance;
   solver.callbacks.push_back(&stop);
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &all.problem, &summary);
-  if (summary.IsSolutionUsable()) {
-    all.numbers.write_back(segments_, shared_);
+  ceres::Solve(solver, &problem, &summary);
+  for (Rigid3& pose : poses_) {
+    pose.rotation.normalize();
   }
-  return summary.IsSolutionUsable();
 }
 
-double JointAdjustment::error_px(const Segment& segment,
-                                 const Landmark& landmark,
-                                 const Observation& seen) const {
-  const Eigen::Vector3d x = in_keyframe(segment, seen.keyframe, landmark.point);
-  if (!(x.z() > 1e-6)) {
+double JointAdjustment::error_px(const Landmark& landmark, const Observation& seen) const {
+  const Eigen::Vector3d x =
+      in_camera(poses_[static_cast<std::size_t>(seen.keyframe)], landmark.point);
+  if (!(x.z() > kMinDepth)) {
     return std::numeric_limits<double>::infinity();
   }
-  return (project_shared<double>(focal_shares(given_), shared_.data(), x) - seen.uv).norm();
+  return (project_shared<double>(focal_share_, shared.data(), x) - seen.uv).norm();
 }
 
-std::vector<SegmentInformation> JointAdjustment::information(double loss_scale_px) {
-  std::vector<SegmentInformation> result;
-  for (const Segment& segment : segments_) {
-    if (segment.landmarks.empty()) {
-      continue;
+std::vector<double> JointAdjustment::errors_px() const {
+  std::vector<double> errors;
+  for (const Landmark& landmark : landmarks_) {
+    for (const Observation& seen : landmark.observations) {
+      errors.push_back(error_px(landmark, seen));
     }
-    Problem all(std::span(&segment, 1), shared_, loss_scale_px);
-    ceres::Problem::EvaluateOptions evaluation;
-    evaluation.residual_blocks = add_segment(segment, 0, given_, all);
-    for (std::size_t i = 0; i < segment.landmarks.size(); ++i) {
-      evaluation.parameter_blocks.push_back(all.numbers.landmark(0, i));
+  }
+  return errors;
+}
+
+void JointAdjustment::reject_outliers(double bound_px) {
+  for (Landmark& landmark : landmarks_) {
+    std::erase_if(landmark.observations,
+                  [&](const Observation& seen) { return !(error_px(landmark, seen) <= bound_px); });
+  }
+  std::erase_if(landmarks_, [](const Landmark& landmark) {
+    return landmark.observations.size() < kMinObservations;
+  });
+}
+
+SharedInformation JointAdjustment::information(double loss_scale_px) {
+  ceres::Problem problem;
+  ceres::Problem::EvaluateOptions evaluation;
+  evaluation.residual_blocks = build(loss_scale_px, problem);
+  for (Landmark& landmark : landmarks_) {
+    evaluation.parameter_blocks.push_back(landmark.point.data());
+  }
+  const std::vector<double*> poses = pose_blocks(problem);
+  evaluation.parameter_blocks.insert(evaluation.parameter_blocks.end(), poses.begin(), poses.end());
+  evaluation.parameter_blocks.push_back(shared.data());
+  std::vector<double> residuals;
+  ceres::CRSMatrix rows;
+  SharedInformation result;
+  if (landmarks_.empty() || !problem.Evaluate(evaluation, nullptr, &residuals, nullptr, &rows)) {
+    return result;
+  }
+  const Eigen::MatrixXd jacobian = without_the_rest(rows);
+  result.hessian = jacobian.transpose() * jacobian;
+  Eigen::Index row = 0;
+  std::size_t segment = 0;
+  result.gradients.resize(ends_.size(), SharedVector::Zero());
+  for (const Landmark& landmark : landmarks_) {
+    while (static_cast<std::size_t>(landmark.observations.front().keyframe) >= ends_[segment]) {
+      ++segment;
     }
-    for (std::size_t k = 1; k < segment.camera_from_first.size(); ++k) {
-      if (all.problem.HasParameterBlock(all.numbers.translation(0, k))) {
-        evaluation.parameter_blocks.push_back(all.numbers.rotation(0, k));
-        evaluation.parameter_blocks.push_back(all.numbers.translation(0, k));
-      }
-    }
-    evaluation.parameter_blocks.push_back(all.numbers.shared());
-    std::vector<double> residuals;
-    ceres::CRSMatrix jacobian;
-    if (all.problem.Evaluate(evaluation, nullptr, &residuals, nullptr, &jacobian)) {
-      result.push_back(eliminate(segment, residuals, jacobian));
+    for (std::size_t i = 0; i < 2 * landmark.observations.size(); ++i, ++row) {
+      result.gradients[segment] +=
+          residuals[static_cast<std::size_t>(row)] * jacobian.row(row).transpose();
     }
   }
   return result;
+}
+
+double JointAdjustment::turned_rad() const {
+  double sum = 0.0;
+  auto begin = poses_.begin();
+  for (const std::size_t end : ends_) {
+    const auto behind = poses_.begin() + static_cast<std::ptrdiff_t>(end);
+    sum += calibration::turned_rad({begin, behind});
+    begin = behind;
+  }
+  return sum;
 }
 
 }  // namespace stemvo::calibration

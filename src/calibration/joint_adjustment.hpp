@@ -1,62 +1,67 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <functional>
 #include <vector>
 
 #include <Eigen/Core>
+#include <ceres/problem.h>
 
-#include "calibration/segment.hpp"
+#include "calibration/segments.hpp"
 #include "calibration/shared_camera.hpp"
-#include "stemvo/geometry/camera.hpp"
+#include "stemvo/camera.hpp"
 
 namespace stemvo::calibration {
 
-/// Which of the shared numbers are refined.
-using SharedMask = std::array<bool, kNumShared>;
-inline constexpr SharedMask kNothingFree = {false, false, false, false, false};
-inline constexpr SharedMask kAllFree = {true, true, true, true, true};
-
-struct AdjustmentOptions {
-  SharedMask is_free = kAllFree;
-  double loss_scale_px = 0.5;  ///< Cauchy scale on the reprojection error
-  int max_iterations = 30;
-  double tolerance = 1e-6;  ///< relative change of the cost
-};
-
-/// What a segment tells of the shared numbers once poses and landmarks are eliminated.
-struct SegmentInformation {
-  SharedMatrix hessian = SharedMatrix::Zero();  ///< of half the robust cost
-  SharedVector gradient = SharedVector::Zero();
+/// What the drive tells of the shared numbers once poses and landmarks are eliminated.
+struct SharedInformation {
+  Eigen::Matrix<double, kNumShared, kNumShared> hessian;  ///< of half the robust cost
+  std::vector<SharedVector> gradients;                    ///< of each segment's part of it
 };
 
 /// Bundle adjustment of all segments at once: poses, landmarks and the camera they share, robust
-/// reprojection error, Schur complement over the landmarks, one thread. The first keyframe of a
-/// segment and one coordinate of its last one hold the gauge.
+/// reprojection error (Cauchy). The first keyframe of a segment and one coordinate of its last one
+/// hold the gauge.
 class JointAdjustment {
  public:
-  JointAdjustment(std::vector<Segment>& segments, const Camera& given)
-      : segments_(segments), given_(given), shared_(shared_of(given)) {}
+  static constexpr int kMaxIterations = 30;
+
+  JointAdjustment(const std::vector<Segment>& segments, const Camera& given);
 
   /// Called after each iteration; false stops.
   using Callback = std::function<bool()>;
-  /// Moves segments and shared numbers. False: not solvable, or stopped; they stay.
-  bool solve(const AdjustmentOptions& options, const Callback& callback);
+  /// Moves poses, landmarks and the free ones of the shared numbers; all stay where it is stopped
+  /// or not solvable. One thread: same input, same bits.
+  void solve(const SharedMask& is_free, double loss_scale_px, const Callback& callback);
 
-  [[nodiscard]] const SharedVector& shared() const { return shared_; }
-  void set_shared(const SharedVector& shared) { shared_ = shared; }
-  /// Reprojection error of an observation; infinite behind the camera.
-  [[nodiscard]] double error_px(const Segment& segment,
-                                const Landmark& landmark,
-                                const Observation& seen) const;
-  /// Here and now, one per segment.
-  [[nodiscard]] std::vector<SegmentInformation> information(double loss_scale_px);
+  /// Drops observations that are farther off, then landmarks with fewer than three left.
+  void reject_outliers(double bound_px);
+
+  /// Reprojection error of every observation; infinite behind the camera.
+  [[nodiscard]] std::vector<double> errors_px() const;
+  /// Here and now.
+  [[nodiscard]] SharedInformation information(double loss_scale_px);
+
+  [[nodiscard]] std::size_t num_keyframes() const { return poses_.size(); }
+  [[nodiscard]] std::size_t num_landmarks() const { return landmarks_.size(); }
+  [[nodiscard]] double turned_rad() const;
+
+  SharedVector shared;
 
  private:
-  std::vector<Segment>& segments_;
-  Camera given_;
-  SharedVector shared_;
+  /// Residuals in the order of the landmarks, then of their observations.
+  std::vector<ceres::ResidualBlockId> build(double loss_scale_px, ceres::Problem& problem);
+  /// Those of the problem that are not held.
+  std::vector<double*> pose_blocks(const ceres::Problem& problem);
+  [[nodiscard]] double error_px(const Landmark& landmark, const Observation& seen) const;
+
+  // One list for all segments: Ceres eliminates blocks in the order of their addresses, which must
+  // not depend on where segments lie in memory.
+  Eigen::Vector2d focal_share_;
+  std::vector<std::size_t> ends_;    ///< per segment: behind its last keyframe
+  std::vector<Rigid3> poses_;        ///< camera_from_first
+  std::vector<Landmark> landmarks_;  ///< whose observations count the keyframes of all segments
 };
 
 }  // namespace stemvo::calibration

@@ -8,88 +8,82 @@
 namespace stemvo::calibration {
 namespace {
 
-/// Gray values: less is no texture.
-constexpr double kMinDeviation = 3.0;
+constexpr int kHalf = 6;  ///< of the window, pixels
+constexpr int kSide = 2 * kHalf + 1;
+constexpr double kMinDeviation = 3.0;  ///< gray values: less is no texture
+constexpr int kMaxIterations = 20;
+constexpr double kConverged_px = 0.005;
+constexpr double kMaxShift_px = 2.0;  ///< from the start
+constexpr double kMaxRms = 0.35;      ///< of the residual, in standard deviations of the patch
 
-/// Bilinear; false outside.
-bool sample(const cv::Mat& picture, double u, double v, double& value) {
-  if (!(u >= 0.0) || !(v >= 0.0) || !(u < picture.cols - 1) || !(v < picture.rows - 1)) {
-    return false;
-  }
-  const int x = static_cast<int>(u);
-  const int y = static_cast<int>(v);
-  const double a = u - x;
-  const double b = v - y;
-  const unsigned char* top = picture.ptr<unsigned char>(y) + x;
-  const unsigned char* bottom = picture.ptr<unsigned char>(y + 1) + x;
-  value =
-      (1.0 - b) * ((1.0 - a) * top[0] + a * top[1]) + b * ((1.0 - a) * bottom[0] + a * bottom[1]);
-  return true;
-}
-
-/// Values at place + linear * (x, y) over the square of this half width, rows first.
-bool sample_square(const cv::Mat& picture,
-                   const PatchPlace& place,
-                   int half,
-                   Eigen::VectorXd& values) {
+/// Bilinear values at uv + linear * (x, y) over the square of this half width, rows first; false
+/// where it leaves the image.
+bool sample(const cv::Mat& image, const PatchPose& pose, int half, Eigen::VectorXd& values) {
   const int side = 2 * half + 1;
   values.resize(static_cast<Eigen::Index>(side) * side);
   Eigen::Index i = 0;
   for (int y = -half; y <= half; ++y) {
     for (int x = -half; x <= half; ++x, ++i) {
-      const Eigen::Vector2d uv = place.uv + place.linear * Eigen::Vector2d(x, y);
-      if (!sample(picture, uv.x(), uv.y(), values[i])) {
+      const Eigen::Vector2d uv = pose.uv + pose.linear * Eigen::Vector2d(x, y);
+      if (!(uv.x() >= 0.0 && uv.y() >= 0.0 && uv.x() < image.cols - 1 && uv.y() < image.rows - 1)) {
         return false;
       }
+      const int left = static_cast<int>(uv.x());
+      const int above = static_cast<int>(uv.y());
+      const double a = uv.x() - left;
+      const double b = uv.y() - above;
+      const unsigned char* top = image.ptr<unsigned char>(above) + left;
+      const unsigned char* bottom = image.ptr<unsigned char>(above + 1) + left;
+      values[i] = (1.0 - b) * ((1.0 - a) * top[0] + a * top[1]) +
+                  b * ((1.0 - a) * bottom[0] + a * bottom[1]);
     }
   }
   return true;
 }
 
+/// To mean 0 and deviation 1, which takes gain and offset of the image out. The deviation before;
+/// nullopt: no texture.
+std::optional<double> normalize(const Eigen::VectorXd& weights, Eigen::VectorXd& values) {
+  values.array() -= weights.dot(values);
+  const double deviation = std::sqrt((weights.array() * values.array().square()).sum());
+  values /= deviation;
+  return deviation > kMinDeviation ? std::optional(deviation) : std::nullopt;
+}
+
 }  // namespace
 
-std::optional<Patch> Patch::cut(const cv::Mat& picture,
-                                const Eigen::Vector2d& uv,
-                                const PatchOptions& options) {
-  Patch patch(options);
-  const int half = options.half_window;
-  const int side = 2 * half + 1;
+std::optional<Patch> Patch::cut(const cv::Mat& image, const Eigen::Vector2d& uv) {
   Eigen::VectorXd wide;  // one pixel more on each side, for the gradients
-  if (!sample_square(picture, {uv, Eigen::Matrix2d::Identity()}, half + 1, wide)) {
+  if (!sample(image, {uv, Eigen::Matrix2d::Identity()}, kHalf + 1, wide)) {
     return std::nullopt;
   }
-  const auto at = [&](int x, int y) { return wide[(y + half + 1) * (side + 2) + x + half + 1]; };
-  const Eigen::Index num_pixels = static_cast<Eigen::Index>(side) * side;
-  patch.values_.resize(num_pixels);
-  patch.weights_.resize(num_pixels);
-  patch.steepest_.resize(num_pixels, kNumParameters);
-  const double sigma = 0.6 * half;
-  Eigen::Index i = 0;
-  for (int y = -half; y <= half; ++y) {
-    for (int x = -half; x <= half; ++x, ++i) {
+  const auto at = [&](int x, int y) { return wide[(y + kHalf + 1) * (kSide + 2) + x + kHalf + 1]; };
+  Patch patch;
+  patch.values_.resize(kSide * kSide);
+  patch.weights_.resize(kSide * kSide);
+  patch.steepest_.resize(kSide * kSide, kNumParameters);
+  constexpr double kSigma = 0.6 * kHalf;
+  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
+    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
       patch.values_[i] = at(x, y);
-      patch.weights_[i] = std::exp(-0.5 * (x * x + y * y) / (sigma * sigma));
+      patch.weights_[i] = std::exp(-0.5 * (x * x + y * y) / (kSigma * kSigma));
     }
   }
   patch.weights_ /= patch.weights_.sum();
-  const double mean = patch.weights_.dot(patch.values_);
-  patch.values_.array() -= mean;
-  const double deviation =
-      std::sqrt((patch.weights_.array() * patch.values_.array().square()).sum());
-  if (!(deviation > kMinDeviation)) {
+  const std::optional<double> deviation = normalize(patch.weights_, patch.values_);
+  if (!deviation) {
     return std::nullopt;
   }
-  patch.values_ /= deviation;
-  i = 0;
-  for (int y = -half; y <= half; ++y) {
-    for (int x = -half; x <= half; ++x, ++i) {
-      const double gx = 0.5 * (at(x + 1, y) - at(x - 1, y)) / deviation;
-      const double gy = 0.5 * (at(x, y + 1) - at(x, y - 1)) / deviation;
+  for (int y = -kHalf, i = 0; y <= kHalf; ++y) {
+    for (int x = -kHalf; x <= kHalf; ++x, ++i) {
+      const double gx = 0.5 * (at(x + 1, y) - at(x - 1, y)) / *deviation;
+      const double gy = 0.5 * (at(x, y + 1) - at(x, y - 1)) / *deviation;
       patch.steepest_.row(i) << gx * x, gx * y, gy * x, gy * y, gx, gy, patch.values_[i], 1.0;
     }
   }
-  const Normal normal = patch.steepest_.transpose() * patch.weights_.asDiagonal() * patch.steepest_;
-  const Eigen::FullPivLU<Normal> factors(normal);
+  const decltype(inverse_) normal =
+      patch.steepest_.transpose() * patch.weights_.asDiagonal() * patch.steepest_;
+  const Eigen::FullPivLU<decltype(inverse_)> factors(normal);
   if (!factors.isInvertible()) {
     return std::nullopt;
   }
@@ -98,23 +92,17 @@ std::optional<Patch> Patch::cut(const cv::Mat& picture,
   return patch;
 }
 
-std::optional<PatchPlace> Patch::find(const cv::Mat& picture, const PatchPlace& start) const {
-  PatchPlace place = start;
+std::optional<PatchPose> Patch::find(const cv::Mat& image, const PatchPose& start) const {
+  PatchPose pose = start;
   Eigen::VectorXd seen;
-  for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
-    if (!sample_square(picture, place, options_.half_window, seen)) {
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    if (!sample(image, pose, kHalf, seen) || !normalize(weights_, seen)) {
       return std::nullopt;
     }
-    // Gain and offset of the picture are taken out, so that both have mean 0 and deviation 1.
-    seen.array() -= weights_.dot(seen);
-    const double deviation = std::sqrt((weights_.array() * seen.array().square()).sum());
-    if (!(deviation > kMinDeviation)) {
-      return std::nullopt;
-    }
-    const Eigen::VectorXd residual = seen / deviation - values_;
+    const Eigen::VectorXd residual = seen - values_;
     const Eigen::Matrix<double, kNumParameters, 1> step =
         inverse_ * (steepest_.transpose() * residual);
-    // The patch moved by the step looks like the picture: the map goes on by its inverse.
+    // The patch moved by the step looks like the image: the map goes on by its inverse.
     Eigen::Matrix2d linear;
     linear << 1.0 + step[0], step[1], step[2], 1.0 + step[3];
     if (!(std::abs(linear.determinant()) > 0.1)) {
@@ -122,14 +110,14 @@ std::optional<PatchPlace> Patch::find(const cv::Mat& picture, const PatchPlace& 
     }
     const Eigen::Matrix2d back = linear.inverse();
     const Eigen::Vector2d shift = -back * step.segment<2>(4);
-    place.uv += place.linear * shift;
-    place.linear = place.linear * back;
-    if (!((place.uv - start.uv).norm() <= options_.max_shift_px)) {
+    pose.uv += pose.linear * shift;
+    pose.linear = pose.linear * back;
+    if (!((pose.uv - start.uv).norm() <= kMaxShift_px)) {
       return std::nullopt;
     }
-    if (shift.norm() < options_.converged_px) {
+    if (shift.norm() < kConverged_px) {
       const double rms = std::sqrt((weights_.array() * residual.array().square()).sum());
-      return rms <= options_.max_rms ? std::optional(place) : std::nullopt;
+      return rms <= kMaxRms ? std::optional(pose) : std::nullopt;
     }
   }
   return std::nullopt;

@@ -3,199 +3,213 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <limits>
 
-#include "calibration/information.hpp"
+#include <Eigen/Dense>
+
+#include "calibration/joint_adjustment.hpp"
+#include "geometry/degrees.hpp"
+#include "geometry/median.hpp"
 
 namespace stemvo::calibration {
 namespace {
 
+constexpr int kNumRounds = 3;          ///< of solving and rejecting with a free camera
+constexpr double kOutlierBound = 4.0;  ///< reprojection error, robust deviations per coordinate
+constexpr double kLossScale = 3.0;     ///< of the Cauchy loss, likewise
+constexpr double kMinLoss_px = 0.05;
+constexpr double kMaxFocalDeviation = 0.005;  ///< relative: more is not determined
+constexpr double kMaxCenterDeviation_px = 2.0;
 /// Median length of a vector of two normal numbers of deviation 1: sqrt(2 ln 2).
 constexpr double kMedianOfRayleigh = 1.1774100;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Of the free numbers; infinite where the information is singular. The larger of two: the inverse
+/// information times the variance of the residuals, and the cluster-robust one (Liang and Zeger,
+/// Biometrika 1986) with segments as clusters, which also sees errors that the tracks of a segment
+/// share.
+Eigen::VectorXd standard_deviations(const SharedInformation& information,
+                                    const std::vector<int>& free,
+                                    double residual_variance_px2) {
+  const auto n = static_cast<Eigen::Index>(free.size());
+  const Eigen::MatrixXd hessian = information.hessian(free, free);
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(n, n);
+  for (const SharedVector& all : information.gradients) {
+    const Eigen::VectorXd gradient = all(free);
+    scatter += gradient * gradient.transpose();
+  }
+  // The numbers differ in size: they are brought to unit information before the test of rank.
+  const Eigen::VectorXd unit = hessian.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::FullPivLU<Eigen::MatrixXd> factors(unit.asDiagonal() * hessian * unit.asDiagonal());
+  if (!unit.allFinite() || !hessian.allFinite() || !factors.isInvertible()) {
+    return Eigen::VectorXd::Constant(n, kInfinity);
+  }
+  const Eigen::MatrixXd inverse = unit.asDiagonal() * factors.inverse() * unit.asDiagonal();
+  const auto num_segments = static_cast<double>(information.gradients.size());
+  const double few = num_segments / std::max(1.0, num_segments - static_cast<double>(n));
+  const Eigen::MatrixXd clustered = few * inverse * scatter * inverse;
+  const Eigen::VectorXd simple = residual_variance_px2 * inverse.diagonal();
+  const Eigen::VectorXd robust = clustered.diagonal();
+  return simple.cwiseMax(robust).cwiseMax(0.0).cwiseSqrt();
+}
 
 class Refinement {
  public:
-  Refinement(std::vector<Segment>& segments,
+  Refinement(const std::vector<Segment>& segments,
              const Camera& given,
-             const RefinementOptions& options,
              const std::function<bool(std::size_t, std::size_t)>& on_step)
-      : segments_(segments),
-        given_(given),
-        options_(options),
-        on_step_(on_step),
-        adjustment_(segments, given) {}
+      : on_step_(on_step), adjustment_(segments, given) {
+    report_.given = given;
+    const std::array<const char*, kNumShared> names = {"focal length", "principal point x",
+                                                       "principal point y", "k1", "k2"};
+    const std::array<double, kNumShared> max_deviation = {
+        given.mean_focal_px() * kMaxFocalDeviation, kMaxCenterDeviation_px, kMaxCenterDeviation_px,
+        kInfinity, kInfinity};
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      report_.parameters[i] = {
+          names[i], adjustment_.shared[static_cast<int>(i)], 0.0, 0.0, max_deviation[i], true};
+    }
+  }
 
-  RefinedCamera run() {
-    adjust(kNothingFree);
-    for (int round = 0; round < options_.num_rounds && !stopped_; ++round) {
-      reject_outliers();
-      adjust(is_free_);
+  CalibrationReport run() {
+    adjust({});
+    for (int round = 0; round < kNumRounds && !report_.interrupted; ++round) {
+      adjustment_.reject_outliers(kOutlierBound * sigma_px_);
+      adjust(free_mask());
     }
-    while (!stopped_ && hold_worst()) {
-      adjust(is_free_);
+    while (!report_.interrupted && hold_worst()) {
+      adjust(free_mask());
     }
-    RefinedCamera result;
-    result.shared = adjustment_.shared();
-    result.deviation = deviation_;
-    result.is_determined = is_free_;
-    result.refined_error_px = root_mean_square_px(segments_, adjustment_);
-    result.given_error_px = stopped_ ? 0.0 : given_error_px();
-    result.stopped = stopped_;
-    if (on_step_ && !stopped_) {
+    for (int i = 0; i < kNumShared; ++i) {
+      parameter(i).refined = adjustment_.shared[i];
+    }
+    report_.refined = with_shared(report_.given, adjustment_.shared);
+    report_.num_landmarks = adjustment_.num_landmarks();
+    report_.num_observations = adjustment_.errors_px().size();
+    report_.turned_deg = kDegPerRad * adjustment_.turned_rad();
+    report_.refined_error_px = root_mean_square_px();
+    if (!report_.interrupted) {
+      // Same observations; poses and landmarks as good as the given camera lets them be.
+      adjustment_.shared = shared_of(report_.given);
+      adjust({});
+      report_.given_error_px = root_mean_square_px();
+    }
+    if (on_step_ && !report_.interrupted) {
       on_step_(num_steps_, num_steps_);
     }
-    return result;
+    return std::move(report_);
   }
 
  private:
-  AdjustmentOptions adjustment(const SharedMask& is_free) const {
-    AdjustmentOptions result;
-    result.is_free = is_free;
-    result.loss_scale_px = std::max(options_.min_loss_px, options_.loss_scale * sigma_px_);
-    return result;
+  CalibratedParameter& parameter(int i) { return report_.parameters[static_cast<std::size_t>(i)]; }
+
+  SharedMask free_mask() const {
+    SharedMask is_free;
+    std::transform(report_.parameters.begin(), report_.parameters.end(), is_free.begin(),
+                   [](const CalibratedParameter& parameter) { return parameter.is_determined; });
+    return is_free;
   }
+
+  double loss_scale_px() const { return std::max(kMinLoss_px, kLossScale * sigma_px_); }
 
   bool step() {
     ++num_steps_;
     // Solves to come are not known beforehand: a bound that is never reached before the end.
-    const auto bound = static_cast<std::size_t>((options_.num_rounds + 2) *
-                                                (AdjustmentOptions().max_iterations + 1));
-    stopped_ = stopped_ || (on_step_ && !on_step_(num_steps_, std::max(bound, num_steps_ + 1)));
-    return !stopped_;
+    constexpr std::size_t kBound = (kNumRounds + 2) * (JointAdjustment::kMaxIterations + 1);
+    report_.interrupted = report_.interrupted ||
+                          (on_step_ && !on_step_(num_steps_, std::max(kBound, num_steps_ + 1)));
+    return !report_.interrupted;
   }
 
+  /// Then measures the noise per coordinate: outliers do not move the median.
   void adjust(const SharedMask& is_free) {
-    adjustment_.solve(adjustment(is_free), [this] { return step(); });
-    measure_noise();
-  }
-
-  /// Robust deviation per coordinate: outliers do not move the median.
-  void measure_noise() {
-    std::vector<double> errors;
-    for (const Segment& segment : segments_) {
-      for (const Landmark& landmark : segment.landmarks) {
-        for (const Observation& seen : landmark.observations) {
-          errors.push_back(adjustment_.error_px(segment, landmark, seen));
-        }
-      }
-    }
-    if (!errors.empty()) {
-      const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-      std::nth_element(errors.begin(), middle, errors.end());
-      sigma_px_ = *middle / kMedianOfRayleigh;
-    }
-  }
-
-  void reject_outliers() {
-    const double bound_px = options_.outlier_bound * sigma_px_;
-    for (Segment& segment : segments_) {
-      for (Landmark& landmark : segment.landmarks) {
-        std::erase_if(landmark.observations, [&](const Observation& seen) {
-          return !(adjustment_.error_px(segment, landmark, seen) <= bound_px);
-        });
-      }
-      std::erase_if(segment.landmarks, [&](const Landmark& landmark) {
-        return static_cast<int>(landmark.observations.size()) < options_.min_observations;
-      });
-    }
+    adjustment_.solve(is_free, loss_scale_px(), [this] { return step(); });
+    sigma_px_ = median(adjustment_.errors_px()) / kMedianOfRayleigh;
   }
 
   /// Of the residuals under the loss, per degree of freedom.
-  double residual_variance_px2(double loss_px) const {
+  double residual_variance_px2() const {
+    const double loss_px = loss_scale_px();
+    const std::vector<double> errors = adjustment_.errors_px();
     double sum = 0.0;
-    double freedom = 0.0;
-    for (const Segment& segment : segments_) {
-      freedom -= 6.0 * static_cast<double>(segment.camera_from_first.size());
-      for (const Landmark& landmark : segment.landmarks) {
-        freedom += 2.0 * static_cast<double>(landmark.observations.size()) - 3.0;
-        for (const Observation& seen : landmark.observations) {
-          const double error = adjustment_.error_px(segment, landmark, seen) / loss_px;
-          sum += loss_px * loss_px * std::log1p(error * error);
-        }
-      }
+    for (const double error : errors) {
+      const double scaled = error / loss_px;
+      sum += loss_px * loss_px * std::log1p(scaled * scaled);
     }
+    const double freedom = 2.0 * static_cast<double>(errors.size()) -
+                           3.0 * static_cast<double>(adjustment_.num_landmarks()) -
+                           6.0 * static_cast<double>(adjustment_.num_keyframes());
     return sum / std::max(1.0, freedom);
   }
 
-  /// Deviation over its bound; above 1 the number is not determined.
-  double excess(int i) const {
-    const auto at = static_cast<std::size_t>(i);
-    const double unit = i == 0 ? given_.mean_focal_px() : 1.0;
-    return deviation_[i] / (options_.max_deviation[at] * unit);
+  void measure_deviations() {
+    std::vector<int> free;
+    for (int i = 0; i < kNumShared; ++i) {
+      if (parameter(i).is_determined) {
+        free.push_back(i);
+      }
+    }
+    if (free.empty()) {
+      return;
+    }
+    const Eigen::VectorXd deviations = standard_deviations(adjustment_.information(loss_scale_px()),
+                                                           free, residual_variance_px2());
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      parameter(free[i]).deviation = deviations[static_cast<Eigen::Index>(i)];
+    }
   }
 
   /// Puts the number that is determined least back to what was given; false: all are determined.
   bool hold_worst() {
-    const double loss_px = adjustment(is_free_).loss_scale_px;
-    const SharedVector deviation = standard_deviations(adjustment_.information(loss_px), is_free_,
-                                                       residual_variance_px2(loss_px));
-    std::optional<int> worst;
-    for (int i = 0; i < kNumShared; ++i) {
-      if (!is_free_[static_cast<std::size_t>(i)]) {
-        continue;
-      }
-      deviation_[i] = deviation[i];
-      if (i < kNumIntrinsics && !(excess(i) <= 1.0) && (!worst || excess(i) > excess(*worst))) {
-        worst = i;
+    measure_deviations();
+    const auto excess = [](const CalibratedParameter& number) {
+      return number.deviation / number.max_deviation;
+    };
+    CalibratedParameter* worst = nullptr;
+    for (int i = 0; i < kNumIntrinsics; ++i) {
+      CalibratedParameter& number = parameter(i);
+      if (number.is_determined && !(excess(number) <= 1.0) &&
+          (worst == nullptr || excess(number) > excess(*worst))) {
+        worst = &number;
       }
     }
-    if (!worst) {
+    if (worst == nullptr) {
       return false;
     }
-    is_free_[static_cast<std::size_t>(*worst)] = false;
-    SharedVector shared = adjustment_.shared();
-    shared[*worst] = shared_of(given_)[*worst];
-    if (!is_free_[0]) {  // without a focal length nothing is known of what bends it
-      is_free_[3] = is_free_[4] = false;
-      shared[3] = shared[4] = 0.0;
+    worst->is_determined = false;
+    if (!parameter(0).is_determined) {  // without a focal length nothing is known of what bends it
+      parameter(3).is_determined = parameter(4).is_determined = false;
     }
-    adjustment_.set_shared(shared);
+    for (int i = 0; i < kNumShared; ++i) {
+      if (!parameter(i).is_determined) {
+        adjustment_.shared[i] = parameter(i).given;
+      }
+    }
     return true;
   }
 
-  static double root_mean_square_px(const std::vector<Segment>& segments,
-                                    const JointAdjustment& adjustment) {
+  double root_mean_square_px() const {
+    const std::vector<double> errors = adjustment_.errors_px();
     double sum = 0.0;
-    std::size_t count = 0;
-    for (const Segment& segment : segments) {
-      for (const Landmark& landmark : segment.landmarks) {
-        for (const Observation& seen : landmark.observations) {
-          const double error = adjustment.error_px(segment, landmark, seen);
-          sum += error * error;
-          count += 2;
-        }
-      }
+    for (const double error : errors) {
+      sum += error * error;
     }
-    return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
+    return std::sqrt(sum / std::max(1.0, 2.0 * static_cast<double>(errors.size())));
   }
 
-  /// Same observations; poses and landmarks as good as the given camera lets them be.
-  double given_error_px() {
-    std::vector<Segment> segments = segments_;
-    JointAdjustment with_given(segments, given_);
-    with_given.solve(adjustment(kNothingFree), [this] { return step(); });
-    return root_mean_square_px(segments, with_given);
-  }
-
-  std::vector<Segment>& segments_;
-  Camera given_;
-  RefinementOptions options_;
   const std::function<bool(std::size_t, std::size_t)>& on_step_;
   JointAdjustment adjustment_;
-  SharedMask is_free_ = kAllFree;
-  SharedVector deviation_ = SharedVector::Zero();
+  CalibrationReport report_;
   double sigma_px_ = 0.2;
   std::size_t num_steps_ = 0;
-  bool stopped_ = false;
 };
 
 }  // namespace
 
-RefinedCamera refine_camera(std::vector<Segment>& segments,
-                            const Camera& given,
-                            const RefinementOptions& options,
-                            const std::function<bool(std::size_t, std::size_t)>& on_step) {
-  return Refinement(segments, given, options, on_step).run();
+CalibrationReport refine_camera(const std::vector<Segment>& segments,
+                                const Camera& given,
+                                const std::function<bool(std::size_t, std::size_t)>& on_step) {
+  return Refinement(segments, given, on_step).run();
 }
 
 }  // namespace stemvo::calibration

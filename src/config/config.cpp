@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/config.hpp"
+#include "config/config.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -10,14 +10,36 @@
 
 #include <fmt/format.h>
 
-#include "config/config_fields.hpp"
-#include "config/config_text.hpp"
 #include "config/config_yaml.hpp"
 
 namespace stemvo {
 namespace {
 
-constexpr int kWideFrame_px = 1000;
+using options::Field;
+
+/// Those of the library, and the program's own before and after them.
+std::vector<Field> fields_of(Config& config) {
+  options::Rule cameras;
+  cameras.choices = {"auto", "image_0", "image_1", "image_2", "image_3"};
+  options::Rule positive;
+  positive.min = 0.0;
+  positive.exclusive_min = true;
+  std::vector<Field> fields = options::fields_of(config);
+  fields.insert(
+      fields.begin(),
+      {"input",
+       "camera",
+       &config.input.camera,
+       {.choices = {"auto", "image_0", "image_1", "image_2", "image_3"}},
+       "folder of the sequence to read; auto: image_2 (colour) where present, else image_0 "
+       "(gray)"});
+  fields.insert(
+      fields.end() - 1,  // the seed is last
+      {"evaluation", "segment_lengths_m", &config.evaluation.segment_lengths_m, positive,
+       "of t_rel and r_rel; []: 100, 200, .. 800, or 10, 20, .. 50 where the path is under "
+       "100 m"});
+  return fields;
+}
 
 Expected<std::string> read_text(const std::filesystem::path& file) {
   std::error_code error;
@@ -39,10 +61,10 @@ Expected<YAML::Node> read_yaml(const std::filesystem::path& file) {
 
 /// A list is written as in the file; anything else is taken as it stands, so that a path may hold
 /// any character.
-std::string read_assigned(const std::string& text, const config::Field& field) {
+std::string read_assigned(const std::string& text, const Field& field) {
   if (!std::holds_alternative<std::vector<double>*>(field.value)) {
     const std::string problem = config::parse_scalar(field, text);
-    return problem.empty() ? config::violation_of(field) : problem;
+    return problem.empty() ? options::violation_of(field) : problem;
   }
   const Expected<YAML::Node> value = config::parse_document(text, "value");
   return value ? config::read_value(*value, field) : value.error().message;
@@ -56,7 +78,7 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
     return root.error();
   }
   Config result = base;
-  std::vector<config::Field> fields = config::fields_of(result);
+  std::vector<Field> fields = fields_of(result);
   if (Status status = config::read_document(*root, file.string(), fields); !status) {
     return status.error();
   }
@@ -70,7 +92,7 @@ Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& f
   }
   Config config;
   std::vector<std::string> keys;
-  for (const config::Field& field : config::fields_of(config)) {
+  for (const Field& field : fields_of(config)) {
     if (config::is_set(*root, field)) {
       keys.push_back(field.name());
     }
@@ -86,14 +108,16 @@ Status apply_override(Config& config, const std::string& assignment) {
   const std::string name = assignment.substr(0, equals);
   const std::string source = "--set " + name;
   Config changed = config;
-  const std::vector<config::Field> fields = config::fields_of(changed);
+  const std::vector<Field> fields = fields_of(changed);
   const auto field = std::find_if(fields.begin(), fields.end(),
-                                  [&name](const config::Field& f) { return f.name() == name; });
+                                  [&name](const Field& f) { return f.name() == name; });
   if (field == fields.end()) {
     const std::string section = name.substr(0, name.find('.'));
     const bool is_section = std::any_of(fields.begin(), fields.end(),
                                         [&](const auto& f) { return f.section == section; });
-    return fail(source + ": " + config::unknown_key(is_section ? section : "", fields));
+    return fail(
+        source + ": " +
+        config::unknown_key(is_section ? section : "", name.substr(name.find('.') + 1), fields));
   }
   const std::string problem = read_assigned(assignment.substr(equals + 1), *field);
   if (!problem.empty()) {
@@ -105,24 +129,19 @@ Status apply_override(Config& config, const std::string& assignment) {
 
 Status validate(const Config& config) {
   Config copy = config;
-  for (const config::Field& field : config::fields_of(copy)) {
-    if (const std::string problem = config::violation_of(field); !problem.empty()) {
+  for (const Field& field : fields_of(copy)) {
+    if (const std::string problem = options::violation_of(field); !problem.empty()) {
       return fail(field.name() + ": " + problem);
     }
   }
-  if (!(config.stem.stretch_low_percent < config.stem.stretch_high_percent)) {
-    return fail(fmt::format(
-        "stem.stretch_low_percent: expected less than stem.stretch_high_percent ({}), found {}",
-        config.stem.stretch_high_percent, config.stem.stretch_low_percent));
-  }
-  return {};
+  return validate(static_cast<const Options&>(config));
 }
 
 std::string dump_config(const Config& config) {
   Config copy = config;
   std::string text;
   std::string_view section;
-  for (const config::Field& field : config::fields_of(copy)) {
+  for (const Field& field : fields_of(copy)) {
     if (field.section != section) {
       section = field.section;
       text += section.empty() ? "\n" : fmt::format("{}{}:\n", text.empty() ? "" : "\n", section);
@@ -132,14 +151,6 @@ std::string dump_config(const Config& config) {
                         config::format_value(field));
   }
   return text;
-}
-
-Config with_chosen_upsample(Config config, int width_px) {
-  if (config.stem.upsample == "auto") {
-    config.stem.upsample =
-        config.features.method == "klt" && width_px >= kWideFrame_px ? "half" : "bicubic";
-  }
-  return config;
 }
 
 }  // namespace stemvo

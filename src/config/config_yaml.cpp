@@ -2,15 +2,73 @@
 #include "config/config_yaml.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "config/config_text.hpp"
-
 namespace stemvo::config {
 namespace {
+
+/// Whole text or nothing; a leading '+' is allowed as in YAML.
+template <typename Number>
+bool parse_decimal(std::string_view text, Number& value) {
+  if (text.size() > 1 && text.front() == '+' && text[1] != '-') {
+    text.remove_prefix(1);
+  }
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stop == end;
+}
+
+std::string expected(std::string_view kind, std::string_view text) {
+  return fmt::format("expected {}, found {}", kind, quote(text));
+}
+
+/// Shortest text that reads back to the same double, and reads as a number with a point.
+std::string format_number(double value) {
+  std::string text = fmt::format("{}", value);
+  if (text.find_first_not_of("-0123456789") == std::string::npos) {
+    text += ".0";
+  }
+  return text;
+}
+
+std::string format_text(const std::string& value) {
+  const std::string plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-";
+  const bool is_plain = value.find_first_not_of(plain) == std::string::npos;
+  const bool is_word = !value.empty() && value.front() != '-';
+  const bool is_null = YAML::IsNullString(value);
+  YAML::Emitter out;
+  if (is_plain && is_word && !is_null) {
+    out << value;
+  } else {
+    out << YAML::DoubleQuoted << value;
+  }
+  return out.c_str();
+}
+
+std::string format_list(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) {
+    text += (text.empty() ? "" : ", ") + format_number(value);
+  }
+  return "[" + text + "]";
+}
+
+std::string parse_number(std::string_view text, double& value) {
+  return parse_decimal(text, value) ? std::string() : expected("a number", text);
+}
+
+std::string parse_choice(const Rule& rule, const EnumValue& value, std::string_view text) {
+  const auto found = std::find(rule.choices.begin(), rule.choices.end(), text);
+  if (found == rule.choices.end()) {
+    return not_a_choice(rule, text);
+  }
+  value.set(value.target, static_cast<int>(found - rule.choices.begin()));
+  return {};
+}
 
 int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
 
@@ -97,7 +155,7 @@ class MapReader {
     }
     const Field* field = find_field(section, key, fields_);
     const std::string problem =
-        field == nullptr ? unknown_key(section, fields_) : read_value(value, *field);
+        field == nullptr ? unknown_key(section, key, fields_) : read_value(value, *field);
     if (!problem.empty()) {
       return error(key_node, fmt::format("{}: {}", full_name(section, quoted_key(key)), problem));
     }
@@ -122,7 +180,63 @@ class MapReader {
 
 }  // namespace
 
-std::string unknown_key(std::string_view section, const std::vector<Field>& fields) {
+std::string parse_scalar(const Field& field, std::string_view text) {
+  return std::visit(
+      [&](auto value) -> std::string {
+        using Value = std::remove_pointer_t<decltype(value)>;
+        if constexpr (std::is_same_v<Value, EnumValue>) {
+          return parse_choice(field.rule, value, text);
+        } else if constexpr (std::is_same_v<Value, std::string>) {
+          *value = text;
+          return {};
+        } else if constexpr (std::is_same_v<Value, bool>) {
+          *value = text == "true";
+          return text == "true" || text == "false" ? std::string()
+                                                   : expected("true or false", text);
+        } else if constexpr (std::is_same_v<Value, double>) {
+          return parse_number(text, *value);
+        } else if constexpr (std::is_same_v<Value, int>) {
+          return parse_decimal(text, *value) ? std::string() : expected("a whole number", text);
+        } else if constexpr (std::is_same_v<Value, std::uint64_t>) {
+          return parse_decimal(text, *value) ? std::string()
+                                             : expected("a whole number of at least 0", text);
+        } else {
+          return expected("a list of numbers like [100, 200]", text);
+        }
+      },
+      field.value);
+}
+
+std::string format_value(const Field& field) {
+  return std::visit(
+      [&](auto value) -> std::string {
+        using Value = std::remove_pointer_t<decltype(value)>;
+        if constexpr (std::is_same_v<Value, EnumValue>) {
+          return std::string(
+              field.rule.choices.at(static_cast<std::size_t>(value.get(value.target))));
+        } else if constexpr (std::is_same_v<Value, std::string>) {
+          return format_text(*value);
+        } else if constexpr (std::is_same_v<Value, double>) {
+          return format_number(*value);
+        } else if constexpr (std::is_same_v<Value, std::vector<double>>) {
+          return format_list(*value);
+        } else {
+          return fmt::format("{}", *value);
+        }
+      },
+      field.value);
+}
+
+std::string unknown_key(std::string_view section,
+                        std::string_view key,
+                        const std::vector<Field>& fields) {
+  static const std::map<std::string, std::string_view> kRenamed = {
+      {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
+      {"scale.joining", "scale.temporal_filter"}};
+  if (const auto renamed = kRenamed.find(fmt::format("{}.{}", section, key));
+      renamed != kRenamed.end()) {
+    return fmt::format("unknown key; its name is {} now", renamed->second);
+  }
   std::vector<std::string_view> known;
   for (const Field& field : fields) {
     const bool is_top = section.empty();

@@ -7,10 +7,12 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "config/config_fields.hpp"
+#include "options/option_fields.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::config {
+
+using namespace options;  // NOLINT: the fields are read and written here
 
 /// The one document of a YAML text. Errors "<source>:<line>: ...": not YAML, several documents.
 [[nodiscard]] Expected<YAML::Node> parse_document(const std::string& text, std::string_view source);
@@ -28,6 +30,15 @@ namespace stemvo::config {
 [[nodiscard]] bool is_set(const YAML::Node& root, const Field& field);
 
 /// "unknown key; known keys of stem: model, filter, ..."
-[[nodiscard]] std::string unknown_key(std::string_view section, const std::vector<Field>& fields);
+[[nodiscard]] std::string unknown_key(std::string_view section,
+                                      std::string_view key,
+                                      const std::vector<Field>& fields);
+
+/// Reads one scalar into a field that is no list. Decimal numbers only ("010" is ten). Returns
+/// nothing, or "expected ..., found ...".
+[[nodiscard]] std::string parse_scalar(const Field& field, std::string_view text);
+
+/// YAML of the value, exact: numbers read back to the same bits.
+[[nodiscard]] std::string format_value(const Field& field);
 
 }  // namespace stemvo::config

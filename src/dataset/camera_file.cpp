@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include "config/config_text.hpp"
 #include "config/config_yaml.hpp"
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
@@ -21,270 +18,188 @@
 namespace stemvo::dataset {
 namespace {
 
-constexpr double kMaxSide_px = 32767;  // what OpenCV's maps hold
-constexpr double kMaxRate_hz = 1e5;
+/// What the keys say; as here where they are absent.
+struct Values {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<double> resolution;
+  std::string camera_model;
+  std::vector<double> intrinsics;
+  std::string distortion_model;
+  std::vector<double> distortion_coefficients;
+  double rate_hz = 0.0;
+  double camera_height_m = 0.0;
 
-/// OpenCV writes "%YAML:1.0", which is not YAML: read as a comment.
-std::string without_opencv_directive(std::string text) {
-  if (text.starts_with("%YAML:")) {
-    text.front() = '#';
+  std::vector<options::Field> fields() {
+    const auto between = [](double min, double max) {
+      options::Rule rule;
+      rule.min = min;
+      rule.max = max;
+      return rule;
+    };
+    options::Rule model;
+    model.choices = {"pinhole"};
+    options::Rule distortion;
+    distortion.choices = {"none", "radial-tangential", "radtan", "equidistant"};
+    const options::Rule side = between(1.0, 32767.0);  // what OpenCV's maps hold
+    return {{"", "image_width", &width_px, side, ""},
+            {"", "image_height", &height_px, side, ""},
+            {"", "resolution", &resolution, side, ""},
+            {"", "camera_model", &camera_model, model, ""},
+            {"", "intrinsics", &intrinsics, {}, ""},
+            {"", "distortion_model", &distortion_model, distortion, ""},
+            {"", "distortion_coefficients", &distortion_coefficients, {}, ""},
+            {"", "rate_hz", &rate_hz, between(1e-9, 1e5), ""},
+            {"", "camera_height", &camera_height_m, between(1e-9, 1000.0), ""}};
   }
-  return text;
-}
+};
 
-/// The values of a file by their keys; errors name file and line.
-class Keys {
+class Reader {
  public:
-  static Expected<Keys> read(const std::filesystem::path& file) {
-    std::error_code ignored;
-    if (!std::filesystem::exists(file, ignored)) {
-      return fail(fmt::format("{}: expected a camera file, found nothing", file.string()));
+  explicit Reader(const std::filesystem::path& file) : file_(file) {}
+
+  Expected<CameraFile> read() {
+    CameraFile result;
+    Status status = read_values();
+    status = status ? set_size(result.lens.camera) : status;
+    status = status ? set_intrinsics(result.lens.camera) : status;
+    status = status ? set_distortion(result.lens) : status;
+    if (!status) {
+      return status.error();
     }
-    const Expected<std::string> text = read_text_file(file);
+    const auto if_given = [](double value) {
+      return value > 0.0 ? std::optional(value) : std::nullopt;
+    };
+    result.rate_hz = if_given(values_.rate_hz);
+    result.camera_height_m = if_given(values_.camera_height_m);
+    return result;
+  }
+
+ private:
+  Status read_values() {
+    Expected<std::string> text = read_text_file(file_);
     if (!text) {
       return text.error();
     }
-    const Expected<YAML::Node> root =
-        config::parse_document(without_opencv_directive(*text), file.string());
+    if (text->starts_with("%YAML:")) {
+      text->front() = '#';  // OpenCV writes "%YAML:1.0", which is not YAML: read as a comment
+    }
+    Expected<YAML::Node> root = config::parse_document(*text, file_.string());
     if (!root) {
       return root.error();
     }
-    Keys keys(file);
-    if (!root->IsMap()) {
-      return fail(
-          fmt::format("{}:{}: expected the keys of a camera (image_width, image_height, "
-                      "intrinsics, ..), found none",
-                      file.string(), std::max(root->Mark().line, 0) + 1));
-    }
-    for (const auto& entry : *root) {
-      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-      if (!keys.values_.emplace(key, entry.second).second) {
-        return fail(fmt::format("{}:{}: {}: expected once, found twice", file.string(),
-                                entry.first.Mark().line + 1, config::quote(key)));
+    root_ = *root;
+    for (const char* key : {"sensor_type", "comment", "T_BS"}) {
+      if (root_.IsMap()) {
+        root_.remove(key);
       }
     }
-    return keys;
+    std::vector<options::Field> fields = values_.fields();
+    return config::read_document(root_, file_.string(), fields);
   }
 
-  [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
   [[nodiscard]] Error missing(std::string_view expected) const {
     return fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected));
   }
   /// "<file>:<line>: <key>: <problem>"
   [[nodiscard]] Error refuse(const std::string& key, const std::string& problem) const {
-    return fail(fmt::format("{}: {}", where(key), problem));
+    return fail(fmt::format("{}: {}: {}",
+                            at_line(file_, static_cast<std::size_t>(root_[key].Mark().line) + 1),
+                            key, problem));
+  }
+  /// Whether a list has one of these lengths; `expected` names them.
+  [[nodiscard]] Status check_length(const std::string& key,
+                                    const std::vector<double>& numbers,
+                                    const std::vector<std::size_t>& lengths,
+                                    std::string_view expected) const {
+    const bool may_be_absent = std::count(lengths.begin(), lengths.end(), 0U) != 0;
+    if (!root_.IsMap() || !root_[key]) {
+      return may_be_absent ? Status() : missing(fmt::format("{}: {}", key, expected));
+    }
+    if (std::count(lengths.begin(), lengths.end(), numbers.size()) == 0) {
+      return refuse(key, fmt::format("expected {}, found {} numbers", expected, numbers.size()));
+    }
+    return {};
   }
 
-  [[nodiscard]] Expected<std::string> word(const std::string& key) const {
-    const YAML::Node& value = values_.at(key);
-    if (!value.IsScalar()) {
-      return refuse(key, "expected one word, found a list or nothing");
+  Status set_size(Camera& camera) const {
+    camera.width_px = values_.width_px;
+    camera.height_px = values_.height_px;
+    if ((values_.width_px == 0) != (values_.height_px == 0)) {
+      return fail(fmt::format("{}: expected image_width and image_height, found {} alone",
+                              file_.string(),
+                              values_.width_px == 0 ? "image_height" : "image_width"));
     }
-    return value.Scalar();
-  }
-  [[nodiscard]] Expected<double> number(const std::string& key) const {
-    const YAML::Node& value = values_.at(key);
-    if (!value.IsScalar()) {
-      return refuse(key, "expected a number, found a list or nothing");
+    if (values_.width_px > 0) {
+      return {};
     }
-    return number_of(key, value);
-  }
-  /// Of one of these lengths; `expected` names them.
-  [[nodiscard]] Expected<std::vector<double>> numbers(const std::string& key,
-                                                      const std::vector<std::size_t>& counts,
-                                                      std::string_view expected) const {
-    const YAML::Node& value = values_.at(key);
-    std::vector<double> result;
-    for (const YAML::Node& element : value) {
-      const Expected<double> number = number_of(key, element);
-      if (!number) {
-        return number.error();
+    if (values_.resolution.empty()) {
+      return missing("image_width and image_height, or resolution: [width, height]");
+    }
+    for (const double side : values_.resolution) {
+      if (side != std::floor(side)) {
+        return refuse("resolution", fmt::format("expected whole pixels, found {}", side));
       }
-      result.push_back(*number);
     }
-    if (!value.IsSequence() ||
-        std::find(counts.begin(), counts.end(), result.size()) == counts.end()) {
-      return refuse(key, value.IsSequence()
-                             ? fmt::format("expected {}, found {} numbers", expected, result.size())
-                             : fmt::format("expected {}, found no list", expected));
+    const Status status = check_length("resolution", values_.resolution, {2}, "[width, height]");
+    if (status) {
+      camera.width_px = static_cast<int>(values_.resolution[0]);
+      camera.height_px = static_cast<int>(values_.resolution[1]);
     }
-    return result;
+    return status;
   }
 
- private:
-  explicit Keys(std::filesystem::path file) : file_(std::move(file)) {}
-
-  [[nodiscard]] std::string where(const std::string& key) const {
-    const int line = values_.at(key).Mark().line;  // of the value; -1: nothing stands there
-    return fmt::format("{}{}: {}", file_.string(), line < 0 ? "" : fmt::format(":{}", line + 1),
-                       key);
+  Status set_intrinsics(Camera& camera) const {
+    const std::vector<double>& numbers = values_.intrinsics;
+    if (const Status status = check_length("intrinsics", numbers, {4}, "[fx, fy, cx, cy]");
+        !status) {
+      return status;
+    }
+    camera.fx_px = numbers[0];
+    camera.fy_px = numbers[1];
+    camera.cx_px = numbers[2];
+    camera.cy_px = numbers[3];
+    if (!(camera.fx_px > 0.0) || !(camera.fy_px > 0.0)) {
+      return refuse("intrinsics", fmt::format("expected positive focal lengths, found {} and {}",
+                                              camera.fx_px, camera.fy_px));
+    }
+    const Status status = check_center(camera);
+    return status ? status : refuse("intrinsics", status.error().message);
   }
-  [[nodiscard]] Expected<double> number_of(const std::string& key, const YAML::Node& value) const {
-    return parse_finite(value.IsScalar() ? value.Scalar() : "a list", where(key));
+
+  Status set_distortion(Lens& lens) const {
+    const std::string& model = values_.distortion_model;
+    const std::vector<double>& numbers = values_.distortion_coefficients;
+    if (model.empty()) {
+      return missing("distortion_model: none, radial-tangential or equidistant");
+    }
+    constexpr const char* kKey = "distortion_coefficients";
+    Status status;
+    if (model == "none") {
+      lens.distortion = Distortion::kNone;
+      status = check_length(kKey, numbers, {0}, "[] for distortion_model none");
+    } else if (model == "equidistant") {
+      lens.distortion = Distortion::kEquidistant;
+      status = check_length(kKey, numbers, {4}, "[k1, k2, k3, k4]");
+    } else {
+      lens.distortion = Distortion::kRadialTangential;
+      status = check_length(kKey, numbers, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
+    }
+    if (status) {
+      std::copy(numbers.begin(), numbers.end(), lens.coefficients.begin());
+    }
+    return status;
   }
 
   std::filesystem::path file_;
-  std::map<std::string, YAML::Node> values_;
+  YAML::Node root_;
+  Values values_;
 };
-
-Status read_size(const Keys& keys, Camera& camera) {
-  const auto check = [&](const std::string& key, double found) -> Expected<int> {
-    if (!(found >= 1.0 && found <= kMaxSide_px && found == std::floor(found))) {
-      return keys.refuse(
-          key, fmt::format("expected whole pixels from 1 to {}, found {}", kMaxSide_px, found));
-    }
-    return static_cast<int>(found);
-  };
-  const auto side = [&](const std::string& key) {
-    return keys.number(key).and_then([&](double found) { return check(key, found); });
-  };
-  Expected<int> width;
-  Expected<int> height;
-  if (keys.has("image_width") && keys.has("image_height")) {
-    width = side("image_width");
-    height = side("image_height");
-  } else if (keys.has("resolution")) {
-    const auto sides = keys.numbers("resolution", {2}, "[width, height]");
-    if (!sides) {
-      return sides.error();
-    }
-    width = check("resolution", sides->front());
-    height = check("resolution", sides->back());
-  } else {
-    return keys.missing("image_width and image_height, or resolution: [width, height]");
-  }
-  if (!width || !height) {
-    return width ? height.error() : width.error();
-  }
-  camera.width_px = *width;
-  camera.height_px = *height;
-  return {};
-}
-
-Status read_intrinsics(const Keys& keys, Camera& camera) {
-  if (keys.has("camera_model")) {
-    const auto model = keys.word("camera_model");
-    if (!model || *model != "pinhole") {
-      return model ? keys.refuse("camera_model",
-                                 fmt::format("expected pinhole, found {}", config::quote(*model)))
-                   : model.error();
-    }
-  }
-  if (!keys.has("intrinsics")) {
-    return keys.missing("intrinsics: [fx, fy, cx, cy]");
-  }
-  const auto numbers = keys.numbers("intrinsics", {4}, "[fx, fy, cx, cy]");
-  if (!numbers) {
-    return numbers.error();
-  }
-  camera.fx_px = (*numbers)[0];
-  camera.fy_px = (*numbers)[1];
-  camera.cx_px = (*numbers)[2];
-  camera.cy_px = (*numbers)[3];
-  if (!(camera.fx_px > 0.0) || !(camera.fy_px > 0.0)) {
-    return keys.refuse("intrinsics", fmt::format("expected positive focal lengths, found {} and {}",
-                                                 camera.fx_px, camera.fy_px));
-  }
-  if (!has_center_inside(camera)) {
-    return keys.refuse(
-        "intrinsics",
-        fmt::format("expected a principal point inside pictures of {}x{} pixels, found ({}, {})",
-                    camera.width_px, camera.height_px, camera.cx_px, camera.cy_px));
-  }
-  return {};
-}
-
-Expected<Distortion> read_model(const Keys& keys) {
-  constexpr std::string_view kKnown = "none, radial-tangential or equidistant";
-  if (!keys.has("distortion_model")) {
-    return keys.missing(fmt::format("distortion_model: {}", kKnown));
-  }
-  const auto name = keys.word("distortion_model");
-  if (!name) {
-    return name.error();
-  }
-  if (*name == "none") {
-    return Distortion::kNone;
-  }
-  if (*name == "radial-tangential" || *name == "radtan") {
-    return Distortion::kRadialTangential;
-  }
-  if (*name == "equidistant") {
-    return Distortion::kEquidistant;
-  }
-  return keys.refuse("distortion_model",
-                     fmt::format("expected {}, found {}", kKnown, config::quote(*name)));
-}
-
-Status read_distortion(const Keys& keys, Lens& lens) {
-  constexpr const char* kKey = "distortion_coefficients";
-  const auto model = read_model(keys);
-  if (!model) {
-    return model.error();
-  }
-  lens.distortion = *model;
-  if (*model == Distortion::kNone && !keys.has(kKey)) {
-    return {};
-  }
-  const auto read = [&](const std::vector<std::size_t>& counts,
-                        std::string_view expected) -> Expected<std::vector<double>> {
-    if (!keys.has(kKey)) {
-      return keys.missing(fmt::format("{}: {}", kKey, expected));
-    }
-    return keys.numbers(kKey, counts, expected);
-  };
-  const auto numbers = *model == Distortion::kNone ? read({0}, "[] for distortion_model none")
-                       : *model == Distortion::kEquidistant
-                           ? read({4}, "[k1, k2, k3, k4]")
-                           : read({4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
-  if (!numbers) {
-    return numbers.error();
-  }
-  std::copy(numbers->begin(), numbers->end(), lens.coefficients.begin());
-  return {};
-}
-
-/// Absent, or positive and not above `max`.
-Expected<std::optional<double>> read_positive(const Keys& keys,
-                                              const std::string& key,
-                                              double max,
-                                              std::string_view unit) {
-  if (!keys.has(key)) {
-    return std::nullopt;
-  }
-  const auto number = keys.number(key);
-  if (!number) {
-    return number.error();
-  }
-  if (!(*number > 0.0 && *number <= max)) {
-    return keys.refuse(
-        key, fmt::format("expected {} above 0 and at most {}, found {}", unit, max, *number));
-  }
-  return *number;
-}
 
 }  // namespace
 
 Expected<CameraFile> read_camera_file(const std::filesystem::path& file) {
-  const Expected<Keys> keys = Keys::read(file);
-  if (!keys) {
-    return keys.error();
-  }
-  CameraFile result;
-  Status status = read_size(*keys, result.lens.camera);
-  status = status ? read_intrinsics(*keys, result.lens.camera) : status;
-  status = status ? read_distortion(*keys, result.lens) : status;
-  if (!status) {
-    return status.error();
-  }
-  const auto rate_hz = read_positive(*keys, "rate_hz", kMaxRate_hz, "frames per second");
-  const auto height_m = read_positive(*keys, "camera_height", 1000.0, "metres");
-  if (!rate_hz || !height_m) {
-    return rate_hz ? height_m.error() : rate_hz.error();
-  }
-  result.rate_hz = *rate_hz;
-  result.camera_height_m = *height_m;
-  return result;
+  return Reader(file).read();
 }
 
 }  // namespace stemvo::dataset

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "dataset/lens.hpp"
+#include "dataset/undistortion.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::dataset {
@@ -19,8 +19,9 @@ struct CameraFile {
 /// YAML with the keys image_width and image_height or `resolution: [w, h]`, camera_model (pinhole,
 /// also where it is absent), intrinsics [fx, fy, cx, cy], distortion_model (none,
 /// radial-tangential or radtan, equidistant), distortion_coefficients, and where known rate_hz and
-/// camera_height; others are not read, so that EuRoC's sensor.yaml is one. Errors, naming file and
-/// line: unreadable, not YAML, a key missing or twice, a value that cannot be.
+/// camera_height. EuRoC's sensor.yaml is one: its other keys (sensor_type, comment, T_BS) are not
+/// read. Errors, naming file and line: unreadable, not YAML, a key missing, unknown or twice, a
+/// value that cannot be.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
 
 }  // namespace stemvo::dataset

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_files.hpp"
 
+#include <span>
 #include <system_error>
 
 namespace stemvo::dataset {
@@ -15,6 +16,19 @@ bool is_folder(const fs::path& path) {
 fs::path absolute_folder(const fs::path& folder) {
   std::error_code code;
   return (fs::absolute(folder, code) / "").lexically_normal().parent_path();
+}
+
+Expected<std::vector<fs::path>> list_folder(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code code;
+  fs::directory_iterator entry(folder, code);
+  for (; !code && entry != fs::directory_iterator(); entry.increment(code)) {
+    found.push_back(entry->path());
+  }
+  if (code) {
+    return fail(fmt::format("{}: cannot list the folder: {}", folder.string(), code.message()));
+  }
+  return found;
 }
 
 Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& request,
@@ -32,17 +46,51 @@ Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& reque
   return range;
 }
 
-bool has_center_inside(const Camera& camera) {
-  return camera.cx_px > 0.0 && camera.cx_px < camera.width_px && camera.cy_px > 0.0 &&
-         camera.cy_px < camera.height_px;
+Expected<FrameList> list_frames(const FrameRange& range,
+                                const std::vector<fs::path>& files,
+                                const std::vector<double>& times_s,
+                                const std::optional<fs::path>& poses,
+                                bool is_exact) {
+  const auto cut = [&](const auto& all) {
+    return std::span(all).subspan(range.begin, range.end - range.begin);
+  };
+  FrameList frames;
+  frames.range = range;
+  frames.files.assign(cut(files).begin(), cut(files).end());
+  frames.timestamps_s.assign(cut(times_s).begin(), cut(times_s).end());
+  if (poses) {
+    const Expected<Trajectory> trajectory = read_kitti_trajectory(*poses);
+    if (!trajectory) {
+      return trajectory.error();
+    }
+    const std::size_t num_expected = is_exact ? files.size() : range.end;
+    if (trajectory->size() < num_expected || (is_exact && trajectory->size() > num_expected)) {
+      return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
+                              poses->string(), num_expected, trajectory->size()));
+    }
+    frames.ground_truth = relative_to_first(cut(*trajectory));
+    frames.ground_truth_file = poses;
+  }
+  return frames;
 }
 
-Status check_size(const fs::path& file, const cv::Mat& picture, const Camera& camera) {
-  if (picture.cols != camera.width_px || picture.rows != camera.height_px) {
-    return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", file.string(),
-                            camera.width_px, camera.height_px, picture.cols, picture.rows));
+Status check_center(const Camera& camera) {
+  const bool is_inside = camera.cx_px > 0.0 && camera.cx_px < camera.width_px &&
+                         camera.cy_px > 0.0 && camera.cy_px < camera.height_px;
+  if (!is_inside) {
+    return fail(
+        fmt::format("expected a principal point inside images of {}x{} pixels, found ({}, {})",
+                    camera.width_px, camera.height_px, camera.cx_px, camera.cy_px));
   }
   return {};
+}
+
+Expected<cv::Mat> check_size(const fs::path& file, Expected<cv::Mat> image, const Camera& camera) {
+  if (image && (image->cols != camera.width_px || image->rows != camera.height_px)) {
+    return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", file.string(),
+                            camera.width_px, camera.height_px, image->cols, image->rows));
+  }
+  return image;
 }
 
 }  // namespace stemvo::dataset

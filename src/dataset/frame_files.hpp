@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
-#include "stemvo/dataset/frame_source.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 /// What all frame sources that read files share.
@@ -20,31 +20,41 @@ namespace stemvo::dataset {
 [[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// Without a trailing separator, so that its last part is the folder's name.
 [[nodiscard]] std::filesystem::path absolute_folder(const std::filesystem::path& folder);
+/// What lies in a folder, in no order. Error: it cannot be listed.
+[[nodiscard]] Expected<std::vector<std::filesystem::path>> list_folder(
+    const std::filesystem::path& folder);
 
 /// Error (folder named): empty or outside the frames there are.
 [[nodiscard]] Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& request,
                                                  std::size_t num_frames,
                                                  const std::filesystem::path& folder);
 
-/// False also for NaN.
-[[nodiscard]] bool has_center_inside(const Camera& camera);
+/// Files, times and, where there is a file of them, poses (KITTI's format) of the range; the rest
+/// of the list is left as it is made. The file has at least the poses up to the range's end;
+/// `is_exact`: as many as there are files. Errors: those of read_kitti_trajectory; another number
+/// of poses.
+[[nodiscard]] Expected<FrameList> list_frames(const FrameRange& range,
+                                              const std::vector<std::filesystem::path>& files,
+                                              const std::vector<double>& times_s,
+                                              const std::optional<std::filesystem::path>& poses,
+                                              bool is_exact);
 
-/// Error (file named): the picture is not of the camera's size.
-[[nodiscard]] Status check_size(const std::filesystem::path& file,
-                                const cv::Mat& picture,
-                                const Camera& camera);
+/// Error: the principal point is outside the image, or not a number.
+[[nodiscard]] Status check_center(const Camera& camera);
 
-template <typename T>
-[[nodiscard]] std::vector<T> cut(const std::vector<T>& all, const FrameRange& range) {
-  const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
-  return {at(range.begin), at(range.end)};
-}
+/// The image as it is. Error: its own, or (file named) it is not of the camera's size.
+[[nodiscard]] Expected<cv::Mat> check_size(const std::filesystem::path& file,
+                                           Expected<cv::Mat> image,
+                                           const Camera& camera);
 
-/// What most of the first readable pictures are; of equals the one seen first. One odd frame must
+/// Images of a folder beside a camera file, which is given (open_source).
+[[nodiscard]] Expected<FrameSource> open_image_folder(const FrameSourceRequest& request);
+
+/// What most of the first readable images are; of equals the one seen first. One odd frame must
 /// not throw the rest away. `kind_of`: path -> Expected<Kind>. Error: none can be read.
 template <typename Kind, typename KindOf>
-[[nodiscard]] Expected<Kind> vote_on_pictures(const std::vector<std::filesystem::path>& files,
-                                              const KindOf& kind_of) {
+[[nodiscard]] Expected<Kind> vote_on_images(const std::vector<std::filesystem::path>& files,
+                                            const KindOf& kind_of) {
   constexpr std::size_t kNumVotes = 5;
   std::string first_message;
   std::vector<Kind> votes;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/dataset/frame_source.hpp"
+#include "dataset/frame_source.hpp"
 
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
-#include "dataset/picture_folder.hpp"
-#include "dataset/picture_list.hpp"
-#include "stemvo/dataset/sequence.hpp"
+#include "dataset/image_list.hpp"
+#include "dataset/sequence.hpp"
+#include "internal_check.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -28,31 +29,42 @@ bool looks_like_kitti(const fs::path& folder) {
 
 /// No camera file is given.
 Error refuse(const fs::path& path) {
+  std::string_view problem =
+      "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt) or, for images, --camera "
+      "FILE, found neither";
   if (dataset::is_pattern(path)) {
-    return fail(
-        fmt::format("{}: expected --camera FILE beside a pattern, found none", path.string()));
+    problem = "expected --camera FILE beside a pattern, found none";
+  } else if (!dataset::is_folder(path)) {
+    problem = "expected a folder in KITTI's layout, or of images with --camera FILE, found none";
   }
-  if (!dataset::is_folder(path)) {
-    return fail(
-        fmt::format("{}: expected a folder in KITTI's layout, or of pictures with "
-                    "--camera FILE, found none",
-                    path.string()));
-  }
-  return fail(
-      fmt::format("{}: expected KITTI's layout (image_2 or image_0, calib.txt, times.txt) "
-                  "or, for pictures, --camera FILE, found neither",
-                  path.string()));
+  return fail(fmt::format("{}: {}", path.string(), problem));
 }
 
-template <typename Source>
-Expected<std::unique_ptr<const FrameSource>> to_pointer(Expected<Source> source) {
-  if (!source) {
-    return source.error();
-  }
-  return std::make_unique<const Source>(std::move(*source));
+std::unique_ptr<const FrameSource> to_pointer(const FrameSource& source) {
+  return std::make_unique<const FrameSource>(source);
 }
 
 }  // namespace
+
+Expected<cv::Mat> FrameSource::read(std::size_t index) const {
+  STEMVO_CHECK(index < size(), "frame index inside the range");
+  return frames_.read(frames_.files[index]);
+}
+
+Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const std::string first = text.substr(0, colon);
+  const std::string last = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const std::optional<std::size_t> begin = parse_index(first.empty() ? "0" : first);
+  const std::optional<std::size_t> end = parse_index(last);
+  if (colon == std::string::npos || text.size() == 1 || !begin || (!last.empty() && !end)) {
+    return fail(fmt::format("frames: expected A:B, A: or :B with whole numbers, found '{}'", text));
+  }
+  if (end && *end <= *begin) {
+    return fail(fmt::format("frames: expected A < B in the half-open A:B, found '{}'", text));
+  }
+  return FrameRangeRequest{*begin, end};
+}
 
 Expected<std::unique_ptr<const FrameSource>> open_source(const FrameSourceRequest& request) {
   if (request.camera_file) {
@@ -60,7 +72,7 @@ Expected<std::unique_ptr<const FrameSource>> open_source(const FrameSourceReques
       return fail(fmt::format("{}: expected --camera or --calib (KITTI's layout only), found both",
                               request.calibration->string()));
     }
-    return to_pointer(dataset::PictureFolder::open(request));
+    return dataset::open_image_folder(request).map(to_pointer);
   }
   if (request.times) {
     return fail(
@@ -71,8 +83,9 @@ Expected<std::unique_ptr<const FrameSource>> open_source(const FrameSourceReques
   if (!dataset::is_folder(request.path) || !looks_like_kitti(request.path)) {
     return refuse(request.path);
   }
-  return to_pointer(KittiSequence::open(request.path, {request.kitti_camera, request.frames,
-                                                       request.ground_truth, request.calibration}));
+  return KittiSequence::open(request.path, {request.kitti_camera, request.frames,
+                                            request.ground_truth, request.calibration})
+      .map(to_pointer);
 }
 
 }  // namespace stemvo

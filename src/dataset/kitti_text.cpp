@@ -1,53 +1,53 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/kitti_text.hpp"
 
-#include <array>
 #include <cmath>
+#include <optional>
+#include <string_view>
 
+#include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "stemvo/rigid3.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::dataset {
 namespace {
 
-constexpr std::size_t kNumbersPerRow = 12;
-
-Expected<Camera> parse_projection(const std::vector<std::string_view>& words,
-                                  const std::string& where) {
-  if (words.size() != kNumbersPerRow + 1) {
-    return fail(fmt::format("{}: expected {} with {} numbers, found {}", where, words.front(),
-                            kNumbersPerRow, words.size() - 1));
-  }
-  std::array<double, kNumbersPerRow> p{};
-  for (std::size_t i = 0; i < kNumbersPerRow; ++i) {
-    const auto number = parse_finite(words[i + 1], where);
-    if (!number) {
-      return fail(number.error().message);
+/// Which camera's projection row a line is; nullopt: another line.
+std::optional<int> camera_of(std::string_view line) {
+  const std::vector<std::string_view> words = split_words(line);
+  for (int i = 0; i < 4 && !words.empty(); ++i) {
+    if (words.front() == fmt::format("P{}:", i) || words.front() == fmt::format("P_rect_0{}:", i)) {
+      return i;
     }
-    p[i] = *number;
   }
-  if (!(p[0] > 0.0) || !(p[5] > 0.0)) {
-    return fail(
-        fmt::format("{}: expected positive focal lengths, found {} and {}", where, p[0], p[5]));
+  return std::nullopt;
+}
+
+Expected<Matrix34d> parse_projection(std::string_view line) {
+  return parse_numbers(line.substr(line.find(':') + 1), 12).map([](const auto& numbers) {
+    return Matrix34d(
+        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data()));
+  });
+}
+
+/// Error: anything but [f 0 c . | 0 f c . | 0 0 1 .], which is a rectified pinhole camera.
+Expected<Camera> to_camera(const Matrix34d& p) {
+  if (!(p(0, 0) > 0.0) || !(p(1, 1) > 0.0)) {
+    return fail(fmt::format("expected positive focal lengths, found {} and {}", p(0, 0), p(1, 1)));
   }
-  // Anything but [f 0 c . | 0 f c . | 0 0 1 .] is not a rectified pinhole camera.
   constexpr double kTolerance = 1e-6;
-  const bool is_pinhole = std::abs(p[1]) <= kTolerance * p[0] &&
-                          std::abs(p[4]) <= kTolerance * p[5] && std::abs(p[8]) <= kTolerance &&
-                          std::abs(p[9]) <= kTolerance && std::abs(p[10] - 1.0) <= kTolerance;
+  const bool is_pinhole =
+      std::abs(p(0, 1)) <= kTolerance * p(0, 0) && std::abs(p(1, 0)) <= kTolerance * p(1, 1) &&
+      (p.row(2).head<3>() - Eigen::RowVector3d::UnitZ()).cwiseAbs().maxCoeff() <= kTolerance;
   if (!is_pinhole) {
-    return fail(
-        fmt::format("{}: expected a pinhole camera [f 0 c; 0 f c; 0 0 1], found [{} {} {}; "
-                    "{} {} {}; {} {} {}]",
-                    where, p[0], p[1], p[2], p[4], p[5], p[6], p[8], p[9], p[10]));
+    return fail(fmt::format(
+        "expected a pinhole camera [f 0 c; 0 f c; 0 0 1], found [{} {} {}; {} {} {}; "
+        "{} {} {}]",
+        p(0, 0), p(0, 1), p(0, 2), p(1, 0), p(1, 1), p(1, 2), p(2, 0), p(2, 1), p(2, 2)));
   }
-  Camera camera;
-  camera.fx_px = p[0];
-  camera.fy_px = p[5];
-  camera.cx_px = p[2];
-  camera.cy_px = p[6];
-  return camera;
+  return Camera{p(0, 0), p(1, 1), p(0, 2), p(1, 2)};
 }
 
 }  // namespace
@@ -55,46 +55,68 @@ Expected<Camera> parse_projection(const std::vector<std::string_view>& words,
 Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index) {
   const auto lines = read_lines(file);
   if (!lines) {
-    return fail(lines.error().message);
+    return lines.error();
   }
-  const std::string odometry_name = fmt::format("P{}:", index);
-  const std::string raw_name = fmt::format("P_rect_0{}:", index);
   for (std::size_t i = 0; i < lines->size(); ++i) {
-    const auto words = split_words((*lines)[i]);
-    if (!words.empty() && (words.front() == odometry_name || words.front() == raw_name)) {
-      return parse_projection(words, at_line(file, i + 1));
+    if (camera_of((*lines)[i]) == index) {
+      const Expected<Camera> camera = parse_projection((*lines)[i]).and_then(to_camera);
+      return camera ? camera : fail_at(file, i, camera.error());
     }
   }
-  return fail(fmt::format("{}: expected a row '{}' for image_{}, found none in {} lines",
-                          file.string(), odometry_name, index, lines->size()));
+  return fail(fmt::format("{}: expected a row 'P{}:' for image_{}, found none in {} lines",
+                          file.string(), index, index, lines->size()));
+}
+
+Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
+                                           const Camera& given,
+                                           const Camera& refined) {
+  const auto lines = read_lines(file);
+  if (!lines) {
+    return lines.error();
+  }
+  std::string text;
+  for (const std::string& line : *lines) {
+    Expected<Matrix34d> row = parse_projection(line);
+    const bool is_given =
+        camera_of(line) && row &&
+        (row->leftCols<3>() - given.matrix()).cwiseAbs().maxCoeff() <= 1e-6 * given.mean_focal_px();
+    if (!is_given) {
+      text += line + "\n";
+      continue;
+    }
+    const Eigen::Vector3d offset_m = given.matrix().inverse() * row->col(3);
+    row->leftCols<3>() = refined.matrix();
+    row->col(3) = refined.matrix() * offset_m;
+    text += split_words(line).front();
+    for (int i = 0; i < 12; ++i) {
+      text += fmt::format(" {:.12e}", (*row)(i / 4, i % 4));
+    }
+    text += "\n";
+  }
+  return text;
 }
 
 Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file,
                                                std::size_t num_expected) {
   const auto lines = read_lines(file);
   if (!lines) {
-    return fail(lines.error().message);
+    return lines.error();
   }
   std::vector<double> times_s;
   for (std::size_t i = 0; i < lines->size(); ++i) {
-    const auto words = split_words((*lines)[i]);
-    if (words.empty()) {
+    if (split_words((*lines)[i]).empty()) {
       continue;
     }
-    const std::string where = at_line(file, i + 1);
-    if (words.size() != 1) {
-      return fail(
-          fmt::format("{}: expected one time in seconds, found {} words", where, words.size()));
-    }
-    const auto time_s = parse_finite(words.front(), where);
+    const auto time_s = parse_numbers((*lines)[i], 1);
     if (!time_s) {
-      return fail(time_s.error().message);
+      return fail_at(file, i, time_s.error());
     }
-    if (!times_s.empty() && !(*time_s > times_s.back())) {
-      return fail(fmt::format("{}: expected a time after {} s, found {} s", where, times_s.back(),
-                              *time_s));
+    if (!times_s.empty() && !(time_s->front() > times_s.back())) {
+      return fail_at(file, i,
+                     fail(fmt::format("expected a time after {} s, found {} s", times_s.back(),
+                                      time_s->front())));
     }
-    times_s.push_back(*time_s);
+    times_s.push_back(time_s->front());
   }
   if (times_s.size() < num_expected) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",

@@ -16,13 +16,47 @@ constexpr double kMinScale = 0.8;
 constexpr double kMaxScale = 2.0;
 constexpr int kNumHalvings = 30;  // of the interval between them
 
+/// Distance from the centre, without the tangential part, which is small and moves all around.
+double distorted_radius(const Lens& lens, double radius) {
+  const auto& [k1, k2, k3, k4, k5] = lens.coefficients;
+  switch (lens.distortion) {
+    case Distortion::kRadialTangential: {
+      const double square = radius * radius;
+      return radius * (1.0 + square * (k1 + square * (k2 + square * k5)));
+    }
+    case Distortion::kEquidistant: {
+      const double angle = std::atan(radius);
+      const double square = angle * angle;
+      return angle * (1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4))));
+    }
+    case Distortion::kNone:
+      break;
+  }
+  return radius;
+}
+
+/// Whether the lens shows things farther out farther out, from the centre up to this distance on
+/// the plane z = 1. Polynomials turn around somewhere; there they show other things a second time.
+bool is_one_to_one(const Lens& lens, double radius) {
+  constexpr int kNumSteps = 256;
+  double last = 0.0;
+  for (int i = 1; i <= kNumSteps; ++i) {
+    const double next = distorted_radius(lens, radius * i / kNumSteps);
+    if (!(next > last)) {
+      return false;
+    }
+    last = next;
+  }
+  return true;
+}
+
 Camera scaled(Camera camera, double scale) {
   camera.fx_px *= scale;
   camera.fy_px *= scale;
   return camera;
 }
 
-/// Where the lens' picture shows a pixel of the view.
+/// Where the lens' image shows a pixel of the view.
 Eigen::Vector2d source_of(const Lens& lens, const Camera& view, double u, double v) {
   const Eigen::Vector2d xy = distort(lens, view.normalize({u, v}));
   return lens.camera.project({xy.x(), xy.y(), 1.0});
@@ -62,7 +96,7 @@ bool lies_inside(const Lens& lens, const Camera& view) {
 Expected<double> find_scale(const Lens& lens) {
   if (!lies_inside(lens, scaled(lens.camera, kMaxScale))) {
     return fail(
-        fmt::format("expected distortion_coefficients that leave half of the picture "
+        fmt::format("expected distortion_coefficients that leave half of the image "
                     "usable, found [{}]",
                     fmt::join(lens.coefficients, ", ")));
   }
@@ -86,6 +120,24 @@ bool is_undistorted(const Lens& lens) {
 
 }  // namespace
 
+Eigen::Vector2d distort(const Lens& lens, const Eigen::Vector2d& xy) {
+  const double radius = xy.norm();
+  if (!(radius > 0.0)) {
+    return xy;
+  }
+  Eigen::Vector2d result = distorted_radius(lens, radius) / radius * xy;
+  if (lens.distortion == Distortion::kRadialTangential) {
+    const double p1 = lens.coefficients[2];
+    const double p2 = lens.coefficients[3];
+    const double xx = xy.x() * xy.x();
+    const double yy = xy.y() * xy.y();
+    const double two_xy = 2.0 * xy.x() * xy.y();
+    result.x() += p1 * two_xy + p2 * (3.0 * xx + yy);
+    result.y() += p2 * two_xy + p1 * (xx + 3.0 * yy);
+  }
+  return result;
+}
+
 Expected<Undistortion> Undistortion::create(const Lens& lens) {
   Undistortion result;
   result.camera_ = lens.camera;
@@ -108,13 +160,13 @@ Expected<Undistortion> Undistortion::create(const Lens& lens) {
   return result;
 }
 
-cv::Mat Undistortion::apply(const cv::Mat& picture) const {
+cv::Mat Undistortion::apply(const cv::Mat& image) const {
   if (map_.empty()) {
-    return picture;
+    return image;
   }
   // Cubic takes five times as long, and the path is no better for it.
   cv::Mat result;
-  cv::remap(picture, result, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::remap(image, result, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   return result;
 }
 

@@ -1,18 +1,36 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+
 #include <opencv2/core.hpp>
 
-#include "dataset/lens.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/geometry/camera.hpp"
 
 namespace stemvo::dataset {
 
-/// Makes a pinhole camera's pictures of a lens' pictures. Size and principal point stay; both focal
+enum class Distortion {
+  kNone,
+  kRadialTangential,  ///< OpenCV's k1 k2 p1 p2 k3
+  kEquidistant,       ///< OpenCV's fisheye k1 k2 k3 k4
+};
+
+/// A camera as it comes out of the box.
+struct Lens {
+  Camera camera;
+  Distortion distortion = Distortion::kNone;
+  std::array<double, 5> coefficients = {};  ///< those a model does not have are 0
+};
+
+/// Where the lens shows what a pinhole camera of focal length 1 sees at `xy`: both on the plane
+/// z = 1. OpenCV's formulas.
+[[nodiscard]] Eigen::Vector2d distort(const Lens& lens, const Eigen::Vector2d& xy);
+
+/// Makes a pinhole camera's images of a lens' images. Size and principal point stay; both focal
 /// lengths are scaled alike, to the widest view all of whose pixels come from inside the lens'
-/// picture: black edges would give corners that stand still on the screen, and unequal scales
-/// would stretch the picture. The view is not widened by more than 1 / 0.8, which keeps resolution
+/// image: black edges would give corners that stand still on the screen, and unequal scales
+/// would stretch the image. The view is not widened by more than 1 / 0.8, which keeps resolution
 /// in the middle; beyond that a wide lens loses its rim. Without distortion nothing changes.
 class Undistortion {
  public:
@@ -20,8 +38,8 @@ class Undistortion {
   [[nodiscard]] static Expected<Undistortion> create(const Lens& lens);
 
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// A picture of the lens' size; several threads may call it.
-  [[nodiscard]] cv::Mat apply(const cv::Mat& picture) const;
+  /// An image of the lens' size; several threads may call it.
+  [[nodiscard]] cv::Mat apply(const cv::Mat& image) const;
 
  private:
   Camera camera_;

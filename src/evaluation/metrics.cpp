@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/evaluation/metrics.hpp"
+#include "evaluation/metrics.hpp"
 
 #include <cmath>
 
 #include "geometry/degrees.hpp"
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 

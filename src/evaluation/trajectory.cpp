@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 

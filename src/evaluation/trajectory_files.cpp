@@ -5,8 +5,8 @@
 
 #include <fmt/core.h>
 
-#include "stemvo/check.hpp"
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
+#include "internal_check.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
@@ -43,17 +43,6 @@ Expected<Rigid3> pose_from_quaternion_row(const std::vector<double>& n) {
   return Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]));
 }
 
-Error fail_at(const std::filesystem::path& file, std::size_t index, const Error& error) {
-  return fail(fmt::format("{}:{}: {}", file.string(), index + 1, error.message));
-}
-
-/// Empty lines at the end of a file are no poses; within it they would shift the frame numbers.
-void drop_empty_tail(std::vector<std::string_view>& lines) {
-  while (!lines.empty() && split_words(lines.back()).empty()) {
-    lines.pop_back();
-  }
-}
-
 Error fail_empty(const std::filesystem::path& file) {
   return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
 }
@@ -61,16 +50,18 @@ Error fail_empty(const std::filesystem::path& file) {
 }  // namespace
 
 Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
+  Expected<std::vector<std::string>> lines = read_lines(file);
+  if (!lines) {
+    return lines.error();
   }
-  std::vector<std::string_view> lines = split_lines(*text);
-  drop_empty_tail(lines);
+  // Empty lines at the end of a file are no poses; within it they would shift the frame numbers.
+  while (!lines->empty() && split_words(lines->back()).empty()) {
+    lines->pop_back();
+  }
   Trajectory poses;
-  poses.reserve(lines.size());
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const Expected<Rigid3> pose = parse_numbers(lines[i], 12).and_then(pose_from_matrix_row);
+  poses.reserve(lines->size());
+  for (std::size_t i = 0; i < lines->size(); ++i) {
+    const Expected<Rigid3> pose = parse_numbers((*lines)[i], 12).and_then(pose_from_matrix_row);
     if (!pose) {
       return fail_at(file, i, pose.error());
     }
@@ -83,14 +74,13 @@ Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
 }
 
 Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
+  const Expected<std::vector<std::string>> lines = read_lines(file);
+  if (!lines) {
+    return lines.error();
   }
-  const std::vector<std::string_view> lines = split_lines(*text);
   TimedTrajectory result;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::string_view line = lines[i].substr(0, lines[i].find('#'));
+  for (std::size_t i = 0; i < lines->size(); ++i) {
+    const std::string line = (*lines)[i].substr(0, (*lines)[i].find('#'));
     if (split_words(line).empty()) {
       continue;
     }

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "features/grid_quota.hpp"
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -14,10 +14,9 @@ namespace {
 /// Detectors are asked for more than the quota so that every cell can choose its strongest.
 constexpr int kOversampling = 4;
 
-cv::Ptr<cv::Feature2D> create_feature(DescriptorFrontEnd::Kind kind,
-                                      const FeatureOptions& options) {
+cv::Ptr<cv::Feature2D> create_feature(const FeatureOptions& options) {
   const int num_asked = kOversampling * options.max_features;
-  if (kind == DescriptorFrontEnd::Kind::kOrb) {
+  if (options.method == FeatureMethod::kOrb) {
     return cv::ORB::create(num_asked, 1.2F, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
                            options.fast_threshold);
   }
@@ -34,8 +33,8 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 
 }  // namespace
 
-DescriptorFrontEnd::DescriptorFrontEnd(Kind kind, const FeatureOptions& options)
-    : kind_(kind), options_(options), feature_(create_feature(kind, options)) {}
+DescriptorFrontEnd::DescriptorFrontEnd(const FeatureOptions& options)
+    : options_(options), feature_(create_feature(options)) {}
 
 std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
     const ChannelImage& image) const {
@@ -100,7 +99,7 @@ std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,
   if (prev.descriptors.empty() || cur.descriptors.empty()) {
     return {};
   }
-  if (kind_ == Kind::kOrb) {
+  if (options_.method == FeatureMethod::kOrb) {
     std::vector<cv::DMatch> pairs;
     cv::BFMatcher(cv::NORM_HAMMING, /*crossCheck=*/true)
         .match(prev.descriptors, cur.descriptors, pairs);

@@ -7,15 +7,14 @@
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 
-#include "stemvo/features/front_end.hpp"
+#include "features/front_end.hpp"
 
 namespace stemvo {
 
 /// Detect, describe, match by brute force: the paper's way (ORB) and the classic one (SIFT).
 class DescriptorFrontEnd : public FrontEnd {
  public:
-  enum class Kind { kOrb, kSift };
-  DescriptorFrontEnd(Kind kind, const FeatureOptions& options);
+  explicit DescriptorFrontEnd(const FeatureOptions& options);
 
   using FrontEnd::process;
   [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
@@ -32,7 +31,6 @@ class DescriptorFrontEnd : public FrontEnd {
 
   [[nodiscard]] std::vector<cv::DMatch> match(const Described& prev, const Described& cur) const;
 
-  Kind kind_;
   FeatureOptions options_;
   cv::Ptr<cv::Feature2D> feature_;
   std::shared_ptr<const Described> last_;

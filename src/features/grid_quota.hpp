@@ -5,7 +5,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "stemvo/features/front_end.hpp"
+#include "features/front_end.hpp"
 
 namespace stemvo {
 

@@ -9,7 +9,7 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "features/grid_quota.hpp"
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/geometry/alignment.hpp"
+#include "geometry/alignment.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {

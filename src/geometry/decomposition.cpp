@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/geometry/decomposition.hpp"
+#include "geometry/decomposition.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -21,43 +21,29 @@ constexpr double kMaxRatio = 1e9;
 struct FaugerasTerms {
   Eigen::Matrix3d u;
   Eigen::Matrix3d v;
-  double sign = 1.0;  ///< det U det V
-  double d1 = 0.0;
-  double d2 = 0.0;
-  double d3 = 0.0;
+  double sign;  ///< det U det V
+  double d1;
+  double d2;
+  double d3;
 };
 
 /// Rotation about y of the case d' = +d2 and reflection of the case d' = -d2 (Faugeras & Lustman
 /// 1988, eq. 12 to 16); x1 and x3 are the signed parts of the plane's normal.
-PlanarMotion planar_hypothesis(const FaugerasTerms& f, double x1, double x3, bool d2_positive) {
-  const double product = x1 * x3 * (f.d1 * f.d1 - f.d3 * f.d3);
+Rigid3 planar_motion(const FaugerasTerms& f, double x1, double x3, bool d2_positive) {
+  const double side = d2_positive ? 1.0 : -1.0;
+  const double scale = (f.d1 + side * f.d3) * f.d2;
+  const double s = x1 * x3 * (f.d1 * f.d1 - f.d3 * f.d3) / scale;
+  const double c = (f.d1 * f.d3 + side * (f.d2 * f.d2)) / scale;
   Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation;
-  if (d2_positive) {
-    const double s = product / ((f.d1 + f.d3) * f.d2);
-    const double c = (f.d2 * f.d2 + f.d1 * f.d3) / ((f.d1 + f.d3) * f.d2);
-    rotation << c, 0.0, -s, 0.0, 1.0, 0.0, s, 0.0, c;
-    translation = Eigen::Vector3d(x1, 0.0, -x3);
-  } else {
-    const double s = product / ((f.d1 - f.d3) * f.d2);
-    const double c = (f.d1 * f.d3 - f.d2 * f.d2) / ((f.d1 - f.d3) * f.d2);
-    rotation << c, 0.0, s, 0.0, -1.0, 0.0, s, 0.0, -c;
-    translation = Eigen::Vector3d(x1, 0.0, x3);
-  }
-  PlanarMotion motion;
-  motion.cur_from_prev = Rigid3::from_matrix(f.sign * f.u * rotation * f.v.transpose(),
-                                             (f.u * translation).normalized());
-  motion.normal_in_prev = (f.v * Eigen::Vector3d(x1, 0.0, x3)).normalized();
-  if (motion.normal_in_prev.z() < 0.0) {
-    motion.normal_in_prev *= -1.0;
-  }
-  return motion;
+  rotation << c, 0.0, -side * s, 0.0, side, 0.0, s, 0.0, side * c;
+  const Eigen::Vector3d translation(x1, 0.0, -side * x3);
+  return Rigid3::from_matrix(f.sign * f.u * rotation * f.v.transpose(),
+                             (f.u * translation).normalized());
 }
 
 }  // namespace
 
-std::vector<PlanarMotion> decompose_homography(const Eigen::Matrix3d& homography,
-                                               const Camera& camera) {
+std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography, const Camera& camera) {
   const Eigen::Matrix3d k = camera.matrix();
   const Eigen::Matrix3d a = k.inverse() * homography * k;
   if (!a.allFinite()) {
@@ -69,17 +55,16 @@ std::vector<PlanarMotion> decompose_homography(const Eigen::Matrix3d& homography
   if (!(d(0) / d(1) >= kMinRatio && d(0) / d(1) <= kMaxRatio && d(1) / d(2) >= kMinRatio)) {
     return {};
   }
-  FaugerasTerms f{svd.matrixU(), svd.matrixV(), 1.0, d(0), d(1), d(2)};
-  f.sign = f.u.determinant() * f.v.determinant() < 0.0 ? -1.0 : 1.0;
+  const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
+  const FaugerasTerms f{svd.matrixU(), svd.matrixV(), sign, d(0), d(1), d(2)};
   const double range = f.d1 * f.d1 - f.d3 * f.d3;
   const double x1 = std::sqrt((f.d1 * f.d1 - f.d2 * f.d2) / range);
   const double x3 = std::sqrt((f.d2 * f.d2 - f.d3 * f.d3) / range);
-  std::vector<PlanarMotion> hypotheses;
-  hypotheses.reserve(8);
+  std::vector<Rigid3> hypotheses;
   for (const bool d2_positive : {true, false}) {
     for (const double sign1 : {1.0, -1.0}) {
       for (const double sign3 : {1.0, -1.0}) {
-        hypotheses.push_back(planar_hypothesis(f, sign1 * x1, sign3 * x3, d2_positive));
+        hypotheses.push_back(planar_motion(f, sign1 * x1, sign3 * x3, d2_positive));
       }
     }
   }

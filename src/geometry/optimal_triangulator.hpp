@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo::internal {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/rigid3.hpp"
 
 #include <cmath>
 #include <limits>

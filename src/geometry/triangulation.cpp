@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/geometry/triangulation.hpp"
+#include "geometry/triangulation.hpp"
 
+#include "geometry/decomposition.hpp"
 #include "optimal_triangulator.hpp"
-#include "stemvo/geometry/decomposition.hpp"
 
 namespace stemvo {
 
@@ -21,15 +21,6 @@ TriangulatedPoint triangulate(const Rigid3& cur_from_prev,
   result.finite = meeting.finite;
   result.in_prev = meeting.depth_prev * match.prev.homogeneous();
   return result;
-}
-
-double depth_in_prev(const Rigid3& cur_from_prev,
-                     const Eigen::Vector2d& prev_xy,
-                     const Eigen::Vector2d& cur_xy) {
-  const Eigen::Matrix3d r = cur_from_prev.rotation_matrix();
-  const Eigen::Vector3d& t = cur_from_prev.translation;
-  const double x = cur_xy.x();
-  return -(t.x() - x * t.z()) / (r.row(0) - x * r.row(2)).dot(prev_xy.homogeneous());
 }
 
 }  // namespace stemvo

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/geometry/two_view_scores.hpp"
+#include "geometry/two_view_scores.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "stemvo/check.hpp"
-
 namespace stemvo {
 namespace {
+
+/// Chi-square 95 % bound of two degrees of freedom and the paper's Gamma, in units of sigma^2.
+constexpr double kHomographyChi2 = 5.991;
+constexpr double kScoreGamma = 5.991;
 
 /// Inverse up to scale (the adjugate): homogeneous maps need no division.
 Eigen::Matrix3d adjugate(const Eigen::Matrix3d& m) {
@@ -40,59 +43,57 @@ double squared_distance_to_line(const Eigen::Vector3d& line, const Eigen::Vector
 }
 
 /// Eq. (6) in both directions; a NaN distance (point at the epipole or at infinity) is an outlier.
-void add_match(double squared_forward,
-               double squared_backward,
-               double bound,
-               std::size_t index,
-               ModelScore& result) {
-  const bool forward = squared_forward < bound;
-  const bool backward = squared_backward < bound;
-  result.score += forward ? kScoreGamma - squared_forward : 0.0;
-  result.score += backward ? kScoreGamma - squared_backward : 0.0;
-  if (forward && backward) {
-    result.inlier_mask[index] = 1;
-    ++result.num_inliers;
+/// `squared_errors(prev_uv, cur_uv)` are those in the current and in the previous image.
+template <typename SquaredErrors>
+ModelScore score_matches(const PixelPairs& pairs,
+                         double sigma_px,
+                         double chi2,
+                         const SquaredErrors& squared_errors) {
+  ModelScore result;
+  result.inlier_mask.assign(pairs.size(), 0);
+  const double weight = 1.0 / (sigma_px * sigma_px);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    int num_within = 0;
+    for (const double squared : squared_errors(pairs.prev_uv[i], pairs.cur_uv[i])) {
+      if (weight * squared < chi2) {
+        result.score += kScoreGamma - weight * squared;
+        ++num_within;
+      }
+    }
+    if (num_within == 2) {
+      result.inlier_mask[i] = 1;
+      ++result.num_inliers;
+    }
   }
+  return result;
 }
 
 }  // namespace
 
 ModelScore score_homography(const Eigen::Matrix3d& homography,
-                            std::span<const Eigen::Vector2d> prev_uv,
-                            std::span<const Eigen::Vector2d> cur_uv,
+                            const PixelPairs& pairs,
                             double sigma_px) {
-  STEMVO_CHECK(prev_uv.size() == cur_uv.size(), "matches come in pairs");
-  ModelScore result;
-  result.inlier_mask.assign(prev_uv.size(), 0);
   if (is_singular(homography)) {
-    return result;
+    return {0.0, 0, std::vector<char>(pairs.size(), 0)};
   }
   const Eigen::Matrix3d prev_from_cur = adjugate(homography);
-  const double weight = 1.0 / (sigma_px * sigma_px);
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    add_match(weight * squared_transfer_error(homography, prev_uv[i], cur_uv[i]),
-              weight * squared_transfer_error(prev_from_cur, cur_uv[i], prev_uv[i]),
-              kHomographyChi2, i, result);
-  }
-  return result;
+  return score_matches(pairs, sigma_px, kHomographyChi2,
+                       [&](const Eigen::Vector2d& prev, const Eigen::Vector2d& cur) {
+                         return std::array{squared_transfer_error(homography, prev, cur),
+                                           squared_transfer_error(prev_from_cur, cur, prev)};
+                       });
 }
 
 ModelScore score_fundamental(const Eigen::Matrix3d& fundamental,
-                             std::span<const Eigen::Vector2d> prev_uv,
-                             std::span<const Eigen::Vector2d> cur_uv,
+                             const PixelPairs& pairs,
                              double sigma_px) {
-  STEMVO_CHECK(prev_uv.size() == cur_uv.size(), "matches come in pairs");
-  ModelScore result;
-  result.inlier_mask.assign(prev_uv.size(), 0);
-  const double weight = 1.0 / (sigma_px * sigma_px);
-  for (std::size_t i = 0; i < prev_uv.size(); ++i) {
-    const Eigen::Vector3d line_in_cur = fundamental * prev_uv[i].homogeneous();
-    const Eigen::Vector3d line_in_prev = fundamental.transpose() * cur_uv[i].homogeneous();
-    add_match(weight * squared_distance_to_line(line_in_cur, cur_uv[i]),
-              weight * squared_distance_to_line(line_in_prev, prev_uv[i]), kFundamentalChi2, i,
-              result);
-  }
-  return result;
+  return score_matches(
+      pairs, sigma_px, kFundamentalChi2,
+      [&](const Eigen::Vector2d& prev, const Eigen::Vector2d& cur) {
+        return std::array{
+            squared_distance_to_line(fundamental * prev.homogeneous(), cur),
+            squared_distance_to_line(fundamental.transpose() * cur.homogeneous(), prev)};
+      });
 }
 
 double homography_ratio(double homography_score, double fundamental_score) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/Core>
+#include <ceres/sized_cost_function.h>
+
 #include "odometry/window.hpp"
-#include "stemvo/geometry/camera.hpp"
+#include "stemvo/camera.hpp"
 
 namespace stemvo {
 
@@ -19,18 +22,32 @@ struct BundleAdjustmentOptions {
   int min_observations = 2;  ///< of a landmark that takes part
 };
 
-struct BundleAdjustmentReport {
-  bool is_usable = false;  ///< false: too little to do, or not solved; the map is unchanged
-  int num_residuals = 0;
-  int num_iterations = 0;
-  double initial_cost = 0.0;
-  double final_cost = 0.0;
-};
-
 /// Sliding-window bundle adjustment: poses of the window and its landmarks, robust reprojection
-/// error, Schur complement over the landmarks. One thread: the same bytes on every run.
-BundleAdjustmentReport refine_window(Window& window,
-                                     const Camera& camera,
-                                     const BundleAdjustmentOptions& options);
+/// error, Schur complement over the landmarks. One thread: the same bytes on every run. False: too
+/// little to do, or not solved; the window is unchanged.
+bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentOptions& options);
+
+/// Reprojection error (px) of a landmark in a keyframe, with its derivatives. Parameters: a change
+/// of the keyframe's pose (rotation vector w, rad, and translation t) and the point in the world X;
+/// x = exp(w) R X + t in the camera, where R is the rotation the change starts from.
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
+ public:
+  /// Points nearer than this (or behind) have no residual; map units.
+  static constexpr double kMinDepth = 1e-6;
+
+  /// The rotation must outlive the cost: the keyframe's observations share it.
+  ReprojectionCost(const Camera& camera, const Eigen::Matrix3d& rotation, const Eigen::Vector2d& uv)
+      : camera_(camera), rotation_(rotation), uv_(uv) {}
+
+  /// False for a point behind the camera: the solver takes a shorter step.
+  bool Evaluate(const double* const* parameters,
+                double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const Camera& camera_;
+  const Eigen::Matrix3d& rotation_;
+  Eigen::Vector2d uv_;
+};
 
 }  // namespace stemvo

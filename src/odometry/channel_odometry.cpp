@@ -3,34 +3,33 @@
 
 #include <utility>
 
+#include "internal_check.hpp"
 #include "odometry/pair_estimator.hpp"
-#include "odometry/road_picture.hpp"
+#include "odometry/road/image.hpp"
 #include "odometry/stopwatch.hpp"
 #include "odometry/window_estimator.hpp"
-#include "stemvo/check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
+namespace {
 
-Expected<ChannelOdometry> ChannelOdometry::create(const Config& config, const Camera& camera) {
-  Expected<std::unique_ptr<FrontEnd>> front_end = create_front_end(config.features);
-  if (!front_end.has_value()) {
-    return front_end.error();
-  }
-  return ChannelOdometry(config, camera, std::move(front_end.value()));
+StemOptions stretch_options(const Options& options, int width_px) {
+  StemOptions stretch = options.stem;
+  stretch.upsample = choose_upsample(stretch.upsample, options.features.method, width_px);
+  return stretch;
 }
 
-ChannelOdometry::ChannelOdometry(const Config& config,
-                                 const Camera& camera,
-                                 std::unique_ptr<FrontEnd> front_end)
+}  // namespace
+
+ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera)
     : camera_(camera),
-      asks_road_(config.scale.source == "camera_height"),
-      stretch_(with_chosen_upsample(config, camera.width_px).stem),
-      front_end_(std::move(front_end)) {
-  if (config.odometry.mode == "two_frame") {
-    estimator_ = std::make_unique<PairEstimator>(config, camera);
+      asks_road_(options.scale.source == ScaleSource::kCameraHeight),
+      stretch_(stretch_options(options, camera.width_px)),
+      front_end_(create_front_end(options.features)) {
+  if (options.odometry.mode == OdometryMode::kTwoFrame) {
+    estimator_ = std::make_unique<PairEstimator>(options, camera);
   } else {
-    estimator_ = std::make_unique<WindowEstimator>(config, camera);
+    estimator_ = std::make_unique<WindowEstimator>(options, camera);
   }
 }
 
@@ -55,7 +54,7 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   prepared.picture = front_end_->prepare(image);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadPicture);
-    prepared.road = std::make_shared<RoadPicture>(make_road_picture(image, camera_));
+    prepared.road = std::make_shared<RoadImage>(make_road_image(image, camera_));
   }
   return prepared;
 }

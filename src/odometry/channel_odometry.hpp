@@ -8,22 +8,32 @@
 
 #include <opencv2/core.hpp>
 
+#include "features/front_end.hpp"
 #include "odometry/estimator.hpp"
-#include "stemvo/config.hpp"
+#include "stem/stem.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/features/front_end.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/odometry/odometry.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
 
 namespace stemvo {
+
+/// A frame as far as it can be made without a pose: seen through the channel. Without an image it
+/// stands for a frame that could not be read.
+struct PreparedFrame {
+  cv::Mat pixels;                                  ///< as given
+  std::shared_ptr<const PreparedPicture> picture;  ///< null: could not be read, or see problem
+  std::shared_ptr<const RoadImage> road;           ///< null: no road is measured
+  std::string problem;                             ///< why the stem gave no channel, else empty
+  double stem_ms = 0.0;
+};
 
 /// What the odometry does with one channel after the stem: several of them can share one stem.
 /// Movable. The same channels give the same poses, whatever runs beside it.
 class ChannelOdometry {
  public:
-  /// Error: that of create_front_end. `config.stem` gives the stretch only.
-  [[nodiscard]] static Expected<ChannelOdometry> create(const Config& config, const Camera& camera);
+  /// For valid options; `options.stem` gives the stretch only.
+  ChannelOdometry(const Options& options, const Camera& camera);
 
   /// The next frame's channel; `frame`, of the camera's size, is where landmarks get their colour.
   /// `times.stem_ms` of the result is the stretch's alone.
@@ -31,7 +41,7 @@ class ChannelOdometry {
   /// A frame without a channel: the last motion goes on.
   FrameResult process_missing();
 
-  /// The parts of process(), as in Odometry.
+  /// The phases of process(), as in PhasedOdometry.
   [[nodiscard]] PreparedFrame prepare(const Channel& channel, const cv::Mat& frame);
   void track(PreparedFrame frame);
   void localize();
@@ -56,8 +66,6 @@ class ChannelOdometry {
     std::string problem;
     LocalizedFrame localized;
   };
-
-  ChannelOdometry(const Config& config, const Camera& camera, std::unique_ptr<FrontEnd> front_end);
 
   Camera camera_;
   bool asks_road_;

@@ -6,10 +6,11 @@
 
 #include <opencv2/core.hpp>
 
-#include "odometry/road_picture.hpp"
-#include "stemvo/features/front_end.hpp"
-#include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/odometry/odometry.hpp"
+#include "features/front_end.hpp"
+#include "odometry/road/image.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -19,12 +20,12 @@ struct TrackedFrame {
   bool has_image = false;  ///< false: it could not be read, or not be seen through the channel
   Matches matches;         ///< none on the first image
   cv::Mat image;           ///< as given, gray or RGB: where landmarks get their colour
-  std::shared_ptr<const RoadPicture> road;  ///< null: the road is not asked
+  std::shared_ptr<const RoadImage> road;  ///< null: the road is not asked
 };
 
 /// A frame whose pose may still be refined.
 struct LocalizedFrame {
-  FrameResult result;             ///< all but the pose, and what the road says
+  FrameResult result;             ///< all but the pose, and the road measurement
   std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
 };
 
@@ -46,5 +47,15 @@ class Estimator {
   /// See Odometry::landmarks().
   [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
 };
+
+/// Length of a step that nothing measures: one unit where no scale is asked for.
+[[nodiscard]] inline double assumed_step(const ScaleOptions& scale) {
+  return scale.source == ScaleSource::kNone ? 1.0 : scale.constant_m;
+}
+
+/// An equal share of a motion that took several frames.
+[[nodiscard]] inline Rigid3 motion_of_one_frame(const Rigid3& motion, int num_frames) {
+  return {so3_exp(so3_log(motion.rotation) / num_frames), motion.translation / num_frames};
+}
 
 }  // namespace stemvo

@@ -1,30 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/odometry/odometry.hpp"
+#include <array>
+#include <cstddef>
+
+#include "stemvo/frame_result.hpp"
 
 namespace stemvo {
 
 std::string_view to_string(FrameState state) {
-  switch (state) {
-    case FrameState::kFirst:
-      return "first";
-    case FrameState::kInitializing:
-      return "initializing";
-    case FrameState::kTracking:
-      return "tracking";
-    case FrameState::kStationary:
-      return "stationary";
-    case FrameState::kLowParallax:
-      return "low_parallax";
-    case FrameState::kRotating:
-      return "rotating";
-    case FrameState::kGated:
-      return "gated";
-    case FrameState::kLost:
-      return "lost";
-    case FrameState::kNoImage:
-      return "no_image";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 9> kNames{"first",      "initializing", "tracking",
+                                                   "stationary", "low_parallax", "rotating",
+                                                   "gated",      "lost",         "no_image"};
+  static_assert(kNames.size() == static_cast<std::size_t>(FrameState::kNoImage) + 1);
+  return kNames.at(static_cast<std::size_t>(state));
 }
 
 bool is_measured(FrameState state) {
@@ -32,17 +19,9 @@ bool is_measured(FrameState state) {
 }
 
 std::string_view to_string(RoadState state) {
-  switch (state) {
-    case RoadState::kDisabled:
-      return "disabled";
-    case RoadState::kNone:
-      return "none";
-    case RoadState::kHeld:
-      return "held";
-    case RoadState::kMeasured:
-      return "measured";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 4> kNames{"disabled", "none", "held", "measured"};
+  static_assert(kNames.size() == static_cast<std::size_t>(RoadState::kMeasured) + 1);
+  return kNames.at(static_cast<std::size_t>(state));
 }
 
 }  // namespace stemvo

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
+#include <vector>
 
-#include "stemvo/geometry/decomposition.hpp"
-#include "stemvo/geometry/relative_pose_refinement.hpp"
-#include "stemvo/geometry/two_view_motion.hpp"
+#include "geometry/decomposition.hpp"
+#include "geometry/pose_refinement.hpp"
+#include "geometry/two_view_motion.hpp"
 
 namespace stemvo {
 namespace {
@@ -32,20 +34,13 @@ constexpr AcceptanceOptions kAcceptance{.min_good = 30,
 /// Refined hypotheses nearer than this are one.
 constexpr double kSameAngle_rad = 0.1;
 
-std::vector<InitialHypothesis> list_hypotheses(const MeasuredMotion& motion, const Camera& camera) {
-  std::vector<InitialHypothesis> hypotheses;
-  if (motion.homography.has_value()) {
-    for (const PlanarMotion& planar : decompose_homography(*motion.homography, camera)) {
-      hypotheses.push_back({TwoViewModel::kHomography, planar.cur_from_prev});
-    }
-  }
-  if (motion.essential.has_value()) {
-    for (const Rigid3& cur_from_prev : decompose_essential(*motion.essential)) {
-      hypotheses.push_back({TwoViewModel::kEssential, cur_from_prev});
-    }
-  }
-  return hypotheses;
-}
+/// A motion that one of the models allows.
+struct Hypothesis {
+  TwoViewModel model = TwoViewModel::kNone;
+  Rigid3 cur_from_prev;
+  double cost = 0.0;  ///< once refined
+  int num_good = 0;
+};
 
 bool is_same(const Rigid3& a, const Rigid3& b) {
   return a.rotation.angularDistance(b.rotation) < kSameAngle_rad &&
@@ -53,41 +48,49 @@ bool is_same(const Rigid3& a, const Rigid3& b) {
 }
 
 /// Those with nearly the most good points.
-std::vector<InitialHypothesis> plausible_hypotheses(const MeasuredMotion& motion,
-                                                    const PointPairs& pairs,
-                                                    const Camera& camera) {
-  std::vector<InitialHypothesis> hypotheses = list_hypotheses(motion, camera);
+std::vector<Hypothesis> plausible_hypotheses(const MeasuredMotion& motion,
+                                             const PixelPairs& pairs,
+                                             const Camera& camera) {
+  std::vector<Hypothesis> hypotheses;
   int most_good = 0;
-  for (InitialHypothesis& hypothesis : hypotheses) {
-    hypothesis.num_good =
-        test_points(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera).num_good;
-    most_good = std::max(most_good, hypothesis.num_good);
+  const auto test = [&](TwoViewModel model, std::span<const Rigid3> motions) {
+    for (const Rigid3& cur_from_prev : motions) {
+      const int num_good = test_points(cur_from_prev, pairs, camera).num_good;
+      hypotheses.push_back({model, cur_from_prev, 0.0, num_good});
+      most_good = std::max(most_good, num_good);
+    }
+  };
+  if (motion.homography.has_value()) {
+    test(TwoViewModel::kHomography, decompose_homography(*motion.homography, camera));
   }
-  std::erase_if(hypotheses, [&](const InitialHypothesis& hypothesis) {
+  if (motion.essential.has_value()) {
+    test(TwoViewModel::kEssential, decompose_essential(*motion.essential));
+  }
+  std::erase_if(hypotheses, [&](const Hypothesis& hypothesis) {
     return hypothesis.num_good < kMinGoodShare * most_good;
   });
   return hypotheses;
 }
 
-PointPairs select(const PointPairs& pairs, const std::vector<char>& mask) {
-  PointPairs selected;
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] != 0) {
-      selected.track_ids.push_back(pairs.track_ids[i]);
-      selected.prev_uv.push_back(pairs.prev_uv[i]);
-      selected.cur_uv.push_back(pairs.cur_uv[i]);
-    }
+/// The cheapest first.
+void refine(std::vector<Hypothesis>& hypotheses,
+            const PixelPairs& pairs,
+            const Camera& camera,
+            double loss_px) {
+  for (Hypothesis& hypothesis : hypotheses) {
+    const RefinedMotion refined =
+        refine_relative_pose(hypothesis.cur_from_prev, pairs, camera, {.loss_scale_px = loss_px});
+    hypothesis.cur_from_prev = refined.cur_from_prev;
+    hypothesis.cost = refined.cost;
   }
-  return selected;
+  std::sort(hypotheses.begin(), hypotheses.end(),
+            [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
 }
 
 }  // namespace
 
-Initializer::Initializer(const Config& config, const Camera& camera)
-    : camera_(camera),
-      loss_px_(config.two_view.refine_loss_px),
-      two_view_(config, camera),
-      seed_(config.seed) {}
+Initializer::Initializer(const Options& config, const Camera& camera)
+    : camera_(camera), loss_px_(config.two_view.refine_loss_px), two_view_(config, camera) {}
 
 void Initializer::start(View reference) {
   reference_ = std::move(reference);
@@ -105,10 +108,10 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
     add_begun_points(matches, all, reference_.points);
   }
   const PointPairs pairs = common_points(reference_.points, now);
-  MeasuredMotion motion =
-      two_view_.measure(pairs.prev_uv, pairs.cur_uv, /*is_initializing=*/true, seed_);
+  const PixelPairs pixels(pairs.prev_uv, pairs.cur_uv);
+  MeasuredMotion motion = two_view_.measure(pixels, /*is_initializing=*/true);
   if (motion.state == FrameState::kTracking) {
-    choose_motion(pairs, motion);
+    choose_motion(pixels, motion);
   }
   std::vector<char> mask = all;
   for (std::size_t i = 0; i < mask.size(); ++i) {
@@ -122,51 +125,33 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   return motion;
 }
 
-std::vector<InitialHypothesis> Initializer::refined(
-    const std::vector<InitialHypothesis>& hypotheses, const PointPairs& pairs) const {
-  std::vector<InitialHypothesis> refined;
-  for (const InitialHypothesis& hypothesis : hypotheses) {
-    const RelativePoseRefinement refinement =
-        refine_relative_pose(hypothesis.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_,
-                             {.loss_scale_px = loss_px_});
-    refined.push_back({hypothesis.model, refinement.cur_from_prev, refinement.final_cost});
-  }
-  std::sort(refined.begin(), refined.end(),
-            [](const InitialHypothesis& a, const InitialHypothesis& b) { return a.cost < b.cost; });
-  return refined;
-}
-
-void Initializer::choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const {
+void Initializer::choose_motion(const PixelPairs& pairs, MeasuredMotion& motion) const {
   motion.is_decisive = false;
-  const std::vector<InitialHypothesis> hypotheses =
-      refined(plausible_hypotheses(motion, pairs, camera_), pairs);
+  std::vector<Hypothesis> hypotheses = plausible_hypotheses(motion, pairs, camera_);
+  refine(hypotheses, pairs, camera_, loss_px_);
   if (hypotheses.empty()) {
     return;
   }
   // Wrong matches cost every hypothesis the same: they are compared on what the best one explains.
-  const PointTestResult first =
-      test_points(hypotheses.front().cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_);
-  const std::vector<InitialHypothesis> compared =
-      refined(hypotheses, select(pairs, first.good_mask));
-  const InitialHypothesis& best = compared.front();
-  const auto rival =
-      std::find_if(compared.begin(), compared.end(), [&](const InitialHypothesis& other) {
-        return !is_same(other.cur_from_prev, best.cur_from_prev);
-      });
+  const std::vector<char> explained =
+      test_points(hypotheses.front().cur_from_prev, pairs, camera_).good_mask;
+  refine(hypotheses, {select(pairs.prev_uv, explained), select(pairs.cur_uv, explained)}, camera_,
+         loss_px_);
+  const Hypothesis& best = hypotheses.front();
+  const auto rival = std::find_if(
+      hypotheses.begin(), hypotheses.end(),
+      [&](const Hypothesis& other) { return !is_same(other.cur_from_prev, best.cur_from_prev); });
   // Of few tracks a quarter must do.
-  const PointTestOptions options{.parallax_rank = std::clamp(pairs.size() / 4, 1, 51)};
-  const PointTestResult test =
-      test_points(best.cur_from_prev, pairs.prev_uv, pairs.cur_uv, camera_, options);
-  TwoViewMotion chosen;
-  chosen.model = best.model;
-  chosen.num_good = test.num_good;
-  chosen.parallax_deg = test.parallax_deg;
+  const int num_pairs = static_cast<int>(pairs.size());
+  const TwoViewMotion chosen{best.model, best.cur_from_prev,
+                             test_points(best.cur_from_prev, pairs, camera_,
+                                         {.parallax_rank = std::clamp(num_pairs / 4, 1, 51)})};
   motion.model = best.model;
   motion.cur_from_prev = best.cur_from_prev;
-  motion.inlier_mask = test.good_mask;
-  two_view_.refine(pairs.prev_uv, pairs.cur_uv, motion);
-  motion.is_decisive = is_decisive(chosen, pairs.size(), kAcceptance) &&
-                       (rival == compared.end() || rival->cost > kMinMargin * best.cost);
+  motion.inlier_mask = chosen.test.good_mask;
+  two_view_.refine(pairs, motion);
+  motion.is_decisive = is_decisive(chosen, num_pairs, kAcceptance) &&
+                       (rival == hypotheses.end() || rival->cost > kMinMargin * best.cost);
 }
 
 std::optional<Window> Initializer::open_window(const View& now,

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
-#include <vector>
 
-#include "odometry/landmarks.hpp"
 #include "odometry/localization.hpp"
+#include "odometry/road/image.hpp"
+#include "odometry/tracks.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "odometry/window.hpp"
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -21,21 +21,14 @@ struct View {
   int frame = -1;
   Rigid3 world_from_camera;
   TrackPoints points;
-};
-
-/// A motion that one of the models allows.
-struct InitialHypothesis {
-  TwoViewModel model = TwoViewModel::kNone;
-  Rigid3 cur_from_prev;
-  double cost = 0.0;  ///< of the refined one
-  int num_good = 0;
+  std::shared_ptr<const RoadImage> road = nullptr;  ///< null: the road is not asked, or not kept
 };
 
 /// Finds the first landmarks: the paper's H/F selection between a reference frame and the newest
 /// one, once there is parallax to decide (paper section 3.5-3.6).
 class Initializer {
  public:
-  Initializer(const Config& config, const Camera& camera);
+  Initializer(const Options& config, const Camera& camera);
 
   /// The frame that the next ones are compared with. Its points may lack those that begin there.
   void start(View reference);
@@ -56,16 +49,13 @@ class Initializer {
   void wait(View view);
 
  private:
-  [[nodiscard]] std::vector<InitialHypothesis> refined(
-      const std::vector<InitialHypothesis>& hypotheses, const PointPairs& pairs) const;
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.
-  void choose_motion(const PointPairs& pairs, MeasuredMotion& motion) const;
+  void choose_motion(const PixelPairs& pairs, MeasuredMotion& motion) const;
 
   Camera camera_;
   double loss_px_;
   TwoViewEstimator two_view_;
-  std::uint64_t seed_;
   View reference_;
   std::deque<View> waiting_;
 };

@@ -1,54 +1,56 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/localization.hpp"
 
+#include <algorithm>
+#include <cstddef>
+
+#include "geometry/pose_refinement.hpp"
 #include "odometry/robust_models.hpp"
-#include "stemvo/geometry/absolute_pose.hpp"
+#include "odometry/tracks.hpp"
 
 namespace stemvo {
 namespace {
 
-SeenLandmarks select(const SeenLandmarks& seen, const std::vector<char>& mask) {
-  SeenLandmarks selected;
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] != 0) {
-      selected.points.push_back(seen.points[i]);
-      selected.uv.push_back(seen.uv[i]);
-    }
-  }
-  return selected;
-}
+constexpr std::size_t kMinTurnLandmarks = 10;
 
-int count_inliers(const SeenLandmarks& seen,
-                  const Rigid3& camera_from_world,
-                  const Camera& camera,
-                  double bound_px) {
-  int count = 0;
-  for (std::size_t i = 0; i < seen.points.size(); ++i) {
-    count += is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px) ? 1 : 0;
+std::vector<char> find_inliers(const SeenLandmarks& seen,
+                               const Rigid3& camera_from_world,
+                               const Camera& camera,
+                               double bound_px) {
+  std::vector<char> mask(seen.points.size());
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    mask[i] = is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px) ? 1 : 0;
   }
-  return count;
+  return mask;
 }
 
 std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
-                                          const Rigid3& camera_from_world,
+                                          const Rigid3& start_camera_from_world,
                                           const Camera& camera,
                                           const LocalizationOptions& options) {
-  const AbsolutePose first = refine_absolute_pose(
-      camera_from_world, seen.points, seen.uv, camera,
-      {.loss_scale_px = options.first_loss_px, .inlier_bound_px = 2.0 * options.inlier_bound_px});
-  if (first.num_inliers < options.min_landmarks) {
+  const Rigid3 first = refine_absolute_pose(start_camera_from_world, seen.points, seen.uv, camera,
+                                            {.loss_scale_px = options.first_loss_px});
+  const std::vector<char> mask = find_inliers(seen, first, camera, 2.0 * options.inlier_bound_px);
+  const SeenLandmarks near{select<Eigen::Vector3d>(seen.points, mask),
+                           select<Eigen::Vector2d>(seen.uv, mask)};
+  if (near.size() < options.min_landmarks) {
     return std::nullopt;
   }
-  const SeenLandmarks inliers = select(seen, first.inlier_mask);
-  const AbsolutePose second = refine_absolute_pose(
-      first.camera_from_world, inliers.points, inliers.uv, camera,
-      {.loss_scale_px = options.loss_px, .inlier_bound_px = options.inlier_bound_px});
-  if (second.num_inliers < options.min_landmarks) {
+  const Rigid3 second =
+      refine_absolute_pose(first, near.points, near.uv, camera, {.loss_scale_px = options.loss_px});
+  const auto count = [&](const SeenLandmarks& landmarks) {
+    const std::vector<char> inliers =
+        find_inliers(landmarks, second, camera, options.inlier_bound_px);
+    return static_cast<int>(std::count(inliers.begin(), inliers.end(), char{1}));
+  };
+  if (count(near) < options.min_landmarks) {
     return std::nullopt;
   }
-  return Localization{
-      second.camera_from_world.inverse(),
-      count_inliers(seen, second.camera_from_world, camera, options.inlier_bound_px)};
+  return Localization{second.inverse(), count(seen)};
+}
+
+Eigen::Quaterniond rotation_between(const PixelPairs& pairs, const Camera& camera) {
+  return refine_rotation(Eigen::Quaterniond::Identity(), pairs, camera, {.max_iterations = 5});
 }
 
 }  // namespace
@@ -89,6 +91,37 @@ std::optional<Localization> localize(const SeenLandmarks& seen,
     }
   }
   return best;
+}
+
+std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
+                                  const Eigen::Vector3d& held_position,
+                                  const SeenLandmarks& seen,
+                                  const Camera& camera,
+                                  double min_flow_px,
+                                  double bound_px) {
+  const Rigid3 camera_from_world = world_from_camera.inverse();
+  const Rigid3 held(camera_from_world.rotation, -(camera_from_world.rotation * held_position));
+  std::vector<Eigen::Vector2d> held_uv;
+  std::vector<Eigen::Vector2d> moved_uv;
+  std::vector<Eigen::Vector2d> seen_uv;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Vector3d in_held = held * seen.points[i];
+    if (in_held.z() > 0.0 &&
+        is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px)) {
+      held_uv.push_back(camera.project(in_held));
+      moved_uv.push_back(camera.project(camera_from_world * seen.points[i]));
+      seen_uv.push_back(seen.uv[i]);
+    }
+  }
+  if (held_uv.size() < kMinTurnLandmarks) {
+    return std::nullopt;
+  }
+  const PixelPairs moved(held_uv, moved_uv);
+  if (rms_parallax_px(rotation_between(moved, camera), moved, camera) >= min_flow_px) {
+    return std::nullopt;
+  }
+  const Eigen::Quaterniond turned = rotation_between({held_uv, seen_uv}, camera) * held.rotation;
+  return Rigid3(turned.conjugate(), held_position);
 }
 
 }  // namespace stemvo

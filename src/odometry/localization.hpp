@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "odometry/window.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -44,5 +44,16 @@ struct Localization {
                                                    const Rigid3& predicted_world_from_camera,
                                                    const Camera& camera,
                                                    const LocalizationOptions& options);
+
+/// world_from_camera with the position held, if it explains the image too: the way from there to
+/// the frame's own position moves its landmarks in the image by less than `min_flow_px` (root mean
+/// square, pixels), once a rotation has done what it can. nullopt: it moved, or too few landmarks
+/// are within `bound_px` to tell.
+[[nodiscard]] std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
+                                                const Eigen::Vector3d& held_position,
+                                                const SeenLandmarks& seen,
+                                                const Camera& camera,
+                                                double min_flow_px,
+                                                double bound_px);
 
 }  // namespace stemvo

@@ -5,29 +5,27 @@
 
 namespace stemvo {
 
-MetricScale::MetricScale(const Config& config,
-                         const Camera& camera,
-                         std::optional<double> drift_sigma) {
-  if (config.scale.source != "camera_height") {
+MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigma) {
+  if (config.scale.source != ScaleSource::kCameraHeight) {
     return;
   }
   RoadOptions options;
   options.camera_height_m = config.scale.camera_height_m;
   options.drift_sigma = drift_sigma.value_or(options.drift_sigma);
-  options.use_dense = config.scale.estimators != "points";
-  options.use_points = config.scale.estimators != "dense";
-  options.join_frames = config.scale.joining;
-  road_.emplace(options, camera);
+  options.use_dense = config.scale.estimators != RoadEstimators::kPoints;
+  options.use_points = config.scale.estimators != RoadEstimators::kDense;
+  options.join_frames = config.scale.temporal_filter;
+  road_.emplace(options);
 }
 
-void MetricScale::restart(const RoadPicture* road) {
+void MetricScale::restart(const RoadImage* road) {
   if (road_.has_value() && road != nullptr) {
     road_->restart();
     keep(road_->update(*road, {}));
   }
 }
 
-double MetricScale::measure(const RoadPicture* road, const Rigid3& cur_from_prev) {
+double MetricScale::measure(const RoadImage* road, const Rigid3& cur_from_prev) {
   if (!road_.has_value() || road == nullptr) {
     return 1.0;
   }
@@ -43,6 +41,7 @@ double MetricScale::measure(const RoadPicture* road, const Rigid3& cur_from_prev
 
 void MetricScale::hold(std::string_view reason) {
   if (road_.has_value()) {
+    sigma_ = road_->skip();
     state_ = state_ == RoadState::kMeasured ? RoadState::kHeld : state_;
     reason_ = reason;
   }
@@ -60,7 +59,7 @@ void MetricScale::keep(const RoadScaleEstimate& estimate) {
   state_ = estimate.is_measured      ? RoadState::kMeasured
            : estimate.is_initialized ? RoadState::kHeld
                                      : RoadState::kNone;
-  reason_ = estimate.is_measured ? std::string_view() : estimate.reason;
+  reason_ = estimate.reason;
 }
 
 void MetricScale::report(FrameResult& result) const {

@@ -4,28 +4,29 @@
 #include <optional>
 #include <string_view>
 
-#include "odometry/road_picture.hpp"
-#include "odometry/road_scale.hpp"
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/odometry/odometry.hpp"
+#include "odometry/road/image.hpp"
+#include "odometry/road/scale.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
 /// Metres per unit of an estimator, from the road (`scale.source: camera_height`; else disabled:
-/// every factor is 1), and what each frame is told of it.
+/// every factor is 1), and what each frame's result says of it.
 class MetricScale {
  public:
   /// `drift_sigma`: of log(metres per unit), per frame.
-  MetricScale(const Config& config, const Camera& camera, std::optional<double> drift_sigma = {});
+  explicit MetricScale(const Options& config, std::optional<double> drift_sigma = {});
+
+  [[nodiscard]] bool is_enabled() const { return road_.has_value(); }
 
   /// The first image, or one that nothing connects with the ones before.
-  void restart(const RoadPicture* road);
+  void restart(const RoadImage* road);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the
   /// factor that makes a unit a metre; the caller multiplies its lengths by it.
-  [[nodiscard]] double measure(const RoadPicture* road, const Rigid3& cur_from_prev);
-  /// A frame on which the road cannot be measured.
+  [[nodiscard]] double measure(const RoadImage* road, const Rigid3& cur_from_prev);
+  /// A frame on which the road cannot be measured: the last scale is kept, its sigma grows.
   void hold(std::string_view reason);
   /// A frame without a map to scale.
   void wait(std::string_view reason);

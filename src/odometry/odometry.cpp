@@ -1,39 +1,79 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/odometry/odometry.hpp"
+#include "stemvo/odometry.hpp"
 
+#include <cmath>
 #include <utility>
 
-#include "odometry/channel_odometry.hpp"
-#include "odometry/stopwatch.hpp"
-#include "stemvo/check.hpp"
-#include "timing/stage_timer.hpp"
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "odometry/phased_odometry.hpp"
 
 namespace stemvo {
+namespace {
+
+constexpr int kMaxSide_px = 32768;
+
+/// Written so that NaN fails.
+Status check_camera(const Camera& camera) {
+  const auto is_side = [](int pixels) { return pixels > 0 && pixels <= kMaxSide_px; };
+  if (!is_side(camera.width_px) || !is_side(camera.height_px)) {
+    return fail(fmt::format("camera: expected a size of 1 to {} pixels a side, found {}x{}",
+                            kMaxSide_px, camera.width_px, camera.height_px));
+  }
+  if (!(camera.fx_px > 0.0 && camera.fy_px > 0.0 && std::isfinite(camera.fx_px) &&
+        std::isfinite(camera.fy_px))) {
+    return fail(fmt::format("camera: expected focal lengths above 0 px, found {} and {}",
+                            camera.fx_px, camera.fy_px));
+  }
+  if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px)) {
+    return fail(fmt::format("camera: expected a finite principal point, found {}, {}", camera.cx_px,
+                            camera.cy_px));
+  }
+  return {};
+}
+
+Status check_options(const Options& options) {
+  if (options.scale.source == ScaleSource::kGroundTruth) {
+    return fail(
+        "scale.source: expected none, constant or camera_height, found ground_truth, for which "
+        "the odometry has no poses");
+  }
+  return validate(options);
+}
+
+Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera) {
+  if (image.cols != camera.width_px || image.rows != camera.height_px) {
+    return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
+                            camera.width_px, camera.height_px, image.cols, image.rows));
+  }
+  const int channels = order == PixelOrder::kGray ? 1 : 3;
+  if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
+    return fail(fmt::format("image: expected {} channel{} of 8 bit, found OpenCV's type {}",
+                            channels, channels == 1 ? "" : "s", cv::typeToString(image.type())));
+  }
+  return {};
+}
+
+}  // namespace
 
 struct Odometry::Impl {
   Camera camera;
-  Stem stem;
-  ChannelOdometry channel_odometry;
+  PhasedOdometry odometry;
 };
 
-Expected<Odometry> Odometry::create(const Config& config,
-                                    const Camera& camera,
-                                    const std::filesystem::path& models_dir) {
-  Expected<Stem> stem = Stem::create(config.stem, models_dir);
-  if (!stem.has_value()) {
-    return stem.error();
+Expected<Odometry> Odometry::create(const Camera& camera, const Options& options) {
+  if (Status status = check_camera(camera); !status) {
+    return status.error();
   }
-  // A model that cannot take this camera's frames is found before work starts.
-  const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  if (const Expected<Channel> channel = stem->apply(blank); !channel.has_value()) {
-    return channel.error();
+  if (Status status = check_options(options); !status) {
+    return status.error();
   }
-  Expected<ChannelOdometry> channel_odometry = ChannelOdometry::create(config, camera);
-  if (!channel_odometry.has_value()) {
-    return channel_odometry.error();
+  Expected<PhasedOdometry> odometry = PhasedOdometry::create(camera, options);
+  if (!odometry) {
+    return odometry.error();
   }
-  return Odometry(std::make_unique<Impl>(
-      Impl{camera, std::move(stem.value()), std::move(channel_odometry.value())}));
+  return Odometry(std::make_unique<Impl>(Impl{camera, *std::move(odometry)}));
 }
 
 Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -41,49 +81,39 @@ Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
-FrameResult Odometry::process(const cv::Mat& frame) {
-  track(prepare(frame));
-  localize();
-  return optimize();
-}
-
-FrameResult Odometry::process_missing() { return impl_->channel_odometry.process_missing(); }
-
-PreparedFrame Odometry::prepare(const cv::Mat& frame) {
-  STEMVO_CHECK(frame.cols == impl_->camera.width_px && frame.rows == impl_->camera.height_px,
-               "the frame has the camera's size");
-  Stopwatch watch;
-  const Expected<Channel> channel = timed(Stage::kStem, [&] { return impl_->stem.apply(frame); });
-  const double stem_ms = watch.lap_ms();
-  PreparedFrame prepared;
-  if (!channel.has_value()) {
-    prepared.problem = channel.error().message;
-    return prepared;
+Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) {
+  if (Status status = check_image(image, order, impl_->camera); !status) {
+    return status.error();
   }
-  prepared = impl_->channel_odometry.prepare(channel.value(), frame);
-  prepared.stem_ms += stem_ms;
-  return prepared;
+  if (order != PixelOrder::kBgr) {
+    return impl_->odometry.process(impl_->odometry.prepare(image));
+  }
+  cv::Mat rgb;  // of its own: the caller's pixels are not ours
+  cv::cvtColor(image, rgb, cv::COLOR_BGR2RGB);
+  return impl_->odometry.process(impl_->odometry.prepare(rgb));
 }
 
-void Odometry::track(PreparedFrame frame) { impl_->channel_odometry.track(std::move(frame)); }
-
-void Odometry::localize() { impl_->channel_odometry.localize(); }
-
-FrameResult Odometry::optimize() { return impl_->channel_odometry.optimize(); }
+FrameResult Odometry::process_missing() { return impl_->odometry.process({}); }
 
 std::vector<Rigid3> Odometry::refined_trajectory() const {
-  return impl_->channel_odometry.estimator().refined_trajectory();
+  return impl_->odometry.frames().estimator().refined_trajectory();
 }
 
 std::vector<MapLandmark> Odometry::landmarks() const {
-  return impl_->channel_odometry.estimator().landmarks();
+  return impl_->odometry.frames().estimator().landmarks();
 }
 
-const ChannelImage& Odometry::channel_image() const { return impl_->channel_odometry.image(); }
-const Matches& Odometry::matches() const { return impl_->channel_odometry.matches(); }
-const std::vector<char>& Odometry::inlier_mask() const {
-  return impl_->channel_odometry.inlier_mask();
+std::vector<TrackedPoint> Odometry::tracked_points() const {
+  const Matches& matches = impl_->odometry.frames().matches();
+  const std::vector<char>& is_inlier = impl_->odometry.frames().inlier_mask();
+  std::vector<TrackedPoint> points;
+  for (std::size_t i = 0; i < matches.track_ids.size(); ++i) {
+    points.push_back({matches.track_ids[i], matches.prev_uv[i], matches.cur_uv[i],
+                      i < is_inlier.size() && is_inlier[i] != 0});
+  }
+  return points;
 }
-const StemInfo& Odometry::stem_info() const { return impl_->stem.info(); }
+
+cv::Mat Odometry::channel_image() const { return impl_->odometry.frames().image().pixels; }
 
 }  // namespace stemvo

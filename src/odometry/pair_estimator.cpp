@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/pair_estimator.hpp"
 
-#include <utility>
+#include <cmath>
+#include <cstddef>
 
 namespace stemvo {
 namespace {
@@ -9,34 +10,129 @@ namespace {
 /// A unit is the last step: what drifts is the car's speed, log per frame.
 constexpr double kSpeedSigma = 0.02;
 
+/// Backward travel is believed only with this many times the least parallax and a clear winner of
+/// the hypothesis test; otherwise it is the cheirality test's flip of 180 degrees.
+constexpr double kReverseParallaxFactor = 3.0;
+constexpr double kReverseRunnerUp = 0.5;
+
+/// The paper's forward motion gate: T_z > T_x and T_z > T_y, T = prev_from_cur (signed, as
+/// printed).
+bool is_forward_in_paper(const Eigen::Vector3d& direction) {
+  return direction.z() > direction.x() && direction.z() > direction.y();
+}
+
+bool is_mainly_along_z(const Eigen::Vector3d& direction) {
+  return std::abs(direction.z()) > std::abs(direction.x()) &&
+         std::abs(direction.z()) > std::abs(direction.y());
+}
+
 }  // namespace
 
-PairEstimator::PairEstimator(const Config& config, const Camera& camera)
+bool MotionChain::passes_gate(const Eigen::Vector3d& direction_in_prev,
+                              const MeasuredMotion& motion) const {
+  if (options_.gate == ForwardGate::kOff) {
+    return true;
+  }
+  if (options_.gate == ForwardGate::kPaper) {
+    return is_forward_in_paper(direction_in_prev);
+  }
+  if (!is_mainly_along_z(direction_in_prev)) {
+    return false;
+  }
+  return direction_in_prev.z() > 0.0 ||
+         (motion.parallax_px > kReverseParallaxFactor * options_.min_parallax_px &&
+          motion.runner_up_ratio < kReverseRunnerUp);
+}
+
+FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
+  const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
+  const Eigen::Vector3d direction = prev_from_cur.translation;
+  const double full_length = length > 0.0 ? length : assumed_step_ * (frames_since_image_ + 1);
+  FrameState state = motion.state;
+  if (state == FrameState::kTracking) {
+    if (!passes_gate(direction, motion)) {
+      state = FrameState::kGated;
+    } else if (is_initializing_) {
+      state = FrameState::kInitializing;
+    }
+  }
+  switch (state) {
+    case FrameState::kTracking:
+    case FrameState::kInitializing:
+      is_initializing_ = is_initializing_ && !motion.is_decisive;
+      last_direction_ = direction.normalized();
+      apply(prev_from_cur, full_length);
+      break;
+    case FrameState::kLowParallax:
+      // The flow is proportional to the step: a creeping frame moves by its share of a full one.
+      apply({prev_from_cur.rotation, last_direction_},
+            full_length * motion.parallax_px / options_.min_parallax_px);
+      break;
+    case FrameState::kGated:
+      if (options_.gate == ForwardGate::kPaper) {
+        apply({}, 0.0);
+      } else {
+        apply({prev_from_cur.rotation, last_direction_}, full_length);
+      }
+      break;
+    case FrameState::kStationary:
+    case FrameState::kRotating:
+      apply(prev_from_cur, 0.0);
+      break;
+    default:
+      extrapolate(/*has_image=*/true);
+      break;
+  }
+  return state;
+}
+
+void MotionChain::apply(const Rigid3& prev_from_cur, double length) {
+  const Eigen::Vector3d step_in_prev = length * prev_from_cur.translation;
+  const Eigen::Vector3d position =
+      world_from_image_.translation + world_from_image_.rotation * step_in_prev;
+  const Eigen::Quaterniond rotation = options_.composition == Composition::kPaper
+                                          ? prev_from_cur.rotation * world_from_image_.rotation
+                                          : world_from_image_.rotation * prev_from_cur.rotation;
+  const int num_frames = frames_since_image_ + 1;
+  last_prev_from_cur_ = motion_of_one_frame({prev_from_cur.rotation, step_in_prev}, num_frames);
+  world_from_image_ = {rotation, position};
+  world_from_camera_ = world_from_image_;
+  frames_since_image_ = 0;
+}
+
+void MotionChain::extrapolate(bool has_image) {
+  world_from_camera_ = world_from_camera_ * last_prev_from_cur_;
+  if (has_image) {
+    world_from_image_ = world_from_camera_;
+    frames_since_image_ = 0;
+  } else {
+    ++frames_since_image_;
+  }
+}
+
+PairEstimator::PairEstimator(const Options& config, const Camera& camera)
     : two_view_(config, camera),
       chain_(config.odometry, config.scale),
-      scale_(config, camera, kSpeedSigma),
-      asks_road_(config.scale.source == "camera_height"),
-      seed_(config.seed),
+      scale_(config, kSpeedSigma),
       last_step_(assumed_step(config.scale)) {}
 
 LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
-  motion_ = {};
-  is_first_ = frame.has_image && !chain_.has_picture();
-  if (is_first_) {
-    chain_.start();
-  } else if (frame.has_image) {
-    if (frame.matches.prev_frame >= 0 && frame.matches.prev_frame != last_image_) {
-      chain_.go_back(trajectory_[static_cast<std::size_t>(frame.matches.prev_frame)],
-                     frame.number - frame.matches.prev_frame);
-    }
-    motion_ = two_view_.measure(frame.matches.prev_uv, frame.matches.cur_uv,
-                                chain_.is_initializing(), seed_);
-  }
-  image_before_ = last_image_;
-  last_image_ = frame.has_image ? frame.number : last_image_;
   LocalizedFrame localized;
+  const Matches& matches = frame.matches;
+  motion_ = {};
+  if (!frame.has_image) {
+    motion_.state = FrameState::kNoImage;
+  } else if (last_image_ < 0) {
+    motion_.state = FrameState::kFirst;
+  } else {
+    if (matches.prev_frame >= 0 && matches.prev_frame != last_image_) {
+      chain_.go_back(trajectory_[static_cast<std::size_t>(matches.prev_frame)],
+                     frame.number - matches.prev_frame);
+    }
+    motion_ = two_view_.measure({matches.prev_uv, matches.cur_uv}, chain_.is_initializing());
+  }
   localized.inlier_mask = motion_.inlier_mask;
-  localized.result.num_matches = static_cast<int>(frame.matches.cur_uv.size());
+  localized.result.num_matches = static_cast<int>(matches.cur_uv.size());
   localized.result.num_inliers = motion_.num_inliers;
   add_scores(motion_, localized.result);
   return localized;
@@ -44,41 +140,38 @@ LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
 
 void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
-  if (!frame.has_image) {
-    chain_.extrapolate(/*has_picture=*/false);
+  result.state = motion_.state;
+  if (motion_.state == FrameState::kNoImage) {
+    chain_.extrapolate(/*has_image=*/false);
     scale_.hold("no image");
-    result.state = FrameState::kNoImage;
-  } else if (is_first_) {
+  } else if (motion_.state == FrameState::kFirst) {
     scale_.restart(frame.road.get());
-    result.state = FrameState::kFirst;
   } else {
-    measure_step(frame);
-    result.state = chain_.add(motion_);
+    result.state = chain_.add(motion_, measure_length(frame));
   }
+  last_image_ = frame.has_image ? frame.number : last_image_;
   scale_.report(result);
   result.world_from_camera = chain_.world_from_camera();
   trajectory_.push_back(result.world_from_camera);
 }
 
-void PairEstimator::measure_step(const TrackedFrame& frame) {
-  if (!asks_road_) {
-    return;
+/// Of the motion; 0 where it is not measured.
+double PairEstimator::measure_length(const TrackedFrame& frame) {
+  if (!scale_.is_enabled()) {
+    return 0.0;
   }
-  if (motion_.state == FrameState::kLost) {
+  const bool is_lost = motion_.state == FrameState::kLost;
+  if (is_lost || frame.matches.prev_frame != last_image_) {  // the road was last seen elsewhere
     scale_.restart(frame.road.get());
-    return;
+    return 0.0;
   }
-  if (frame.matches.prev_frame != image_before_) {  // the road was last seen elsewhere
-    scale_.restart(frame.road.get());
-    return;
-  }
-  const bool has_step = motion_.state == FrameState::kTracking;
+  const bool has_length = motion_.state == FrameState::kTracking;
+  const int num_frames = has_length ? frame.number - frame.matches.prev_frame : 0;
   const Rigid3& direction = motion_.cur_from_prev;
-  const int num_frames = frame.number - frame.matches.prev_frame;
-  const double step = has_step ? num_frames * last_step_ : 0.0;
   last_step_ *=
-      scale_.measure(frame.road.get(), Rigid3(direction.rotation, step * direction.translation));
-  motion_.step = has_step ? num_frames * last_step_ : 0.0;
+      scale_.measure(frame.road.get(),
+                     Rigid3(direction.rotation, num_frames * last_step_ * direction.translation));
+  return num_frames * last_step_;
 }
 
 }  // namespace stemvo

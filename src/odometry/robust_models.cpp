@@ -25,15 +25,24 @@ std::vector<cv::Point2d> to_points(std::span<const Eigen::Vector2d> uv) {
   return points;
 }
 
-cv::UsacParams usac_params(const TwoViewOptions& options, std::uint64_t seed) {
+cv::UsacParams usac_params(double confidence,
+                           int max_iterations,
+                           double threshold_px,
+                           std::uint64_t seed) {
   cv::UsacParams params;
-  params.confidence = options.confidence;
+  params.confidence = confidence;
   params.isParallel = false;
-  params.maxIterations = options.max_iterations;
-  params.threshold = options.inlier_threshold_px;
+  params.maxIterations = max_iterations;
+  params.threshold = threshold_px;
   params.sampler = cv::SAMPLING_UNIFORM;
   params.randomGeneratorState = static_cast<int>(seed & 0x7fffffffU);
-  const bool is_magsac = options.estimator == "magsac";
+  return params;
+}
+
+cv::UsacParams two_view_params(const TwoViewOptions& options, std::uint64_t seed) {
+  cv::UsacParams params =
+      usac_params(options.confidence, options.max_iterations, options.inlier_threshold_px, seed);
+  const bool is_magsac = options.estimator == RobustEstimator::kMagsac;
   params.score = is_magsac ? cv::SCORE_METHOD_MAGSAC : cv::SCORE_METHOD_RANSAC;
   params.loMethod = is_magsac ? cv::LOCAL_OPTIM_SIGMA : cv::LOCAL_OPTIM_NULL;
   return params;
@@ -54,14 +63,12 @@ std::optional<Eigen::Matrix3d> to_model(const cv::Mat& matrix) {
 
 /// Runs one of OpenCV's estimators; its exceptions mean degenerate input here.
 template <typename Estimator>
-std::optional<Eigen::Matrix3d> run_guarded(std::span<const Eigen::Vector2d> prev_uv,
-                                           std::span<const Eigen::Vector2d> cur_uv,
-                                           const Estimator& estimator) {
-  if (prev_uv.size() < kMinMatches || prev_uv.size() != cur_uv.size()) {
+std::optional<Eigen::Matrix3d> run_guarded(const PixelPairs& pairs, const Estimator& estimator) {
+  if (pairs.size() < kMinMatches) {
     return std::nullopt;
   }
   try {
-    return to_model(estimator(to_points(prev_uv), to_points(cur_uv)));
+    return to_model(estimator(to_points(pairs.prev_uv), to_points(pairs.cur_uv)));
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
@@ -69,37 +76,34 @@ std::optional<Eigen::Matrix3d> run_guarded(std::span<const Eigen::Vector2d> prev
 
 }  // namespace
 
-std::optional<Eigen::Matrix3d> estimate_homography(std::span<const Eigen::Vector2d> prev_uv,
-                                                   std::span<const Eigen::Vector2d> cur_uv,
+std::optional<Eigen::Matrix3d> estimate_homography(const PixelPairs& pairs,
                                                    const TwoViewOptions& options,
                                                    std::uint64_t seed) {
   const StageTimer timer(Stage::kHomography);
-  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
-    return cv::findHomography(prev, cur, cv::noArray(), usac_params(options, seed));
+  return run_guarded(pairs, [&](const auto& prev, const auto& cur) {
+    return cv::findHomography(prev, cur, cv::noArray(), two_view_params(options, seed));
   });
 }
 
-std::optional<Eigen::Matrix3d> estimate_fundamental(std::span<const Eigen::Vector2d> prev_uv,
-                                                    std::span<const Eigen::Vector2d> cur_uv,
+std::optional<Eigen::Matrix3d> estimate_fundamental(const PixelPairs& pairs,
                                                     const TwoViewOptions& options,
                                                     std::uint64_t seed) {
   const StageTimer timer(Stage::kEpipolar);
-  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
-    return cv::findFundamentalMat(prev, cur, cv::noArray(), usac_params(options, seed));
+  return run_guarded(pairs, [&](const auto& prev, const auto& cur) {
+    return cv::findFundamentalMat(prev, cur, cv::noArray(), two_view_params(options, seed));
   });
 }
 
-std::optional<Eigen::Matrix3d> estimate_essential(std::span<const Eigen::Vector2d> prev_uv,
-                                                  std::span<const Eigen::Vector2d> cur_uv,
+std::optional<Eigen::Matrix3d> estimate_essential(const PixelPairs& pairs,
                                                   const Camera& camera,
                                                   const TwoViewOptions& options,
                                                   std::uint64_t seed) {
   const StageTimer timer(Stage::kEpipolar);
   cv::Mat intrinsics;
   cv::eigen2cv(camera.matrix(), intrinsics);
-  return run_guarded(prev_uv, cur_uv, [&](const auto& prev, const auto& cur) {
+  return run_guarded(pairs, [&](const auto& prev, const auto& cur) {
     return cv::findEssentialMat(prev, cur, intrinsics, intrinsics, cv::noArray(), cv::noArray(),
-                                cv::noArray(), usac_params(options, seed));
+                                cv::noArray(), two_view_params(options, seed));
   });
 }
 
@@ -122,15 +126,9 @@ std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> po
     const Eigen::Vector3d near = point - center;
     points.emplace_back(near.x(), near.y(), near.z());
   }
-  cv::UsacParams params;
-  params.confidence = kPoseConfidence;
-  params.isParallel = false;
-  params.maxIterations = kPoseIterations;
-  params.threshold = bound_px;
+  cv::UsacParams params = usac_params(kPoseConfidence, kPoseIterations, bound_px, seed);
   params.score = cv::SCORE_METHOD_MSAC;
-  params.sampler = cv::SAMPLING_UNIFORM;
   params.loMethod = cv::LOCAL_OPTIM_INNER_LO;
-  params.randomGeneratorState = static_cast<int>(seed & 0x7fffffffU);
   cv::Mat intrinsics;
   cv::eigen2cv(camera.matrix(), intrinsics);
   cv::Mat rotation;

@@ -7,34 +7,29 @@
 
 #include <Eigen/Core>
 
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "geometry/pixel_pairs.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
 /// Hypotheses from OpenCV's robust estimators, all cur_from_prev, from matches in pixels. Single
 /// threaded, from a fixed seed; nullopt when the input is degenerate or no model was found.
-[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_homography(
-    std::span<const Eigen::Vector2d> prev_uv,
-    std::span<const Eigen::Vector2d> cur_uv,
-    const TwoViewOptions& options,
-    std::uint64_t seed);
+[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_homography(const PixelPairs& pairs,
+                                                                 const TwoViewOptions& options,
+                                                                 std::uint64_t seed);
 
 /// Pixels: x_cur^T F x_prev = 0.
-[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_fundamental(
-    std::span<const Eigen::Vector2d> prev_uv,
-    std::span<const Eigen::Vector2d> cur_uv,
-    const TwoViewOptions& options,
-    std::uint64_t seed);
+[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_fundamental(const PixelPairs& pairs,
+                                                                  const TwoViewOptions& options,
+                                                                  std::uint64_t seed);
 
 /// Normalised coordinates: x_cur^T E x_prev = 0.
-[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_essential(
-    std::span<const Eigen::Vector2d> prev_uv,
-    std::span<const Eigen::Vector2d> cur_uv,
-    const Camera& camera,
-    const TwoViewOptions& options,
-    std::uint64_t seed);
+[[nodiscard]] std::optional<Eigen::Matrix3d> estimate_essential(const PixelPairs& pairs,
+                                                                const Camera& camera,
+                                                                const TwoViewOptions& options,
+                                                                std::uint64_t seed);
 
 /// camera_from_world from 2D-3D matches of which many may be wrong: samples of three points (P3P),
 /// consensus within `bound_px` of reprojection. A start for refine_absolute_pose. nullopt for fewer

@@ -3,15 +3,15 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/odometry/odometry.hpp"
+#include "geometry/pixel_pairs.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -37,28 +37,24 @@ struct MeasuredMotion {
 /// matrix afterwards, the point test, then refinement of R and t on the inliers.
 class TwoViewEstimator {
  public:
-  TwoViewEstimator(const Config& config, const Camera& camera);
+  TwoViewEstimator(const Options& config, const Camera& camera)
+      : options_(config.two_view),
+        odometry_(config.odometry),
+        camera_(camera),
+        seed_(config.seed) {}
 
-  /// Matches in input pixels. `is_initializing`: let R_H choose the model.
-  [[nodiscard]] MeasuredMotion measure(std::span<const Eigen::Vector2d> prev_uv,
-                                       std::span<const Eigen::Vector2d> cur_uv,
-                                       bool is_initializing,
-                                       std::uint64_t seed) const;
+  /// `is_initializing`: let R_H choose the model.
+  [[nodiscard]] MeasuredMotion measure(const PixelPairs& pairs, bool is_initializing) const;
   /// Refines a motion on its inliers, and finds inliers, parallax and state anew.
-  void refine(std::span<const Eigen::Vector2d> prev_uv,
-              std::span<const Eigen::Vector2d> cur_uv,
-              MeasuredMotion& result) const;
+  void refine(const PixelPairs& pairs, MeasuredMotion& result) const;
 
  private:
-  void score_models(std::span<const Eigen::Vector2d> prev_uv,
-                    std::span<const Eigen::Vector2d> cur_uv,
-                    bool is_initializing,
-                    std::uint64_t seed,
-                    MeasuredMotion& result) const;
+  void score_models(const PixelPairs& pairs, bool is_initializing, MeasuredMotion& result) const;
 
   TwoViewOptions options_;
   OdometryOptions odometry_;
   Camera camera_;
+  std::uint64_t seed_;
 };
 
 /// S_H, S_F, R_H and the model.

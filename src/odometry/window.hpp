@@ -7,9 +7,9 @@
 
 #include <Eigen/Core>
 
-#include "odometry/track_points.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "odometry/tracks.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -55,6 +55,14 @@ struct WindowOptions {
 /// Appends the keyframe, drops the oldest beyond the window's length, and landmarks that no
 /// keyframe sees any more.
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);
+
+/// Triangulates the tracks of the newest keyframe that are no landmarks yet, from the first and the
+/// last keyframe that see them. Kept are points with enough parallax, in front of every keyframe
+/// that sees them and reprojected well in each.
+void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
+
+/// Drops landmarks that a keyframe sees from behind or too far from their observation.
+void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
 
 /// Multiplies every length; `center` (in the world) stays where it is.
 void rescale(Window& window, double factor, const Eigen::Vector3d& center);

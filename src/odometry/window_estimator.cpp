@@ -2,13 +2,10 @@
 #include "odometry/window_estimator.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
 #include <utility>
 
-#include "odometry/frame_motion.hpp"
-#include "odometry/landmarks.hpp"
-#include "odometry/parallax.hpp"
-#include "odometry/stationary.hpp"
+#include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -22,7 +19,7 @@ constexpr double kMinOverlap = 0.6;
 /// .. or, where the camera moves, less than this share of the tracks are landmarks.
 constexpr double kMinLandmarkShare = 0.3;
 /// A motion that explains less than this share of the matches is none: the frame shows another
-/// place.
+/// scene.
 constexpr double kMinExplained = 0.5;
 /// A camera that was still is believed to move from so many times the flow on.
 constexpr double kHysteresis = 1.5;
@@ -31,13 +28,13 @@ constexpr double kTurnFlow = 3.0;
 
 }  // namespace
 
-WindowEstimator::WindowEstimator(const Config& config, const Camera& camera)
+WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
     : camera_(camera),
       options_(config.odometry),
       refine_every_(config.refine.every),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config, camera),
-      scale_(config, camera),
+      scale_(config),
       step_(assumed_step(config.scale)) {
   window_options_.num_keyframes = config.refine.window;
   refinement_.loss_scale_px = config.refine.loss_px;
@@ -49,149 +46,42 @@ WindowEstimator::WindowEstimator(const Config& config, const Camera& camera)
 LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
   LocalizedFrame localized;
   FrameResult& result = localized.result;
-  localized.inlier_mask.assign(frame.matches.cur_uv.size(), 1);
-  has_opened_ = false;
-  if (!frame.has_image) {
-    world_from_camera_ = world_from_camera_ * prev_from_cur_;
-    result.state = FrameState::kNoImage;
-  } else if (last_.frame < 0) {
-    start_reference({frame.number, world_from_camera_, {}}, frame.road);
-    scale_.restart(frame.road.get());
-    result.state = FrameState::kFirst;
-  } else if (is_initializing_) {
-    result.state = initialize(frame, localized);
-  } else {
-    const StageTimer timer(Stage::kLocalization);
-    result.state = track(frame, localized);
-  }
-  if (frame.has_image) {
-    is_held_ = result.state != FrameState::kTracking;
-  }
-  result.num_matches = static_cast<int>(localized.inlier_mask.size());
-  result.num_inliers = static_cast<int>(
-      std::count(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{1}));
+  std::vector<char>& mask = localized.inlier_mask;
+  mask.assign(frame.matches.cur_uv.size(), 1);
+  result.state = find_pose(frame, localized);
+  is_held_ = frame.has_image ? result.state != FrameState::kTracking : is_held_;
+  result.num_matches = static_cast<int>(mask.size());
+  result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   return localized;
 }
 
-/// The reference is the first keyframe of a map to be. The window, if there is one, stays until the
-/// map is: a frame may see it again.
-void WindowEstimator::start_reference(View reference, std::shared_ptr<const RoadPicture> road) {
-  initializer_.start(std::move(reference));
-  reference_road_ = std::move(road);
-  frames_still_ = 0;
-  is_initializing_ = true;
-}
-
-/// Where the matches start: the frame before, or the last one before trouble.
-void WindowEstimator::start_reference_before(const Matches& matches) {
-  const int frame = std::max(matches.prev_frame, 0);
-  start_reference({frame, trajectory_[static_cast<std::size_t>(frame)], {}},
-                  frame == last_.frame ? last_road_ : nullptr);
-}
-
-FrameState WindowEstimator::initialize(const TrackedFrame& frame, LocalizedFrame& localized) {
-  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  if (const std::optional<Localization> found = localize_in_window(now)) {
-    return accept_localization(frame, *found, localized);
+FrameState WindowEstimator::find_pose(const TrackedFrame& frame, LocalizedFrame& localized) {
+  if (!frame.has_image) {
+    world_from_camera_ = world_from_camera_ * prev_from_cur_;
+    return FrameState::kNoImage;
   }
-  const View& reference = initializer_.reference();
-  const bool starts_elsewhere =
-      reference.points.empty() && frame.matches.prev_frame != reference.frame;
-  if (starts_elsewhere || initializer_.is_worn_out(now)) {
-    start_reference_before(frame.matches);
-  }
-  return accept(frame, initializer_.measure(frame.matches, now), localized);
-}
-
-/// What the motion since the reference makes of the frame.
-FrameState WindowEstimator::accept(const TrackedFrame& frame,
-                                   const MeasuredMotion& motion,
-                                   LocalizedFrame& localized) {
-  add_scores(motion, localized.result);
-  localized.inlier_mask = motion.inlier_mask;
-  if (motion.state == FrameState::kLost) {
-    start_reference({frame.number, world_from_camera_ * prev_from_cur_, {}}, frame.road);
-    return lose(localized);
-  }
-  const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
-  if (motion.state == FrameState::kTracking && motion.is_decisive &&
-      open_window(frame, motion, points)) {
-    return FrameState::kInitializing;
-  }
-  // Until there is a first map, the position is held; later the camera goes on as fast as it was.
-  const Rigid3 guess = guessed_pose(frame.number, motion);
-  const bool goes_on = num_keyframes_ > 0 && motion.state == FrameState::kTracking;
-  world_from_camera_ =
-      Rigid3(guess.rotation, goes_on ? guess.translation : world_from_camera_.translation);
-  const bool is_still =
-      motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
-  frames_still_ += is_still ? 1 : 0;
-  initializer_.wait({frame.number, world_from_camera_, points});
-  return motion.state == FrameState::kTracking ? FrameState::kInitializing : motion.state;
-}
-
-/// The length of the way since the reference is not known: as many steps as frames that moved.
-Rigid3 WindowEstimator::guessed_pose(int frame, const MeasuredMotion& motion) const {
-  const View& reference = initializer_.reference();
-  const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = step_ * (frame - reference.frame - frames_still_);
-  return reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
-}
-
-bool WindowEstimator::open_window(const TrackedFrame& frame,
-                                  const MeasuredMotion& motion,
-                                  TrackPoints points) {
-  const View& reference = initializer_.reference();
-  View view{frame.number, guessed_pose(frame.number, motion), std::move(points)};
-  std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
-  if (!window.has_value()) {
-    return false;
-  }
-  if (!window_.keyframes.empty()) {  // the frames since belong to the new one
-    std::erase_if(window_.keyframes.back().followers,
-                  [&](const FrameBetween& follower) { return follower.frame > reference.frame; });
-    history_.close(window_);
-  }
-  window_ = std::move(*window);
-  if (reference_road_ != nullptr) {
-    scale_.restart(reference_road_.get());
-    road_pose_ = reference.world_from_camera;
-  } else {
+  if (last_.frame < 0) {
+    start_reference({frame.number, world_from_camera_, {}, frame.road});
     scale_.restart(frame.road.get());
-    road_pose_ = view.world_from_camera;
+    return FrameState::kFirst;
   }
-  is_initializing_ = false;
-  world_from_camera_ = view.world_from_camera;
-  anchor_ = std::move(view);
-  num_keyframes_ = 2;
-  has_opened_ = true;
-  return true;
-}
-
-/// Nothing tells how the camera moved: the last motion goes on, and no track does.
-FrameState WindowEstimator::lose(LocalizedFrame& localized) {
-  world_from_camera_ = world_from_camera_ * prev_from_cur_;
-  std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
-  return FrameState::kLost;
-}
-
-FrameState WindowEstimator::track(const TrackedFrame& frame, LocalizedFrame& localized) {
+  std::optional<StageTimer> timer;
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  if (frame.matches.prev_frame == anchor_.frame) {
-    add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
+  if (!is_initializing_) {
+    timer.emplace(Stage::kLocalization);
+    if (frame.matches.prev_frame == anchor_.frame) {
+      add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
+    }
+    if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
+      world_from_camera_ = anchor_.world_from_camera;
+      return FrameState::kStationary;
+    }
   }
-  if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
-    world_from_camera_ = anchor_.world_from_camera;
-    return FrameState::kStationary;
-  }
-  const std::optional<Localization> found = localize_in_window(now);
+  const std::optional<Localization> found =
+      stemvo::localize(find_seen_landmarks(window_, now), world_from_camera_ * prev_from_cur_,
+                       camera_, localization_);
   return found.has_value() ? accept_localization(frame, *found, localized)
-                           : start_new_map(frame, localized);
-}
-
-std::optional<Localization> WindowEstimator::localize_in_window(const TrackPoints& now) const {
-  return stemvo::localize(find_seen_landmarks(window_, now), world_from_camera_ * prev_from_cur_,
-                          camera_, localization_);
+                           : measure_since_reference(frame, now, localized);
 }
 
 FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
@@ -218,16 +108,95 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
   return turn_px < bound_px ? FrameState::kLowParallax : FrameState::kRotating;
 }
 
-/// The landmarks are out of view, or the frame shows another place.
-FrameState WindowEstimator::start_new_map(const TrackedFrame& frame, LocalizedFrame& localized) {
-  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
-  start_reference_before(frame.matches);
+/// There are no landmarks yet, they are out of view, or the frame shows another scene.
+FrameState WindowEstimator::measure_since_reference(const TrackedFrame& frame,
+                                                    const TrackPoints& now,
+                                                    LocalizedFrame& localized) {
+  const bool had_map = !is_initializing_;
+  const View& reference = initializer_.reference();
+  const bool starts_elsewhere =
+      reference.points.empty() && frame.matches.prev_frame != reference.frame;
+  if (had_map || starts_elsewhere || initializer_.is_worn_out(now)) {
+    start_reference_before(frame.matches);
+  }
   MeasuredMotion motion = initializer_.measure(frame.matches, now);
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
-  if (motion.num_inliers < kMinExplained * num_matches) {
+  if (had_map && motion.num_inliers < kMinExplained * num_matches) {
     motion.state = FrameState::kLost;
   }
-  return accept(frame, motion, localized);
+  add_scores(motion, localized.result);
+  localized.inlier_mask = motion.inlier_mask;
+  return accept_motion(frame, motion, localized);
+}
+
+/// What the motion since the reference makes of the frame.
+FrameState WindowEstimator::accept_motion(const TrackedFrame& frame,
+                                          const MeasuredMotion& motion,
+                                          LocalizedFrame& localized) {
+  if (motion.state == FrameState::kLost) {  // the last motion goes on, and no track does
+    world_from_camera_ = world_from_camera_ * prev_from_cur_;
+    start_reference({frame.number, world_from_camera_, {}, frame.road});
+    std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
+    return FrameState::kLost;
+  }
+  // The length of the way since the reference is not known: as many steps as frames that moved.
+  const View& reference = initializer_.reference();
+  const Rigid3 direction = motion.cur_from_prev.inverse();
+  const double length = step_ * (frame.number - reference.frame - frames_still_);
+  const Rigid3 guess =
+      reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
+  const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
+  const bool is_tracking = motion.state == FrameState::kTracking;
+  if (is_tracking && motion.is_decisive && open_window({frame.number, guess, points, frame.road})) {
+    return FrameState::kInitializing;
+  }
+  // Until there is a first map, the position is held; later the camera goes on as fast as it was.
+  const bool goes_on = !window_.keyframes.empty() && is_tracking;
+  world_from_camera_ =
+      Rigid3(guess.rotation, goes_on ? guess.translation : world_from_camera_.translation);
+  const bool is_still =
+      motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
+  frames_still_ += is_still ? 1 : 0;
+  initializer_.wait({frame.number, world_from_camera_, points});
+  return is_tracking ? FrameState::kInitializing : motion.state;
+}
+
+/// The reference is the first keyframe of a map to be. The window, if there is one, stays until the
+/// map is: a frame may see it again.
+void WindowEstimator::start_reference(View reference) {
+  initializer_.start(std::move(reference));
+  frames_still_ = 0;
+  is_initializing_ = true;
+}
+
+/// Where the matches start: the frame before, or the last one before trouble.
+void WindowEstimator::start_reference_before(const Matches& matches) {
+  const int frame = std::max(matches.prev_frame, 0);
+  start_reference({frame,
+                   trajectory_[static_cast<std::size_t>(frame)],
+                   {},
+                   frame == last_.frame ? last_.road : nullptr});
+}
+
+bool WindowEstimator::open_window(View view) {
+  const View& reference = initializer_.reference();
+  std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
+  if (!window.has_value()) {
+    return false;
+  }
+  if (!window_.keyframes.empty()) {  // the frames since belong to the new one
+    std::erase_if(window_.keyframes.back().followers,
+                  [&](const FrameBetween& follower) { return follower.frame > reference.frame; });
+    history_.close(window_);
+  }
+  window_ = std::move(*window);
+  const View& road_view = reference.road != nullptr ? reference : view;
+  scale_.restart(road_view.road.get());
+  road_pose_ = road_view.world_from_camera;
+  is_initializing_ = false;
+  world_from_camera_ = view.world_from_camera;
+  anchor_ = std::move(view);
+  return true;
 }
 
 double WindowEstimator::min_flow_px() const {
@@ -237,8 +206,9 @@ double WindowEstimator::min_flow_px() const {
 void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
   if (is_last_localized_ && matches.prev_frame == last_.frame) {
-    mask = epipolar_inliers(camera_from_world * last_.world_from_camera, matches.prev_uv,
-                            matches.cur_uv, camera_, localization_.inlier_bound_px);
+    mask =
+        epipolar_inliers(camera_from_world * last_.world_from_camera,
+                         {matches.prev_uv, matches.cur_uv}, camera_, localization_.inlier_bound_px);
   }
   for (std::size_t i = 0; i < mask.size(); ++i) {
     const auto landmark = window_.landmarks.find(matches.track_ids[i]);
@@ -261,7 +231,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
     }
   }
   measure_scale(frame, result.state);
-  finish_frame(frame, result.state);
+  remember(frame, result.state);
   scale_.report(result);
   result.world_from_camera = world_from_camera_;
 }
@@ -277,22 +247,22 @@ bool WindowEstimator::is_keyframe(const View& view) const {
     return true;
   }
   const Rigid3 cur_from_newest = view.world_from_camera.inverse() * newest.world_from_camera;
-  return median_parallax_px(cur_from_newest.rotation, pairs.prev_uv, pairs.cur_uv, camera_) >
+  return median_parallax_px(cur_from_newest.rotation, {pairs.prev_uv, pairs.cur_uv}, camera_) >
          keyframe_parallax_px_;
 }
 
 void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   Keyframe keyframe{frame.number, world_from_camera_, anchor_.points, {}};
-  if (static_cast<int>(window_.keyframes.size()) >= window_options_.num_keyframes) {
+  const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
+  if (window_.keyframes.size() >= length) {
     history_.leave(window_, keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
-  ++num_keyframes_;
   triangulate_landmarks(window_, camera_, window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
     refinement_.num_fixed_keyframes =
-        num_keyframes_ < window_options_.num_keyframes ? 1 : window_options_.num_keyframes / 2;
+        window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera_, refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     anchor_.world_from_camera = world_from_camera_;
@@ -311,39 +281,33 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
       scale_.wait("no map");
     }
   } else {
+    const Eigen::Vector3d center = road_pose_.translation;
     const double factor =
         scale_.measure(frame.road.get(), world_from_camera_.inverse() * road_pose_);
-    rescale_map(factor, road_pose_.translation);
+    if (factor != 1.0) {
+      rescale(window_, factor, center);
+      for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
+        pose->translation = center + factor * (pose->translation - center);
+      }
+    }
     road_pose_ = world_from_camera_;
   }
 }
 
-void WindowEstimator::rescale_map(double factor, const Eigen::Vector3d& center) {
-  if (factor == 1.0) {
-    return;
-  }
-  rescale(window_, factor, center);
-  for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
-    pose->translation = center + factor * (pose->translation - center);
-  }
-}
-
 /// The pose is final, but for the refined trajectory.
-void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) {
+void WindowEstimator::remember(const TrackedFrame& frame, FrameState state) {
   if (frame.has_image) {
-    const bool is_localized = state != FrameState::kLost && !is_initializing_;
-    if (is_localized && (has_opened_ || is_last_localized_)) {
-      const Rigid3& before =
-          has_opened_ ? initializer_.reference().world_from_camera : last_.world_from_camera;
-      const int frame_before = has_opened_ ? initializer_.reference().frame : last_.frame;
-      prev_from_cur_ =
-          motion_of_one_frame(before.inverse() * world_from_camera_, frame.number - frame_before);
+    const bool is_localized = !is_initializing_;
+    const bool has_opened = is_localized && state == FrameState::kInitializing;
+    if (has_opened || (is_localized && is_last_localized_)) {
+      const View& before = has_opened ? initializer_.reference() : last_;
+      prev_from_cur_ = motion_of_one_frame(before.world_from_camera.inverse() * world_from_camera_,
+                                           frame.number - before.frame);
       const double step = prev_from_cur_.translation.norm();
       step_ = step > 0.0 && state == FrameState::kTracking ? step : step_;
     }
     is_last_localized_ = is_localized;
-    last_ = {frame.number, world_from_camera_, {}};
-    last_road_ = frame.road;
+    last_ = {frame.number, world_from_camera_, {}, frame.road};
   }
   if (!window_.keyframes.empty() && window_.keyframes.back().frame != frame.number) {
     Keyframe& newest = window_.keyframes.back();
@@ -354,15 +318,15 @@ void WindowEstimator::finish_frame(const TrackedFrame& frame, FrameState state) 
 }
 
 std::vector<Rigid3> WindowEstimator::refined_trajectory() const {
-  WindowHistory history = history_;
-  history.close(window_);
-  return refined_poses(trajectory_, history.motions());
+  return refined_poses(trajectory_, closed_history().motions());
 }
 
-std::vector<MapLandmark> WindowEstimator::landmarks() const {
+std::vector<MapLandmark> WindowEstimator::landmarks() const { return closed_history().landmarks(); }
+
+WindowHistory WindowEstimator::closed_history() const {
   WindowHistory history = history_;
   history.close(window_);
-  return history.landmarks();
+  return history;
 }
 
 }  // namespace stemvo

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -14,9 +13,9 @@
 #include "odometry/metric_scale.hpp"
 #include "odometry/window.hpp"
 #include "odometry/window_history.hpp"
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/options.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
@@ -24,7 +23,7 @@ namespace stemvo {
 /// localized against its landmarks. It alone owns pose, window and scale (docs/architecture.md).
 class WindowEstimator final : public Estimator {
  public:
-  WindowEstimator(const Config& config, const Camera& camera);
+  WindowEstimator(const Options& config, const Camera& camera);
 
   [[nodiscard]] LocalizedFrame localize(const TrackedFrame& frame) override;
   void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
@@ -36,26 +35,21 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] const Window& window() const { return window_; }
 
  private:
-  // While there are no landmarks.
-  void start_reference_before(const Matches& matches);
-  FrameState initialize(const TrackedFrame& frame, LocalizedFrame& localized);
-  FrameState accept(const TrackedFrame& frame,
-                    const MeasuredMotion& motion,
-                    LocalizedFrame& localized);
-  [[nodiscard]] bool open_window(const TrackedFrame& frame,
-                                 const MeasuredMotion& motion,
-                                 TrackPoints points);
-  void start_reference(View reference, std::shared_ptr<const RoadPicture> road);
-  [[nodiscard]] Rigid3 guessed_pose(int frame, const MeasuredMotion& motion) const;
-  FrameState lose(LocalizedFrame& localized);
-
-  // Against landmarks.
-  FrameState track(const TrackedFrame& frame, LocalizedFrame& localized);
-  [[nodiscard]] std::optional<Localization> localize_in_window(const TrackPoints& now) const;
+  // Localization: what gives the frame its pose and its state.
+  FrameState find_pose(const TrackedFrame& frame, LocalizedFrame& localized);
   FrameState accept_localization(const TrackedFrame& frame,
                                  const Localization& found,
                                  LocalizedFrame& localized);
-  FrameState start_new_map(const TrackedFrame& frame, LocalizedFrame& localized);
+  FrameState measure_since_reference(const TrackedFrame& frame,
+                                     const TrackPoints& now,
+                                     LocalizedFrame& localized);
+  FrameState accept_motion(const TrackedFrame& frame,
+                           const MeasuredMotion& motion,
+                           LocalizedFrame& localized);
+
+  void start_reference(View reference);
+  void start_reference_before(const Matches& matches);
+  [[nodiscard]] bool open_window(View view);
   /// What counts as motion in the image.
   [[nodiscard]] double min_flow_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
@@ -65,8 +59,8 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const TrackedFrame& frame);
   void measure_scale(const TrackedFrame& frame, FrameState state);
-  void rescale_map(double factor, const Eigen::Vector3d& center);
-  void finish_frame(const TrackedFrame& frame, FrameState state);
+  void remember(const TrackedFrame& frame, FrameState state);
+  [[nodiscard]] WindowHistory closed_history() const;
 
   Camera camera_;
   OdometryOptions options_;
@@ -81,20 +75,16 @@ class WindowEstimator final : public Estimator {
   Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;
   MetricScale scale_;
-  Rigid3 world_from_camera_;  ///< of the frame in work
-  Rigid3 prev_from_cur_;      ///< the last motion of one frame
-  double step_;               ///< length of the last step measured, per frame
-  View last_;                 ///< the last frame with an image, without its points
-  View anchor_;               ///< the last frame that was not stationary
-  std::shared_ptr<const RoadPicture> last_road_;
-  std::shared_ptr<const RoadPicture> reference_road_;  ///< of the initializer's reference
+  Rigid3 world_from_camera_;        ///< of the frame in work
+  Rigid3 prev_from_cur_;            ///< the last motion of one frame
+  double step_;                     ///< length of the last step measured, per frame
+  View last_;                       ///< the last frame with an image, without its points
+  View anchor_;                     ///< the last frame that was not stationary
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
   bool is_held_ = false;            ///< the last image did not show new motion
   int frames_still_ = 0;            ///< since the initializer's reference: stationary, rotating
-  int num_keyframes_ = 0;           ///< since the window was opened
   int keyframes_since_refinement_ = 0;
-  bool has_opened_ = false;  ///< the frame in work opened the window
   std::vector<Rigid3> trajectory_;
 };
 

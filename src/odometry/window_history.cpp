@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {

@@ -10,8 +10,8 @@
 #include <opencv2/core.hpp>
 
 #include "odometry/window.hpp"
-#include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/odometry/odometry.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/pipeline/channel_pictures.hpp"
+#include "pipeline/channel_pictures.hpp"
 
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "models/manifest.hpp"
 #include "pipeline/out_folder.hpp"
-#include "stemvo/report/frame_picture.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "report/frame_image.hpp"
 
 namespace stemvo {
 namespace {
@@ -58,7 +58,7 @@ class ChannelWriter {
  private:
   Status save(const cv::Mat& picture, const std::string& name) {
     ++num_written_;
-    return write_picture(request_.out_dir / (name + ".png"), picture);
+    return write_image(request_.out_dir / (name + ".png"), picture);
   }
 
   const ChannelPicturesRequest& request_;
@@ -83,7 +83,7 @@ Expected<std::size_t> write_channel_pictures(const ChannelPicturesRequest& reque
     return opened.error();
   }
   const FrameSource& sequence = **opened;
-  const Expected<Stem> stem = Stem::create(request.config.stem, request.models_dir);
+  const Expected<Stem> stem = create_stem(request.config.stem, request.models_dir);
   if (!stem) {
     return stem.error();
   }

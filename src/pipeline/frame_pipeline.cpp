@@ -7,8 +7,9 @@
 
 #include <opencv2/core/utility.hpp>
 
+#include "internal_check.hpp"
+#include "models/manifest.hpp"
 #include "pipeline/frame_scheduler.hpp"
-#include "stemvo/check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
@@ -24,7 +25,7 @@ struct Frame {
 /// The stages of an odometry, on frames that go round kMaxInFlight places.
 class OdometryStages {
  public:
-  OdometryStages(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit)
+  OdometryStages(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit)
       : sequence_(sequence), odometry_(odometry), visit_(visit) {}
 
   [[nodiscard]] FrameStages stages() {
@@ -73,7 +74,7 @@ class OdometryStages {
   }
 
   const FrameSource& sequence_;
-  Odometry& odometry_;
+  PhasedOdometry& odometry_;
   const FrameVisitor& visit_;
   std::array<Frame, kMaxInFlight> ring_;
   std::size_t num_prepared_ = 0;
@@ -84,7 +85,19 @@ class OdometryStages {
 
 }  // namespace
 
-void run_frames(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit) {
+Expected<PhasedOdometry> create_odometry(const Config& config,
+                                         const Camera& camera,
+                                         const std::filesystem::path& models_dir) {
+  Options options = config;
+  auto stem = with_network(config.stem, models_dir);
+  if (!stem) {
+    return stem.error();
+  }
+  options.stem = *std::move(stem);
+  return PhasedOdometry::create(camera, options);
+}
+
+void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
   OdometryStages odometry_stages(sequence, odometry, visit);
   run_stages(odometry_stages.stages(), sequence.size(), cv::getNumThreads());
 }

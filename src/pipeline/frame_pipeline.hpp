@@ -2,13 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 
 #include <opencv2/core.hpp>
 
-#include "stemvo/dataset/frame_source.hpp"
+#include "config/config.hpp"
+#include "dataset/frame_source.hpp"
+#include "odometry/phased_odometry.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/odometry/odometry.hpp"
 
 namespace stemvo::pipeline {
 
@@ -18,11 +20,17 @@ namespace stemvo::pipeline {
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
+/// An odometry for a valid configuration whose network models_dir knows. Errors: those of
+/// with_network and PhasedOdometry::create.
+[[nodiscard]] Expected<PhasedOdometry> create_odometry(const Config& config,
+                                                       const Camera& camera,
+                                                       const std::filesystem::path& models_dir);
+
 /// Takes the frames of a sequence through an odometry. Reading, the stem and the rest work on
 /// different frames at the same time, on as many threads as ThreadScope allows (without one: a
 /// thread per core), OpenCV's loops included, a few frames ahead at most; the poses do not depend
 /// on it. What a stage or the visitor throws leaves this function; frames behind the last one
 /// visited are dropped then.
-void run_frames(const FrameSource& sequence, Odometry& odometry, const FrameVisitor& visit);
+void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

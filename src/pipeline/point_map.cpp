@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <vector>
 
+#include "internal_check.hpp"
 #include "pipeline/result_files.hpp"
-#include "stemvo/check.hpp"
-#include "stemvo/report/map_ply.hpp"
+#include "report/map_ply.hpp"
 
 namespace stemvo::pipeline {
 namespace {

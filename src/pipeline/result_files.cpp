@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
-#include "stemvo/report/evaluate_report.hpp"
-#include "stemvo/report/trajectory_plot.hpp"
+#include "report/evaluate_report.hpp"
+#include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 
 namespace stemvo::pipeline {
@@ -86,7 +86,9 @@ Status write_config(const std::filesystem::path& out_dir,
   }
   out << "\n";
   // With what auto, -1 and 0 stand for, which may change with the manifest.
-  Config effective = with_chosen_upsample(config, sequence.camera().width_px);
+  Config effective = config;
+  effective.stem.upsample =
+      choose_upsample(config.stem.upsample, config.features.method, sequence.camera().width_px);
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;
   out << dump_config(effective);

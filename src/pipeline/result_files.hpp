@@ -5,11 +5,11 @@
 #include <optional>
 #include <span>
 
-#include "stemvo/config.hpp"
-#include "stemvo/dataset/frame_source.hpp"
+#include "config/config.hpp"
+#include "dataset/frame_source.hpp"
+#include "evaluation/trajectory.hpp"
+#include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/evaluation/trajectory.hpp"
-#include "stemvo/pipeline/run.hpp"
 
 namespace stemvo::pipeline {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/pipeline/run.hpp"
+#include "pipeline/run.hpp"
 
 #include <algorithm>
 #include <memory>
@@ -10,15 +10,16 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "evaluation/metrics.hpp"
+#include "evaluation/trajectory.hpp"
+#include "internal_check.hpp"
+#include "options/option_fields.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "stemvo/check.hpp"
-#include "stemvo/evaluation/metrics.hpp"
-#include "stemvo/evaluation/trajectory.hpp"
-#include "stemvo/report/frame_picture.hpp"
-#include "stemvo/report/frames_csv.hpp"
+#include "report/frame_image.hpp"
+#include "report/frames_csv.hpp"
 #include "stemvo/version.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -45,9 +46,10 @@ struct Drive {
 
 /// A folder of pictures is no car of KITTI's: what its camera file does not say is not known.
 Config with_camera_height(Config config, const RunRequest& request, const FrameSource& source) {
-  const bool is_default = config.scale.source == "camera_height" && !request.chosen.source;
+  const bool is_default =
+      config.scale.source == ScaleSource::kCameraHeight && !request.chosen.source;
   if (request.camera_file && !source.camera_height_m() && is_default) {
-    config.scale.source = "none";
+    config.scale.source = ScaleSource::kNone;
   }
   if (source.camera_height_m() && !request.chosen.camera_height) {
     config.scale.camera_height_m = *source.camera_height_m();
@@ -59,7 +61,8 @@ Expected<std::unique_ptr<const FrameSource>> open_sequence(const RunRequest& req
   auto sequence =
       open_source({request.sequence_dir, request.config.input.camera, request.frames,
                    request.ground_truth, request.calibration, request.camera_file, request.times});
-  if (sequence && request.config.scale.source == "ground_truth" && !(*sequence)->ground_truth()) {
+  if (sequence && request.config.scale.source == ScaleSource::kGroundTruth &&
+      !(*sequence)->ground_truth()) {
     const auto file = request.camera_file
                           ? request.sequence_dir
                           : request.sequence_dir / "../../poses" / ((*sequence)->name() + ".txt");
@@ -70,22 +73,23 @@ Expected<std::unique_ptr<const FrameSource>> open_sequence(const RunRequest& req
   return sequence;
 }
 
-Status write_frame_picture(const RunRequest& request,
-                           const Odometry& odometry,
-                           const cv::Mat& frame,
-                           std::size_t number,
-                           const FrameResult& result) {
+Status write_frame_image(const RunRequest& request,
+                         const PhasedOdometry& odometry,
+                         const cv::Mat& frame,
+                         std::size_t number,
+                         const FrameResult& result) {
   const std::string caption =
       fmt::format("frame {}: {}, {} of {} matches", number, to_string(result.state),
                   result.num_inliers, result.num_matches);
-  const cv::Mat picture = draw_frame_picture(frame, odometry.channel_image(), odometry.matches(),
-                                             odometry.inlier_mask(), caption);
-  return write_picture(request.out_dir / "pictures" / fmt::format("{:06}.png", number), picture);
+  const cv::Mat picture =
+      draw_frame_image(frame, odometry.frames().image(), odometry.frames().matches(),
+                       odometry.frames().inlier_mask(), caption);
+  return write_image(request.out_dir / "pictures" / fmt::format("{:06}.png", number), picture);
 }
 
 Drive drive(const RunRequest& request,
             const FrameSource& sequence,
-            Odometry& odometry,
+            PhasedOdometry& odometry,
             FramesCsv& csv,
             const RunProgress& progress) {
   Drive result;
@@ -104,7 +108,7 @@ Drive drive(const RunRequest& request,
     csv.write(number, sequence.timestamps_s()[i], pose);
     if (request.picture_every > 0 && i % static_cast<std::size_t>(request.picture_every) == 0) {
       keep_first(result.written,
-                 write_frame_picture(request, odometry, frame.value_or(cv::Mat()), number, pose));
+                 write_frame_image(request, odometry, frame.value_or(cv::Mat()), number, pose));
     }
     result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
     return !result.interrupted;
@@ -125,14 +129,14 @@ std::optional<std::span<const Rigid3>> truth_of(const FrameSource& sequence,
 
 /// A trajectory without a scale has no error in metres until one is fitted.
 Alignment alignment_of(const ScaleOptions& scale) {
-  return scale.source == "none" ? Alignment::kSim3 : Alignment::kNone;
+  return scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
 }
 
 Trajectory refined_trajectory(const RunRequest& request,
                               const FrameSource& sequence,
-                              const Odometry& odometry) {
-  Trajectory refined = odometry.refined_trajectory();
-  return request.config.scale.source == "ground_truth"
+                              const PhasedOdometry& odometry) {
+  Trajectory refined = odometry.frames().estimator().refined_trajectory();
+  return request.config.scale.source == ScaleSource::kGroundTruth
              ? rescale_steps(refined, *truth_of(sequence, refined.size()))
              : refined;
 }
@@ -151,10 +155,10 @@ MetricsReport make_report(const RunRequest& request,
   report.model = request.config.stem.model;
   report.filter = stem.filter;
   report.fps = static_cast<double>(num_frames) / std::max(seconds, 1e-9);
-  report.scale_source = request.config.scale.source;
+  report.scale_source = options::to_string(request.config.scale.source);
   report.tracked_fraction =
       static_cast<double>(done.num_measured) / static_cast<double>(num_frames);
-  if (request.config.scale.source == "camera_height") {
+  if (request.config.scale.source == ScaleSource::kCameraHeight) {
     report.road_measured_fraction =
         static_cast<double>(done.num_road_measured) / static_cast<double>(num_frames);
   }
@@ -173,14 +177,14 @@ MetricsReport make_report(const RunRequest& request,
 /// All but metrics.json, for which it makes the report.
 Status write_results(const RunRequest& request,
                      const FrameSource& sequence,
-                     const Odometry& odometry,
+                     const PhasedOdometry& odometry,
                      Drive& done,
                      MetricsReport& report) {
-  if (request.config.scale.source == "ground_truth") {
+  if (request.config.scale.source == ScaleSource::kGroundTruth) {
     done.trajectory = rescale_steps(done.trajectory, *truth_of(sequence, done.trajectory.size()));
   }
   Status written = pipeline::write_trajectories(request.out_dir, sequence, done.trajectory);
-  if (request.config.odometry.mode == "map") {
+  if (request.config.odometry.mode == OdometryMode::kMap) {
     done.refined = refined_trajectory(request, sequence, odometry);
   }
   keep_first(written, pipeline::write_refined_trajectory(request.out_dir, done.refined));
@@ -191,8 +195,9 @@ Status write_results(const RunRequest& request,
   keep_first(written, pipeline::write_config(request.out_dir, request.config, sequence,
                                              odometry.stem_info()));
   if (request.write_map) {
-    keep_first(written, pipeline::write_point_map(request.out_dir, odometry.landmarks(),
-                                                  odometry.refined_trajectory(), *done.refined));
+    keep_first(written, pipeline::write_point_map(
+                            request.out_dir, odometry.frames().estimator().landmarks(),
+                            odometry.frames().estimator().refined_trajectory(), *done.refined));
   }
   keep_first(written, pipeline::write_map(request.out_dir, sequence, done.trajectory, report));
   return written;
@@ -211,8 +216,8 @@ Status prepare_out_folder(const RunRequest& request) {
 Expected<RunSummary> run_source(const RunRequest& request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
-  Expected<Odometry> odometry =
-      Odometry::create(request.config, sequence.camera(), request.models_dir);
+  Expected<PhasedOdometry> odometry =
+      pipeline::create_odometry(request.config, sequence.camera(), request.models_dir);
   if (!odometry) {
     return odometry.error();
   }
@@ -248,9 +253,8 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (const Status status = validate(request.config); !status) {
     return status.error();
   }
-  if (request.write_map && request.config.odometry.mode != "map") {
-    return fail(fmt::format("--map: expected odometry.mode map, which makes one, found {}",
-                            request.config.odometry.mode));
+  if (request.write_map && request.config.odometry.mode != OdometryMode::kMap) {
+    return fail("--map: expected odometry.mode map, which makes one, found two_frame");
   }
   const pipeline::ThreadScope threads(request.num_threads);
   const auto sequence = open_sequence(request);

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/check.hpp"
+#include "report/check.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <string_view>
+#include <utility>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <yaml-cpp/yaml.h>
 
+#include "config/config_yaml.hpp"
 #include "report/text_table.hpp"
 #include "text/text_file.hpp"
 
@@ -28,77 +28,55 @@ std::string first_line(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
 }
 
-std::string at(const std::filesystem::path& file, const YAML::Node& node) {
-  return fmt::format("{}:{}", file.string(), node.Mark().line + 1);
-}
-
-/// `{max: 1.0}`, `{min: 0.99}` or both.
-Expected<std::vector<Bound>> parse_bounds(const std::filesystem::path& file,
-                                          const YAML::Node& key_node,
-                                          const YAML::Node& bounds_node) {
-  const std::string key = key_node.Scalar();
-  if (!bounds_node.IsMap() || bounds_node.size() == 0) {
-    return fail(fmt::format("{}: {}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'",
-                            at(file, key_node), key,
-                            bounds_node.IsScalar() ? bounds_node.Scalar() : "no bound"));
-  }
-  std::vector<Bound> bounds;
-  std::set<std::string> seen;
-  for (const auto& entry : bounds_node) {
-    const std::string name = entry.first.IsScalar() ? entry.first.Scalar() : "";
-    if (name != "min" && name != "max") {
-      return fail(
-          fmt::format("{}: {}: expected min or max, found '{}'", at(file, entry.first), key, name));
-    }
-    if (!seen.insert(name).second) {
-      return fail(fmt::format("{}: {}: expected {} once, found it twice", at(file, entry.first),
-                              key, name));
-    }
-    const Expected<std::vector<double>> limit =
-        parse_numbers(entry.second.IsScalar() ? entry.second.Scalar() : "", 1);
-    if (!limit) {
-      return fail(
-          fmt::format("{}: {}.{}: {}", at(file, entry.first), key, name, limit.error().message));
-    }
-    bounds.push_back({key, name == "max", limit->front(), key_node.Mark().line + 1});
-  }
-  return bounds;
-}
-
+/// `{max: 1.0}`, `{min: 0.99}` or both under each metric's name.
 Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
+  const Expected<YAML::Node> root = read_text_file(file).and_then(
+      [&](const std::string& text) { return config::parse_document(text, file.string()); });
+  if (!root) {
+    return fail(first_line(root.error().message));
   }
-  YAML::Node root;
-  try {
-    root = YAML::Load(*text);
-  } catch (const YAML::Exception& error) {
-    return fail(fmt::format("{}:{}: not YAML: {}", file.string(), error.mark.line + 1,
-                            first_line(error.msg)));
-  }
-  if (!root.IsMap() || root.size() == 0) {
+  if (!root->IsMap() || root->size() == 0) {
     return fail(fmt::format("{}: expected lines like 't_rel_percent: {{max: 1.0}}', found none",
                             file.string()));
   }
-  std::vector<Bound> all;
-  std::set<std::string> seen;
-  for (const auto& entry : root) {
-    if (!entry.first.IsScalar()) {
-      return fail(fmt::format("{}: expected the name of a metric, found another kind of key",
-                              at(file, entry.first)));
+  const auto fail_at = [&](const YAML::Node& node, const std::string& problem) {
+    return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, problem));
+  };
+  const auto text_of = [](const YAML::Node& node) { return node.IsScalar() ? node.Scalar() : ""; };
+  std::vector<Bound> bounds;
+  std::set<std::pair<std::string, std::string>> seen;
+  for (const auto& entry : *root) {
+    const YAML::Node& key_node = entry.first;
+    const YAML::Node& bounds_node = entry.second;
+    const std::string key = text_of(key_node);
+    if (!key_node.IsScalar()) {
+      return fail_at(key_node, "expected the name of a metric, found another kind of key");
     }
-    if (!seen.insert(entry.first.Scalar()).second) {
-      return fail(fmt::format("{}: expected {} once, found it twice", at(file, entry.first),
-                              entry.first.Scalar()));
+    if (!seen.emplace(key, "").second) {
+      return fail_at(key_node, fmt::format("expected {} once, found it twice", key));
     }
-    const Expected<std::vector<Bound>> bounds = parse_bounds(file, entry.first, entry.second);
-    if (!bounds) {
-      return bounds;
+    if (!bounds_node.IsMap() || bounds_node.size() == 0) {
+      return fail_at(key_node,
+                     fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
+                                 bounds_node.IsScalar() ? bounds_node.Scalar() : "no bound"));
     }
-    all.insert(all.end(), bounds->begin(), bounds->end());
+    for (const auto& bound : bounds_node) {
+      const YAML::Node& name_node = bound.first;
+      const std::string name = text_of(name_node);
+      if (name != "min" && name != "max") {
+        return fail_at(name_node, fmt::format("{}: expected min or max, found '{}'", key, name));
+      }
+      if (!seen.emplace(key, name).second) {
+        return fail_at(name_node, fmt::format("{}: expected {} once, found it twice", key, name));
+      }
+      const Expected<std::vector<double>> limit = parse_numbers(text_of(bound.second), 1);
+      if (!limit) {
+        return fail_at(name_node, fmt::format("{}.{}: {}", key, name, limit.error().message));
+      }
+      bounds.push_back({key, name == "max", limit->front(), key_node.Mark().line + 1});
+    }
   }
-  return all;
+  return bounds;
 }
 
 Expected<nlohmann::json> read_metrics(const std::filesystem::path& file) {
@@ -194,11 +172,11 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   TextTable table("lrll");
   table.add({"metric", "value", "bound", "result"});
   table.rule();
-  std::size_t failed = 0;
   for (const ThresholdResult& result : results) {
     table.add({result.key, result.value, result.bound, result.passed ? "ok" : "FAILED"});
-    failed += result.passed ? 0 : 1;
   }
+  const auto failed = std::count_if(results.begin(), results.end(),
+                                    [](const ThresholdResult& r) { return !r.passed; });
   const std::string summary =
       failed == 0 ? fmt::format("all {} bounds kept\n", results.size())
                   : fmt::format("{} of {} bounds not kept\n", failed, results.size());

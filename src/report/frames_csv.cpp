@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/frames_csv.hpp"
+#include "report/frames_csv.hpp"
 
 #include <cerrno>
-#include <fstream>
-#include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 namespace stemvo {
 
@@ -18,78 +15,57 @@ constexpr std::string_view kHeader =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
     "scale_sigma,road\n";
 
-std::string_view model_name(TwoViewModel model) {
-  switch (model) {
-    case TwoViewModel::kNone:
-      return "none";
-    case TwoViewModel::kHomography:
-      return "homography";
-    case TwoViewModel::kEssential:
-      return "essential";
-  }
-  return "unknown";
-}
+constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
 }  // namespace
 
-struct FramesCsv::Impl {
-  std::filesystem::path file;
-  std::ofstream stream;
-  std::string trouble;  ///< the first failed write
-
-  void put(std::string_view text) {
-    if (!trouble.empty()) {
-      return;
-    }
-    errno = 0;
-    stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-    stream.flush();  // a killed run keeps its rows
-    if (!stream) {
-      trouble = std::generic_category().message(errno);
-    }
+void FramesCsv::put(std::string_view text) {
+  if (!failure_.empty()) {
+    return;
   }
-};
+  errno = 0;
+  stream_.write(text.data(), static_cast<std::streamsize>(text.size()));
+  stream_.flush();  // a killed run keeps its rows
+  if (!stream_) {
+    failure_ = std::generic_category().message(errno);
+  }
+}
 
-FramesCsv::FramesCsv(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-FramesCsv::FramesCsv(FramesCsv&&) noexcept = default;
-FramesCsv& FramesCsv::operator=(FramesCsv&&) noexcept = default;
-FramesCsv::~FramesCsv() = default;
+Status FramesCsv::status() const {
+  return failure_.empty() ? Status()
+                          : fail(fmt::format("{}: cannot write: {}", file_.string(), failure_));
+}
 
 Expected<FramesCsv> FramesCsv::create(const std::filesystem::path& file) {
-  auto impl = std::make_unique<Impl>();
-  impl->file = file;
+  FramesCsv csv;
+  csv.file_ = file;
   errno = 0;
-  impl->stream.open(file, std::ios::binary | std::ios::trunc);
-  if (!impl->stream) {
-    return fail(
-        fmt::format("{}: cannot write: {}", file.string(), std::generic_category().message(errno)));
+  csv.stream_.open(file, std::ios::binary | std::ios::trunc);
+  if (!csv.stream_) {
+    csv.failure_ = std::generic_category().message(errno);
   }
-  FramesCsv csv(std::move(impl));
-  csv.impl_->put(kHeader);
-  if (!csv.impl_->trouble.empty()) {
-    return fail(fmt::format("{}: cannot write: {}", file.string(), csv.impl_->trouble));
+  csv.put(kHeader);
+  if (const Status created = csv.status(); !created) {
+    return created.error();
   }
   return csv;
 }
 
 void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
   const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
-  impl_->put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n",
-                         frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers,
-                         r.homography_score, r.fundamental_score, r.homography_ratio,
-                         model_name(r.model), r.times.stem_ms, r.times.features_ms, r.times.pose_ms,
-                         sigma, to_string(r.road)));
+  put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n", frame,
+                  timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
+                  r.fundamental_score, r.homography_ratio,
+                  kModels[static_cast<std::size_t>(r.model)], r.times.stem_ms, r.times.features_ms,
+                  r.times.pose_ms, sigma, to_string(r.road)));
 }
 
 Status FramesCsv::close() {
-  impl_->stream.close();
-  if (impl_->trouble.empty() && !impl_->stream) {
-    impl_->trouble = std::generic_category().message(errno);
+  stream_.close();
+  if (failure_.empty() && !stream_) {
+    failure_ = std::generic_category().message(errno);
   }
-  if (!impl_->trouble.empty()) {
-    return fail(fmt::format("{}: cannot write: {}", impl_->file.string(), impl_->trouble));
-  }
-  return {};
+  return status();
 }
 
 }  // namespace stemvo

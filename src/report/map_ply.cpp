@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/map_ply.hpp"
+#include "report/map_ply.hpp"
 
 #include <bit>
-#include <cstring>
 #include <string>
-#include <type_traits>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
@@ -14,23 +12,18 @@
 namespace stemvo {
 namespace {
 
-/// Appends a number of four bytes, the least significant first.
+static_assert(std::endian::native == std::endian::little, "as the file");
+
 template <typename Number>
 void append(Number number, std::string& bytes) {
-  static_assert(sizeof(Number) == 4 && std::is_trivially_copyable_v<Number>);
-  auto bits = std::bit_cast<std::uint32_t>(number);
-  for (int i = 0; i < 4; ++i, bits >>= 8U) {
-    bytes.push_back(static_cast<char>(bits & 0xffU));
-  }
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
 void append_vertex(const ColoredPoint& point, std::string& bytes) {
   for (const float coordinate : point.position) {
     append(coordinate, bytes);
   }
-  for (const std::uint8_t level : point.rgb) {
-    bytes.push_back(static_cast<char>(level));
-  }
+  bytes.append(point.rgb.begin(), point.rgb.end());
 }
 
 std::string header(std::size_t num_vertices, std::size_t num_edges) {

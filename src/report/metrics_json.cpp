@@ -1,166 +1,167 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/metrics_json.hpp"
+#include "report/metrics_json.hpp"
 
-#include <string_view>
-#include <vector>
+#include <limits>
+#include <type_traits>
 
-#include <fmt/core.h>
-#include <nlohmann/json.hpp>
+#include <fmt/format.h>
 
+#include "report/evaluate_report.hpp"
 #include "report/metrics_keys.hpp"
-#include "report/optional_number.hpp"
-#include "report/text_table.hpp"
-#include "report/timing_json.hpp"
-#include "stemvo/report/evaluate_report.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
-
 namespace {
 
-std::string number_or_dash(const std::optional<double>& value, int decimals) {
-  return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
+using Json = nlohmann::ordered_json;
+
+struct Writer {
+  Json& json;
+
+  template <typename Value>
+  void operator()(const char* key, const Value& value) const {
+    json[key] = value;
+  }
+};
+
+/// Throws Json::exception where a key is missing or of another type.
+struct Reader {
+  const Json& json;
+
+  template <typename Value>
+  void operator()(const char* key, Value& value) const {
+    const Json& found = json.at(key);
+    if constexpr (std::is_same_v<Value, double>) {
+      value = found.is_null() ? std::numeric_limits<double>::quiet_NaN() : found.get<double>();
+    } else {
+      found.get_to(value);
+    }
+  }
+};
+
+// Each key once, in the file's order: what is visited is const where it is written.
+
+template <typename Report, typename Visitor>
+void visit_run(Report& report, const Visitor& visit) {
+  visit("stemvo_version", report.stemvo_version);
+  visit("sequence", report.sequence);
+  visit("first_frame", report.first_frame);
+  visit("frames", report.num_frames);
+  visit("model", report.model);
+  visit("filter", report.filter);
+  visit("fps", report.fps);
+  visit("scale_source", report.scale_source);
+  visit("tracked_fraction", report.tracked_fraction);
+  visit("road_measured_fraction", report.road_measured_fraction);
 }
 
-std::string scale_explained(const std::string& source) {
-  if (source == "ground_truth") {
-    return "ground_truth (each step rescaled to its true length)";
-  }
-  if (source == "constant") {
-    return "constant (every step the same length: not metric)";
-  }
-  if (source == "none") {
-    return "none (up to scale: units, not metres)";
-  }
-  return source;
+template <typename M, typename Visitor>
+void visit_metrics(M& metrics, const Visitor& visit) {
+  visit("path_length_m", metrics.path_length_m);
+  visit("average_offset_m", metrics.average_offset_m);
+  visit("null_offset_m", metrics.null_offset_m);
+  visit("t_rel_percent", metrics.t_rel_percent);
+  visit("r_rel_deg_per_100m", metrics.r_rel_deg_per_100m);
+  visit("segment_lengths_m", metrics.segment_lengths_m);
+  visit("segments", metrics.num_segments);
+  visit("ate_rmse_m", metrics.ate_rmse);
+  visit("rpe_rotation_deg", metrics.rpe_rotation_deg);
 }
 
-nlohmann::ordered_json refined_json(const Metrics& metrics) {
-  nlohmann::ordered_json json;
-  json["average_offset_m"] = metrics.average_offset_m;
-  json["t_rel_percent"] = number_or_null(metrics.t_rel_percent);
-  json["r_rel_deg_per_100m"] = number_or_null(metrics.r_rel_deg_per_100m);
-  json["rpe_rotation_deg"] = metrics.rpe_rotation_deg;
-  return json;
+/// What is kept of a refined trajectory.
+template <typename M, typename Visitor>
+void visit_refined(M& metrics, const Visitor& visit) {
+  visit("average_offset_m", metrics.average_offset_m);
+  visit("t_rel_percent", metrics.t_rel_percent);
+  visit("r_rel_deg_per_100m", metrics.r_rel_deg_per_100m);
+  visit("rpe_rotation_deg", metrics.rpe_rotation_deg);
 }
 
-std::string head(const MetricsReport& report) {
-  TextTable table("ll");
-  const std::size_t end = report.first_frame + report.num_frames;
-  table.add({"sequence", fmt::format("{}, {} frames ({}:{})", report.sequence, report.num_frames,
-                                     report.first_frame, end)});
-  table.add({"model", fmt::format("{}, filter {}", report.model, report.filter)});
-  table.add({"scale", scale_explained(report.scale_source)});
-  table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
-  table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
-                                    100.0 * report.tracked_fraction)});
-  if (report.road_measured_fraction) {
-    table.add({"road", fmt::format("measured on {:.1f} % of the frames",
-                                   100.0 * *report.road_measured_fraction)});
-  }
-  if (report.metrics) {
-    table.add({"path", fmt::format("{:.1f} m (ground truth)", report.metrics->path_length_m)});
-  }
-  return table.str();
-}
-
-std::string error_table(const MetricsReport& report) {
-  const Metrics& m = *report.metrics;
-  const std::string segments = m.num_segments == 0 ? "no segment fits into the drive"
-                                                   : fmt::format("mean over {} segments of {}",
-                                                                 m.num_segments, length_range(m));
-  const std::string fitted(to_string(m.alignment));
-  TextTable table("lrlll");
-  table.add({"error", "value", "unit", "alignment", ""});
-  table.rule();
-  table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
-  if (report.refined) {
-    table.add({"  with look-ahead", number_or_dash(report.refined->t_rel_percent, 2), "%",
-               std::string(to_string(report.refined->alignment)), "trajectory_refined_kitti.txt"});
-  }
-  table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
-             "the same segments"});
-  table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
-             "mean of |dx| + |dz|"});
-  table.add({"  if it never moved", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
-             "the same for a camera that stays at the start"});
-  const std::pair<std::string_view, double> ates[] = {{"none", m.ate_rmse.none_m},
-                                                      {"scale", m.ate_rmse.scale_m},
-                                                      {"se3", m.ate_rmse.se3_m},
-                                                      {"sim3", m.ate_rmse.sim3_m}};
-  for (const auto& [alignment, rmse_m] : ates) {
-    const std::string_view note = alignment == "none"    ? "root mean square position error"
-                                  : alignment == "scale" ? "one scale fitted"
-                                  : alignment == "se3"   ? "rotation and shift fitted"
-                                                         : "rotation, shift and scale fitted";
-    table.add({"position ATE", fmt::format("{:.2f}", rmse_m), "m", std::string(alignment),
-               std::string(note)});
-  }
-  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
-             "mean over steps of one frame (RPE)"});
-  return table.str();
+template <typename Ate, typename Visitor>
+void visit_ate(Ate& ate, const Visitor& visit) {
+  visit("none", ate.none_m);
+  visit("scale", ate.scale_m);
+  visit("se3", ate.se3_m);
+  visit("sim3", ate.sim3_m);
 }
 
 }  // namespace
 
-void add_metrics(nlohmann::ordered_json& json, const Metrics* metrics) {
-  static const Metrics kNoMetrics;
-  const Metrics& m = metrics != nullptr ? *metrics : kNoMetrics;
-  nlohmann::ordered_json values;
-  values["path_length_m"] = m.path_length_m;
-  values["average_offset_m"] = m.average_offset_m;
-  values["null_offset_m"] = m.null_offset_m;
-  values["t_rel_percent"] = number_or_null(m.t_rel_percent);
-  values["r_rel_deg_per_100m"] = number_or_null(m.r_rel_deg_per_100m);
-  values["segment_lengths_m"] = m.segment_lengths_m;
-  values["segments"] = m.num_segments;
-  values["ate_rmse_m"]["none"] = m.ate_rmse.none_m;
-  values["ate_rmse_m"]["scale"] = m.ate_rmse.scale_m;
-  values["ate_rmse_m"]["se3"] = m.ate_rmse.se3_m;
-  values["ate_rmse_m"]["sim3"] = m.ate_rmse.sim3_m;
-  values["rpe_rotation_deg"] = m.rpe_rotation_deg;
-  for (const auto& [key, value] : values.items()) {
-    json[key] = metrics != nullptr ? value : nlohmann::ordered_json();
+// Found by nlohmann's library.
+void to_json(Json& json, const AbsoluteTrajectoryError& ate) { visit_ate(ate, Writer{json}); }
+void from_json(const Json& json, AbsoluteTrajectoryError& ate) { visit_ate(ate, Reader{json}); }
+void to_json(Json& json, const TimeSummary& time) {
+  json = {{"median_ms", time.median_ms}, {"p95_ms", time.p95_ms}};
+}
+
+void to_json(Json& json, const TimingReport& report) {
+  json["threads"] = report.num_threads;
+  json["fps"] = report.fps;
+  json["loop_fps"] = static_cast<double>(report.num_frames) / report.loop_s;
+  json["interval"] = report.interval;
+  json["latency"] = report.latency;
+  json["peak_memory_mib"] = report.peak_memory_mib;
+  json["cpu_s"] = report.cpu_s;
+  json["start_cpu_s"] = report.start_cpu_s;
+  json["other_cpu_s"] = report.rest_cpu_s;
+  json["stages"] = Json::object();
+  for (const StageTiming& stage : report.stages) {
+    json["stages"][stage.name] = {{"calls", stage.calls},
+                                  {"median_ms", stage.wall.median_ms},
+                                  {"p95_ms", stage.wall.p95_ms},
+                                  {"cpu_s", stage.cpu_s},
+                                  {"share_percent", stage.share_percent}};
   }
 }
 
-std::string to_text(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+void add_metrics(Json& json, const std::optional<Metrics>& metrics) {
+  const Metrics none;
+  visit_metrics(metrics ? *metrics : none, [&](const char* key, const auto& value) {
+    json[key] = metrics ? Json(value) : Json();
+  });
 }
 
-std::string length_range(const Metrics& metrics) {
-  const std::vector<double>& lengths = metrics.segment_lengths_m;
-  return lengths.size() == 1 ? fmt::format("{:g} m", lengths.front())
-                             : fmt::format("{:g}..{:g} m", lengths.front(), lengths.back());
+std::string to_text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
 Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
-  nlohmann::ordered_json json;
-  json["stemvo_version"] = report.stemvo_version;
-  json["sequence"] = report.sequence;
-  json["first_frame"] = report.first_frame;
-  json["frames"] = report.num_frames;
-  json["model"] = report.model;
-  json["filter"] = report.filter;
-  json["fps"] = report.fps;
-  json["scale_source"] = report.scale_source;
-  json["tracked_fraction"] = report.tracked_fraction;
-  json["road_measured_fraction"] = number_or_null(report.road_measured_fraction);
-  json["alignment"] = report.metrics ? nlohmann::ordered_json(to_string(report.metrics->alignment))
-                                     : nlohmann::ordered_json();
-  add_metrics(json, report.metrics ? &*report.metrics : nullptr);
-  json["refined"] = report.refined ? refined_json(*report.refined) : nlohmann::ordered_json();
+  Json json;
+  visit_run(report, Writer{json});
+  json["alignment"] = report.metrics ? Json(to_string(report.metrics->alignment)) : Json();
+  add_metrics(json, report.metrics);
+  json["refined"] = nullptr;
+  if (report.refined) {
+    visit_refined(*report.refined, Writer{json["refined"]});
+  }
   if (report.timing) {
-    json["timing"] = timing_json(*report.timing);
+    json["timing"] = *report.timing;
   }
   return write_text_file(file, to_text(json));
 }
 
-std::string format_metrics_table(const MetricsReport& report) {
-  if (!report.metrics) {
-    return head(report) + "\nNo ground truth: the errors are not known.\n";
+Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file) {
+  const Expected<std::string> text = read_text_file(file);
+  if (!text) {
+    return text.error();
   }
-  return head(report) + '\n' + error_table(report);
+  try {
+    const Json json = Json::parse(*text);
+    MetricsReport report;
+    visit_run(report, Reader{json});
+    if (!json.at("refined").is_null()) {
+      visit_refined(report.refined.emplace(), Reader{json["refined"]});
+    }
+    if (!json.at("segment_lengths_m").is_null()) {  // all of them are null without ground truth
+      visit_metrics(report.metrics.emplace(), Reader{json});
+      report.metrics->alignment =
+          parse_alignment(json.at("alignment").get<std::string>()).value_or(Alignment::kNone);
+    }
+    return report;
+  } catch (const Json::exception& error) {
+    return fail(
+        fmt::format("{}: expected the metrics of a run, found: {}", file.string(), error.what()));
+  }
 }
 
 }  // namespace stemvo

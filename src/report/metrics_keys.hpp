@@ -1,22 +1,33 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <nlohmann/json.hpp>
 
-#include "stemvo/evaluation/metrics.hpp"
+#include "evaluation/metrics.hpp"
+
+/// What may be missing is null in JSON.
+template <typename T>
+struct nlohmann::adl_serializer<std::optional<T>> {
+  template <typename Json>
+  static void to_json(Json& json, const std::optional<T>& value) {
+    json = value ? Json(*value) : Json();
+  }
+  template <typename Json>
+  static void from_json(const Json& json, std::optional<T>& value) {
+    value = json.is_null() ? std::nullopt : std::optional<T>(json.template get<T>());
+  }
+};
 
 namespace stemvo {
 
-/// Adds the keys of metrics.json that need ground truth; all null when `metrics` is null.
-void add_metrics(nlohmann::ordered_json& json, const Metrics* metrics);
+/// Adds the keys of metrics.json that need ground truth; all null without metrics.
+void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& metrics);
 
 /// Indented, ends with a newline. A number that is not finite becomes null, bytes that are not
 /// UTF-8 the replacement character.
 [[nodiscard]] std::string to_text(const nlohmann::ordered_json& json);
-
-/// "100..800 m": first and last of the lengths.
-[[nodiscard]] std::string length_range(const Metrics& metrics);
 
 }  // namespace stemvo

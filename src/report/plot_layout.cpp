@@ -3,73 +3,50 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include <fmt/core.h>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 
 namespace {
 
-constexpr double kMarginLeft_px = 150.0;
-constexpr double kMarginRight_px = 50.0;
-constexpr double kMarginTop_px = 200.0;  // title, subtitle, legend
-constexpr double kMarginBottom_px = 125.0;
-constexpr double kLeastWidth_px = 900.0;  // of the plot: the texts above it need the room
-constexpr double kMostWidth_px = 1400.0;
-constexpr double kLeastHeight_px = 480.0;
-constexpr double kMostHeight_px = 1100.0;
-constexpr double kLeastTick_px = 105.0;
-constexpr double kLeastSpan_m = 1.0;
+constexpr double kMinWidth_px = 900.0;  // of the plot: the texts above it need the room
+constexpr double kMaxWidth_px = 1400.0;
+constexpr double kMinHeight_px = 480.0;
+constexpr double kMaxHeight_px = 1100.0;
+constexpr double kMinTick_px = 105.0;
+constexpr double kMinSpan_m = 1.0;
 constexpr double kAir = 0.06;  // share of the span left free on each side
-
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void add(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  [[nodiscard]] double center() const { return 0.5 * (low + high); }
-  [[nodiscard]] double span() const { return high - low; }
-};
 
 }  // namespace
 
 PlotLayout make_plot_layout(const std::vector<const Trajectory*>& trajectories) {
-  Range x;
-  Range z;
+  Eigen::AlignedBox2d box;  // x, z
   for (const Trajectory* trajectory : trajectories) {
     for (const Rigid3& pose : *trajectory) {
       if (pose.translation.allFinite()) {
-        x.add(pose.translation.x());
-        z.add(pose.translation.z());
+        box.extend(Eigen::Vector2d(pose.translation.x(), pose.translation.z()));
       }
     }
   }
-  if (!(x.low <= x.high)) {
-    x = z = {0.0, 0.0};
+  if (box.isEmpty()) {
+    box.extend(Eigen::Vector2d::Zero());
   }
   // Air on both sides in terms of the longer side, so that a line is not drawn on the frame.
-  const double air_m = 2.0 * kAir * std::max({x.span(), z.span(), kLeastSpan_m});
-  const double span_x_m = x.span() + air_m;
-  const double span_z_m = z.span() + air_m;
+  const double air_m = 2.0 * kAir * std::max(box.sizes().maxCoeff(), kMinSpan_m);
+  const Eigen::Vector2d span_m = box.sizes().array() + air_m;
 
   PlotLayout layout;
-  layout.px_per_m = std::min(
-      {kMostWidth_px / span_x_m, kMostHeight_px / span_z_m, kMostHeight_px / kLeastSpan_m});
-  layout.plot_width_px = std::max(kLeastWidth_px, std::round(span_x_m * layout.px_per_m));
-  layout.plot_height_px = std::max(kLeastHeight_px, std::round(span_z_m * layout.px_per_m));
-  layout.left_px = kMarginLeft_px;
-  layout.top_px = kMarginTop_px;
-  layout.width_px = kMarginLeft_px + layout.plot_width_px + kMarginRight_px;
-  layout.height_px = kMarginTop_px + layout.plot_height_px + kMarginBottom_px;
-  layout.min_x_m = x.center() - 0.5 * layout.plot_width_px / layout.px_per_m;
-  layout.min_z_m = z.center() - 0.5 * layout.plot_height_px / layout.px_per_m;
-  layout.tick_m = round_tick(kLeastTick_px / layout.px_per_m);
+  layout.px_per_m =
+      std::min({kMaxWidth_px / span_m.x(), kMaxHeight_px / span_m.y(), kMaxHeight_px / kMinSpan_m});
+  layout.plot_width_px = std::max(kMinWidth_px, std::round(span_m.x() * layout.px_per_m));
+  layout.plot_height_px = std::max(kMinHeight_px, std::round(span_m.y() * layout.px_per_m));
+  layout.min_x_m = box.center().x() - 0.5 * layout.plot_width_px / layout.px_per_m;
+  layout.min_z_m = box.center().y() - 0.5 * layout.plot_height_px / layout.px_per_m;
+  layout.tick_m = round_tick(kMinTick_px / layout.px_per_m);
   return layout;
 }
 

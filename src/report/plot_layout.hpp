@@ -4,17 +4,18 @@
 #include <string>
 #include <vector>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 
 namespace stemvo {
 
 /// Where the figure's parts lie. Pixels, y down; the plot shows x to the right and z up with one
 /// scale for both.
 struct PlotLayout {
-  double width_px = 0.0;  ///< of the whole figure
-  double height_px = 0.0;
-  double left_px = 0.0;  ///< of the plot's frame
-  double top_px = 0.0;
+  static constexpr double kLeft_px = 150.0;  ///< of the plot's frame
+  static constexpr double kTop_px = 200.0;   ///< title, subtitle, legend
+  static constexpr double kMarginRight_px = 50.0;
+  static constexpr double kMarginBottom_px = 125.0;
+
   double plot_width_px = 0.0;
   double plot_height_px = 0.0;
   double min_x_m = 0.0;  ///< at the left edge of the plot
@@ -22,9 +23,13 @@ struct PlotLayout {
   double px_per_m = 1.0;
   double tick_m = 1.0;  ///< between grid lines, on both axes
 
-  [[nodiscard]] double to_px_x(double x_m) const { return left_px + (x_m - min_x_m) * px_per_m; }
+  [[nodiscard]] double right_px() const { return kLeft_px + plot_width_px; }
+  [[nodiscard]] double bottom_px() const { return kTop_px + plot_height_px; }
+  [[nodiscard]] double width_px() const { return right_px() + kMarginRight_px; }
+  [[nodiscard]] double height_px() const { return bottom_px() + kMarginBottom_px; }
+  [[nodiscard]] double to_px_x(double x_m) const { return kLeft_px + (x_m - min_x_m) * px_per_m; }
   [[nodiscard]] double to_px_y(double z_m) const {
-    return top_px + plot_height_px - (z_m - min_z_m) * px_per_m;
+    return bottom_px() - (z_m - min_z_m) * px_per_m;
   }
   [[nodiscard]] double max_x_m() const { return min_x_m + plot_width_px / px_per_m; }
   [[nodiscard]] double max_z_m() const { return min_z_m + plot_height_px / px_per_m; }

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 
@@ -24,8 +24,6 @@ void TextTable::add(std::vector<std::string> cells) {
   STEMVO_CHECK(!cells.empty() && cells.size() <= alignment_.size(), "one cell per column");
   rows_.push_back(std::move(cells));
 }
-
-void TextTable::rule() { rows_.emplace_back(); }
 
 std::string TextTable::str() const {
   std::vector<std::size_t> widths(alignment_.size(), 0);
@@ -50,6 +48,15 @@ std::string TextTable::str() const {
     text += line + '\n';
   }
   return text;
+}
+
+std::string number_or_dash(const std::optional<double>& value, int decimals) {
+  return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
+}
+
+std::string length_range(const std::vector<double>& lengths_m) {
+  return lengths_m.size() == 1 ? fmt::format("{:g} m", lengths_m.front())
+                               : fmt::format("{:g}..{:g} m", lengths_m.front(), lengths_m.back());
 }
 
 }  // namespace stemvo

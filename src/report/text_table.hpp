@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,12 +16,17 @@ class TextTable {
   /// At most as many cells as columns (checked).
   void add(std::vector<std::string> cells);
   /// A line under the last row.
-  void rule();
+  void rule() { rows_.emplace_back(); }
   [[nodiscard]] std::string str() const;
 
  private:
   std::string alignment_;
   std::vector<std::vector<std::string>> rows_;  ///< an empty row is a rule
 };
+
+[[nodiscard]] std::string number_or_dash(const std::optional<double>& value, int decimals);
+
+/// "100..800 m": first and last of the lengths.
+[[nodiscard]] std::string length_range(const std::vector<double>& lengths_m);
 
 }  // namespace stemvo

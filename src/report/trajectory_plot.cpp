@@ -1,21 +1,29 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/trajectory_plot.hpp"
+#include "report/trajectory_plot.hpp"
 
 #include <algorithm>
 #include <map>
+#include <memory>
+#include <numbers>
 #include <string_view>
 
 #include <cairo-svg.h>
-#include <fmt/core.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
-#include "report/cairo_canvas.hpp"
+#include "internal_check.hpp"
 #include "report/plot_layout.hpp"
-#include "stemvo/check.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
 
 namespace {
+
+struct Color {
+  double red = 0.0;
+  double green = 0.0;
+  double blue = 0.0;
+};
 
 // Okabe and Ito's colours (safe for the colour-blind) on neutral grays.
 constexpr Color kWhite{1.0, 1.0, 1.0};
@@ -36,197 +44,271 @@ constexpr double kTruthWidth_px = 9.0;
 constexpr double kEstimateWidth_px = 3.5;
 constexpr double kStart_px = 9.5;
 constexpr double kEnd_px = 12.0;
+constexpr double kRim_px = 3.0;
 
 constexpr double kTitle_px = 36.0;
 constexpr double kSubtitle_px = 25.0;
 constexpr double kLabel_px = 27.0;
 constexpr double kTick_px = 24.0;
 
-void draw_grid(const CairoCanvas& canvas, const PlotLayout& layout, const std::string& unit) {
-  const double right = layout.left_px + layout.plot_width_px;
-  const double bottom = layout.top_px + layout.plot_height_px;
-  canvas.set_font(kTick_px);
-  for (const double x : tick_positions(layout.min_x_m, layout.max_x_m(), layout.tick_m)) {
-    const double px = layout.to_px_x(x);
-    canvas.set_color(kGrid);
-    canvas.line(px, layout.top_px, px, bottom, 1.5);
-    canvas.set_color(kInk);
-    canvas.text(px, bottom + 38.0, tick_label(x, layout.tick_m), TextAnchor::kCenter);
-  }
-  for (const double z : tick_positions(layout.min_z_m, layout.max_z_m(), layout.tick_m)) {
-    const double py = layout.to_px_y(z);
-    canvas.set_color(kGrid);
-    canvas.line(layout.left_px, py, right, py, 1.5);
-    canvas.set_color(kInk);
-    canvas.text(layout.left_px - 16.0, py + 0.36 * kTick_px, tick_label(z, layout.tick_m),
-                TextAnchor::kRight);
-  }
-  canvas.set_font(kLabel_px);
-  canvas.text(0.5 * (layout.left_px + right), bottom + 92.0,
-              fmt::format("x, to the right [{}]", unit), TextAnchor::kCenter);
-  canvas.vertical_text(44.0, layout.top_px + 0.5 * layout.plot_height_px,
-                       fmt::format("z, forward [{}]", unit));
-  canvas.set_color(kFrame);
-  cairo_rectangle(canvas.context(), layout.left_px, layout.top_px, layout.plot_width_px,
-                  layout.plot_height_px);
-  canvas.stroke(2.0);
-}
-
-void draw_path(const CairoCanvas& canvas,
-               const PlotLayout& layout,
-               const Trajectory& trajectory,
-               const Color& color,
-               double width_px) {
-  bool is_open = false;
-  for (const Rigid3& pose : trajectory) {
-    if (!pose.translation.allFinite()) {
-      is_open = false;
-      continue;
-    }
-    const double x = layout.to_px_x(pose.translation.x());
-    const double y = layout.to_px_y(pose.translation.z());
-    is_open ? cairo_line_to(canvas.context(), x, y) : cairo_move_to(canvas.context(), x, y);
-    is_open = true;
-  }
-  canvas.set_color(color);
-  canvas.stroke(width_px);
-}
-
-void draw_markers(const CairoCanvas& canvas,
-                  const PlotLayout& layout,
-                  const Trajectory& trajectory) {
-  const auto is_finite = [](const Rigid3& pose) { return pose.translation.allFinite(); };
-  const auto first = std::find_if(trajectory.begin(), trajectory.end(), is_finite);
-  if (first == trajectory.end()) {
-    return;
-  }
-  const auto last = std::find_if(trajectory.rbegin(), trajectory.rend(), is_finite);
-  // On a loop both fall together: the square's corners stay visible around the disk.
-  canvas.square(layout.to_px_x(last->translation.x()), layout.to_px_y(last->translation.z()),
-                kEnd_px, kEnd);
-  canvas.disk(layout.to_px_x(first->translation.x()), layout.to_px_y(first->translation.z()),
-              kStart_px, kStart);
-}
-
-const Color& color_of_other(std::size_t index) { return kOthers[index % std::size(kOthers)]; }
-
-/// Left-aligned with the plot; shrinks until it fits the figure.
-void draw_fitting_text(const CairoCanvas& canvas,
-                       const PlotLayout& layout,
-                       double y,
-                       const std::string& text,
-                       double size_px,
-                       bool is_bold) {
-  const double room_px = layout.width_px - layout.left_px - 20.0;
-  canvas.set_font(size_px, is_bold);
-  const double width_px = canvas.text_width(text);
-  if (width_px > room_px) {
-    canvas.set_font(size_px * room_px / width_px, is_bold);
-  }
-  canvas.text(layout.left_px, y, text, TextAnchor::kLeft);
-}
-
-void draw_titles(const CairoCanvas& canvas, const PlotLayout& layout, const TrajectoryPlot& plot) {
-  canvas.set_color(kInk);
-  const double title_y = plot.subtitle.empty() ? 108.0 : 62.0;
-  draw_fitting_text(canvas, layout, title_y, plot.title, kTitle_px, true);
-  canvas.set_color(kSoftInk);
-  draw_fitting_text(canvas, layout, 108.0, plot.subtitle, kSubtitle_px, false);
-}
-
-/// What a path is called, and how it is drawn.
-struct LegendLine {
-  Color color;
-  double width_px;
-  std::string text;
-};
-
-std::vector<LegendLine> legend_lines(const TrajectoryPlot& plot) {
-  std::vector<LegendLine> lines;
-  if (plot.ground_truth) {
-    lines.push_back({kTruth, kTruthWidth_px, "ground truth"});
-  }
-  lines.push_back({kEstimate, kEstimateWidth_px, plot.estimate_name});
-  for (std::size_t i = 0; i < plot.others.size(); ++i) {
-    lines.push_back({color_of_other(i), kEstimateWidth_px, plot.others[i].name});
-  }
-  return lines;
-}
-
-constexpr double kSwatch_px = 76.0;  ///< room of a path's sample
+constexpr double kSwatch_px = 76.0;  // legend: room of a path's sample
 constexpr double kAfterText_px = 48.0;
 constexpr double kAfterMarker_px = 14.0;
 
-double legend_width(const CairoCanvas& canvas, const std::vector<LegendLine>& lines) {
-  double width_px = 2.0 * (kStart_px + kEnd_px + kAfterMarker_px) + kAfterText_px +
-                    canvas.text_width("start") + canvas.text_width("end");
-  for (const LegendLine& line : lines) {
-    width_px += kSwatch_px + canvas.text_width(line.text) + kAfterText_px;
-  }
-  return width_px;
+struct CairoDelete {
+  void operator()(cairo_t* context) const { cairo_destroy(context); }
+  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+  void operator()(cairo_font_options_t* options) const { cairo_font_options_destroy(options); }
+};
+using CairoSurface = std::unique_ptr<cairo_surface_t, CairoDelete>;
+
+/// One bad byte in a folder's name would otherwise cost the whole figure: cairo stops at it.
+std::string printable(std::string text) {
+  using Json = nlohmann::json;
+  std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-/// One line above the plot, where it can hide no data; shrinks until it fits the figure.
-void draw_legend(const CairoCanvas& canvas, const PlotLayout& layout, const TrajectoryPlot& plot) {
-  const std::vector<LegendLine> lines = legend_lines(plot);
-  canvas.set_font(kTick_px);
-  const double room_px = layout.width_px - layout.left_px - 20.0;
-  const double zoom = std::min(1.0, room_px / legend_width(canvas, lines));
-  canvas.set_font(kTick_px * zoom);
-  const double y = layout.top_px - 30.0;
-  double x = layout.left_px;
-  const auto label = [&](const std::string& text) {
-    canvas.set_color(kInk);
-    canvas.text(x, y + 0.36 * kTick_px * zoom, text, TextAnchor::kLeft);
-    x += canvas.text_width(text) + kAfterText_px * zoom;
-  };
-  for (const LegendLine& line : lines) {
-    canvas.set_color(line.color);
-    canvas.line(x + 5.0 * zoom, y, x + 59.0 * zoom, y, line.width_px);
-    x += kSwatch_px * zoom;
-    label(line.text);
-  }
-  canvas.disk(x + kStart_px * zoom, y, kStart_px * zoom, kStart);
-  x += (2.0 * kStart_px + kAfterMarker_px) * zoom;
-  label("start");
-  canvas.square(x + kEnd_px * zoom, y, kEnd_px * zoom, kEnd);
-  x += (2.0 * kEnd_px + kAfterMarker_px) * zoom;
-  label("end");
-}
+struct Path {
+  const Trajectory* trajectory;
+  std::string name;  ///< in the legend
+  Color color;
+  double width_px;
+};
 
-PlotLayout layout_of(const TrajectoryPlot& plot) {
+/// In the legend's order.
+std::vector<Path> paths_of(const TrajectoryPlot& plot) {
   STEMVO_CHECK(!plot.estimate.empty(), "at least one pose to draw");
-  std::vector<const Trajectory*> trajectories{&plot.estimate};
+  std::vector<Path> paths;
   if (plot.ground_truth) {
-    trajectories.push_back(&*plot.ground_truth);
+    paths.push_back({&*plot.ground_truth, "ground truth", kTruth, kTruthWidth_px});
   }
-  for (const NamedTrajectory& other : plot.others) {
-    trajectories.push_back(&other.trajectory);
+  paths.push_back({&plot.estimate, plot.estimate_name, kEstimate, kEstimateWidth_px});
+  for (std::size_t i = 0; i < plot.others.size(); ++i) {
+    paths.push_back({&plot.others[i].trajectory, plot.others[i].name,
+                     kOthers[i % std::size(kOthers)], kEstimateWidth_px});
+  }
+  return paths;
+}
+
+PlotLayout layout_of(const std::vector<Path>& paths) {
+  std::vector<const Trajectory*> trajectories;
+  for (const Path& path : paths) {
+    trajectories.push_back(path.trajectory);
   }
   return make_plot_layout(trajectories);
 }
 
-/// The one drawing for every kind of surface. Error: cairo's.
-Status draw(cairo_surface_t* surface, const PlotLayout& layout, const TrajectoryPlot& plot) {
-  const CairoCanvas canvas(surface);
-  canvas.fill_background(kWhite);
-  draw_titles(canvas, layout, plot);
-  draw_legend(canvas, layout, plot);
-  draw_grid(canvas, layout, plot.unit);
-  if (plot.ground_truth) {
-    draw_path(canvas, layout, *plot.ground_truth, kTruth, kTruthWidth_px);
+/// The one drawing for every kind of surface.
+class Drawing {
+ public:
+  explicit Drawing(const TrajectoryPlot& plot)
+      : plot_(plot), paths_(paths_of(plot)), layout_(layout_of(paths_)) {}
+
+  [[nodiscard]] const PlotLayout& layout() const { return layout_; }
+
+  [[nodiscard]] cairo_status_t draw(cairo_surface_t* surface) {
+    cairo_.reset(cairo_create(surface));
+    // Without hinting text has the same shape and width on both kinds of surface.
+    const std::unique_ptr<cairo_font_options_t, CairoDelete> options(cairo_font_options_create());
+    cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);
+    cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
+    cairo_font_options_set_hint_metrics(options.get(), CAIRO_HINT_METRICS_OFF);
+    cairo_set_font_options(cairo_.get(), options.get());
+    cairo_set_line_cap(cairo_.get(), CAIRO_LINE_CAP_ROUND);
+    cairo_set_line_join(cairo_.get(), CAIRO_LINE_JOIN_ROUND);
+    set_color(kWhite);
+    cairo_paint(cairo_.get());
+    draw_titles();
+    draw_legend();
+    draw_grid();
+    const auto estimates = paths_.begin() + (plot_.ground_truth ? 1 : 0);
+    std::for_each(paths_.begin(), estimates, [&](const Path& path) { draw_path(path); });
+    std::for_each(paths_.rbegin(), std::reverse_iterator(estimates),
+                  [&](const Path& path) { draw_path(path); });
+    draw_markers();
+    return cairo_status(cairo_.get());
   }
-  for (std::size_t i = plot.others.size(); i-- > 0;) {
-    draw_path(canvas, layout, plot.others[i].trajectory, color_of_other(i), kEstimateWidth_px);
+
+ private:
+  void set_color(const Color& color) const {
+    cairo_set_source_rgb(cairo_.get(), color.red, color.green, color.blue);
   }
-  draw_path(canvas, layout, plot.estimate, kEstimate, kEstimateWidth_px);
-  draw_markers(canvas, layout, plot.estimate);
-  const cairo_status_t status = cairo_status(canvas.context());
-  if (status != CAIRO_STATUS_SUCCESS) {
-    return fail(cairo_status_to_string(status));
+
+  void stroke(double width_px) const {
+    cairo_set_line_width(cairo_.get(), width_px);
+    cairo_stroke(cairo_.get());
   }
-  return {};
-}
+
+  void line(double x0, double y0, double x1, double y1, double width_px) const {
+    cairo_move_to(cairo_.get(), x0, y0);
+    cairo_line_to(cairo_.get(), x1, y1);
+    stroke(width_px);
+  }
+
+  /// Fills the current path and gives it a white rim, so that it stands out on any line.
+  void fill_marker(const Color& color) const {
+    set_color(color);
+    cairo_fill_preserve(cairo_.get());
+    set_color(kWhite);
+    stroke(kRim_px);
+  }
+
+  void start_marker(double x, double y, double zoom) const {
+    cairo_new_path(cairo_.get());
+    cairo_arc(cairo_.get(), x, y, kStart_px * zoom, 0.0, 2.0 * std::numbers::pi);
+    fill_marker(kStart);
+  }
+
+  void end_marker(double x, double y, double zoom) const {
+    const double radius_px = kEnd_px * zoom;
+    cairo_rectangle(cairo_.get(), x - radius_px, y - radius_px, 2.0 * radius_px, 2.0 * radius_px);
+    fill_marker(kEnd);
+  }
+
+  void set_font(double size_px, bool is_bold = false) const {
+    // Every Debian and Ubuntu with cairo has DejaVu (fontconfig depends on it); elsewhere
+    // fontconfig finds the nearest face.
+    cairo_select_font_face(cairo_.get(), "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
+                           is_bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
+    cairo_set_font_size(cairo_.get(), size_px);
+  }
+
+  [[nodiscard]] double text_width(const std::string& text) const {
+    cairo_text_extents_t extents;
+    cairo_text_extents(cairo_.get(), printable(text).c_str(), &extents);
+    return extents.x_advance;
+  }
+
+  /// Baseline at y; the text starts at x - share * its width.
+  void text(double x, double y, const std::string& text, double share) const {
+    cairo_move_to(cairo_.get(), x - share * text_width(text), y);
+    cairo_show_text(cairo_.get(), printable(text).c_str());
+    cairo_new_path(cairo_.get());
+  }
+
+  [[nodiscard]] double room_px() const { return layout_.width_px() - PlotLayout::kLeft_px - 20.0; }
+
+  /// Left-aligned with the plot; shrinks until it fits the figure.
+  void fitting_text(double y, const std::string& text_to_fit, double size_px, bool is_bold) const {
+    set_font(size_px, is_bold);
+    const double width_px = text_width(text_to_fit);
+    if (width_px > room_px()) {
+      set_font(size_px * room_px() / width_px, is_bold);
+    }
+    text(PlotLayout::kLeft_px, y, text_to_fit, 0.0);
+  }
+
+  void draw_titles() const {
+    set_color(kInk);
+    fitting_text(plot_.subtitle.empty() ? 108.0 : 62.0, plot_.title, kTitle_px, true);
+    set_color(kSoftInk);
+    fitting_text(108.0, plot_.subtitle, kSubtitle_px, false);
+  }
+
+  [[nodiscard]] double legend_width() const {
+    double width_px = 2.0 * (kStart_px + kEnd_px + kAfterMarker_px) + kAfterText_px +
+                      text_width("start") + text_width("end");
+    for (const Path& path : paths_) {
+      width_px += kSwatch_px + text_width(path.name) + kAfterText_px;
+    }
+    return width_px;
+  }
+
+  /// One line above the plot, where it can hide no data; shrinks until it fits the figure.
+  void draw_legend() const {
+    set_font(kTick_px);
+    const double zoom = std::min(1.0, room_px() / legend_width());
+    set_font(kTick_px * zoom);
+    const double y = PlotLayout::kTop_px - 30.0;
+    double x = PlotLayout::kLeft_px;
+    const auto label = [&](const std::string& name) {
+      set_color(kInk);
+      text(x, y + 0.36 * kTick_px * zoom, name, 0.0);
+      x += text_width(name) + kAfterText_px * zoom;
+    };
+    for (const Path& path : paths_) {
+      set_color(path.color);
+      line(x + 5.0 * zoom, y, x + 59.0 * zoom, y, path.width_px);
+      x += kSwatch_px * zoom;
+      label(path.name);
+    }
+    start_marker(x + kStart_px * zoom, y, zoom);
+    x += (2.0 * kStart_px + kAfterMarker_px) * zoom;
+    label("start");
+    end_marker(x + kEnd_px * zoom, y, zoom);
+    x += (2.0 * kEnd_px + kAfterMarker_px) * zoom;
+    label("end");
+  }
+
+  void draw_grid() const {
+    constexpr double kLeft = PlotLayout::kLeft_px;
+    constexpr double kTop = PlotLayout::kTop_px;
+    const double right = layout_.right_px();
+    const double bottom = layout_.bottom_px();
+    set_font(kTick_px);
+    for (const double x : tick_positions(layout_.min_x_m, layout_.max_x_m(), layout_.tick_m)) {
+      const double px = layout_.to_px_x(x);
+      set_color(kGrid);
+      line(px, kTop, px, bottom, 1.5);
+      set_color(kInk);
+      text(px, bottom + 38.0, tick_label(x, layout_.tick_m), 0.5);
+    }
+    for (const double z : tick_positions(layout_.min_z_m, layout_.max_z_m(), layout_.tick_m)) {
+      const double py = layout_.to_px_y(z);
+      set_color(kGrid);
+      line(kLeft, py, right, py, 1.5);
+      set_color(kInk);
+      text(kLeft - 16.0, py + 0.36 * kTick_px, tick_label(z, layout_.tick_m), 1.0);
+    }
+    set_font(kLabel_px);
+    text(0.5 * (kLeft + right), bottom + 92.0, fmt::format("x, to the right [{}]", plot_.unit),
+         0.5);
+    cairo_save(cairo_.get());
+    cairo_translate(cairo_.get(), 44.0, kTop + 0.5 * layout_.plot_height_px);
+    cairo_rotate(cairo_.get(), -0.5 * std::numbers::pi);
+    text(0.0, 0.0, fmt::format("z, forward [{}]", plot_.unit), 0.5);
+    cairo_restore(cairo_.get());
+    set_color(kFrame);
+    cairo_rectangle(cairo_.get(), kLeft, kTop, layout_.plot_width_px, layout_.plot_height_px);
+    stroke(2.0);
+  }
+
+  void draw_path(const Path& path) const {
+    bool is_open = false;
+    for (const Rigid3& pose : *path.trajectory) {
+      if (!pose.translation.allFinite()) {
+        is_open = false;
+        continue;
+      }
+      const double x = layout_.to_px_x(pose.translation.x());
+      const double y = layout_.to_px_y(pose.translation.z());
+      is_open ? cairo_line_to(cairo_.get(), x, y) : cairo_move_to(cairo_.get(), x, y);
+      is_open = true;
+    }
+    set_color(path.color);
+    stroke(path.width_px);
+  }
+
+  void draw_markers() const {
+    const auto is_finite = [](const Rigid3& pose) { return pose.translation.allFinite(); };
+    const Trajectory& path = plot_.estimate;
+    const auto first = std::find_if(path.begin(), path.end(), is_finite);
+    if (first == path.end()) {
+      return;
+    }
+    const auto last = std::find_if(path.rbegin(), path.rend(), is_finite);
+    // On a loop both fall together: the square's corners stay visible around the disk.
+    end_marker(layout_.to_px_x(last->translation.x()), layout_.to_px_y(last->translation.z()), 1.0);
+    start_marker(layout_.to_px_x(first->translation.x()), layout_.to_px_y(first->translation.z()),
+                 1.0);
+  }
+
+  const TrajectoryPlot& plot_;
+  std::vector<Path> paths_;
+  PlotLayout layout_;
+  std::unique_ptr<cairo_t, CairoDelete> cairo_;
+};
 
 cairo_status_t append_bytes(void* text, const unsigned char* data, unsigned int size) {
   static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(data), size);
@@ -234,12 +316,8 @@ cairo_status_t append_bytes(void* text, const unsigned char* data, unsigned int 
 }
 
 Status write_bytes(const std::filesystem::path& file,
-                   const Status& drawn,
                    cairo_status_t status,
                    const std::string& bytes) {
-  if (!drawn) {
-    return fail(fmt::format("{}: cannot draw: {}", file.string(), drawn.error().message));
-  }
   if (status != CAIRO_STATUS_SUCCESS) {
     return fail(fmt::format("{}: cannot draw: {}", file.string(), cairo_status_to_string(status)));
   }
@@ -270,26 +348,30 @@ std::string with_own_surface_numbers(const std::string& svg) {
 }  // namespace
 
 Status write_trajectory_png(const std::filesystem::path& file, const TrajectoryPlot& plot) {
-  const PlotLayout layout = layout_of(plot);
-  const CairoSurface surface(cairo_image_surface_create(
-      CAIRO_FORMAT_RGB24, static_cast<int>(layout.width_px), static_cast<int>(layout.height_px)));
-  const Status drawn = draw(surface.get(), layout, plot);
+  Drawing drawing(plot);
+  const CairoSurface surface(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(drawing.layout().width_px()),
+                                 static_cast<int>(drawing.layout().height_px())));
   std::string bytes;
-  const cairo_status_t status =
-      cairo_surface_write_to_png_stream(surface.get(), append_bytes, &bytes);
-  return write_bytes(file, drawn, status, bytes);
+  cairo_status_t status = drawing.draw(surface.get());
+  if (status == CAIRO_STATUS_SUCCESS) {
+    status = cairo_surface_write_to_png_stream(surface.get(), append_bytes, &bytes);
+  }
+  return write_bytes(file, status, bytes);
 }
 
 Status write_trajectory_svg(const std::filesystem::path& file, const TrajectoryPlot& plot) {
-  const PlotLayout layout = layout_of(plot);
+  Drawing drawing(plot);
   std::string bytes;
-  const CairoSurface surface(
-      cairo_svg_surface_create_for_stream(append_bytes, &bytes, layout.width_px, layout.height_px));
+  const CairoSurface surface(cairo_svg_surface_create_for_stream(
+      append_bytes, &bytes, drawing.layout().width_px(), drawing.layout().height_px()));
   cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
-  const Status drawn = draw(surface.get(), layout, plot);
+  cairo_status_t status = drawing.draw(surface.get());
   cairo_surface_finish(surface.get());
-  return write_bytes(file, drawn, cairo_surface_status(surface.get()),
-                     with_own_surface_numbers(bytes));
+  if (status == CAIRO_STATUS_SUCCESS) {
+    status = cairo_surface_status(surface.get());
+  }
+  return write_bytes(file, status, with_own_surface_numbers(bytes));
 }
 
 }  // namespace stemvo

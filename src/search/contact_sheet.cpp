@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "search/contact_sheet.hpp"
-
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -9,11 +7,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "search/ranking.hpp"
-#include "search/tables.hpp"
-#include "stemvo/dataset/sequence.hpp"
-#include "stemvo/report/frame_picture.hpp"
-#include "stemvo/report/trajectory_plot.hpp"
+#include "dataset/sequence.hpp"
+#include "models/manifest.hpp"
+#include "report/frame_image.hpp"
+#include "report/trajectory_plot.hpp"
+#include "search/results.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -22,40 +21,19 @@ namespace {
 std::string outcome_of(const FilterRow& row) {
   return row.status == FilterStatus::kStopped
              ? fmt::format("stopped after {} frames", row.drives.front().num_frames)
-             : fmt::format("t_rel {:.2f} %", mean_score(row.drives).t_rel_percent.value_or(0.0));
+             : fmt::format("t_rel {:.2f} %", row.mean.t_rel_percent.value_or(0.0));
 }
 
-std::string caption_of(const ShownFilter& shown) {
-  return fmt::format("{}: {}, {}", shown.place, to_string(shown.row->key), outcome_of(*shown.row));
-}
-
-std::string legend_of(const ShownFilter& shown) {
-  return shown.row->status == FilterStatus::kStopped
-             ? fmt::format("{} ({})", shown.place, outcome_of(*shown.row))
-             : shown.place;
-}
-
-Expected<KittiSequence> open_first(const Folders& folders, const SearchIdentity& identity) {
-  const auto first =
-      std::find_if(identity.sequences.begin(), identity.sequences.end(),
-                   [](const SequenceIdentity& sequence) { return !sequence.is_held_out; });
-  const Expected<Config> config = load_config(folders.out_dir / "config.yaml");
-  if (!config) {
-    return config.error();
+NamedTrajectory trajectory_of(const ShownFilter& shown) {
+  const FilterRow& row = *shown.row;
+  NamedTrajectory named;
+  named.name = row.status == FilterStatus::kStopped
+                   ? fmt::format("{} ({})", shown.rank, outcome_of(row))
+                   : shown.rank;
+  for (const auto& [x_m, z_m] : row.drives.front().path) {
+    named.trajectory.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(x_m, 0.0, z_m));
   }
-  return KittiSequence::open(
-      first->directory,
-      {.camera = config->input.camera,
-       .frames = FrameRangeRequest{first->first_frame, first->first_frame + first->num_frames}});
-}
-
-Trajectory trajectory_of(const FilterRow& row) {
-  Trajectory trajectory;
-  for (const PathPoint& point : row.drives.front().path) {
-    trajectory.emplace_back(Eigen::Quaterniond::Identity(),
-                            Eigen::Vector3d(point.x_m, 0.0, point.z_m));
-  }
-  return trajectory;
+  return named;
 }
 
 Status write_trajectories(const std::filesystem::path& file,
@@ -63,17 +41,19 @@ Status write_trajectories(const std::filesystem::path& file,
                           const std::vector<ShownFilter>& shown) {
   TrajectoryPlot plot;
   plot.title = fmt::format("{}, each step of its true length", sequence.name());
-  plot.estimate = trajectory_of(*shown.front().row);
-  plot.estimate_name = legend_of(shown.front());
   plot.ground_truth = sequence.ground_truth();
-  for (std::size_t i = 1; i < shown.size(); ++i) {
-    plot.others.push_back({legend_of(shown[i]), trajectory_of(*shown[i].row)});
+  for (const ShownFilter& one : shown) {
+    plot.others.push_back(trajectory_of(one));
   }
+  plot.estimate = plot.others.front().trajectory;
+  plot.estimate_name = plot.others.front().name;
+  plot.others.erase(plot.others.begin());
   return write_trajectory_png(file, plot);
 }
 
 Expected<cv::Mat> draw_channels(const Folders& folders,
                                 const SearchIdentity& identity,
+                                const Config& common,
                                 const KittiSequence& sequence,
                                 const std::vector<ShownFilter>& shown) {
   const std::size_t middle = sequence.size() / 2;
@@ -84,12 +64,9 @@ Expected<cv::Mat> draw_channels(const Folders& folders,
   std::vector<cv::Mat> channels;
   std::vector<std::string> captions = {
       fmt::format("{}, frame {}", sequence.name(), sequence.range().begin + middle)};
-  for (const ShownFilter& one : shown) {
-    const Expected<Config> config = config_of(folders.out_dir, identity, one.row->key);
-    if (!config) {
-      return config.error();
-    }
-    const Expected<Stem> stem = Stem::create(config->stem, folders.models_dir);
+  for (const auto& [rank, row] : shown) {
+    const Config config = config_of(common, identity.layer_of(row->key), row->key.filter);
+    const Expected<Stem> stem = create_stem(config.stem, folders.models_dir);
     if (!stem) {
       return stem.error();
     }
@@ -98,24 +75,25 @@ Expected<cv::Mat> draw_channels(const Folders& folders,
       return channel.error();
     }
     channels.push_back(channel->values);
-    captions.push_back(caption_of(one));
+    captions.push_back(fmt::format("{}: {}, {}", rank, to_string(row->key), outcome_of(*row)));
   }
   return draw_channel_sheet(*frame, channels, captions);
 }
 
 }  // namespace
 
-std::vector<ShownFilter> choose_rows(const SearchIdentity& identity, const SearchReport& report) {
+std::vector<ShownFilter> choose_rows(const SearchIdentity& identity,
+                                     const std::vector<FilterRow>& all) {
   std::vector<const FilterRow*> rows;
-  for (const FilterRow& row : report.rows) {
-    if (row.status != FilterStatus::kNotDetected && !layer_of(identity, row.key).is_baseline) {
+  for (const FilterRow& row : all) {
+    if (row.status != FilterStatus::kNotDetected && !identity.layer_of(row.key).baseline) {
       rows.push_back(&row);
     }
   }
-  std::vector<ShownFilter> shown;
-  if (!rows.empty()) {
-    shown.push_back({"best", rows.front()});
+  if (rows.empty()) {
+    return {};
   }
+  std::vector<ShownFilter> shown = {{"best", rows.front()}};
   if (rows.size() > 2) {
     shown.push_back({"median", rows[rows.size() / 2]});
   }
@@ -127,12 +105,17 @@ std::vector<ShownFilter> choose_rows(const SearchIdentity& identity, const Searc
 
 Status write_contact_sheet(const Folders& folders,
                            const SearchIdentity& identity,
-                           const SearchReport& report) {
-  const std::vector<ShownFilter> shown = choose_rows(identity, report);
+                           const Config& common,
+                           const std::vector<FilterRow>& rows) {
+  const std::vector<ShownFilter> shown = choose_rows(identity, rows);
   if (shown.empty()) {
     return {};
   }
-  const Expected<KittiSequence> sequence = open_first(folders, identity);
+  const SequenceIdentity& first = identity.sequences.front();
+  const Expected<KittiSequence> sequence = KittiSequence::open(
+      first.directory,
+      {.camera = common.input.camera,
+       .frames = FrameRangeRequest{first.first_frame, first.first_frame + first.num_frames}});
   if (!sequence) {
     return sequence.error();
   }
@@ -140,7 +123,7 @@ Status write_contact_sheet(const Folders& folders,
   if (const Status status = write_trajectories(plot_file, *sequence, shown); !status) {
     return status;
   }
-  const Expected<cv::Mat> channels = draw_channels(folders, identity, *sequence, shown);
+  const Expected<cv::Mat> channels = draw_channels(folders, identity, common, *sequence, shown);
   if (!channels) {
     return channels.error();
   }
@@ -153,7 +136,7 @@ Status write_contact_sheet(const Folders& folders,
   cv::resize(plot, plot, {channels->cols, cvRound(zoom * plot.rows)}, 0, 0, cv::INTER_AREA);
   cv::Mat sheet;
   cv::vconcat(*channels, plot, sheet);
-  return write_picture(folders.out_dir / "sheet.png", sheet);
+  return write_image(folders.out_dir / "sheet.png", sheet);
 }
 
 }  // namespace stemvo::search

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <map>
 #include <system_error>
 #include <tuple>
 #include <utility>
@@ -7,58 +8,63 @@
 #include <fmt/format.h>
 
 #include "pipeline/out_folder.hpp"
-#include "search/identity.hpp"
-#include "search/joined_records.hpp"
-#include "search/record_file.hpp"
-#include "search/report.hpp"
-#include "stemvo/search/search.hpp"
+#include "search/results.hpp"
 
 namespace stemvo {
+namespace search {
 namespace {
 
 namespace fs = std::filesystem;
-using search::LayerIdentity;
-using search::Record;
-using search::RecordFileContent;
-using search::SearchIdentity;
 
-Expected<RecordFileContent> read_part(const fs::path& folder) {
-  const fs::path file = folder / search::kRecordsFile;
-  auto content = search::read_records(file);
-  if (!content) {
-    return content;
+Expected<SearchRecords> read_part(const fs::path& folder) {
+  const std::string file = (folder / kRecordsFile).string();
+  auto part = read_records(file);
+  if (!part) {
+    return part;
   }
-  if (content->num_good_bytes == 0) {
-    return fail(fmt::format("{}: expected the records of a search, found none", file.string()));
+  if (part->num_good_bytes == 0) {
+    return fail(fmt::format("{}: expected the records of a search, found none", file));
   }
-  if (content->identity.schedule.size() != 1) {
+  if (part->identity.rungs.size() != 1) {
     return fail(
         fmt::format("{}: expected a search with --exhaustive, found one that halves: its parts "
                     "cannot be joined",
-                    file.string()));
+                    file));
   }
-  const std::size_t expected = search::num_filters(content->identity);
-  if (content->records.size() != expected) {
-    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume",
-                            file.string(), expected, content->records.size()));
+  if (part->records.size() != part->identity.num_filters()) {
+    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume", file,
+                            part->identity.num_filters(), part->records.size()));
   }
-  return content;
+  return part;
+}
+
+/// The identity of all parts takes in another one's.
+Status add_identity(const SearchIdentity& part, SearchIdentity& joined) {
+  if (joined.layers.empty()) {  // the first
+    joined = part;
+    return {};
+  }
+  if (const std::string change = describe_change(joined, part, true); !change.empty()) {
+    return fail(change);
+  }
+  joined.layers.insert(joined.layers.end(), part.layers.begin(), part.layers.end());
+  for (std::size_t i = 0; i < joined.sequences.size(); ++i) {
+    if (joined.sequences[i].frames.empty()) {  // not run by the parts before
+      joined.sequences[i].frames = part.sequences[i].frames;
+    }
+  }
+  return {};
 }
 
 /// Ranges of a layer that meet or overlap become one.
 std::vector<LayerIdentity> join_layers(std::vector<LayerIdentity> layers) {
-  const auto key = [](const LayerIdentity& layer) {
+  std::ranges::sort(layers, {}, [](const LayerIdentity& layer) {
     return std::tie(layer.model, layer.layer, layer.features, layer.first);
-  };
-  std::sort(layers.begin(), layers.end(),
-            [&key](const LayerIdentity& a, const LayerIdentity& b) { return key(a) < key(b); });
+  });
   std::vector<LayerIdentity> joined;
   for (const LayerIdentity& layer : layers) {
-    const bool goes_on = !joined.empty() && joined.back().model == layer.model &&
-                         joined.back().layer == layer.layer &&
-                         joined.back().features == layer.features &&
-                         layer.first <= joined.back().last;
-    if (goes_on) {
+    if (!joined.empty() && joined.back().is_layer_of(layer.key(0)) &&
+        layer.first <= joined.back().last) {
       joined.back().last = std::max(joined.back().last, layer.last);
     } else {
       joined.push_back(layer);
@@ -67,71 +73,99 @@ std::vector<LayerIdentity> join_layers(std::vector<LayerIdentity> layers) {
   return joined;
 }
 
-/// What the parts did not run another one knows.
-void add_frames(const SearchIdentity& part, SearchIdentity& identity) {
-  for (std::size_t i = 0; i < identity.sequences.size(); ++i) {
-    if (identity.sequences[i].frames.empty()) {
-      identity.sequences[i].frames = part.sequences[i].frames;
+/// What all parts found: of each filter, by sequence of the identity.
+using Scores = std::map<FilterKey, std::vector<std::optional<DriveScore>>>;
+
+/// What two parts hold is no trouble where they agree; else an error.
+Status add_record(const std::vector<SequenceIdentity>& sequences,
+                  const FilterRecord& record,
+                  Scores& scores) {
+  auto& known = scores[record.key];
+  known.resize(sequences.size());
+  for (std::size_t i = 0; i < sequences.size(); ++i) {
+    std::optional<DriveScore> found = sequences[i].held_out ? record.held_out : std::nullopt;
+    for (const DriveScore& drive : record.drives) {
+      found = !sequences[i].held_out && drive.sequence == sequences[i].name ? drive : found;
     }
+    if (found && known[i] && found != known[i]) {
+      return fail(fmt::format("expected the result of another part for {} on {}, found another one",
+                              to_string(record.key), sequences[i].name));
+    }
+    known[i] = found ? found : known[i];
   }
+  return {};
 }
 
-Status write_records(const fs::path& out_dir,
-                     const SearchIdentity& identity,
-                     const std::vector<Record>& records) {
-  const fs::path file = out_dir / search::kRecordsFile;
-  std::error_code code;
-  if (fs::exists(file, code)) {
-    return fail(fmt::format("{}: expected a folder without a search, found one", file.string()));
+/// A record per filter, as a search over all sequences writes it. Error: a filter that no part ran
+/// on one of the sequences.
+Expected<std::vector<FilterRecord>> join_records(const std::vector<SequenceIdentity>& sequences,
+                                                 const Scores& scores) {
+  std::vector<FilterRecord> records;
+  for (const auto& [key, found] : scores) {
+    FilterRecord& record = records.emplace_back();
+    record.key = key;
+    for (std::size_t i = 0; i < sequences.size(); ++i) {
+      if (!found[i]) {
+        return fail(fmt::format("--merge: expected a part with {} on {}{}, found none",
+                                to_string(key), sequences[i].name,
+                                sequences[i].held_out ? " (held out)" : ""));
+      }
+      // An exhaustive search runs each frame once, or none where the layer cannot be run.
+      if (sequences[i].held_out) {
+        record.held_out = found[i];
+        record.held_out_filter_frames = found[i]->num_frames;
+      } else {
+        record.drives.push_back(*found[i]);
+        record.filter_frames += found[i]->num_frames;
+      }
+    }
   }
-  auto writer = search::RecordWriter::create(file, identity);
-  return writer ? writer->append(records) : writer.error();
+  return records;
 }
 
 }  // namespace
+}  // namespace search
 
-Expected<SearchReport> merge_searches(const std::vector<fs::path>& parts,
-                                      const fs::path& out_dir,
-                                      const fs::path& models_dir) {
-  SearchIdentity identity;
-  std::vector<LayerIdentity> layers;
-  search::JoinedRecords joined;
-  for (const fs::path& part : parts) {
-    auto content = read_part(part);
-    if (!content) {
-      return content.error();
+Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
+                                      const std::filesystem::path& out_dir,
+                                      const std::filesystem::path& models_dir) {
+  search::SearchIdentity identity;
+  search::Scores scores;
+  for (const std::filesystem::path& folder : parts) {
+    const auto part = search::read_part(folder);
+    if (!part) {
+      return part.error();
     }
-    if (identity.layers.empty()) {
-      identity = content->identity;
-    }
-    identity.layers = layers.empty() ? identity.layers : layers;
-    if (const std::string change = search::describe_change(identity, content->identity, true);
-        !change.empty()) {
+    if (const Status fits = search::add_identity(part->identity, identity); !fits) {
       return fail(fmt::format("{}: expected a part of the same search as {}, found that {}",
-                              part.string(), parts.front().string(), change));
+                              folder.string(), parts.front().string(), fits.error().message));
     }
-    layers.insert(layers.end(), content->identity.layers.begin(), content->identity.layers.end());
-    add_frames(content->identity, identity);
-    if (const Status added = joined.add(part, content->records); !added) {
-      return added.error();
+    for (const FilterRecord& record : part->records) {
+      const Status agrees = search::add_record(identity.sequences, record, scores);
+      if (!agrees) {
+        return fail(fmt::format("{}: {}", folder.string(), agrees.error().message));
+      }
     }
   }
-  auto records = joined.all(identity);
+  const auto records = search::join_records(identity.sequences, scores);
   if (!records) {
     return records.error();
   }
-  identity.layers = join_layers(std::move(layers));
-  identity.schedule =
-      search::exhaustive_schedule(search::num_filters(identity) - search::num_baselines(identity));
+  identity.layers = search::join_layers(std::move(identity.layers));
+  identity.rungs = {{1.0, identity.num_filters() - identity.num_baselines()}};
   identity.only_sequence.reset();
-  Status status = pipeline::create_out_folder(out_dir);
-  if (status) {
-    status = write_records(out_dir, identity, *records);
-  }
-  if (!status) {
+  if (const Status status = pipeline::create_out_folder(out_dir); !status) {
     return status.error();
   }
-  return search::finish({out_dir, models_dir}, identity, *records, {});
+  const std::filesystem::path file = out_dir / search::kRecordsFile;
+  std::error_code code;
+  if (std::filesystem::exists(file, code)) {
+    return fail(fmt::format("{}: expected a folder without a search, found one", file.string()));
+  }
+  auto writer = search::RecordWriter::open(file, identity);
+  const Status written = writer ? writer->append(*records) : writer.error();
+  return written ? search::write_results({out_dir, models_dir}, identity, *records)
+                 : written.error();
 }
 
 }  // namespace stemvo

@@ -7,9 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "benchmark/fingerprint.hpp"
-#include "search/check_request.hpp"
-#include "stemvo/evaluation/metrics.hpp"
+#include "evaluation/metrics.hpp"
+#include "options/option_fields.hpp"
+#include "pipeline/input_hashes.hpp"
+#include "search/halving.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -17,7 +19,70 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A channel needs room for the windows of a tracker or descriptor and for motion.
-constexpr int kLeastSide_px = 16;
+constexpr int kMinSide_px = 16;
+
+/// What the filters in flight may take by the estimate; the process takes some 0.2 GB more, and the
+/// weights and layers of the network.
+constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
+
+std::size_t num_sequences(const SearchRequest& request) {
+  return request.sequence_dirs.size() + (request.held_out_dir ? 1 : 0);
+}
+
+/// What can be said before anything is opened.
+Status check_request(const SearchRequest& request) {
+  if (const Status valid = validate(request.config); !valid) {
+    return valid;
+  }
+  if (request.config.scale.source != ScaleSource::kGroundTruth) {
+    return fail(fmt::format(
+        "scale.source: expected ground_truth for a search, which ranks by t_rel with steps of the "
+        "true length, found {}",
+        options::to_string(request.config.scale.source)));
+  }
+  if (request.only_sequence && *request.only_sequence >= num_sequences(request)) {
+    return fail(fmt::format("--only-sequence: expected 0 to {}, the held-out one last, found {}",
+                            num_sequences(request) - 1, *request.only_sequence));
+  }
+  if (request.only_sequence && !request.exhaustive) {
+    return fail(
+        "--only-sequence: expected --exhaustive with it (halving goes by the mean over all "
+        "sequences), found none");
+  }
+  for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
+    if (std::find(request.layers.begin(), layer, *layer) != layer) {
+      return fail(fmt::format("--layers: expected each once, found '{}' again", *layer));
+    }
+  }
+  return {};
+}
+
+/// Each sequence ranks once, under a name of its own, and the held-out one has no frame that ranks.
+Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added) {
+  std::error_code code;
+  const bool same_folder = before.directory == added.directory ||
+                           fs::equivalent(before.directory, added.directory, code);
+  const std::size_t added_end = added.first_frame + added.num_frames;
+  const std::size_t begin = std::max(before.first_frame, added.first_frame);
+  const std::size_t end = std::min(before.first_frame + before.num_frames, added_end);
+  if (added.held_out && same_folder && begin < end) {
+    return fail(
+        fmt::format("--held-out: {}: expected frames that do not rank, found {}:{}, of which {}:{} "
+                    "do (--held-out-frames, --frames)",
+                    added.directory, added.first_frame, added_end, begin, end));
+  }
+  if (!added.held_out && same_folder) {
+    return fail(fmt::format("SEQUENCE_DIR: expected each folder once, found {} and {}",
+                            before.directory, added.directory));
+  }
+  if (!added.held_out && before.name == added.name) {
+    return fail(fmt::format(
+        "SEQUENCE_DIR: expected names by which sequences can be told apart, found two of the name "
+        "{}: {} and {}",
+        added.name, before.directory, added.directory));
+  }
+  return {};
+}
 
 Expected<KittiSequence> open_sequence(const SearchRequest& request,
                                       const fs::path& directory,
@@ -46,21 +111,25 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
   return sequence;
 }
 
-/// Whether a layer's filters can be run on frames of this size.
-void add_layer(const PlanLayer& layer, PlanSequence& planned) {
-  const Camera& camera = planned.sequence.camera();
+/// Why the layer's filters cannot be run on frames of this camera, empty where they can; lowers how
+/// many are in flight.
+std::string fit_layer(const LayerIdentity& identity,
+                      const Camera& camera,
+                      std::size_t num_sequences,
+                      PlanLayer& layer) {
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  const auto channels = layer.stem.apply_range(blank, layer.first, layer.first + 1);
-  std::string& unusable = planned.unusable.emplace_back();
-  cv::Size& size = planned.channels.emplace_back();
+  const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1);
   if (!channels) {
-    unusable = channels.error().message;
-    return;
+    return channels.error().message;
   }
-  size = channels->front().values.size();
-  if (std::min(size.width, size.height) < kLeastSide_px) {
-    unusable = fmt::format("channel {}x{}", size.width, size.height);
-  }
+  const cv::Size size = channels->front().values.size();
+  const Upsample upsample =
+      choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera.width_px);
+  const int factor = enlargement(upsample, identity.sampling_px);
+  const std::size_t bytes = bytes_in_flight(size, size * factor, num_sequences);
+  layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);
+  const bool is_small = std::min(size.width, size.height) < kMinSide_px;
+  return is_small ? fmt::format("channel {}x{}", size.width, size.height) : std::string();
 }
 
 Status add_sequence(const SearchRequest& request,
@@ -71,139 +140,98 @@ Status add_sequence(const SearchRequest& request,
   if (!sequence) {
     return sequence.error();
   }
-  const FrameRange range = sequence->range();
-  SequenceIdentity identity;
-  identity.name = sequence->name();
-  identity.is_held_out = is_held_out;
-  identity.first_frame = range.begin;
-  identity.num_frames = sequence->size();
-  std::error_code ignored;
-  identity.directory = fs::absolute(directory, ignored).lexically_normal().string();
-  const bool is_run = request.only_sequence.value_or(plan.identity.sequences.size()) ==
-                      plan.identity.sequences.size();
-  const auto hashes = benchmark::hash_sequence(
-      *sequence, directory,
-      is_run ? benchmark::FrameIdentity::kContents : benchmark::FrameIdentity::kNamesAndSizes);
+  std::vector<SequenceIdentity>& known = plan.identity.sequences;
+  const bool is_run = request.only_sequence.value_or(known.size()) == known.size();
+  using pipeline::FrameIdentity;
+  const auto hashes = pipeline::hash_sequence(
+      *sequence, directory, is_run ? FrameIdentity::kContents : FrameIdentity::kNamesAndSizes);
   if (!hashes) {
     return hashes.error();
   }
-  identity.frames = is_run ? hashes->frames : std::string();
-  identity.calibration = hashes->calibration;
-  identity.ground_truth = hashes->ground_truth;
-  plan.identity.sequences.push_back(std::move(identity));
-  if (!is_run) {
-    return {};
+  std::error_code ignored;
+  SequenceIdentity identity = {
+      .name = sequence->name(),
+      .held_out = is_held_out,
+      .first_frame = sequence->range().begin,
+      .num_frames = sequence->size(),
+      .frames = is_run ? hashes->frames : std::string(),
+      .calibration = hashes->calibration,
+      .ground_truth = hashes->ground_truth,
+      .directory = fs::absolute(directory, ignored).lexically_normal().string()};
+  for (const SequenceIdentity& before : known) {
+    if (Status status = check_pair(before, identity); !status) {
+      return status;
+    }
   }
-  PlanSequence planned{std::move(*sequence), is_held_out, {}, {}};
-  for (const PlanLayer& layer : plan.layers) {
-    add_layer(layer, planned);
+  known.push_back(std::move(identity));
+  if (is_run) {
+    const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
+    std::vector<std::string> problems;
+    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+      problems.push_back(
+          fit_layer(plan.identity.layers[i], sequence->camera(), num_run, plan.layers[i]));
+    }
+    plan.sequences.push_back({std::move(*sequence), is_held_out, std::move(problems)});
   }
-  plan.sequences.push_back(std::move(planned));
   return {};
 }
 
-void add_candidates(SearchPlan& plan) {
-  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-    const PlanLayer& layer = plan.layers[i];
-    const std::string& features = layer.config.features.method;
-    plan.identity.layers.push_back({.model = layer.model,
-                                    .layer = layer.layer,
-                                    .features = features,
-                                    .first = layer.first,
-                                    .last = layer.last,
-                                    .hash = {},
-                                    .sampling_px = layer.stem.info().sampling_px,
-                                    .stem_model = layer.config.stem.model,
-                                    .is_baseline = layer.is_baseline});
-    for (int filter = layer.first; filter < layer.last; ++filter) {
-      plan.candidates.push_back({.key = {layer.model, layer.layer, filter, features},
-                                 .layer = i,
-                                 .is_baseline = layer.is_baseline});
-    }
-  }
-}
-
-void choose_racing(SearchPlan& plan) {
+/// Which candidates halving chooses from, and the rungs.
+void add_race(bool exhaustive, SearchPlan& plan) {
+  std::size_t num_racing = 0;
   for (Candidate& candidate : plan.candidates) {
-    candidate.races =
-        !candidate.is_baseline && std::all_of(plan.sequences.begin(), plan.sequences.end(),
-                                              [&candidate](const PlanSequence& sequence) {
-                                                return sequence.is_held_out ||
-                                                       sequence.unusable[candidate.layer].empty();
-                                              });
+    const auto runs = [&candidate](const PlanSequence& sequence) {
+      return sequence.is_held_out || sequence.problems[candidate.layer].empty();
+    };
+    candidate.races = !candidate.is_baseline && std::ranges::all_of(plan.sequences, runs);
+    num_racing += candidate.races ? 1 : 0;
   }
-}
-
-/// Of the filters; baselines are outside.
-Schedule schedule_of(const SearchPlan& plan, bool exhaustive) {
-  const auto racing = std::count_if(plan.candidates.begin(), plan.candidates.end(),
-                                    [](const Candidate& one) { return one.races; });
-  return exhaustive ? exhaustive_schedule(num_filters(plan.identity) - num_baselines(plan.identity))
-                    : halving_schedule(static_cast<std::size_t>(racing));
-}
-
-/// Those of the program and of each layer's model.
-Status add_hashes(const SearchRequest& request, SearchPlan& plan) {
-  const auto program = benchmark::hash_program();
-  if (!program) {
-    return program.error();
-  }
-  plan.identity.program = *program;
-  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-    const auto model = benchmark::hash_model(plan.layers[i].config, request.models_dir);
-    if (!model) {
-      return model.error();
-    }
-    plan.identity.layers[i].hash = *model;
-  }
-  return {};
+  const std::size_t num_filters = plan.identity.num_filters() - plan.identity.num_baselines();
+  plan.identity.rungs = exhaustive ? Schedule{{1.0, num_filters}} : halving_schedule(num_racing);
 }
 
 }  // namespace
 
-std::size_t SearchPlan::num_frames(bool held_out) const {
-  std::size_t count = 0;
-  for (const PlanSequence& one : sequences) {
-    count += one.is_held_out == held_out ? one.sequence.size() : 0;
-  }
-  return count;
+std::size_t bytes_in_flight(cv::Size channel, cv::Size image, std::size_t num_sequences) {
+  constexpr std::size_t kChannelBytes = 2 * sizeof(float);  // two frames
+  // A gray value and two derivatives of 16 bits on each level of the pyramid, 4/3 of the first
+  // one's pixels in all; the image itself; what a thread works in.
+  constexpr std::size_t kImageBytes = 8;
+  constexpr std::size_t kPathBytes = std::size_t{1} << 17;
+  const auto pixels = [](cv::Size size) { return static_cast<std::size_t>(size.area()); };
+  const std::size_t buffer = image == channel ? 0 : sizeof(float);
+  const std::size_t odometry = (kImageBytes + buffer) * pixels(image) + kPathBytes;
+  return kChannelBytes * pixels(channel) + num_sequences * odometry;
 }
 
 Expected<SearchPlan> make_plan(const SearchRequest& request) {
-  Status status = check_request(request);
-  if (!status) {
-    return status.error();
-  }
-  Expected<std::vector<PlanLayer>> layers = plan_layers(request);
-  if (!layers) {
-    return layers.error();
-  }
   SearchPlan plan;
-  plan.layers = std::move(*layers);
-  add_candidates(plan);
-  status = add_hashes(request, plan);
+  plan.block = static_cast<std::size_t>(std::max(0, request.block));
+  Status status = check_request(request);
+  if (status) {
+    status = add_layers(request, plan);
+  }
   for (const fs::path& directory : request.sequence_dirs) {
-    if (status) {
-      status = add_sequence(request, directory, false, plan);
-    }
+    status = status ? add_sequence(request, directory, false, plan) : status;
   }
   if (status && request.held_out_dir) {
     status = add_sequence(request, *request.held_out_dir, true, plan);
   }
-  if (status) {
-    status = check_sequences(plan.identity);
-  }
   if (!status) {
     return status.error();
   }
-  plan.identity.only_sequence = request.only_sequence;
+  const auto program = pipeline::hash_program();
+  if (!program) {
+    return program.error();
+  }
   Config common = request.config;
   common.stem.model = "default";  // the layers say which
   common.stem.layer = StemOptions().layer;
   common.stem.filter = -1;
+  plan.identity.program = *program;
   plan.identity.configuration = dump_config(common);
-  choose_racing(plan);
-  plan.identity.schedule = schedule_of(plan, request.exhaustive);
+  plan.identity.only_sequence = request.only_sequence;
+  add_race(request.exhaustive, plan);
   return plan;
 }
 

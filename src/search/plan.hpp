@@ -2,31 +2,27 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
+#include <cstdint>
 #include <string>
 #include <vector>
 
-#include "search/identity.hpp"
-#include "stemvo/search/search.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "search/records.hpp"
+#include "search/search.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::search {
 
-/// Filters that share one pass of a stem, and the configuration of their odometry.
+/// A layer of the identity, loaded.
 struct PlanLayer {
-  std::string model;  ///< the manifest's name, not a path
-  std::string layer;
-  Config config;  ///< with the model and layer; the filter is the candidate's
+  Config config;  ///< of its odometry, with the model and layer; the filter is the candidate's
   Stem stem;
-  int first = 0;
-  int last = 0;
-  bool is_baseline = false;
   std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
+  std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
 };
 
 struct Candidate {
   FilterKey key;
-  std::size_t layer = 0;  ///< index of its PlanLayer
+  std::size_t layer = 0;  ///< index
   bool is_baseline = false;
   /// No baseline, and can be run on all sequences that rank: what halving chooses from.
   bool races = false;
@@ -36,26 +32,32 @@ struct Candidate {
 struct PlanSequence {
   KittiSequence sequence;
   bool is_held_out = false;
-  /// One per layer: why its filters cannot be run on frames of this size; empty: they can.
-  std::vector<std::string> unusable;
-  std::vector<cv::Size> channels;  ///< the size of each layer's; empty where that is not known
+  std::vector<std::string> problems;  ///< per layer: why it cannot be run here; empty: it can
 };
 
 /// A search that was found to be possible.
 struct SearchPlan {
-  std::vector<PlanLayer> layers;
-  std::vector<Candidate> candidates;    ///< in the order of layers and filters
-  std::vector<PlanSequence> sequences;  ///< those to run
   SearchIdentity identity;
-
-  [[nodiscard]] std::size_t num_frames(bool held_out) const;
+  std::vector<PlanLayer> layers;        ///< as those of the identity
+  std::vector<Candidate> candidates;    ///< in the order of layers and filters, baselines last
+  std::vector<PlanSequence> sequences;  ///< those to run
+  std::size_t block = 0;                ///< filters in flight; 0: as memory allows
 };
 
-/// Loads the model's layers, those asked for, and the baselines. Errors: unknown model or layer
-/// (lists the known ones), filters outside, a file that is not that of the manifest.
-[[nodiscard]] Expected<std::vector<PlanLayer>> plan_layers(const SearchRequest& request);
+/// Bytes of a filter in flight, by an estimate: its channel of this frame and of the next (floats),
+/// and, once per sequence, its odometry: the image (8 bits) with its pyramid and derivatives, where
+/// the channel is brought to another size a buffer of floats, and the path. 256 filters of 620x188
+/// take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
+[[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
+                                          cv::Size image,
+                                          std::size_t num_sequences);
 
-/// Errors: those of plan_layers and run_search.
+/// Loads the model's layers, those asked for, and the baselines into the plan and its identity.
+/// Errors: unknown model or layer (lists the known ones), filters outside, a file that is not that
+/// of the manifest.
+[[nodiscard]] Status add_layers(const SearchRequest& request, SearchPlan& plan);
+
+/// Errors: those of run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
 }  // namespace stemvo::search

@@ -2,291 +2,338 @@
 #include "search/race.hpp"
 
 #include <algorithm>
-#include <set>
+#include <map>
+#include <optional>
 #include <utility>
 
-#include "search/blocks.hpp"
-#include "search/ranking.hpp"
-#include "stem/enlargement.hpp"
-#include "stemvo/check.hpp"
-#include "stemvo/config.hpp"
+#include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
+
+#include "internal_check.hpp"
+#include "search/filter_drive.hpp"
+#include "search/halving.hpp"
 
 namespace stemvo::search {
 namespace {
 
-using KeySet = std::set<FilterKey, KeyOrder>;
+using Candidates = std::vector<std::size_t>;  // ascending indices
 
-KeySet survivors_of(const std::vector<const Record*>& records, std::size_t count) {
-  const std::vector<FilterKey> keys = choose_survivors(records, count);
-  return {keys.begin(), keys.end()};
-}
+/// One frame through all layers of a block.
+struct BlockFrame {
+  cv::Mat frame;  ///< empty: could not be read
+  /// Filters from `first` on, by layer; none of a layer that refused the frame.
+  struct LayerChannels {
+    int first = 0;
+    std::vector<Channel> channels;
+  };
+  std::map<std::size_t, LayerChannels> layers;
+};
 
-}  // namespace
+/// A candidate's odometry on each sequence; none where it has not started, or cannot.
+using Drives = std::vector<std::optional<FilterDrive>>;
 
-Race::Race(const SearchPlan& plan,
-           const SearchRequest& request,
-           SearchProgress progress,
-           RecordWriter writer,
-           std::vector<Record> records,
-           std::size_t most_kept)
-    : plan_(plan),
-      evaluation_(request.config.evaluation),
-      block_size_(static_cast<std::size_t>(std::max(0, request.block))),
-      most_kept_(most_kept),
-      progress_(std::move(progress)),
-      writer_(std::move(writer)) {
-  for (Record& record : records) {
-    frames_done_ += record.filter_frames + record.held_out_filter_frames;
-    add_record(std::move(record));
-  }
-}
+struct Race {
+  const SearchPlan& plan;
+  const SearchProgress& progress;
+  RecordWriter& writer;
+  std::vector<FilterRecord>& records;
+  std::size_t max_kept = 0;
+  std::vector<Drives> drives{plan.candidates.size()};  ///< of those in flight or kept, else empty
+  std::map<std::pair<std::size_t, FilterKey>, std::size_t> record_of = {};  ///< by rung
+  std::vector<std::string> warnings = {};
+  std::size_t frames_done = 0;
+  bool is_stopped = false;
 
-void Race::add_record(Record record) {
-  record_of_[record.rung].try_emplace(record.key, records_.size());
-  records_.push_back(std::move(record));
-}
-
-Status Race::run() {
-  Block alive;
-  Block baselines;
-  for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
-    (plan_.candidates[i].is_baseline ? baselines : alive).push_back(i);
-  }
-  for (std::size_t rung = 0; rung < plan_.identity.schedule.size() && !is_stopped_; ++rung) {
-    if (rung > 0) {
-      alive = survivors(alive, rung);
+  Status run() {
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      frames_done += records[i].filter_frames + records[i].held_out_filter_frames;
+      record_of.try_emplace({records[i].rung, records[i].key}, i);
     }
-    if (is_last(rung)) {  // what filters are compared with runs all frames, outside the race
-      alive.insert(alive.end(), baselines.begin(), baselines.end());
+    Candidates alive;
+    Candidates baselines;
+    for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
+      (plan.candidates[i].is_baseline ? baselines : alive).push_back(i);
     }
-    if (Status status = run_rung(rung, alive); !status) {
-      return status;
-    }
-  }
-  return {};
-}
-
-bool Race::is_last(std::size_t rung) const { return rung + 1 == plan_.identity.schedule.size(); }
-
-/// Without what is repeated.
-std::size_t Race::frames_planned() const {
-  const Schedule& schedule = plan_.identity.schedule;
-  std::size_t planned = 0;
-  for (const PlanSequence& sequence : plan_.sequences) {
-    const std::size_t num_frames = sequence.sequence.size();
-    std::size_t racing = 0;
-    for (const Candidate& candidate : plan_.candidates) {
-      const bool runs = sequence.unusable[candidate.layer].empty();
-      if (runs && (candidate.is_baseline || schedule.size() == 1)) {
-        planned += num_frames;
-      } else if (runs && !candidate.races && !sequence.is_held_out) {
-        planned += frames_at(schedule.front(), num_frames);
+    for (std::size_t rung = 0; rung < plan.identity.rungs.size() && !is_stopped; ++rung) {
+      if (rung > 0) {
+        std::erase_if(alive, [this](std::size_t one) { return !plan.candidates[one].races; });
+        alive = best_of(alive, rung - 1, plan.identity.rungs[rung].filters);
       }
-      racing += candidate.races && schedule.size() > 1 ? 1 : 0;
-    }
-    std::size_t before = 0;
-    for (const Rung& rung : schedule) {
-      const std::size_t frames = frames_at(rung, num_frames);
-      const bool is_asked = !sequence.is_held_out || rung == schedule.back();
-      planned += is_asked ? std::min(racing, rung.num_filters) * (frames - before) : 0;
-      before = sequence.is_held_out ? 0 : frames;
-    }
-  }
-  return std::max(planned, frames_done_);
-}
-
-const Record* Race::find(std::size_t candidate, std::size_t rung) const {
-  const auto of_rung = record_of_.find(static_cast<int>(rung));
-  if (of_rung == record_of_.end()) {
-    return nullptr;
-  }
-  const auto found = of_rung->second.find(plan_.candidates[candidate].key);
-  return found == of_rung->second.end() ? nullptr : &records_[found->second];
-}
-
-Race::Block Race::survivors(const Block& alive, std::size_t rung) {
-  std::vector<const Record*> done;
-  for (const std::size_t candidate : alive) {
-    if (plan_.candidates[candidate].races) {
-      done.push_back(find(candidate, rung - 1));
-      STEMVO_CHECK(done.back() != nullptr, "a rung is complete before the next");
-    }
-  }
-  const KeySet keys = survivors_of(done, plan_.identity.schedule[rung].num_filters);
-  Block chosen;
-  for (const std::size_t candidate : alive) {
-    if (keys.contains(plan_.candidates[candidate].key)) {
-      chosen.push_back(candidate);
-    } else {
-      kept_.erase(candidate);
-    }
-  }
-  return chosen;
-}
-
-/// Those without a record, in blocks; those that go on apart from those that start, since a block
-/// is at one frame.
-Status Race::run_rung(std::size_t rung, const Block& alive) {
-  Block going_on;
-  Block starting;
-  for (const std::size_t candidate : alive) {
-    if (find(candidate, rung) == nullptr) {
-      (kept_.count(candidate) > 0 ? going_on : starting).push_back(candidate);
-    }
-  }
-  for (const Block& group : {going_on, starting}) {
-    for (const Block& block : cut(group)) {
-      if (is_stopped_) {
-        return {};
+      if (is_last(rung)) {  // what filters are compared with runs all frames, outside the race
+        alive.insert(alive.end(), baselines.begin(), baselines.end());
       }
-      if (Status status = run_block_of(rung, block); !status) {
+      if (Status status = run_rung(rung, alive); !status) {
         return status;
       }
     }
+    return {};
   }
-  return {};
-}
 
-std::vector<Race::Block> Race::cut(const Block& group) const {
-  std::vector<Flight> flights;
-  for (const std::size_t candidate : group) {
-    const std::size_t layer = plan_.candidates[candidate].layer;
-    Flight& flight =
-        flights.emplace_back(Flight{.layer = layer, .pass = plan_.layers[layer].pass, .bytes = 0});
-    for (const PlanSequence& sequence : plan_.sequences) {
-      const cv::Size channel = sequence.channels[layer];
-      flight.bytes = std::max(flight.bytes, bytes_in_flight(channel, picture_size(layer, sequence),
-                                                            plan_.sequences.size()));
+  bool is_last(std::size_t rung) const { return rung + 1 == plan.identity.rungs.size(); }
+  /// Why a candidate cannot be run on a sequence; empty: it can.
+  const std::string& problem(std::size_t candidate, const PlanSequence& on) const {
+    return on.problems[plan.candidates[candidate].layer];
+  }
+  const Config& odometry_config(std::size_t candidate) const {
+    return plan.layers[plan.candidates[candidate].layer].config;
+  }
+  /// Up to where a rung runs a sequence; 0: not at all.
+  std::size_t frames_to(std::size_t rung, const PlanSequence& planned) const {
+    const std::size_t num_frames = planned.sequence.size();
+    if (planned.is_held_out) {
+      return is_last(rung) ? num_frames : 0;
+    }
+    return frames_at(plan.identity.rungs[rung], num_frames);
+  }
+
+  /// Without what is repeated.
+  std::size_t frames_planned() const {
+    const Schedule& rungs = plan.identity.rungs;
+    std::size_t planned = 0;
+    std::size_t num_racing = 0;
+    for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
+      std::size_t last = plan.candidates[i].is_baseline ? rungs.size() - 1 : 0;
+      if (plan.candidates[i].races) {
+        while (!is_last(last) && num_racing < rungs[last + 1].filters) {
+          ++last;
+        }
+        ++num_racing;
+      }
+      for (const PlanSequence& sequence : plan.sequences) {
+        planned += problem(i, sequence).empty() ? frames_to(last, sequence) : 0;
+      }
+    }
+    return std::max(planned, frames_done);
+  }
+
+  const FilterRecord* find(std::size_t candidate, std::size_t rung) const {
+    const auto found = record_of.find({rung, plan.candidates[candidate].key});
+    return found == record_of.end() ? nullptr : &records[found->second];
+  }
+
+  /// Of candidates that ran the rung; the odometries of the others are given up.
+  Candidates best_of(const Candidates& group, std::size_t rung, std::size_t count) {
+    std::vector<const FilterRecord*> found;
+    for (const std::size_t candidate : group) {
+      found.push_back(find(candidate, rung));
+      STEMVO_CHECK(found.back() != nullptr, "a rung is complete before the next");
+    }
+    Candidates best;
+    for (const std::size_t index : choose_survivors(found, count)) {
+      best.push_back(group[index]);
+    }
+    std::ranges::sort(best);
+    for (const std::size_t candidate : group) {
+      if (!std::ranges::binary_search(best, candidate)) {
+        drives[candidate].clear();
+      }
+    }
+    return best;
+  }
+
+  /// Keeps the best odometries of those that ran this rung, beside those that are still to run it.
+  void limit_kept(std::size_t rung) {
+    Candidates done;
+    std::size_t num_waiting = 0;
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      if (!drives[i].empty() && find(i, rung) != nullptr) {
+        done.push_back(i);
+      } else if (!drives[i].empty()) {
+        ++num_waiting;
+      }
+    }
+    if (done.size() + num_waiting > max_kept) {
+      best_of(done, rung, max_kept - std::min(max_kept, num_waiting));
     }
   }
-  std::vector<Block> blocks = cut_into_blocks(flights, block_size_);
-  for (Block& block : blocks) {
-    for (std::size_t& index : block) {
-      index = group[index];
+
+  /// Those without a record, in blocks; those that go on apart from those that start, since a block
+  /// is at one frame.
+  Status run_rung(std::size_t rung, const Candidates& alive) {
+    Candidates going_on;
+    Candidates starting;
+    for (const std::size_t candidate : alive) {
+      if (find(candidate, rung) == nullptr) {
+        (drives[candidate].empty() ? starting : going_on).push_back(candidate);
+      }
     }
+    for (const Candidates& group : {going_on, starting}) {
+      for (const Candidates& block : cut_into_blocks(plan, group, plan.block)) {
+        if (Status status = run_block(rung, block); !status || is_stopped) {
+          return status;
+        }
+      }
+    }
+    return {};
+  }
+
+  Status run_block(std::size_t rung, const Candidates& block) {
+    std::vector<FilterRecord> done;
+    for (const std::size_t candidate : block) {
+      FilterRecord& record = done.emplace_back();
+      record.key = plan.candidates[candidate].key;
+      record.rung = rung;
+      drives[candidate].resize(plan.sequences.size());
+    }
+    for (std::size_t i = 0; i < plan.sequences.size(); ++i) {
+      const std::size_t end = frames_to(rung, plan.sequences[i]);
+      if (end > 0 && !run_sequence(i, end, block, done)) {
+        return {};
+      }
+    }
+    for (const FilterRecord& record : done) {
+      record_of.try_emplace({rung, record.key}, records.size());
+      records.push_back(record);
+    }
+    for (const std::size_t candidate : block) {
+      if (is_last(rung) || !plan.candidates[candidate].races) {
+        drives[candidate].clear();
+      }
+    }
+    limit_kept(rung);
+    return writer.append(done);
+  }
+
+  /// False: stopped before the last frame.
+  bool run_sequence(std::size_t index,
+                    std::size_t end,
+                    const Candidates& block,
+                    std::vector<FilterRecord>& done) {
+    const PlanSequence& planned = plan.sequences[index];
+    const KittiSequence& sequence = planned.sequence;
+    FrameRange frames{0, end};
+    Candidates running;
+    for (const std::size_t candidate : block) {
+      std::optional<FilterDrive>& drive = drives[candidate][index];
+      if (problem(candidate, planned).empty()) {
+        if (!drive) {
+          drive.emplace(odometry_config(candidate), sequence.camera());
+        }
+        frames.begin = drive->num_frames();
+        running.push_back(candidate);
+      }
+    }
+    STEMVO_CHECK(frames.begin <= end, "odometries are kept at the frames of their last rung");
+    if (!running.empty() && frames.begin < end && !run_frames(index, frames, running)) {
+      return false;
+    }
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const std::optional<FilterDrive>& drive = drives[block[i]][index];
+      DriveScore score;
+      score.sequence = sequence.name();
+      score.reason = problem(block[i], planned);
+      if (drive) {
+        score = drive->score(sequence.name(), *sequence.ground_truth(),
+                             odometry_config(block[i]).evaluation);
+        (planned.is_held_out ? done[i].held_out_filter_frames : done[i].filter_frames) +=
+            frames.end - frames.begin;
+      }
+      if (planned.is_held_out) {
+        done[i].held_out = std::move(score);
+      } else {
+        done[i].drives.push_back(std::move(score));
+      }
+    }
+    return true;
+  }
+
+  /// All are at the first of these frames. False: stopped before the last one.
+  bool run_frames(std::size_t sequence, FrameRange frames, const Candidates& running) {
+    BlockFrame now;
+    BlockFrame next = read_frame(sequence, frames.begin, running);
+    for (std::size_t i = frames.begin; i < frames.end; ++i) {
+      now = std::exchange(next, {});
+      const int num_tasks = static_cast<int>(running.size()) + 1;
+      const auto run_tasks = [&](const cv::Range& tasks) {
+        for (int task = tasks.start; task < tasks.end; ++task) {
+          if (task > 0) {
+            process(running[static_cast<std::size_t>(task - 1)], sequence, now);
+          } else if (i + 1 < frames.end) {
+            next = read_frame(sequence, i + 1, running);
+          }
+        }
+      };
+      cv::parallel_for_({0, num_tasks}, run_tasks, num_tasks);
+      frames_done += running.size();
+      is_stopped = progress && !progress(frames_done, frames_planned());
+      if (is_stopped) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  BlockFrame read_frame(std::size_t index, std::size_t frame_index, const Candidates& running) {
+    const KittiSequence& sequence = plan.sequences[index].sequence;
+    const Expected<cv::Mat> frame = sequence.read(frame_index);
+    if (!frame) {
+      warn(frame.error().message);
+      return {};
+    }
+    std::map<std::size_t, std::pair<int, int>> ranges;  // of each layer [first, last)
+    for (const std::size_t candidate : running) {
+      const int filter = plan.candidates[candidate].key.filter;
+      ranges.try_emplace(plan.candidates[candidate].layer, filter, 0).first->second.second =
+          filter + 1;
+    }
+    BlockFrame read{*frame, {}};
+    for (const auto& [layer, range] : ranges) {
+      auto channels = plan.layers[layer].stem.apply_range(*frame, range.first, range.second);
+      if (channels) {
+        read.layers[layer] = {range.first, std::move(*channels)};
+      } else {
+        warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
+                         channels.error().message));
+      }
+    }
+    return read;
+  }
+
+  void process(std::size_t candidate, std::size_t sequence, const BlockFrame& read) {
+    FilterDrive& drive = *drives[candidate][sequence];
+    const auto found = read.layers.find(plan.candidates[candidate].layer);
+    if (found != read.layers.end()) {
+      const int index = plan.candidates[candidate].key.filter - found->second.first;
+      drive.process(found->second.channels[static_cast<std::size_t>(index)], read.frame);
+    } else {
+      drive.process_missing();
+    }
+  }
+
+  void warn(const std::string& text) {
+    if (std::ranges::find(warnings, text) == warnings.end()) {
+      warnings.push_back(text);
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<Candidates> cut_into_blocks(const SearchPlan& plan,
+                                        const Candidates& candidates,
+                                        std::size_t block) {
+  std::vector<Candidates> blocks;
+  const PlanLayer* first = nullptr;  // of the last block
+  for (const std::size_t candidate : candidates) {
+    const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
+    const bool goes_on = first != nullptr && (block > 0 || layer.pass == first->pass) &&
+                         blocks.back().size() < (block > 0 ? block : first->max_in_flight);
+    if (!goes_on) {
+      blocks.emplace_back();
+      first = &layer;
+    }
+    blocks.back().push_back(candidate);
   }
   return blocks;
 }
 
-/// What the odometry of a layer works on.
-cv::Size Race::picture_size(std::size_t layer, const PlanSequence& sequence) const {
-  const PlanLayer& of = plan_.layers[layer];
-  const Config chosen = with_chosen_upsample(of.config, sequence.sequence.camera().width_px);
-  return sequence.channels[layer] * enlargement(chosen.stem.upsample, of.stem.info().sampling_px);
-}
-
-Status Race::run_block_of(std::size_t rung, const Block& block) {
-  std::vector<Record> done(block.size());
-  std::vector<Drives> drives(block.size());
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    done[i].key = plan_.candidates[block[i]].key;
-    done[i].rung = static_cast<int>(rung);
-    if (auto kept = kept_.extract(block[i]); !kept.empty()) {
-      drives[i] = std::move(kept.mapped());
-    }
-    drives[i].resize(plan_.sequences.size());
-  }
-  for (std::size_t s = 0; s < plan_.sequences.size(); ++s) {
-    const bool is_asked = !plan_.sequences[s].is_held_out || is_last(rung);
-    if (is_asked && (is_stopped_ || !run_sequence_of(rung, s, block, drives, done))) {
-      return {};
-    }
-  }
-  if (Status status = writer_.append(done); !status) {
-    return status;
-  }
-  for (Record& record : done) {
-    add_record(std::move(record));
-  }
-  if (!is_last(rung)) {
-    keep(rung, block, std::move(drives));
-  }
-  return {};
-}
-
-/// Of those that ran this rung the best; those that have not run it yet are still to go on.
-void Race::keep(std::size_t rung, const Block& block, std::vector<Drives> drives) {
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    kept_.emplace(block[i], std::move(drives[i]));
-  }
-  if (kept_.size() <= most_kept_) {
-    return;
-  }
-  std::vector<const Record*> done;
-  for (const auto& [candidate, ignored] : kept_) {
-    if (const Record* record = find(candidate, rung)) {
-      done.push_back(record);
-    }
-  }
-  const std::size_t num_waiting = kept_.size() - done.size();
-  const KeySet best = survivors_of(done, most_kept_ - std::min(most_kept_, num_waiting));
-  std::erase_if(kept_, [&](const auto& one) {
-    return find(one.first, rung) != nullptr && !best.contains(plan_.candidates[one.first].key);
-  });
-}
-
-bool Race::run_sequence_of(std::size_t rung,
-                           std::size_t sequence_index,
-                           const Block& block,
-                           std::vector<Drives>& drives,
-                           std::vector<Record>& records) {
-  const PlanSequence& planned = plan_.sequences[sequence_index];
-  const KittiSequence& sequence = planned.sequence;
-  const std::size_t end = planned.is_held_out
-                              ? sequence.size()
-                              : frames_at(plan_.identity.schedule[rung], sequence.size());
-  std::vector<BlockMember> members;
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    const Candidate& candidate = plan_.candidates[block[i]];
-    std::optional<FilterDrive>& drive = drives[i][sequence_index];
-    if (!planned.unusable[candidate.layer].empty()) {
-      continue;
-    }
-    if (!drive) {
-      drive.emplace(make_drive(candidate, sequence.camera()));
-    }
-    begin = drive->num_frames();
-    members.push_back({&candidate, &*drive});
-  }
-  const auto count = [this](std::size_t frames) {
-    frames_done_ += frames;
-    is_stopped_ = progress_ && !progress_(frames_done_, frames_planned());
-    return !is_stopped_;
-  };
-  if (!run_block(plan_, sequence, members, begin, end, count, warnings_)) {
-    return false;
-  }
-  for (std::size_t i = 0; i < block.size(); ++i) {
-    add_score(planned, plan_.candidates[block[i]], drives[i][sequence_index], end - begin,
-              records[i]);
-  }
-  return true;
-}
-
-FilterDrive Race::make_drive(const Candidate& candidate, const Camera& camera) const {
-  const Config& config = plan_.layers[candidate.layer].config;
-  Expected<ChannelOdometry> odometry = ChannelOdometry::create(config, camera);
-  STEMVO_CHECK(odometry.has_value(), "the configuration was checked");
-  return FilterDrive(std::move(*odometry), config.odometry.min_inliers);
-}
-
-void Race::add_score(const PlanSequence& planned,
-                     const Candidate& candidate,
-                     const std::optional<FilterDrive>& drive,
-                     std::size_t num_frames,
-                     Record& record) const {
-  const KittiSequence& sequence = planned.sequence;
-  DriveScore score = unusable_score(sequence.name(), planned.unusable[candidate.layer]);
-  if (drive) {
-    score = drive->score(sequence.name(), *sequence.ground_truth(), evaluation_);
-    (planned.is_held_out ? record.held_out_filter_frames : record.filter_frames) += num_frames;
-  }
-  if (planned.is_held_out) {
-    record.held_out = std::move(score);
-  } else {
-    record.drives.push_back(std::move(score));
-  }
+Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
+                                            const SearchProgress& progress,
+                                            RecordWriter& writer,
+                                            std::vector<FilterRecord>& records,
+                                            std::size_t max_kept) {
+  Race race{plan, progress, writer, records, max_kept};
+  return race.run().map([&race] { return race.warnings; });
 }
 
 }  // namespace stemvo::search

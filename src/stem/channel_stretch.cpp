@@ -5,9 +5,8 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "stem/enlargement.hpp"
-#include "stemvo/check.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "internal_check.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo {
 namespace {
@@ -93,6 +92,22 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
     image.map = channel.map;
   }
   return image;
+}
+
+Upsample choose_upsample(Upsample asked, FeatureMethod method, int width_px) {
+  constexpr int kWideFrame_px = 1000;
+  if (asked != Upsample::kAuto) {
+    return asked;
+  }
+  return method == FeatureMethod::kKlt && width_px >= kWideFrame_px ? Upsample::kHalf
+                                                                    : Upsample::kBicubic;
+}
+
+int enlargement(Upsample upsample, int sampling_px) {
+  if (upsample == Upsample::kNative) {
+    return 1;
+  }
+  return upsample == Upsample::kHalf ? std::max(1, sampling_px / 2) : sampling_px;
 }
 
 }  // namespace stemvo

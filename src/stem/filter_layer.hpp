@@ -6,10 +6,10 @@
 
 #include <opencv2/core.hpp>
 
+#include "stem/channel.hpp"
 #include "stem/onnx_session.hpp"
 #include "stem/sampling.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/stem/channel.hpp"
 
 namespace stemvo::internal {
 

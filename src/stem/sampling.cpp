@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "stem/sampling.hpp"
 
-#include "stemvo/check.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo::internal {
 
-SamplingPlan::SamplingPlan(const ModelEntry& entry, int sampling_px)
-    : x{entry.kernel_px[1], entry.stride_px, sampling_px, entry.padding_px[1], entry.padding_px[3]},
-      y{entry.kernel_px[0], entry.stride_px, sampling_px, entry.padding_px[0], entry.padding_px[2]},
-      sees_windows_only(!entry.native_sampling_only) {
-  STEMVO_CHECK(sampling_px >= 1 && entry.stride_px % sampling_px == 0,
+SamplingPlan::SamplingPlan(const StemNetwork& network, int sampling_px)
+    : x{network.kernel_px[1], network.stride_px, sampling_px, network.padding_px[1],
+        network.padding_px[3]},
+      y{network.kernel_px[0], network.stride_px, sampling_px, network.padding_px[0],
+        network.padding_px[2]},
+      sees_windows_only(!network.native_sampling_only) {
+  STEMVO_CHECK(sampling_px >= 1 && network.stride_px % sampling_px == 0,
                "sampling divides the stride");
 }
 

@@ -5,8 +5,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "stemvo/stem/channel.hpp"
-#include "stemvo/stem/manifest.hpp"
+#include "stem/channel.hpp"
+#include "stemvo/options.hpp"
 
 namespace stemvo::internal {
 
@@ -48,7 +48,7 @@ struct SamplingAxis {
 
 /// Both axes.
 struct SamplingPlan {
-  SamplingPlan(const ModelEntry& entry, int sampling_px);
+  SamplingPlan(const StemNetwork& network, int sampling_px);
 
   SamplingAxis x;
   SamplingAxis y;

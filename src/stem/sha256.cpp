@@ -5,8 +5,8 @@
 #include <fmt/ranges.h>
 #include <openssl/evp.h>
 
+#include "internal_check.hpp"
 #include "stem/model_file.hpp"
-#include "stemvo/check.hpp"
 
 namespace stemvo::internal {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/stem/stem.hpp"
+#include "stem/stem.hpp"
 
 #include <numeric>
 #include <utility>
@@ -7,17 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "internal_check.hpp"
 #include "stem/filter_layer.hpp"
 #include "stem/model_file.hpp"
-#include "stemvo/check.hpp"
 
 namespace stemvo {
-
-struct Stem::Impl {
-  StemInfo info;
-  std::unique_ptr<internal::FilterLayer> layer;   ///< all filters
-  std::unique_ptr<internal::FilterLayer> folded;  ///< the one chosen alone; null: it has no file
-};
 
 namespace {
 
@@ -25,8 +19,8 @@ using internal::FilterLayer;
 
 struct LoadedLayer {
   StemInfo info;
-  std::unique_ptr<FilterLayer> layer;
-  std::unique_ptr<FilterLayer> folded;
+  std::unique_ptr<FilterLayer> layer;   ///< all filters; null: not asked for
+  std::unique_ptr<FilterLayer> folded;  ///< the one chosen alone; null: it has no file
 };
 
 /// -1 stands for the default. Error: outside the layer.
@@ -61,25 +55,25 @@ Expected<int> choose_sampling(int asked, int stride) {
 }
 
 /// The same for a network's layer, which may allow its own stride only.
-Expected<int> choose_sampling(int asked, const ModelEntry& entry) {
-  if (!entry.native_sampling_only) {
-    return choose_sampling(asked, entry.stride_px);
+Expected<int> choose_sampling(int asked, const StemNetwork& network) {
+  if (!network.native_sampling_only) {
+    return choose_sampling(asked, network.stride_px);
   }
-  if (asked == 0 || asked == entry.stride_px) {
-    return entry.stride_px;
+  if (asked == 0 || asked == network.stride_px) {
+    return network.stride_px;
   }
   return fail(fmt::format(
       "stem.sampling_px: expected {} for layer {} of {}, which the manifest allows at its native "
       "stride only, found {}",
-      entry.stride_px, entry.layer, entry.file.string(), asked));
+      network.stride_px, network.layer, network.file.string(), asked));
 }
 
 /// Null where the filter, sampled like this, has no file of its own.
-Expected<std::unique_ptr<FilterLayer>> load_folded(const ModelEntry& entry,
+Expected<std::unique_ptr<FilterLayer>> load_folded(const StemNetwork& network,
                                                    int filter,
                                                    int sampling) {
-  const auto folded = internal::folded_entry(entry);
-  if (!folded || entry.folded->filter != filter || entry.folded->sampling_px != sampling) {
+  const auto folded = internal::folded_network(network);
+  if (!folded || network.folded->filter != filter || network.folded->sampling_px != sampling) {
     return nullptr;
   }
   auto session = internal::open_model(*folded);
@@ -90,53 +84,74 @@ Expected<std::unique_ptr<FilterLayer>> load_folded(const ModelEntry& entry,
                                       internal::SamplingPlan(*folded, sampling));
 }
 
-Expected<LoadedLayer> load_network(const StemOptions& options,
-                                   const std::filesystem::path& models_dir) {
-  const auto entry = internal::find_model(options.model, options.layer, models_dir);
-  if (!entry) {
-    return entry.error();
-  }
-  const auto sampling = choose_sampling(options.sampling_px, *entry);
-  if (!sampling) {
-    return sampling.error();
-  }
-  const auto filter = choose_filter(options, entry->num_filters, entry->default_filter);
-  if (!filter) {
-    return filter.error();
-  }
-  auto session = internal::open_model(*entry);
+Expected<std::unique_ptr<FilterLayer>> load_all(const StemNetwork& network, int sampling) {
+  auto session = internal::open_model(network);
   if (!session) {
     return session.error();
   }
-  auto folded = load_folded(*entry, *filter, *sampling);
-  if (!folded) {
-    return folded.error();
-  }
-  const internal::SamplingPlan plan(*entry, *sampling);
+  const internal::SamplingPlan plan(network, sampling);
   if (plan.needs_margin() && !session->fixed_size().empty()) {
     return fail(fmt::format(
         "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
         "found {}",
-        entry->stride_px, entry->file.string(), *sampling));
+        network.stride_px, network.file.string(), sampling));
+  }
+  return internal::make_network_layer(network.file.string(), *std::move(session), plan);
+}
+
+/// Error: a name of no layer of our own, without a network.
+Expected<StemNetwork> network_of(const StemOptions& options) {
+  if (options.network) {
+    return *options.network;
+  }
+  if (options.model == "default") {
+    return internal::built_in_network();
+  }
+  return fail(fmt::format(
+      "stem.model: expected default, gray, input_layer or a network beside it, found '{}'",
+      options.model));
+}
+
+Expected<LoadedLayer> load_network(const StemOptions& options, bool all_filters) {
+  const auto network = network_of(options);
+  if (!network) {
+    return network.error();
+  }
+  const auto sampling = choose_sampling(options.sampling_px, *network);
+  if (!sampling) {
+    return sampling.error();
+  }
+  const auto filter = choose_filter(options, network->num_filters, network->default_filter);
+  if (!filter) {
+    return filter.error();
   }
   LoadedLayer loaded;
   loaded.info = {.model = options.model,
-                 .layer = entry->layer,
-                 .sha256 = entry->sha256,
+                 .layer = network->layer,
+                 .sha256 = network->sha256,
                  .filter = *filter,
-                 .num_filters = entry->num_filters,
-                 .native_stride_px = entry->stride_px,
+                 .num_filters = network->num_filters,
+                 .native_stride_px = network->stride_px,
                  .sampling_px = *sampling};
-  loaded.layer = internal::make_network_layer(entry->file.string(), *std::move(session), plan);
+  auto folded = load_folded(*network, *filter, *sampling);
+  if (!folded) {
+    return folded.error();
+  }
   loaded.folded = *std::move(folded);
+  if (loaded.folded == nullptr || all_filters) {
+    auto layer = load_all(*network, *sampling);
+    if (!layer) {
+      return layer.error();
+    }
+    loaded.layer = *std::move(layer);
+  }
   return loaded;
 }
 
-Expected<LoadedLayer> load_layer(const StemOptions& options,
-                                 const std::filesystem::path& models_dir) {
+Expected<LoadedLayer> load_layer(const StemOptions& options, bool all_filters) {
   const bool is_gray = options.model == "gray";
   if (!is_gray && options.model != "input_layer") {
-    return load_network(options, models_dir);
+    return load_network(options, all_filters);
   }
   if (options.layer != "first") {
     return fail(
@@ -159,22 +174,23 @@ Expected<LoadedLayer> load_layer(const StemOptions& options,
 
 }  // namespace
 
+struct Stem::Impl : LoadedLayer {
+  static Expected<Stem> load(const StemOptions& options, bool all_filters) {
+    auto loaded = load_layer(options, all_filters);
+    if (!loaded) {
+      return loaded.error();
+    }
+    return Stem(std::make_unique<Impl>(*std::move(loaded)));
+  }
+};
+
 Stem::Stem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Stem::Stem(Stem&&) noexcept = default;
 Stem& Stem::operator=(Stem&&) noexcept = default;
 Stem::~Stem() = default;
 
-Expected<Stem> Stem::create(const StemOptions& options, const std::filesystem::path& models_dir) {
-  auto loaded = load_layer(options, models_dir);
-  if (!loaded) {
-    return loaded.error();
-  }
-  auto impl = std::make_unique<Impl>();
-  impl->info = std::move(loaded->info);
-  impl->layer = std::move(loaded->layer);
-  impl->folded = std::move(loaded->folded);
-  return Stem(std::move(impl));
-}
+Expected<Stem> Stem::create(const StemOptions& options) { return Impl::load(options, false); }
+Expected<Stem> Stem::create_all(const StemOptions& options) { return Impl::load(options, true); }
 
 const StemInfo& Stem::info() const { return impl_->info; }
 
@@ -191,13 +207,14 @@ Expected<Channel> Stem::apply(const cv::Mat& frame) const {
 
 Expected<std::vector<Channel>> Stem::apply_all(const cv::Mat& frame) const {
   STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
-  return impl_->layer->apply(frame, 0, impl_->info.num_filters);
+  return apply_range(frame, 0, impl_->info.num_filters);
 }
 
 Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame, int first, int last) const {
   STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
   STEMVO_CHECK(0 <= first && first < last && last <= impl_->info.num_filters,
                "a range of filters lies inside the layer");
+  STEMVO_CHECK(impl_->layer != nullptr, "the stem was made with all filters");
   return impl_->layer->apply(frame, first, last);
 }
 

@@ -6,14 +6,14 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <optional>
 #include <system_error>
 
 #include <fmt/core.h>
 
 namespace stemvo {
-
 namespace {
+
+namespace fs = std::filesystem;
 
 std::string last_system_error() { return std::generic_category().message(errno); }
 
@@ -26,14 +26,13 @@ std::optional<double> to_finite(std::string_view word) {
   return is_good ? std::optional(number) : std::nullopt;
 }
 
-/// Long words (a binary file) would drown the message.
-std::string_view shown(std::string_view word) { return word.substr(0, 40); }
+fs::path beside(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
 
 }  // namespace
 
-Expected<std::string> read_text_file(const std::filesystem::path& file) {
+Expected<std::string> read_text_file(const fs::path& file) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
+  if (fs::is_directory(file, ignored)) {
     return fail(fmt::format("{}: expected a file, found a folder", file.string()));
   }
   errno = 0;
@@ -48,7 +47,7 @@ Expected<std::string> read_text_file(const std::filesystem::path& file) {
   return text;
 }
 
-Status write_text_file(const std::filesystem::path& file, std::string_view text) {
+Status write_text_file(const fs::path& file, std::string_view text) {
   errno = 0;
   std::ofstream stream(file, std::ios::binary | std::ios::trunc);
   if (!stream) {
@@ -62,17 +61,34 @@ Status write_text_file(const std::filesystem::path& file, std::string_view text)
   return {};
 }
 
-Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file) {
+Status check_can_replace(const fs::path& file) {
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
-    return fail(fmt::format("{}: expected a file, found nothing", file.string()));
+  if (fs::is_directory(file, ignored)) {
+    return fail(fmt::format("{}: expected a file to write, found a folder", file.string()));
   }
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
+  const Status status = write_text_file(beside(file), "");
+  fs::remove(beside(file), ignored);
+  return status;
+}
+
+Status replace_text_file(const fs::path& file, std::string_view text) {
+  std::error_code code;
+  Status status = write_text_file(beside(file), text);
+  if (status) {
+    fs::rename(beside(file), file, code);
+    if (code) {
+      status = fail(fmt::format("{}: cannot write: {}", file.string(), code.message()));
+    }
   }
-  const std::vector<std::string_view> lines = split_lines(*text);
-  return std::vector<std::string>(lines.begin(), lines.end());
+  fs::remove(beside(file), code);
+  return status;
+}
+
+Expected<std::vector<std::string>> read_lines(const fs::path& file) {
+  return read_text_file(file).map([](const std::string& text) {
+    const std::vector<std::string_view> lines = split_lines(text);
+    return std::vector<std::string>(lines.begin(), lines.end());
+  });
 }
 
 std::vector<std::string_view> split_lines(std::string_view text) {
@@ -101,29 +117,33 @@ std::vector<std::string_view> split_words(std::string_view line) {
   return words;
 }
 
-std::string at_line(const std::filesystem::path& file, std::size_t line) {
+std::string at_line(const fs::path& file, std::size_t line) {
   return fmt::format("{}:{}", file.string(), line);
 }
 
-Expected<double> parse_finite(std::string_view word, const std::string& where) {
-  if (const std::optional<double> number = to_finite(word)) {
-    return *number;
-  }
-  return fail(fmt::format("{}: expected a finite number, found '{}'", where, shown(word)));
+Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
+  return fail(fmt::format("{}: {}", at_line(file, index + 1), error.message));
+}
+
+std::optional<std::size_t> parse_index(std::string_view text) {
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(text.begin(), text.end(), index);
+  return error == std::errc() && end == text.end() ? std::optional(index) : std::nullopt;
 }
 
 Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count) {
   std::vector<double> numbers;
-  const std::vector<std::string_view> words = split_words(line);
-  for (const std::string_view word : words) {
+  for (const std::string_view word : split_words(line)) {
     const std::optional<double> number = to_finite(word);
     if (!number) {
-      return fail(fmt::format("expected a finite number, found '{}'", shown(word)));
+      return fail(fmt::format("expected a finite number, found '{}'",
+                              word.substr(0, 40)));  // a binary file has long words
     }
     numbers.push_back(*number);
   }
   if (numbers.size() != count) {
-    return fail(fmt::format("expected {} numbers, found {}", count, numbers.size()));
+    return fail(fmt::format("expected {} number{}, found {}", count, count == 1 ? "" : "s",
+                            numbers.size()));
   }
   return numbers;
 }

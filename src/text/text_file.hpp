@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,10 +14,16 @@ namespace stemvo {
 
 /// The whole file as it is. Error: missing, a folder, unreadable.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file);
-/// Replaces the file. Error: it cannot be created, or the disk took less than all of it.
+/// Writes the file anew. Error: it cannot be created, or the disk took less than all of it.
 [[nodiscard]] Status write_text_file(const std::filesystem::path& file, std::string_view text);
 
-/// All lines of a file without their ends. Error: nothing there, a folder, unreadable.
+/// Replaces the file at once: whoever reads it finds the old or the new one. Errors: it is a
+/// folder, or those of write_text_file.
+[[nodiscard]] Status replace_text_file(const std::filesystem::path& file, std::string_view text);
+/// Proves that the file can be replaced, without touching it.
+[[nodiscard]] Status check_can_replace(const std::filesystem::path& file);
+
+/// All lines of a file without their ends. Errors: those of read_text_file.
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.
 [[nodiscard]] std::vector<std::string_view> split_lines(std::string_view text);
@@ -24,8 +32,13 @@ namespace stemvo {
 
 /// "file:line", line counted from 1, for messages.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, std::size_t line);
-/// A finite number that is the whole word, whatever the locale. `where` starts the message.
-[[nodiscard]] Expected<double> parse_finite(std::string_view word, const std::string& where);
+/// The error with file and line in front; `index` counts lines from 0.
+[[nodiscard]] Error fail_at(const std::filesystem::path& file,
+                            std::size_t index,
+                            const Error& error);
+
+/// Nothing but decimal digits; nullopt: another text, or too large.
+[[nodiscard]] std::optional<std::size_t> parse_index(std::string_view text);
 /// Exactly `count` finite numbers, whatever the locale. The error says what was expected and found,
 /// without file and line: "expected 12 numbers, found 11".
 [[nodiscard]] Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count);

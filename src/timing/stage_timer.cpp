@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <ctime>
+#include <fstream>
+#include <limits>
+#include <string>
 #include <string_view>
 
-#include "stemvo/check.hpp"
-#include "timing/peak_memory.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -17,6 +20,8 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "road picture",        "detection",    "tracking",          "homography", "epipolar geometry",
     "two-view refinement", "localization", "window refinement", "road scale", "frame files",
     "result files"};
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double read_ms(clockid_t clock) {
   timespec time{};
@@ -29,7 +34,34 @@ double ms_between(std::chrono::steady_clock::time_point from,
   return std::chrono::duration<double, std::milli>(to - from).count();
 }
 
+/// VmHWM of /proc/self/status: unlike getrusage, not that of the program that started this one.
+double peak_memory_mib() {
+  std::ifstream status("/proc/self/status");
+  for (std::string key; status >> key;) {
+    double kib = 0.0;
+    if (key == "VmHWM:" && status >> kib) {
+      return kib / 1024.0;
+    }
+  }
+  return kNaN;
+}
+
+double nearest_rank(std::vector<double>& values, double share) {
+  const double rank = std::max(1.0, std::ceil(share * static_cast<double>(values.size())));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank) - 1;
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 }  // namespace
+
+TimeSummary summarize_ms(std::span<const double> values_ms) {
+  if (values_ms.empty()) {
+    return {kNaN, kNaN};
+  }
+  std::vector<double> values(values_ms.begin(), values_ms.end());
+  return {nearest_rank(values, 0.5), nearest_rank(values, 0.95)};
+}
 
 std::atomic<StageRecorder*> StageRecorder::active_ = nullptr;
 

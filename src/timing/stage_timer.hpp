@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stemvo/report/timing.hpp"
+#include "stemvo/timing/timing_report.hpp"
 
 namespace stemvo {
 
@@ -15,7 +15,7 @@ namespace stemvo {
 enum class Stage {
   kRead,         ///< file and PNG decoder
   kStem,         ///< the filter
-  kStretch,      ///< channel to 8-bit picture
+  kStretch,      ///< channel to 8-bit image
   kPyramid,      ///< klt
   kDescription,  ///< orb, sift: descriptors
   kRoadPicture,
@@ -27,7 +27,7 @@ enum class Stage {
   kLocalization,      ///< among the landmarks
   kWindowRefinement,  ///< triangulation and bundle adjustment
   kRoadScale,
-  kFrameFiles,   ///< frames.csv, pictures
+  kFrameFiles,   ///< frames.csv, images of frames
   kResultFiles,  ///< everything that is written at the end
 };
 inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;

@@ -1,5 +1,5 @@
 # Installs into BINARY_DIR/package, moves the installed tree (it must not know where it was made), and
-# builds and runs the consumer beside this file against it.
+# builds and runs the program of the README against it, on frames of a rendered drive.
 # cmake -D BINARY_DIR=... -D VERSION=... -P install_and_consume.cmake
 set(work "${BINARY_DIR}/package")
 set(prefix "${work}/moved prefix")
@@ -23,18 +23,37 @@ if(NOT output MATCHES "${VERSION}")
 endif()
 run("installed models" "${prefix}/bin/stemvo" models)
 
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH tests)
+file(READ "${tests}/../README.md" readme)
+if(NOT readme MATCHES "```cpp\n([^`]+)```")
+  message(FATAL_ERROR "README.md: expected a program in a block of cpp, found none")
+endif()
+file(WRITE "${work}/readme_program.cpp" "${CMAKE_MATCH_1}")
+
 file(GLOB_RECURSE headers RELATIVE "${prefix}/include" "${prefix}/include/stemvo/*.hpp")
+list(LENGTH headers count)
+if(count GREATER 12)
+  message(FATAL_ERROR "expected at most 12 public headers, found ${count}")
+endif()
 list(TRANSFORM headers REPLACE "(.+)" "#include <\\1>\n")
 list(JOIN headers "" all_headers)
 file(WRITE "${work}/all_headers.cpp" "${all_headers}")
 
 # Makefiles, because they leave the files that list each object's includes.
 run("configure" ${CMAKE_COMMAND} -S "${CMAKE_CURRENT_LIST_DIR}" -B "${work}/build" -G "Unix Makefiles"
-    -D CMAKE_BUILD_TYPE=Release -D "CMAKE_PREFIX_PATH=${prefix}" -D "STEMVO_ALL_HEADERS=${work}/all_headers.cpp")
+    -D CMAKE_BUILD_TYPE=Release -D "CMAKE_PREFIX_PATH=${prefix}" -D "STEMVO_ALL_HEADERS=${work}/all_headers.cpp"
+    -D "STEMVO_README_PROGRAM=${work}/readme_program.cpp")
 run("build" ${CMAKE_COMMAND} --build "${work}/build" --parallel 2)
-run("run" "${work}/build/consumer" "${prefix}/share/stemvo/models")
-if(NOT output MATCHES "^${VERSION}[^ ]*: first\n$")
-  message(FATAL_ERROR "consumer: expected '${VERSION}...: first', found '${output}'")
+run("render" "${BINARY_DIR}/stemvo" synth "${work}/drive" --frames 4)
+file(GLOB frames "${work}/drive/sequences/00/image_2/*.png")
+list(SORT frames)
+run("run" "${work}/build/consumer" ${frames})
+string(REGEX MATCHALL "[^\n]+\n" positions "${output}")
+list(LENGTH positions count)
+list(GET positions 3 last)
+# x right, y down, z forward: a car drives some metres forward.
+if(NOT count EQUAL 4 OR NOT last MATCHES " ([0-9.]+)\n$" OR CMAKE_MATCH_1 LESS 1 OR CMAKE_MATCH_1 GREATER 10)
+  message(FATAL_ERROR "README's program: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
 endif()
 
 file(GLOB_RECURSE dependency_files "${work}/build/*.o.d")
@@ -44,7 +63,7 @@ if(NOT count EQUAL 3)
 endif()
 foreach(file IN LISTS dependency_files)
   file(READ "${file}" includes)
-  if(includes MATCHES "[^ \n]*/(onnxruntime[^/ ]*|ceres|yaml-cpp|cairo[^/ ]*|openssl|nlohmann|fmt)[/.][^ \n]*")
+  if(includes MATCHES "[^ \n]*/(onnxruntime[^/ ]*|ceres|yaml-cpp|cairo[^/ ]*|openssl|nlohmann|fmt|tl)[/.][^ \n]*")
     message(FATAL_ERROR "a public header includes a hidden library: ${CMAKE_MATCH_0} (${file})")
   endif()
 endforeach()

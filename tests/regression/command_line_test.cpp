@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/config.hpp"
+#include "config/config.hpp"
 #include "stemvo/version.hpp"
 #include "support/run_program.hpp"
 

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/state_runs.hpp"
 
@@ -103,7 +103,7 @@ TEST_F(PictureFolderRun, GivesTheBytesOfTheSameKittiFolder) {
 TEST_F(PictureFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
       run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 pictures
-  expect_error(result, 1, {"00.txt", "10 pictures", "60 poses"});
+  expect_error(result, 1, {"00.txt", "10 images", "60 poses"});
   write_file(folder_ / "ten.txt", first_ten_lines(folder_ / "poses/00.txt"));
   const ProgramResult good = run({"--gt", folder_ / "ten.txt", "--frames", "2:9"});
   ASSERT_EQ(good.exit_code, 0) << good.err;
@@ -149,7 +149,7 @@ TEST_F(PictureFolderRun, PatternsAndJpegs) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(num_poses(), 11U);
   expect_error(run_path((pictures_ / "1*.png").string(), {"--camera", camera_}), 1,
-               {"1*.png", "expected pictures (.png, .jpg, .jpeg), found none"});
+               {"1*.png", "expected images (.png, .jpg, .jpeg), found none"});
   expect_error(run_path((pictures_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
 }
 
@@ -194,13 +194,12 @@ TEST_F(PictureFolderRun, BadCameraFiles) {
                {"camera.yaml: expected intrinsics: [fx, fy, cx, cy], found no such key"});
   expect_error(run_with_camera("intrinsics: [", "intrinsics: [-"), 1,
                {"camera.yaml:3: intrinsics: expected positive focal lengths"});
-  expect_error(
-      run_with_camera("image_width: 620", "image_width: 200"), 1,
-      {"camera.yaml:3: intrinsics: expected a principal point inside pictures of 200x188"});
+  expect_error(run_with_camera("image_width: 620", "image_width: 200"), 1,
+               {"camera.yaml:3: intrinsics: expected a principal point inside images of 200x188"});
   expect_error(run_with_camera("image_width: 620", "image_width: 0"), 1,
                {"camera.yaml:1: image_width: expected whole pixels", "found 0"});
   expect_error(run_with_camera("image_width: 620", "image_width: 621"), 1,
-               {"my pictures: expected pictures of 621x188 pixels", "found 620x188"});
+               {"my pictures: expected images of 621x188 pixels", "found 620x188"});
   expect_error(run_with_camera("none", "radial"), 1,
                {"camera.yaml:4: distortion_model: expected none, radial-tangential or "
                 "equidistant, found 'radial'"});
@@ -218,7 +217,7 @@ TEST_F(PictureFolderRun, BadFoldersTimesAndPoses) {
   expect_error(run_path(folder_ / "none", {"--camera", camera_}), 1, {"none: expected a folder"});
   fs::create_directories(folder_.path() / "empty");
   expect_error(run_path(folder_ / "empty", {"--camera", camera_}), 1,
-               {"empty: expected pictures (.png, .jpg, .jpeg), found none"});
+               {"empty: expected images (.png, .jpg, .jpeg), found none"});
   write_file(folder_ / "times.txt", "0\n0.1\n");
   expect_error(run({"--times", folder_ / "times.txt"}), 1,
                {"times.txt: expected a time for each of 10", "found 2"});

@@ -5,9 +5,9 @@
 
 #include <gmock/gmock.h>
 
+#include "search/halving.hpp"
 #include "search/race.hpp"
-#include "search/report.hpp"
-#include "search/tables.hpp"
+#include "search/results.hpp"
 #include "support/search_program.hpp"
 
 namespace stemvo::search {
@@ -31,35 +31,32 @@ class SearchRace : public Search {
 
   /// Goes on from what `out` holds. Stops after so many filter-frames of this call.
   [[nodiscard]] Outcome race(const std::string& out,
-                             std::size_t most_kept,
-                             std::size_t most_frames = SIZE_MAX) const {
+                             std::size_t max_kept,
+                             std::size_t max_frames = SIZE_MAX) const {
     const auto plan = make_plan(request_);
     EXPECT_TRUE(plan) << plan.error().message;
     const fs::path file = folder_ / (out + ".jsonl");
-    std::vector<Record> before;
+    SearchRecords known;
     if (fs::exists(file)) {
-      before = read_records(file).value().records;
+      known = read_records(file).value();
     }
-    auto writer = before.empty() ? RecordWriter::create(file, plan->identity)
-                                 : RecordWriter::go_on(file, fs::file_size(file));
+    auto writer = RecordWriter::open(file, plan->identity, known.num_good_bytes);
+    std::vector<FilterRecord>& records = known.records;
     std::size_t done_before = SIZE_MAX;
     const auto progress = [&](std::size_t done, std::size_t) {
       done_before = std::min(done_before, done);
-      return done - done_before < most_frames;
+      return done - done_before < max_frames;
     };
-    Race race(*plan, request_, progress, std::move(*writer), std::move(before), most_kept);
-    EXPECT_TRUE(race.run());
-    SearchReport report;
-    report.rows = rank_filters(race.records(), plan->identity.schedule.size());
+    EXPECT_TRUE(run_race(*plan, progress, *writer, records, max_kept));
     Outcome outcome;
-    outcome.table = format_csv(plan->identity, report);
-    for (const Record& record : race.records()) {
+    outcome.table = format_csv(plan->identity, rank_filters(records, plan->identity.rungs.size()));
+    for (const FilterRecord& record : records) {
       outcome.filter_frames += record.filter_frames;
     }
-    const int last = static_cast<int>(plan->identity.schedule.size()) - 1;
+    const std::size_t last = plan->identity.rungs.size() - 1;
     outcome.was_stopped =
-        std::none_of(race.records().begin(), race.records().end(),
-                     [last](const Record& record) { return record.rung == last; });
+        std::none_of(records.begin(), records.end(),
+                     [last](const FilterRecord& record) { return record.rung == last; });
     return outcome;
   }
 
@@ -83,25 +80,25 @@ TEST_F(SearchRace, OnePassServesAllFiltersUnlessABlockIsAskedFor) {
 }
 
 TEST_F(SearchRace, OnlyTheBestAreKeptInMemoryAndTheTableIsTheSame) {
-  const Outcome all = race("all", kMostKept);
+  const Outcome all = race("all", kMaxKept);
   ASSERT_NE(all.table.find(",stopped,"), std::string::npos);
   std::size_t more_work = all.filter_frames;
   // The fewer are kept the more start again.
-  for (const std::size_t most_kept : {5U, 2U, 0U}) {
-    const Outcome some = race("kept" + std::to_string(most_kept), most_kept);
-    EXPECT_EQ(some.table, all.table) << most_kept;
-    EXPECT_GT(some.filter_frames, more_work) << most_kept;
+  for (const std::size_t max_kept : {5U, 2U, 0U}) {
+    const Outcome some = race("kept" + std::to_string(max_kept), max_kept);
+    EXPECT_EQ(some.table, all.table) << max_kept;
+    EXPECT_GT(some.filter_frames, more_work) << max_kept;
     more_work = some.filter_frames;
   }
 }
 
 TEST_F(SearchRace, StoppedAndGoneOnWithHalvingGivesTheSameTable) {
-  const Outcome whole = race("whole", kMostKept);
-  for (const std::size_t most_kept : {kMostKept, std::size_t{2}}) {
-    const std::string name = "stopped" + std::to_string(most_kept);
-    EXPECT_TRUE(race(name, most_kept, 70).was_stopped);  // in the third of five rungs
-    EXPECT_TRUE(race(name, most_kept, 20).was_stopped);
-    const Outcome gone_on = race(name, most_kept);
+  const Outcome whole = race("whole", kMaxKept);
+  for (const std::size_t max_kept : {kMaxKept, std::size_t{2}}) {
+    const std::string name = "stopped" + std::to_string(max_kept);
+    EXPECT_TRUE(race(name, max_kept, 70).was_stopped);  // in the third of five rungs
+    EXPECT_TRUE(race(name, max_kept, 20).was_stopped);
+    const Outcome gone_on = race(name, max_kept);
     EXPECT_EQ(gone_on.table, whole.table);
     EXPECT_GT(gone_on.filter_frames, whole.filter_frames);  // what was in memory ran again
   }

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "stemvo/evaluation/metrics.hpp"
+#include "evaluation/metrics.hpp"
 #include "support/drives.hpp"
 #include "support/state_drives.hpp"
 #include "support/state_runs.hpp"

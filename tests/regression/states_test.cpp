@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
 #include "support/state_drives.hpp"

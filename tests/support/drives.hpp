@@ -92,7 +92,7 @@ inline std::filesystem::path render_once(const std::string& name,
   return render_once(name, options);
 }
 
-/// A walk with the camera in the hand, 640 x 480, 30 pictures a second.
+/// A walk with the camera in the hand, 640 x 480, 30 frames a second.
 inline std::filesystem::path render_walk_once(int num_frames) {
   return render_once("walk_" + std::to_string(num_frames),
                      {"--walk", "--frames", std::to_string(num_frames)});

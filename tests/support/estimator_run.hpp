@@ -12,19 +12,19 @@
 
 #include <opencv2/core.hpp>
 
+#include "geometry/alignment.hpp"
 #include "odometry/estimator.hpp"
-#include "odometry/road_picture.hpp"
-#include "stemvo/config.hpp"
-#include "stemvo/geometry/alignment.hpp"
+#include "odometry/road/image.hpp"
+#include "stemvo/options.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo::testing {
 
 /// Defaults without a road: a step that nothing measures is one unit.
-inline Config config_without_scale(const std::string& mode = "map") {
-  Config config;
+inline Options config_without_scale(OdometryMode mode = OdometryMode::kMap) {
+  Options config;
   config.odometry.mode = mode;
-  config.scale.source = "none";
+  config.scale.source = ScaleSource::kNone;
   return config;
 }
 
@@ -96,8 +96,8 @@ class EstimatorRun {
     return number;
   }
 
-  cv::Mat picture;                                              ///< of the next frame
-  std::function<std::shared_ptr<const RoadPicture>(int)> road;  ///< of the drive's frames, or none
+  cv::Mat picture;                                            ///< of the next frame
+  std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::vector<FrameResult> results;
   std::vector<char> inlier_mask;  ///< of the last frame
   std::vector<int> point_ids;     ///< of the same matches

@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo::testing {
 

@@ -4,14 +4,14 @@
 #include <memory>
 #include <vector>
 
-#include "odometry/road_picture.hpp"
-#include "stemvo/config.hpp"
+#include "config/config.hpp"
+#include "odometry/road/image.hpp"
 #include "support/estimator_run.hpp"
 #include "support/road_scene.hpp"
 
 namespace stemvo::testing {
 
-/// Straight ahead along a road whose pictures are rendered, past points on both sides whose tracks
+/// Straight ahead along a road whose images are rendered, past points on both sides whose tracks
 /// are exact.
 struct RoadDrive {
   static constexpr double kStep_m = 0.8;
@@ -21,12 +21,12 @@ struct RoadDrive {
 
   explicit RoadDrive(int num_frames) : tracks(make_tracks(num_frames)) { scene.noise_gray = 1.0; }
 
-  [[nodiscard]] std::shared_ptr<const RoadPicture> road_picture(int frame, bool has_road) const {
+  [[nodiscard]] std::shared_ptr<const RoadImage> road_image(int frame, bool has_road) const {
     RoadScene shown = scene;
     shown.has_road = has_road;
     const cv::Mat pixels =
         render_road(shown, tracks.pose(frame).inverse(), static_cast<std::uint64_t>(frame));
-    return std::make_shared<RoadPicture>(make_road_picture({pixels, {}}, scene.camera));
+    return std::make_shared<RoadImage>(make_road_image({pixels, {}}, scene.camera));
   }
 
  private:
@@ -42,10 +42,10 @@ struct RoadDrive {
   }
 };
 
-inline Config metric_config(const std::string& mode = "map") {
-  Config config;
+inline Options metric_config(OdometryMode mode = OdometryMode::kMap) {
+  Options config;
   config.odometry.mode = mode;
-  config.scale.source = "camera_height";
+  config.scale.source = ScaleSource::kCameraHeight;
   return config;
 }
 

@@ -10,11 +10,11 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "odometry/road_picture.hpp"
-#include "odometry/road_types.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
-#include "stemvo/stem/channel.hpp"
+#include "odometry/road/image.hpp"
+#include "odometry/road/model.hpp"
+#include "stem/channel.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo::testing {
 
@@ -65,7 +65,7 @@ inline double asphalt(double x, double z, double pixel_m) {
   return gray;
 }
 
-/// The picture of a camera that is `camera_from_cur` away from the current one (whose plane the
+/// The image of a camera that is `camera_from_cur` away from the current one (whose plane the
 /// scene describes).
 inline cv::Mat render_road(const RoadScene& scene,
                            const Rigid3& camera_from_cur,
@@ -77,7 +77,7 @@ inline cv::Mat render_road(const RoadScene& scene,
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> noise;
   const Camera& camera = scene.camera;
-  cv::Mat picture(camera.height_px, camera.width_px, CV_8U);
+  cv::Mat image(camera.height_px, camera.width_px, CV_8U);
   const auto shade = [&](double u, double v) {
     const Eigen::Vector3d ray = rotation * camera.normalize({u, v}).homogeneous();
     const double down = normal.dot(ray);
@@ -104,17 +104,17 @@ inline cv::Mat render_road(const RoadScene& scene,
           gray += 0.25 * (shade(u + d, v - 0.25) + shade(u + d, v + 0.25));
         }
       }
-      picture.at<std::uint8_t>(v, u) =
+      image.at<std::uint8_t>(v, u) =
           cv::saturate_cast<std::uint8_t>(gray + scene.noise_gray * noise(engine));
     }
   }
-  return picture;
+  return image;
 }
 
-/// Two pictures of a scene; the camera drove `step_m` along the road, and turned.
+/// Two images of a scene; the camera drove `step_m` along the road, and turned.
 struct RoadPair {
-  RoadPicture prev;
-  RoadPicture cur;
+  RoadImage prev;
+  RoadImage cur;
   Rigid3 cur_from_prev;  ///< metres
 };
 
@@ -124,8 +124,8 @@ inline RoadPair render_pair(const RoadScene& scene, double step_m, double yaw_ra
   RoadPair pair;
   pair.cur_from_prev = {so3_exp({0.0, -yaw_rad, 0.0}), -forward};
   const Rigid3 prev_from_cur = pair.cur_from_prev.inverse();
-  pair.prev = make_road_picture({render_road(scene, prev_from_cur, 1), {}}, scene.camera);
-  pair.cur = make_road_picture({render_road(scene, Rigid3{}, 2), {}}, scene.camera);
+  pair.prev = make_road_image({render_road(scene, prev_from_cur, 1), {}}, scene.camera);
+  pair.cur = make_road_image({render_road(scene, Rigid3{}, 2), {}}, scene.camera);
   return pair;
 }
 

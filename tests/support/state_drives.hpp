@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/drives.hpp"
 
 namespace stemvo::test {

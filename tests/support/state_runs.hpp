@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/run_program.hpp"
 #include "support/state_drives.hpp"
 

@@ -9,9 +9,9 @@
 
 #include <Eigen/Core>
 
-#include "stemvo/features/front_end.hpp"
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "features/front_end.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 #include "support/synthetic_scene.hpp"
 
 namespace stemvo::testing {

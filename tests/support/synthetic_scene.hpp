@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo::testing {
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/refine_camera.hpp"
+#include "calibration/shared_camera.hpp"
 #include "support/synthetic_scene.hpp"
 
 namespace stemvo::calibration {
@@ -83,15 +84,18 @@ Camera wrong_camera() {
 TEST(CalibrationRefineCamera, TurnsGiveBackAWrongCamera) {
   const SharedVector truth = shared_of(kitti_camera());
   for (const std::uint64_t seed : {1U, 2U}) {
-    std::vector<Segment> segments = make_drive({}, seed);
-    const RefinedCamera refined = refine_camera(segments, wrong_camera(), {}, {});
-    EXPECT_NEAR(refined.shared[0] / truth[0], 1.0, 0.001);
-    EXPECT_NEAR(refined.shared[1], truth[1], 0.5);
-    EXPECT_NEAR(refined.shared[2], truth[2], 0.5);
+    const std::vector<Segment> segments = make_drive({}, seed);
+    const CalibrationReport refined = refine_camera(segments, wrong_camera(), {});
+    EXPECT_NEAR(refined.parameters[0].refined / truth[0], 1.0, 0.001);
+    EXPECT_NEAR(refined.parameters[1].refined, truth[1], 0.5);
+    EXPECT_NEAR(refined.parameters[2].refined, truth[2], 0.5);
     for (int i = 0; i < kNumShared; ++i) {
-      EXPECT_TRUE(refined.is_determined[static_cast<std::size_t>(i)]) << i;
-      EXPECT_LE(std::abs(refined.shared[i] - truth[i]), 4.0 * refined.deviation[i]) << i;
-      EXPECT_GT(refined.deviation[i], 0.0) << i;
+      const auto at = static_cast<std::size_t>(i);
+      EXPECT_TRUE(refined.parameters[at].is_determined) << i;
+      EXPECT_LE(std::abs(refined.parameters[at].refined - truth[i]),
+                4.0 * refined.parameters[at].deviation)
+          << i;
+      EXPECT_GT(refined.parameters[at].deviation, 0.0) << i;
     }
     EXPECT_NEAR(refined.refined_error_px, 0.03, 0.01);
     EXPECT_GT(refined.given_error_px, 1.02 * refined.refined_error_px);
@@ -101,9 +105,9 @@ TEST(CalibrationRefineCamera, TurnsGiveBackAWrongCamera) {
 TEST(CalibrationRefineCamera, OutliersDoNotPull) {
   DriveOptions options;
   options.outlier_ratio = 0.1;
-  std::vector<Segment> segments = make_drive(options, 4);
-  const RefinedCamera refined = refine_camera(segments, wrong_camera(), {}, {});
-  EXPECT_NEAR(refined.shared[0] / shared_of(kitti_camera())[0], 1.0, 0.001);
+  const std::vector<Segment> segments = make_drive(options, 4);
+  const CalibrationReport refined = refine_camera(segments, wrong_camera(), {});
+  EXPECT_NEAR(refined.parameters[0].refined / shared_of(kitti_camera())[0], 1.0, 0.001);
   EXPECT_LT(refined.refined_error_px, 0.04);
 }
 
@@ -112,39 +116,39 @@ TEST(CalibrationRefineCamera, DistortionDoesNotMoveTheFocalLength) {
   DriveOptions options;
   options.truth[3] = 0.01;
   options.truth[4] = -0.005;
-  std::vector<Segment> segments = make_drive(options, 5);
-  const RefinedCamera refined = refine_camera(segments, wrong_camera(), {}, {});
-  EXPECT_NEAR(refined.shared[0] / options.truth[0], 1.0, 0.0015);
-  EXPECT_NEAR(refined.shared[3], 0.01, 0.002);
-  EXPECT_NEAR(refined.shared[4], -0.005, 0.002);
+  const std::vector<Segment> segments = make_drive(options, 5);
+  const CalibrationReport refined = refine_camera(segments, wrong_camera(), {});
+  EXPECT_NEAR(refined.parameters[0].refined / options.truth[0], 1.0, 0.0015);
+  EXPECT_NEAR(refined.parameters[3].refined, 0.01, 0.002);
+  EXPECT_NEAR(refined.parameters[4].refined, -0.005, 0.002);
 }
 
 TEST(CalibrationRefineCamera, StraightRoadDeterminesNothing) {
   DriveOptions options;
   options.yaw_rad = 0.0;
-  std::vector<Segment> segments = make_drive(options, 6);
+  const std::vector<Segment> segments = make_drive(options, 6);
   const Camera given = wrong_camera();
-  const RefinedCamera refined = refine_camera(segments, given, {}, {});
-  EXPECT_FALSE(refined.is_determined[0]);
-  EXPECT_EQ(refined.shared[0], shared_of(given)[0]);
-  EXPECT_FALSE(refined.deviation[0] < 0.005 * given.fx_px);
+  const CalibrationReport refined = refine_camera(segments, given, {});
+  EXPECT_FALSE(refined.parameters[0].is_determined);
+  EXPECT_EQ(refined.parameters[0].refined, shared_of(given)[0]);
+  EXPECT_FALSE(refined.parameters[0].deviation < 0.005 * given.fx_px);
 }
 
 TEST(CalibrationRefineCamera, SameInputGivesTheSameBits) {
-  std::vector<Segment> first = make_drive({}, 7);
-  std::vector<Segment> second = make_drive({}, 7);
-  const RefinedCamera a = refine_camera(first, wrong_camera(), {}, {});
-  const RefinedCamera b = refine_camera(second, wrong_camera(), {}, {});
-  EXPECT_EQ(a.shared, b.shared);
-  EXPECT_EQ(a.deviation, b.deviation);
+  const CalibrationReport a = refine_camera(make_drive({}, 7), wrong_camera(), {});
+  const CalibrationReport b = refine_camera(make_drive({}, 7), wrong_camera(), {});
+  for (std::size_t i = 0; i < a.parameters.size(); ++i) {
+    EXPECT_EQ(a.parameters[i].refined, b.parameters[i].refined);
+    EXPECT_EQ(a.parameters[i].deviation, b.parameters[i].deviation);
+  }
 }
 
 TEST(CalibrationRefineCamera, StopsWhenAsked) {
-  std::vector<Segment> segments = make_drive({}, 8);
+  const std::vector<Segment> segments = make_drive({}, 8);
   int steps = 0;
-  const RefinedCamera refined = refine_camera(
-      segments, wrong_camera(), {}, [&steps](std::size_t, std::size_t) { return ++steps < 3; });
-  EXPECT_TRUE(refined.stopped);
+  const CalibrationReport refined = refine_camera(
+      segments, wrong_camera(), [&steps](std::size_t, std::size_t) { return ++steps < 3; });
+  EXPECT_TRUE(refined.interrupted);
   EXPECT_EQ(steps, 3);
 }
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "stemvo/config.hpp"
+#include "config/config.hpp"
 
 namespace stemvo {
 namespace {
@@ -47,24 +47,6 @@ class ConfigLoad : public ::testing::Test {
 
   std::filesystem::path file_;
 };
-
-TEST(Config, AutoUpsamplingGoesByFeaturesAndWidth) {
-  const auto chosen = [](const std::string& features, int width_px, const std::string& asked) {
-    Config config;
-    config.features.method = features;
-    config.stem.upsample = asked;
-    return with_chosen_upsample(config, width_px).stem.upsample;
-  };
-  EXPECT_EQ(chosen("klt", 1241, "auto"), "half");
-  EXPECT_EQ(chosen("klt", 1000, "auto"), "half");
-  EXPECT_EQ(chosen("klt", 999, "auto"), "bicubic");
-  EXPECT_EQ(chosen("orb", 1241, "auto"), "bicubic");
-  EXPECT_EQ(chosen("sift", 1241, "auto"), "bicubic");
-  for (const char* asked : {"bicubic", "half", "native"}) {
-    EXPECT_EQ(chosen("klt", 1241, asked), asked);
-    EXPECT_EQ(chosen("orb", 640, asked), asked);
-  }
-}
 
 TEST_F(ConfigLoad, ReadsEveryKindOfValueOverTheDefaults) {
   const Expected<Config> config = load(
@@ -104,6 +86,15 @@ TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
   EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"),
               StartsWith(":2: stm: unknown key; known keys: input, stem, features, "));
   EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", seed"));
+}
+
+TEST_F(ConfigLoad, ARenamedKeyNamesItsNewName) {
+  EXPECT_EQ(error_of("scale:\n  joining: false\n"),
+            ":2: scale.joining: unknown key; its name is scale.temporal_filter now");
+  Config config;
+  const Status status = apply_override(config, "odometry.standing_flow_px=0.2");
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, EndsWith("its name is odometry.stationary_flow_px now"));
 }
 
 TEST_F(ConfigLoad, DuplicatedKeyNamesBothLines) {
@@ -230,7 +221,7 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
 
 TEST(ConfigValidate, EveryNumberRefusesNan) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(validate({}));
+  EXPECT_TRUE(validate(Config{}));
   const auto refuses = [nan](auto&& member) {
     Config config;
     member(config) = nan;
@@ -266,8 +257,8 @@ TEST(ConfigFiles, PaperYamlLoads) {
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_TRUE(validate(*config));
   EXPECT_EQ(config->stem.filter, 10);
-  EXPECT_EQ(config->odometry.composition, "paper");
-  EXPECT_EQ(config->odometry.gate, "paper");
+  EXPECT_EQ(config->odometry.composition, Composition::kPaper);
+  EXPECT_EQ(config->odometry.gate, ForwardGate::kPaper);
 }
 
 }  // namespace

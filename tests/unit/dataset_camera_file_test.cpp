@@ -125,8 +125,7 @@ TEST_F(CameraFileTest, ReadsTheSharedFiles) {
 TEST_F(CameraFileTest, NoFile) {
   const auto none = read_camera_file(folder_ / "camera.yaml");
   ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().message,
-              HasSubstr("camera.yaml: expected a camera file, found nothing"));
+  EXPECT_THAT(none.error().message, HasSubstr("camera.yaml: cannot read: No such file"));
   const auto folder = read_camera_file(folder_.path());
   ASSERT_FALSE(folder);
   EXPECT_THAT(folder.error().message, HasSubstr("found a folder"));
@@ -135,16 +134,24 @@ TEST_F(CameraFileTest, NoFile) {
 TEST_F(CameraFileTest, NoYaml) {
   expect_refused("intrinsics: [1, 2\n", {"camera.yaml:2", "not YAML"});
   expect_refused("\x89PNG\r\n\x1a\n", {"camera.yaml:1"});
-  expect_refused("", {"expected the keys of a camera"});
-  expect_refused("just words\n", {"camera.yaml:1: expected the keys of a camera"});
-  expect_refused(std::string(kGood) + "rate_hz: 20\n", {"camera.yaml:9", "'rate_hz'", "twice"});
+  expect_refused("", {"expected image_width and image_height, or resolution"});
+  expect_refused("just words\n", {"camera.yaml:1: expected keys with values"});
+  expect_refused(std::string(kGood) + "rate_hz: 20\n", {"camera.yaml:9: rate_hz: duplicated key"});
 }
 
 TEST_F(CameraFileTest, MissingKeys) {
-  expect_refused(with_line(1, ""), {"image_width and image_height, or resolution", "no such key"});
+  expect_refused(with_line(1, ""), {"expected image_width and image_height, found image_height"});
+  expect_refused(with_line(2, "resolution: [640, 480]"), {"found image_width alone"});
+  expect_refused(with_line(1, "").replace(1, 17, ""),
+                 {"image_width and image_height, or resolution", "no such key"});
   expect_refused(with_line(4, ""), {"intrinsics: [fx, fy, cx, cy]", "no such key"});
   expect_refused(with_line(5, ""), {"distortion_model: none, radial-tangential or equidistant"});
   expect_refused(with_line(6, ""), {"distortion_coefficients: [k1, k2, p1, p2]", "no such key"});
+}
+
+TEST_F(CameraFileTest, UnknownKeysAreRefused) {
+  expect_refused(with_line(7, "rate: 10"), {"camera.yaml:7: rate: unknown key", "rate_hz"});
+  expect_refused(with_line(8, "scale: {camera_height_m: 1.2}"), {"camera.yaml:8: scale: unknown"});
 }
 
 TEST_F(CameraFileTest, OddSizes) {
@@ -162,31 +169,31 @@ TEST_F(CameraFileTest, OddIntrinsics) {
     expect_refused(with_line(4, "intrinsics: " + numbers), words);
   };
   refused("[520, 520, 320]", {"[fx, fy, cx, cy]", "found 3"});
-  refused("520", {"[fx, fy, cx, cy]", "found no list"});
+  refused("520", {"expected a list of numbers", "'520'"});
   refused("[-520, 520, 320, 240]", {"positive focal lengths", "-520"});
   refused("[520, 0, 320, 240]", {"positive focal lengths", "and 0"});
-  refused("[520, nan, 320, 240]", {"finite number", "nan"});
-  refused("[520, .inf, 320, 240]", {"finite number", "inf"});
-  refused("[520, x, 320, 240]", {"finite number", "'x'"});
-  refused("[520, [1], 320, 240]", {"finite number", "a list"});
-  refused("[520, 520, 640, 240]", {"principal point inside pictures of 640x480", "(640, 240)"});
-  refused("[520, 520, 320, -1]", {"principal point inside pictures of 640x480", "(320, -1)"});
+  refused("[520, nan, 320, 240]", {"expected a number", "nan"});
+  refused("[520, .inf, 320, 240]", {"expected a number", "inf"});
+  refused("[520, x, 320, 240]", {"expected a number", "'x'"});
+  refused("[520, [1], 320, 240]", {"list of numbers", "a list"});
+  refused("[520, 520, 640, 240]", {"principal point inside images of 640x480", "(640, 240)"});
+  refused("[520, 520, 320, -1]", {"principal point inside images of 640x480", "(320, -1)"});
   expect_refused(with_line(3, "camera_model: omni"),
-                 {"camera.yaml:3: camera_model: expected pinhole, found 'omni'"});
+                 {"camera.yaml:3: camera_model: expected one of pinhole, found 'omni'"});
 }
 
 TEST_F(CameraFileTest, OddDistortion) {
   expect_refused(with_line(5, "distortion_model: fov"),
-                 {"camera.yaml:5: distortion_model: expected none, radial-tangential or "
-                  "equidistant, found 'fov'"});
-  expect_refused(with_line(5, "distortion_model: [none]"), {"camera.yaml:5", "expected one word"});
+                 {"camera.yaml:5: distortion_model: expected one of none, radial-tangential, "
+                  "radtan, equidistant, found 'fov'"});
+  expect_refused(with_line(5, "distortion_model: [none]"), {"camera.yaml:5", "expected one value"});
   expect_refused(with_line(5, "distortion_model: equidistant"),
                  {"camera.yaml:6", "[k1, k2, k3, k4], found 5"});
   expect_refused(with_line(5, "distortion_model: none"), {"camera.yaml:6", "[]", "found 5"});
   expect_refused(with_line(6, "distortion_coefficients: [0.1, 0.2, 0.3]"),
                  {"camera.yaml:6", "[k1, k2, p1, p2]", "found 3"});
   expect_refused(with_line(6, "distortion_coefficients: [0.1, .nan, 0, 0]"),
-                 {"camera.yaml:6", "finite number", "nan"});
+                 {"camera.yaml:6", "expected a number", "nan"});
 }
 
 TEST_F(CameraFileTest, OddRateAndHeight) {
@@ -195,7 +202,7 @@ TEST_F(CameraFileTest, OddRateAndHeight) {
     expect_refused(with_line(8, std::string("camera_height: ") + number),
                    {"camera_height: expected"});
   }
-  expect_refused(with_line(7, "rate_hz: 0"), {"camera.yaml:7", "above 0", "found 0"});
+  expect_refused(with_line(7, "rate_hz: 0"), {"camera.yaml:7", "from 1e-09 to 100000", "found 0"});
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/evaluation/metrics.hpp"
+#include "evaluation/metrics.hpp"
 #include "support/shared_data.hpp"
 
 namespace stemvo {

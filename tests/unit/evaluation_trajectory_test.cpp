@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/evaluation/trajectory.hpp"
+#include "evaluation/trajectory.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {

@@ -7,8 +7,8 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/alignment.hpp"
-#include "stemvo/geometry/rigid3.hpp"
+#include "geometry/alignment.hpp"
+#include "stemvo/rigid3.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 

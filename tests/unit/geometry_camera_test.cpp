@@ -2,7 +2,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/camera.hpp"
+#include "stemvo/camera.hpp"
 #include "support/matchers.hpp"
 
 namespace stemvo {
@@ -25,7 +25,7 @@ TEST(Camera, NormalizeIsTheInverseOfProject) {
   EXPECT_THAT(kCamera.normalize({600.0, 180.0}), IsNear(Eigen::Vector2d(0.0, 0.0), 0.0));
 }
 
-TEST(Camera, RightOfTheAxisIsRightInThePictureAndDownIsDown) {
+TEST(Camera, RightOfTheAxisIsRightInTheImageAndDownIsDown) {
   const Eigen::Vector2d uv = kCamera.project({1.0, 1.0, 10.0});
   EXPECT_GT(uv.x(), kCamera.cx_px);
   EXPECT_GT(uv.y(), kCamera.cy_px);

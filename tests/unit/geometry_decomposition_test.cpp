@@ -6,7 +6,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/decomposition.hpp"
+#include "geometry/decomposition.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -50,15 +50,17 @@ double motion_error(const Rigid3& found, const Rigid3& expected) {
                   direction_error_rad(found.translation, expected.translation));
 }
 
-/// How far lambda * h is from R + mu * T n^T, for the best lambda and mu.
-double reproduction_error(const Eigen::Matrix3d& h, const PlanarMotion& motion) {
-  const Eigen::Matrix3d r = motion.cur_from_prev.rotation_matrix();
-  const Eigen::Matrix3d tn = motion.cur_from_prev.translation * motion.normal_in_prev.transpose();
-  Eigen::Matrix<double, 9, 2> a;
+/// How far lambda * h is from R + T n^T, for the best lambda and n.
+double reproduction_error(const Eigen::Matrix3d& h, const Rigid3& motion) {
+  Eigen::Matrix<double, 9, 4> a;
   a.col(0) = h.reshaped();
-  a.col(1) = -tn.reshaped();
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Matrix3d tn = motion.translation * Eigen::Vector3d::Unit(i).transpose();
+    a.col(i + 1) = -tn.reshaped();
+  }
+  const Eigen::Matrix3d r = motion.rotation_matrix();
   const Eigen::Matrix<double, 9, 1> b = r.reshaped();
-  const Eigen::Vector2d x = (a.transpose() * a).ldlt().solve(a.transpose() * b);
+  const Eigen::Vector4d x = (a.transpose() * a).ldlt().solve(a.transpose() * b);
   return (a * x - b).cwiseAbs().maxCoeff();
 }
 
@@ -68,9 +70,8 @@ TEST(DecomposeHomography, TrueMotionIsAmongTheEight) {
     const auto hypotheses = decompose_homography(pixel_homography(plane), kitti_camera());
     ASSERT_EQ(hypotheses.size(), 8U);
     double best = std::numeric_limits<double>::infinity();
-    for (const PlanarMotion& hypothesis : hypotheses) {
-      best = std::min(best, std::max(motion_error(hypothesis.cur_from_prev, plane.cur_from_prev),
-                                     direction_error_rad(hypothesis.normal_in_prev, plane.normal)));
+    for (const Rigid3& hypothesis : hypotheses) {
+      best = std::min(best, motion_error(hypothesis, plane.cur_from_prev));
     }
     EXPECT_LE(best, 1e-9) << "seed " << seed;
   }
@@ -80,11 +81,8 @@ TEST(DecomposeHomography, EveryHypothesisReproducesTheHomography) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     const PlantedPlane plane = planted_plane(seed);
     const Eigen::Matrix3d h = euclidean_homography(plane);
-    for (const PlanarMotion& hypothesis :
-         decompose_homography(pixel_homography(plane), kitti_camera())) {
-      EXPECT_NEAR(hypothesis.cur_from_prev.translation.norm(), 1.0, 1e-12);
-      EXPECT_NEAR(hypothesis.normal_in_prev.norm(), 1.0, 1e-12);
-      EXPECT_GE(hypothesis.normal_in_prev.z(), 0.0);
+    for (const Rigid3& hypothesis : decompose_homography(pixel_homography(plane), kitti_camera())) {
+      EXPECT_NEAR(hypothesis.translation.norm(), 1.0, 1e-12);
       EXPECT_LE(reproduction_error(h, hypothesis), 1e-9) << "seed " << seed;
     }
   }
@@ -94,9 +92,9 @@ TEST(DecomposeHomography, SignAndScaleDoNotMatter) {
   const PlantedPlane plane = planted_plane(3);
   for (const double scale : {-1.0, 1e-6, -3e5}) {
     double best = std::numeric_limits<double>::infinity();
-    for (const PlanarMotion& hypothesis :
+    for (const Rigid3& hypothesis :
          decompose_homography(scale * pixel_homography(plane), kitti_camera())) {
-      best = std::min(best, motion_error(hypothesis.cur_from_prev, plane.cur_from_prev));
+      best = std::min(best, motion_error(hypothesis, plane.cur_from_prev));
     }
     EXPECT_LE(best, 1e-9) << "scale " << scale;
   }
@@ -125,10 +123,8 @@ TEST(DecomposeHomography, SingularMatrixStaysFinite) {
   PlantedPlane plane = planted_plane(5);
   plane.distance = plane.normal.dot(plane.cur_from_prev.inverse().translation);
   ASSERT_NEAR(euclidean_homography(plane).determinant(), 0.0, 1e-12);
-  for (const PlanarMotion& hypothesis :
-       decompose_homography(pixel_homography(plane), kitti_camera())) {
-    EXPECT_THAT(hypothesis.cur_from_prev, testing::IsFiniteMotion());
-    EXPECT_TRUE(hypothesis.normal_in_prev.allFinite());
+  for (const Rigid3& hypothesis : decompose_homography(pixel_homography(plane), kitti_camera())) {
+    EXPECT_THAT(hypothesis, testing::IsFiniteMotion());
   }
 }
 

@@ -6,9 +6,9 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include "geometry/decomposition.hpp"
 #include "geometry/median.hpp"
-#include "stemvo/geometry/decomposition.hpp"
-#include "stemvo/geometry/relative_pose_refinement.hpp"
+#include "geometry/pose_refinement.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -36,27 +36,33 @@ Rigid3 disturbed(const Scene& scene, double rotation_rad, double direction_rad) 
           so3_exp(direction_rad * axis) * t};
 }
 
-RelativePoseRefinement refine(const Scene& scene, const Rigid3& start) {
-  return refine_relative_pose(start, scene.prev_uv, scene.cur_uv, scene.camera);
+RefinedMotion refine(const Scene& scene, const Rigid3& start) {
+  return refine_relative_pose(start, {scene.prev_uv, scene.cur_uv}, scene.camera);
+}
+
+double cost_at(const Scene& scene, const Rigid3& motion) {
+  return refine_relative_pose(motion, {scene.prev_uv, scene.cur_uv}, scene.camera,
+                              {.max_iterations = 0})
+      .cost;
 }
 
 TEST(RefineRelativePose, ExactMatchesGiveTheExactMotion) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Scene scene = make_scene({.seed = seed});
-    const RelativePoseRefinement result = refine(scene, disturbed(scene, 0.02, 0.1));
+    const RefinedMotion result = refine(scene, disturbed(scene, 0.02, 0.1));
     EXPECT_LE(rotation_error_rad(result.cur_from_prev, scene.cur_from_prev), 1e-6) << seed;
     EXPECT_LE(
         direction_error_rad(result.cur_from_prev.translation, scene.cur_from_prev.translation),
         1e-6)
         << seed;
-    EXPECT_LE(result.final_cost, 1e-9);
+    EXPECT_LE(result.cost, 1e-9);
   }
 }
 
 TEST(RefineRelativePose, PlanarScenesAreExactToo) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Scene scene = make_scene({.planar = true, .seed = seed});
-    const RelativePoseRefinement result = refine(scene, disturbed(scene, 0.002, 0.01));
+    const RefinedMotion result = refine(scene, disturbed(scene, 0.002, 0.01));
     EXPECT_THAT(result.cur_from_prev, IsNearMotion(scene.cur_from_prev, 1e-6)) << seed;
   }
 }
@@ -102,25 +108,27 @@ TEST(RefineRelativePose, CostNeverRises) {
         make_scene({.num_points = 60, .noise_px = 1.0, .outlier_ratio = 0.5, .seed = seed});
     for (const double start_error : {0.0, 0.01, 0.3, 2.0}) {
       const Rigid3 start = disturbed(scene, start_error, start_error);
+      double last_cost = std::numeric_limits<double>::infinity();
       for (const int max_iterations : {0, 1, 20}) {
-        const RelativePoseRefinement result = refine_relative_pose(
-            start, scene.prev_uv, scene.cur_uv, scene.camera, {.max_iterations = max_iterations});
-        EXPECT_TRUE(std::isfinite(result.final_cost));
-        EXPECT_LE(result.final_cost, result.initial_cost);
-        EXPECT_LE(result.num_iterations, max_iterations);
+        const RefinedMotion result = refine_relative_pose(
+            start, {scene.prev_uv, scene.cur_uv}, scene.camera, {.max_iterations = max_iterations});
+        EXPECT_TRUE(std::isfinite(result.cost));
+        EXPECT_LE(result.cost, last_cost);
+        last_cost = result.cost;
         EXPECT_NEAR(result.cur_from_prev.translation.norm(), 1.0, 1e-12);
         EXPECT_NEAR(result.cur_from_prev.rotation.norm(), 1.0, 1e-12);
       }
       // The reported cost is that of the reported motion.
-      const RelativePoseRefinement result = refine(scene, start);
-      EXPECT_NEAR(refine(scene, result.cur_from_prev).initial_cost, result.final_cost,
-                  1e-9 * (1.0 + result.final_cost));
+      const RefinedMotion result = refine(scene, start);
+      EXPECT_NEAR(cost_at(scene, result.cur_from_prev), result.cost, 1e-9 * (1.0 + result.cost));
     }
   }
 }
 
 TEST(RefineRelativePose, CostIsTheRobustSampsonDistanceInPixels) {
-  const Scene scene = make_scene({.num_points = 50, .noise_px = 1.0, .seed = 4});
+  // So many wrong matches that the product of the loss's terms needs several logarithms.
+  const Scene scene =
+      make_scene({.num_points = 400, .noise_px = 1.0, .outlier_ratio = 0.5, .seed = 4});
   Camera camera = scene.camera;
   camera.fy_px = 500.0;
   const Eigen::Matrix3d f =
@@ -134,11 +142,10 @@ TEST(RefineRelativePose, CostIsTheRobustSampsonDistanceInPixels) {
         residual * residual / (in_cur.head<2>().squaredNorm() + in_prev.head<2>().squaredNorm());
     expected += 0.7 * 0.7 * std::log1p(squared / (0.7 * 0.7));
   }
-  const RelativePoseRefinement result =
-      refine_relative_pose(scene.cur_from_prev, scene.prev_uv, scene.cur_uv, camera,
+  const RefinedMotion result =
+      refine_relative_pose(scene.cur_from_prev, {scene.prev_uv, scene.cur_uv}, camera,
                            {.loss_scale_px = 0.7, .max_iterations = 0});
-  EXPECT_NEAR(result.initial_cost, expected, 1e-9 * expected);
-  EXPECT_EQ(result.final_cost, result.initial_cost);
+  EXPECT_NEAR(result.cost, expected, 1e-9 * expected);
 }
 
 TEST(RefineRelativePose, BrokenMatchesAreLeftOut) {
@@ -155,23 +162,22 @@ TEST(RefineRelativePose, UnusableInputComesBackUnchanged) {
   const std::span<const Eigen::Vector2d> prev(scene.prev_uv);
   const std::span<const Eigen::Vector2d> cur(scene.cur_uv);
   const Rigid3 start(scene.cur_from_prev.rotation, {0.1, 0.2, 0.9});
-  const auto unchanged = [&](const RelativePoseRefinement& result, const Rigid3& motion) {
+  const auto unchanged = [&](const RefinedMotion& result, const Rigid3& motion) {
     EXPECT_EQ(result.cur_from_prev.translation, motion.translation);
     EXPECT_EQ(result.cur_from_prev.rotation.coeffs(), motion.rotation.coeffs());
-    EXPECT_EQ(result.num_iterations, 0);
-    EXPECT_EQ(result.final_cost, 0.0);
+    EXPECT_EQ(result.cost, 0.0);
   };
-  unchanged(refine_relative_pose(start, {}, {}, scene.camera), start);
-  unchanged(refine_relative_pose(start, prev.first(4), cur.first(4), scene.camera), start);
+  unchanged(refine_relative_pose(start, {{}, {}}, scene.camera), start);
+  unchanged(refine_relative_pose(start, {prev.first(4), cur.first(4)}, scene.camera), start);
   const Points broken(200, Eigen::Vector2d(kNan, 0.0));
-  unchanged(refine_relative_pose(start, broken, cur, scene.camera), start);
-  unchanged(refine_relative_pose(start, prev, cur, Camera{}), start);
+  unchanged(refine_relative_pose(start, {broken, cur}, scene.camera), start);
+  unchanged(refine_relative_pose(start, {prev, cur}, Camera{}), start);
   const Rigid3 no_translation(start.rotation, Eigen::Vector3d::Zero());
-  unchanged(refine_relative_pose(no_translation, prev, cur, scene.camera), no_translation);
+  unchanged(refine_relative_pose(no_translation, {prev, cur}, scene.camera), no_translation);
   Rigid3 with_nan = start;
   with_nan.translation.y() = kNan;
-  EXPECT_EQ(refine_relative_pose(with_nan, prev, cur, scene.camera).num_iterations, 0);
-  EXPECT_THROW(static_cast<void>(refine_relative_pose(start, prev, {}, scene.camera)),
+  EXPECT_EQ(refine_relative_pose(with_nan, {prev, cur}, scene.camera).cost, 0.0);
+  EXPECT_THROW(static_cast<void>(refine_relative_pose(start, {prev, {}}, scene.camera)),
                std::logic_error);
 }
 
@@ -186,10 +192,9 @@ TEST(RefineRelativePose, DegenerateMatchesStayFinite) {
   const Rigid3 ahead(Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitZ());
   for (const Rigid3& start : {scene.cur_from_prev, ahead}) {
     for (const Points* points : std::initializer_list<const Points*>{&same, &line, &still}) {
-      const RelativePoseRefinement result =
-          refine_relative_pose(start, *points, *points, scene.camera);
+      const RefinedMotion result = refine_relative_pose(start, {*points, *points}, scene.camera);
       EXPECT_THAT(result.cur_from_prev, testing::IsFiniteMotion());
-      EXPECT_LE(result.final_cost, result.initial_cost);
+      EXPECT_TRUE(std::isfinite(result.cost));
     }
   }
 }
@@ -199,14 +204,14 @@ Scene rotating_scene(SceneOptions options) {
   return make_scene(options);
 }
 
+Eigen::Quaterniond refined_rotation(const Scene& scene, const Eigen::Quaterniond& start) {
+  return refine_rotation(start, {scene.prev_uv, scene.cur_uv}, scene.camera);
+}
+
 TEST(RefineRotation, ExactMatchesGiveTheExactRotation) {
   const Scene scene = rotating_scene({.seed = 3});
-  const RelativePoseRefinement result =
-      refine_rotation(Rigid3(Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.0}), scene.prev_uv,
-                      scene.cur_uv, scene.camera);
-  EXPECT_THAT(result.cur_from_prev, IsNearMotion(scene.cur_from_prev, 1e-9));
-  EXPECT_LT(result.final_cost, 1e-12);
-  EXPECT_GT(result.initial_cost, 1.0);
+  const Eigen::Quaterniond found = refined_rotation(scene, Eigen::Quaterniond::Identity());
+  EXPECT_LE(found.angularDistance(scene.cur_from_prev.rotation), 1e-9);
 }
 
 TEST(RefineRotation, NoiseAndOutliers) {
@@ -214,12 +219,9 @@ TEST(RefineRotation, NoiseAndOutliers) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Scene scene =
         rotating_scene({.num_points = 500, .noise_px = 0.3, .outlier_ratio = 0.2, .seed = seed});
-    const Rigid3 start(so3_exp({0.0, 0.01, 0.0}) * scene.cur_from_prev.rotation,
-                       Eigen::Vector3d::Zero());
-    const RelativePoseRefinement result =
-        refine_rotation(start, scene.prev_uv, scene.cur_uv, scene.camera);
-    EXPECT_LE(result.final_cost, result.initial_cost);
-    errors.push_back(rotation_error_rad(result.cur_from_prev, scene.cur_from_prev));
+    const Eigen::Quaterniond& truth = scene.cur_from_prev.rotation;
+    errors.push_back(
+        refined_rotation(scene, so3_exp({0.0, 0.01, 0.0}) * truth).angularDistance(truth));
   }
   EXPECT_LE(median(errors), 1.5e-4);
 }
@@ -228,19 +230,15 @@ TEST(RefineRotation, DegenerateInputStaysFinite) {
   Scene scene = rotating_scene({.seed = 3});
   const std::span<const Eigen::Vector2d> prev(scene.prev_uv);
   const std::span<const Eigen::Vector2d> cur(scene.cur_uv);
-  const Rigid3 start(so3_exp({0.01, 0.0, 0.0}), {0.0, 0.0, 1.0});
+  const Eigen::Quaterniond start = so3_exp({0.01, 0.0, 0.0});
   for (const std::size_t n : {0U, 1U}) {
-    const RelativePoseRefinement result =
-        refine_rotation(start, prev.first(n), cur.first(n), scene.camera);
-    EXPECT_EQ(result.cur_from_prev.rotation.coeffs(), start.rotation.coeffs());
-    EXPECT_EQ(result.cur_from_prev.translation.norm(), 0.0);
+    EXPECT_EQ(refine_rotation(start, {prev.first(n), cur.first(n)}, scene.camera).coeffs(),
+              start.coeffs());
   }
   const Points same(200, Eigen::Vector2d(300.0, 100.0));
-  EXPECT_THAT(refine_rotation(start, same, same, scene.camera).cur_from_prev,
-              testing::IsFiniteMotion());
+  EXPECT_TRUE(refine_rotation(start, {same, same}, scene.camera).coeffs().allFinite());
   scene.prev_uv[0].x() = kNan;
-  EXPECT_THAT(refine_rotation(start, scene.prev_uv, cur, scene.camera).cur_from_prev,
-              IsNearMotion(scene.cur_from_prev, 1e-9));
+  EXPECT_LE(refined_rotation(scene, start).angularDistance(scene.cur_from_prev.rotation), 1e-9);
 }
 
 }  // namespace

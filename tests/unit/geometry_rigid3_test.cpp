@@ -5,7 +5,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/rigid3.hpp"
+#include "stemvo/rigid3.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 

@@ -6,8 +6,8 @@
 #include <Eigen/SVD>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/camera.hpp"
-#include "stemvo/geometry/triangulation.hpp"
+#include "geometry/triangulation.hpp"
+#include "stemvo/camera.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -109,23 +109,6 @@ TEST(Triangulate, WithoutMeetingRaysNothingIsFinite) {
     EXPECT_TRUE(point.in_prev.allFinite());
     EXPECT_TRUE(std::isfinite(point.cos_parallax));
   }
-}
-
-TEST(DepthInPrev, IsTheDepthOfTheTriangulatedPoint) {
-  const Scene scene = make_scene({.num_points = 50, .seed = 9});
-  for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
-    const Eigen::Vector3d& truth = scene.points_in_prev[i];
-    EXPECT_NEAR(depth_in_prev(scene.cur_from_prev, scene.camera.normalize(scene.prev_uv[i]),
-                              scene.camera.normalize(scene.cur_uv[i])),
-                truth.z(), 1e-7 * truth.z());
-  }
-}
-
-TEST(DepthInPrev, HandWorkedAndUndefined) {
-  // One metre to the right: the point at depth 10 moves left by 0.1.
-  const Rigid3 motion(Eigen::Quaterniond::Identity(), {-1.0, 0.0, 0.0});
-  EXPECT_NEAR(depth_in_prev(motion, {0.2, 0.3}, {0.1, 0.3}), 10.0, 1e-12);
-  EXPECT_FALSE(std::isfinite(depth_in_prev(motion, {0.25, 0.3}, {0.25, 0.3})));
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/decomposition.hpp"
-#include "stemvo/geometry/two_view_motion.hpp"
+#include "geometry/decomposition.hpp"
+#include "geometry/two_view_motion.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -21,14 +21,25 @@ using testing::Scene;
 
 using Points = std::vector<Eigen::Vector2d>;
 
+std::optional<TwoViewMotion> motion_from_essential(const Eigen::Matrix3d& essential,
+                                                   const PixelPairs& pairs,
+                                                   const Camera& camera) {
+  return best_motion(TwoViewModel::kEssential, decompose_essential(essential), pairs, camera);
+}
+
+std::optional<TwoViewMotion> motion_from_homography(const Eigen::Matrix3d& homography,
+                                                    const Scene& scene) {
+  return best_motion(TwoViewModel::kHomography, decompose_homography(homography, scene.camera),
+                     {scene.prev_uv, scene.cur_uv}, scene.camera);
+}
+
 std::optional<TwoViewMotion> essential_motion(const Scene& scene) {
-  return motion_from_essential(essential_from_motion(scene.cur_from_prev), scene.prev_uv,
-                               scene.cur_uv, scene.camera);
+  return motion_from_essential(essential_from_motion(scene.cur_from_prev),
+                               {scene.prev_uv, scene.cur_uv}, scene.camera);
 }
 
 std::optional<TwoViewMotion> homography_motion(const Scene& scene) {
-  return motion_from_homography(testing::true_homography(scene), scene.prev_uv, scene.cur_uv,
-                                scene.camera);
+  return motion_from_homography(testing::true_homography(scene), scene);
 }
 
 int count(const std::vector<char>& mask) {
@@ -41,7 +52,7 @@ TEST(MotionFromEssential, ExactMatchesGiveTheTrueMotion) {
     const auto motion = essential_motion(scene);
     ASSERT_TRUE(motion.has_value());
     EXPECT_THAT(motion->cur_from_prev, IsNearMotion(scene.cur_from_prev, 1e-9));
-    EXPECT_EQ(motion->num_good, 200);
+    EXPECT_EQ(motion->test.num_good, 200);
     EXPECT_EQ(motion->model, TwoViewModel::kEssential);
     EXPECT_TRUE(is_decisive(*motion, 200)) << "seed " << seed;
   }
@@ -54,8 +65,8 @@ TEST(MotionFromEssential, NoiseAndOutliersDoNotChangeTheChoice) {
     ASSERT_TRUE(motion.has_value());
     EXPECT_THAT(motion->cur_from_prev, IsNearMotion(scene.cur_from_prev, 1e-9));
     const int num_inliers = 200 - count(scene.is_outlier);
-    EXPECT_GE(motion->num_good, num_inliers - 5);
-    EXPECT_LE(motion->num_good, num_inliers + 10);
+    EXPECT_GE(motion->test.num_good, num_inliers - 5);
+    EXPECT_LE(motion->test.num_good, num_inliers + 10);
   }
 }
 
@@ -63,16 +74,15 @@ TEST(MotionFrom, RunnerUpIsTheSecondBestInWhateverOrderTheyCome) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = seed});
     std::vector<int> counts;
-    for (const PlanarMotion& hypothesis :
+    for (const Rigid3& hypothesis :
          decompose_homography(testing::true_homography(scene), scene.camera)) {
       counts.push_back(
-          test_points(hypothesis.cur_from_prev, scene.prev_uv, scene.cur_uv, scene.camera)
-              .num_good);
+          test_points(hypothesis, {scene.prev_uv, scene.cur_uv}, scene.camera).num_good);
     }
     std::sort(counts.rbegin(), counts.rend());
     const auto motion = homography_motion(scene);
     ASSERT_TRUE(motion.has_value());
-    EXPECT_EQ(motion->num_good, counts[0]);
+    EXPECT_EQ(motion->test.num_good, counts[0]);
     EXPECT_DOUBLE_EQ(motion->runner_up_ratio, static_cast<double>(counts[1]) / counts[0]);
   }
 }
@@ -84,8 +94,8 @@ TEST(MotionFromHomography, AllPointsPassAndTheTrueMotionIsOneOfTheBest) {
     const auto motion = homography_motion(scene);
     ASSERT_TRUE(motion.has_value());
     EXPECT_EQ(motion->model, TwoViewModel::kHomography);
-    EXPECT_EQ(motion->num_good, 200);
-    EXPECT_EQ(count(motion->good_mask), 200);
+    EXPECT_EQ(motion->test.num_good, 200);
+    EXPECT_EQ(count(motion->test.good_mask), 200);
     const bool is_true =
         ::testing::Matches(IsNearMotion(scene.cur_from_prev, 1e-8))(motion->cur_from_prev);
     num_true += is_true ? 1 : 0;
@@ -157,22 +167,20 @@ TEST(MotionFrom, DegenerateModelsGiveNothing) {
   const Eigen::Matrix3d k = scene.camera.matrix();
   const Eigen::Matrix3d rotation_only = k * scene.cur_from_prev.rotation_matrix() * k.inverse();
   const Eigen::Matrix3d nan = Eigen::Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  const auto from_h = [&](const Eigen::Matrix3d& h) {
-    return motion_from_homography(h, scene.prev_uv, scene.cur_uv, scene.camera);
-  };
+  const auto from_h = [&](const Eigen::Matrix3d& h) { return motion_from_homography(h, scene); };
   EXPECT_FALSE(from_h(rotation_only).has_value());
   EXPECT_FALSE(from_h(nan).has_value());
   EXPECT_FALSE(from_h(Eigen::Matrix3d::Zero()).has_value());
-  EXPECT_FALSE(motion_from_essential(nan, scene.prev_uv, scene.cur_uv, scene.camera).has_value());
+  EXPECT_FALSE(motion_from_essential(nan, {scene.prev_uv, scene.cur_uv}, scene.camera).has_value());
   const Eigen::Matrix3d e = essential_from_motion(scene.cur_from_prev);
-  EXPECT_FALSE(motion_from_essential(e, {}, {}, scene.camera).has_value());
+  EXPECT_FALSE(motion_from_essential(e, {{}, {}}, scene.camera).has_value());
 }
 
 TEST(MotionFrom, EqualPointsAreNeverDecisive) {
   const Scene scene = make_scene({.seed = 3});
   const Points same(200, Eigen::Vector2d(300.0, 100.0));
   const auto motion =
-      motion_from_essential(essential_from_motion(scene.cur_from_prev), same, same, scene.camera);
+      motion_from_essential(essential_from_motion(scene.cur_from_prev), {same, same}, scene.camera);
   if (motion.has_value()) {
     EXPECT_THAT(motion->cur_from_prev, testing::IsFiniteMotion());
     EXPECT_FALSE(is_decisive(*motion, 200));
@@ -182,8 +190,8 @@ TEST(MotionFrom, EqualPointsAreNeverDecisive) {
 TEST(IsDecisive, EveryCriterionCounts) {
   TwoViewMotion good;
   good.model = TwoViewModel::kEssential;
-  good.num_good = 95;
-  good.parallax_deg = 1.5;
+  good.test.num_good = 95;
+  good.test.parallax_deg = 1.5;
   good.runner_up_ratio = 0.3;
   EXPECT_TRUE(is_decisive(good, 100));
   EXPECT_FALSE(is_decisive(good, 106)) << "below the share";
@@ -197,7 +205,7 @@ TEST(IsDecisive, EveryCriterionCounts) {
   good.runner_up_ratio = 0.76;
   EXPECT_FALSE(is_decisive(good, 100));
   good.runner_up_ratio = 0.3;
-  good.parallax_deg = std::numeric_limits<double>::quiet_NaN();
+  good.test.parallax_deg = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(is_decisive(good, 100)) << "NaN";
 }
 

@@ -8,8 +8,8 @@
 #include <Eigen/SVD>
 #include <gtest/gtest.h>
 
-#include "stemvo/geometry/decomposition.hpp"
-#include "stemvo/geometry/two_view_scores.hpp"
+#include "geometry/decomposition.hpp"
+#include "geometry/two_view_scores.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
 
@@ -28,14 +28,14 @@ Eigen::Matrix3d shift(double x, double y) {
   return h;
 }
 
-/// Pure sideways motion: epipolar lines are the rows of the picture.
+/// Pure sideways motion: epipolar lines are the rows of the image.
 Eigen::Matrix3d row_fundamental() { return skew(Eigen::Vector3d(1.0, 0.0, 0.0)); }
 
 TEST(ScoreHomography, HandWorked) {
   const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
   // Shifted by (5, 0), then off by 0, 1, 2 and 3 px: the last is past sqrt(5.991) = 2.448.
   const Points cur = {{5.0, 0.0}, {105.0, 51.0}, {203.0, 80.0}, {15.0, 23.0}};
-  const ModelScore score = score_homography(shift(5.0, 0.0), prev, cur, 1.0);
+  const ModelScore score = score_homography(shift(5.0, 0.0), {prev, cur}, 1.0);
   EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 4.0), 1e-9);
   EXPECT_EQ(score.num_inliers, 3);
   EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
@@ -46,7 +46,7 @@ TEST(ScoreHomography, BothDirectionsAreCounted) {
   const Eigen::Matrix3d zoom = Eigen::Vector3d(2.0, 2.0, 1.0).asDiagonal();
   const Points prev = {{10.0, 10.0}};
   const Points cur = {{23.0, 20.0}};
-  const ModelScore score = score_homography(zoom, prev, cur, 1.0);
+  const ModelScore score = score_homography(zoom, {prev, cur}, 1.0);
   EXPECT_NEAR(score.score, 5.991 - 2.25, 1e-9);
   EXPECT_EQ(score.num_inliers, 0);
 }
@@ -54,19 +54,19 @@ TEST(ScoreHomography, BothDirectionsAreCounted) {
 TEST(ScoreHomography, SigmaScalesTheBound) {
   const Points prev = {{0.0, 0.0}};
   const Points cur = {{4.0, 0.0}};
-  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), prev, cur, 1.0).score, 0.0);
-  EXPECT_NEAR(score_homography(Eigen::Matrix3d::Identity(), prev, cur, 2.0).score,
+  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), {prev, cur}, 1.0).score, 0.0);
+  EXPECT_NEAR(score_homography(Eigen::Matrix3d::Identity(), {prev, cur}, 2.0).score,
               2.0 * (5.991 - 4.0), 1e-9);
 }
 
 TEST(ScoreHomography, ScaleOfTheMatrixDoesNotMatter) {
   const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = 3});
   const Eigen::Matrix3d h = testing::true_homography(scene);
-  const double expected = score_homography(h, scene.prev_uv, scene.cur_uv, 1.0).score;
+  const double expected = score_homography(h, {scene.prev_uv, scene.cur_uv}, 1.0).score;
   EXPECT_GT(expected, 0.0);
   for (const double scale : {-1.0, 1e-9, 1e7}) {
     const Eigen::Matrix3d scaled = scale * h;
-    EXPECT_NEAR(score_homography(scaled, scene.prev_uv, scene.cur_uv, 1.0).score, expected,
+    EXPECT_NEAR(score_homography(scaled, {scene.prev_uv, scene.cur_uv}, 1.0).score, expected,
                 1e-6 * expected);
   }
 }
@@ -81,7 +81,7 @@ TEST(ScoreHomography, SingularOrBrokenScoresZero) {
   const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
   const Eigen::Matrix3d ones = Eigen::Matrix3d::Ones();
   for (const Eigen::Matrix3d& m : {rank_two, with_nan, zero, ones}) {
-    const ModelScore score = score_homography(m, scene.prev_uv, scene.cur_uv, 1.0);
+    const ModelScore score = score_homography(m, {scene.prev_uv, scene.cur_uv}, 1.0);
     EXPECT_EQ(score.score, 0.0);
     EXPECT_EQ(score.num_inliers, 0);
     EXPECT_EQ(score.inlier_mask.size(), scene.prev_uv.size());
@@ -92,11 +92,11 @@ TEST(ScoreFundamental, HandWorked) {
   const Points prev = {{0.0, 0.0}, {100.0, 50.0}, {200.0, 80.0}, {10.0, 20.0}};
   // Rows differ by 0, 1, 1.9 and 2 px: the last is past sqrt(3.841) = 1.96.
   const Points cur = {{50.0, 0.0}, {20.0, 51.0}, {203.0, 78.1}, {900.0, 22.0}};
-  const ModelScore score = score_fundamental(row_fundamental(), prev, cur, 1.0);
+  const ModelScore score = score_fundamental(row_fundamental(), {prev, cur}, 1.0);
   EXPECT_NEAR(score.score, 2.0 * (3.0 * 5.991 - 0.0 - 1.0 - 3.61), 1e-9);
   EXPECT_EQ(score.num_inliers, 3);
   EXPECT_THAT(score.inlier_mask, ::testing::ElementsAre(1, 1, 1, 0));
-  EXPECT_NEAR(score_fundamental(row_fundamental(), prev, cur, 2.0).score,
+  EXPECT_NEAR(score_fundamental(row_fundamental(), {prev, cur}, 2.0).score,
               2.0 * (4.0 * 5.991 - (0.0 + 1.0 + 3.61 + 4.0) / 4.0), 1e-9);
 }
 
@@ -106,7 +106,7 @@ TEST(ScoreFundamental, BrokenScoresZero) {
   with_nan(2, 2) = std::numeric_limits<double>::quiet_NaN();
   const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
   for (const Eigen::Matrix3d& m : {with_nan, zero}) {
-    const ModelScore score = score_fundamental(m, scene.prev_uv, scene.cur_uv, 1.0);
+    const ModelScore score = score_fundamental(m, {scene.prev_uv, scene.cur_uv}, 1.0);
     EXPECT_EQ(score.score, 0.0);
     EXPECT_EQ(score.num_inliers, 0);
   }
@@ -117,22 +117,22 @@ TEST(Scores, BrokenPointsAreOutliersAndNoPointsScoreZero) {
   const double inf = std::numeric_limits<double>::infinity();
   const Points prev = {{1.0, 2.0}, {nan, 2.0}, {inf, 2.0}, {1.0, 2.0}};
   const Points cur = {{1.0, 2.0}, {1.0, 2.0}, {1.0, 2.0}, {1.0, nan}};
-  const ModelScore h = score_homography(Eigen::Matrix3d::Identity(), prev, cur, 1.0);
-  const ModelScore f = score_fundamental(row_fundamental(), prev, cur, 1.0);
+  const ModelScore h = score_homography(Eigen::Matrix3d::Identity(), {prev, cur}, 1.0);
+  const ModelScore f = score_fundamental(row_fundamental(), {prev, cur}, 1.0);
   for (const ModelScore& score : {h, f}) {
     EXPECT_TRUE(std::isfinite(score.score));
     EXPECT_GE(score.inlier_mask[0], 1);
     EXPECT_EQ(score.num_inliers, 1);
   }
-  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), {}, {}, 1.0).score, 0.0);
-  EXPECT_EQ(score_fundamental(row_fundamental(), {}, {}, 1.0).score, 0.0);
+  EXPECT_EQ(score_homography(Eigen::Matrix3d::Identity(), {{}, {}}, 1.0).score, 0.0);
+  EXPECT_EQ(score_fundamental(row_fundamental(), {{}, {}}, 1.0).score, 0.0);
 }
 
 TEST(Scores, MatchesThatDoNotPairAreOurMistake) {
   const Points one = {{1.0, 2.0}};
-  EXPECT_THROW(static_cast<void>(score_homography(Eigen::Matrix3d::Identity(), one, {}, 1.0)),
+  EXPECT_THROW(static_cast<void>(score_homography(Eigen::Matrix3d::Identity(), {one, {}}, 1.0)),
                std::logic_error);
-  EXPECT_THROW(static_cast<void>(score_fundamental(row_fundamental(), {}, one, 1.0)),
+  EXPECT_THROW(static_cast<void>(score_fundamental(row_fundamental(), {{}, one}, 1.0)),
                std::logic_error);
 }
 
@@ -201,8 +201,8 @@ Models fit_models(const Scene& scene) {
 
 double ratio(const Models& models, const Scene& scene) {
   return homography_ratio(
-      score_homography(models.homography, scene.prev_uv, scene.cur_uv, 1.0).score,
-      score_fundamental(models.fundamental, scene.prev_uv, scene.cur_uv, 1.0).score);
+      score_homography(models.homography, {scene.prev_uv, scene.cur_uv}, 1.0).score,
+      score_fundamental(models.fundamental, {scene.prev_uv, scene.cur_uv}, 1.0).score);
 }
 
 TEST(ModelChoice, PlanarScenesChooseTheHomography) {
@@ -240,7 +240,7 @@ TEST(Scores, TrueModelsFindTheTrueInliers) {
     const Scene scene = make_scene({.noise_px = 0.3, .outlier_ratio = 0.3, .seed = seed});
     const Eigen::Matrix3d f =
         fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera);
-    const ModelScore score = score_fundamental(f, scene.prev_uv, scene.cur_uv, 1.0);
+    const ModelScore score = score_fundamental(f, {scene.prev_uv, scene.cur_uv}, 1.0);
     int missed = 0;
     int taken = 0;
     for (std::size_t i = 0; i < scene.is_outlier.size(); ++i) {

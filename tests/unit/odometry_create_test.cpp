@@ -1,34 +1,142 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
+#include <limits>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
-#include "stemvo/odometry/odometry.hpp"
+#include "models/manifest.hpp"
+#include "stemvo/odometry.hpp"
 #include "support/synthetic_scene.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr Camera kCamera{200, 200, 159.5, 47.5, 320, 96};
+
+std::string error_of(const Options& options, const Camera& camera = kCamera) {
+  const auto odometry = Odometry::create(camera, options);
+  return odometry ? "no error" : odometry.error().message;
+}
+
+/// Blobs, so that there is something to track; another colour in each channel.
+cv::Mat image_at(int frame) {
+  cv::Mat image(96, 320, CV_8UC3, cv::Scalar(90, 100, 110));
+  cv::RNG random(7);
+  for (int i = 0; i < 150; ++i) {
+    const cv::Point center(random.uniform(0, 340) - 2 * frame, random.uniform(0, 96));
+    cv::circle(image, center, 3, cv::Scalar(random.uniform(0, 255), random.uniform(0, 255), i),
+               cv::FILLED);
+  }
+  return image;
+}
+
+TEST(OdometryCreate, NeedsNoFilesAndNoOptions) { EXPECT_EQ(error_of({}), "no error"); }
+
+TEST(OdometryCreate, AnOptionOutOfRangeIsAnErrorThatNamesIt) {
+  Options options;
+  options.features.klt_window = 10;
+  EXPECT_THAT(
+      error_of(options),
+      HasSubstr("features.klt_window: expected a whole number odd, from 3 to 201, found 10"));
+  options = {};
+  options.scale.camera_height_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error_of(options), HasSubstr("scale.camera_height_m"));
+  options = {};
+  options.odometry.mode = static_cast<OdometryMode>(7);
+  EXPECT_THAT(error_of(options), AllOf(HasSubstr("odometry.mode: expected one of two_frame, map"),
+                                       HasSubstr("number 7")));
+  options = {};
+  options.stem.model = "resnet";
+  EXPECT_THAT(error_of(options), AllOf(HasSubstr("stem.model"), HasSubstr("'resnet'")));
+}
+
+TEST(OdometryCreate, StepsOfTheGroundTruthAreNotGuessed) {
+  Options options;
+  options.scale.source = ScaleSource::kGroundTruth;
+  EXPECT_THAT(error_of(options), HasSubstr("scale.source: expected none, constant or"));
+}
+
+TEST(OdometryCreate, ACameraThatIsNoneIsAnError) {
+  Camera camera = kCamera;
+  camera.fx_px = std::nan("");
+  EXPECT_THAT(error_of({}, camera), HasSubstr("camera: expected focal lengths above 0"));
+  camera = kCamera;
+  camera.width_px = 0;
+  EXPECT_THAT(error_of({}, camera), HasSubstr("found 0x96"));
+  camera = kCamera;
+  camera.cy_px = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(error_of({}, camera), HasSubstr("principal point"));
+}
+
 TEST(OdometryCreate, AModelThatCannotTakeTheFramesIsAnErrorBeforeWork) {
   const testing::TempFolder folder;
   testing::write_models(folder, testing::kFixed4);  // takes frames of 48x32 only
-  Config config;
-  config.stem.model = (folder.path() / "fixed_k4s4.onnx").string();
-  config.stem.sampling_px = 4;
-  const auto odometry = Odometry::create(config, testing::kitti_camera(), folder.path());
-  ASSERT_FALSE(odometry.has_value());
-  EXPECT_THAT(odometry.error().message, ::testing::HasSubstr("fixed_k4s4.onnx"));
-  EXPECT_THAT(odometry.error().message, ::testing::HasSubstr("found 1241x376"));
+  Options options;
+  options.stem.model = (folder.path() / "fixed_k4s4.onnx").string();
+  options.stem.sampling_px = 4;
+  options.stem = with_network(options.stem, folder.path()).value();
+  EXPECT_THAT(error_of(options, testing::kitti_camera()),
+              AllOf(HasSubstr("fixed_k4s4.onnx"), HasSubstr("found 1241x376")));
 }
 
 TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
-  Config config;
-  Camera camera = testing::kitti_camera();
+  Camera camera = kCamera;
   camera.width_px = 3;
   camera.height_px = 2;
-  const auto odometry = Odometry::create(config, camera, STEMVO_SOURCE_DIR "/models");
-  ASSERT_FALSE(odometry.has_value());
-  EXPECT_THAT(odometry.error().message, ::testing::HasSubstr("found 3x2"));
+  EXPECT_THAT(error_of({}, camera), HasSubstr("found 3x2"));
+}
+
+TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
+  Odometry odometry = Odometry::create(kCamera).value();
+  const auto message = [&](const cv::Mat& image, PixelOrder order) {
+    const auto result = odometry.process(image, order);
+    return result ? "no error" : result.error().message;
+  };
+  EXPECT_THAT(message(cv::Mat3b(95, 320), PixelOrder::kRgb),
+              AllOf(HasSubstr("expected 320x96"), HasSubstr("found 320x95")));
+  EXPECT_THAT(message(cv::Mat(), PixelOrder::kGray), HasSubstr("found 0x0"));
+  EXPECT_THAT(message(cv::Mat1b(96, 320), PixelOrder::kBgr), HasSubstr("expected 3 channels"));
+  EXPECT_THAT(message(cv::Mat3b(96, 320), PixelOrder::kGray), HasSubstr("expected 1 channel of"));
+  EXPECT_THAT(message(cv::Mat1w(96, 320), PixelOrder::kGray), HasSubstr("CV_16U"));
+  EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb)->state, FrameState::kFirst);
+}
+
+TEST(OdometryProcess, BgrGivesTheChannelThatRgbGives) {
+  Odometry of_rgb = Odometry::create(kCamera).value();
+  Odometry of_bgr = Odometry::create(kCamera).value();
+  Odometry mistaken = Odometry::create(kCamera).value();
+  for (int i = 0; i < 3; ++i) {
+    const cv::Mat rgb = image_at(i);
+    cv::Mat bgr;
+    cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+    ASSERT_TRUE(of_rgb.process(rgb, PixelOrder::kRgb));
+    ASSERT_TRUE(of_bgr.process(bgr, PixelOrder::kBgr));
+    ASSERT_TRUE(mistaken.process(bgr, PixelOrder::kRgb));
+    EXPECT_EQ(rgb.at<cv::Vec3b>(5, 5)[0], bgr.at<cv::Vec3b>(5, 5)[2]);  // neither is written to
+    EXPECT_EQ(cv::norm(of_rgb.channel_image(), of_bgr.channel_image(), cv::NORM_INF), 0.0);
+    EXPECT_GT(cv::norm(of_rgb.channel_image(), mistaken.channel_image(), cv::NORM_INF), 0.0);
+  }
+  EXPECT_GT(of_rgb.tracked_points().size(), 20U);
+}
+
+TEST(OdometryProcess, TheBuiltInNetworkIsThatOfTheModelsFolder) {
+  Options from_folder;
+  from_folder.stem = with_network({}, STEMVO_SOURCE_DIR "/models").value();
+  for (const int filter : {-1, 2, 5}) {
+    Options built_in;
+    built_in.stem.filter = from_folder.stem.filter = filter;
+    Odometry a = Odometry::create(kCamera, built_in).value();
+    Odometry b = Odometry::create(kCamera, from_folder).value();
+    ASSERT_TRUE(a.process(image_at(0), PixelOrder::kRgb));
+    ASSERT_TRUE(b.process(image_at(0), PixelOrder::kRgb));
+    EXPECT_EQ(cv::norm(a.channel_image(), b.channel_image(), cv::NORM_INF), 0.0) << filter;
+  }
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ View view_of(const Matches& matches, const Rigid3& pose, int frame) {
   return {frame, pose, current_points(matches, std::vector<char>(matches.cur_uv.size(), 1))};
 }
 
-Decided initialize(const DriveTracks& drive, const Config& config = {}) {
+Decided initialize(const DriveTracks& drive, const Options& config = {}) {
   Initializer initializer(config, drive.camera);
   initializer.start({0, Rigid3(), {}});
   Decided result;
@@ -51,7 +51,7 @@ void expect_true_motion(const Decided& decided, const DriveTracks& drive, double
   EXPECT_LT((estimate.translation - truth.translation.normalized()).norm(), 5.0 * max_rad);
 }
 
-/// A camera in the hand, 30 pictures a second, 3 m from what it sees: 0.1 m/s to the right, less
+/// A camera in the hand, 30 frames a second, 3 m from what it sees: 0.1 m/s to the right, less
 /// than a pixel a frame.
 DriveTracks sideways_walk(double noise_px, std::uint64_t seed) {
   const Rigid3 step(so3_exp({0.0, 0.0005, 0.0}), {0.1 / 30.0, 0.0, 0.0});

@@ -18,8 +18,8 @@ using testing::RoadDrive;
 
 constexpr double kStep_m = RoadDrive::kStep_m;
 
-std::unique_ptr<Estimator> make_estimator(const Config& config, const Camera& camera) {
-  if (config.odometry.mode == "two_frame") {
+std::unique_ptr<Estimator> make_estimator(const Options& config, const Camera& camera) {
+  if (config.odometry.mode == OdometryMode::kTwoFrame) {
     return std::make_unique<PairEstimator>(config, camera);
   }
   return std::make_unique<WindowEstimator>(config, camera);
@@ -32,14 +32,14 @@ double step_m(const EstimatorRun& run, int i) {
       .norm();
 }
 
-class MetricScaleOf : public ::testing::TestWithParam<std::string> {};
+class MetricScaleOf : public ::testing::TestWithParam<OdometryMode> {};
 
 TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
   const RoadDrive drive(20);
   const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
   const int num_seen = 12;
-  run.road = [&](int i) { return drive.road_picture(i, i < num_seen); };
+  run.road = [&](int i) { return drive.road_image(i, i < num_seen); };
   run.add_all();
   const double unknown = run.results[0].scale_sigma.value();
   EXPECT_EQ(run.results[0].road, RoadState::kNone);
@@ -63,16 +63,16 @@ TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
     }
     last_sigma = result.scale_sigma.value();
   }
-  EXPECT_LT(last_sigma, (GetParam() == "map" ? 0.1 : 0.3) * unknown);
+  EXPECT_LT(last_sigma, (GetParam() == OdometryMode::kMap ? 0.1 : 0.3) * unknown);
 }
 
 TEST_P(MetricScaleOf, ARoadThatIsNotAskedIsDisabled) {
   const RoadDrive drive(4);
-  Config config = metric_config(GetParam());
-  config.scale.source = "constant";
+  Options config = metric_config(GetParam());
+  config.scale.source = ScaleSource::kConstant;
   const auto estimator = make_estimator(config, drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_all();
   for (const FrameResult& result : run.results) {
     EXPECT_EQ(result.road, RoadState::kDisabled);
@@ -84,12 +84,13 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
   const RoadDrive drive(12);
   const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_range(0, 10);
   const FrameResult missing = run.add_missing();
   EXPECT_EQ(missing.state, FrameState::kNoImage);
   EXPECT_EQ(missing.road, RoadState::kHeld);
   EXPECT_EQ(missing.road_reason, "no image");
+  EXPECT_GT(missing.scale_sigma, run.results[9].scale_sigma);
   EXPECT_NEAR(step_m(run, 10), kStep_m, 0.03 * kStep_m);  // the motion goes on
   const FrameResult after = run.add(11);
   EXPECT_EQ(after.road, RoadState::kMeasured) << after.road_reason;
@@ -100,8 +101,10 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
 
 INSTANTIATE_TEST_SUITE_P(Modes,
                          MetricScaleOf,
-                         ::testing::Values("map", "two_frame"),
-                         [](const auto& mode) { return mode.param; });
+                         ::testing::Values(OdometryMode::kMap, OdometryMode::kTwoFrame),
+                         [](const auto& mode) {
+                           return mode.param == OdometryMode::kMap ? "map" : "two_frame";
+                         });
 
 // The first road multiplies the window, whose poses are as far from each other as they were; what
 // has left the window before keeps the length it had.
@@ -111,7 +114,7 @@ TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
   const RoadDrive drive(num_frames);
   WindowEstimator estimator(metric_config(), drive.scene.camera);
   EstimatorRun run(estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_picture(i, i >= first_road); };
+  run.road = [&](int i) { return drive.road_image(i, i >= first_road); };
   run.add_range(0, first_road);
   EXPECT_EQ(run.results.back().road, RoadState::kNone);
   const double unit_m = kStep_m / step_m(run, first_road - 1);
@@ -135,12 +138,12 @@ TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
 
 TEST(MetricScale, DisabledItChangesNothing) {
   const RoadDrive drive(2);
-  Config config;
-  config.scale.source = "none";
-  MetricScale scale(config, drive.scene.camera);
-  const auto picture = drive.road_picture(0, true);
-  scale.restart(picture.get());
-  EXPECT_EQ(scale.measure(picture.get(), Rigid3()), 1.0);
+  Options config;
+  config.scale.source = ScaleSource::kNone;
+  MetricScale scale(config);
+  const auto image = drive.road_image(0, true);
+  scale.restart(image.get());
+  EXPECT_EQ(scale.measure(image.get(), Rigid3()), 1.0);
   scale.hold("no image");
   FrameResult result;
   scale.report(result);
@@ -149,9 +152,9 @@ TEST(MetricScale, DisabledItChangesNothing) {
   EXPECT_FALSE(result.scale_sigma.has_value());
 }
 
-TEST(MetricScale, AFrameWithoutARoadPictureKeepsTheUnit) {
+TEST(MetricScale, AFrameWithoutARoadImageKeepsTheUnit) {
   const RoadDrive drive(2);
-  MetricScale scale(metric_config(), drive.scene.camera);
+  MetricScale scale(metric_config());
   EXPECT_EQ(scale.measure(nullptr, Rigid3()), 1.0);
 }
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "odometry/motion_chain.hpp"
+#include "odometry/pair_estimator.hpp"
 
 namespace stemvo {
 namespace {
@@ -26,9 +26,7 @@ MeasuredMotion driven(const Eigen::Vector3d& direction,
 MotionChain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
   ScaleOptions scale;
   scale.constant_m = step_m;
-  MotionChain chain(options, scale);
-  chain.start();
-  return chain;
+  return {options, scale};
 }
 
 TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
@@ -40,10 +38,9 @@ TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
 
 TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
   ScaleOptions scale;
-  scale.source = "none";
+  scale.source = ScaleSource::kNone;
   scale.constant_m = 0.7;
   MotionChain chain({}, scale);
-  chain.start();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
@@ -62,7 +59,7 @@ TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
 
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   OdometryOptions paper;
-  paper.composition = "paper";
+  paper.composition = Composition::kPaper;
   MotionChain right = make_chain();
   MotionChain wrong = make_chain(paper);
   Rigid3 truth;
@@ -81,7 +78,7 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
 }
 
 TEST(MotionChain, GateNeverDropsTheRotation) {
-  MotionChain chain = make_chain({.gate = "translation"});
+  MotionChain chain = make_chain({.gate = ForwardGate::kTranslation});
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 5.0 * kDeg, 1e-12);
@@ -90,7 +87,7 @@ TEST(MotionChain, GateNeverDropsTheRotation) {
 
 TEST(MotionChain, ThePapersGateDropsBoth) {
   OdometryOptions options;
-  options.gate = "paper";
+  options.gate = ForwardGate::kPaper;
   MotionChain chain = make_chain(options);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
@@ -99,7 +96,7 @@ TEST(MotionChain, ThePapersGateDropsBoth) {
 }
 
 TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
-  MotionChain chain = make_chain({.gate = "translation"});
+  MotionChain chain = make_chain({.gate = ForwardGate::kTranslation});
   EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
   MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
   doubtful.runner_up_ratio = 0.9;
@@ -120,12 +117,12 @@ TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
 }
 
-TEST(MotionChain, ABrokenFrameIsBridged) {
+TEST(MotionChain, AMissingImageIsBridged) {
   MotionChain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  chain.extrapolate(/*has_picture=*/false);
+  chain.extrapolate(/*has_image=*/false);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
-  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last picture, two frames away
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last image, two frames away
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.0, 1e-12);
   MeasuredMotion lost;
   EXPECT_EQ(chain.add(lost), FrameState::kLost);

@@ -12,7 +12,7 @@ using testing::EstimatorRun;
 
 struct Driven {
   DriveTracks drive;
-  PairEstimator estimator{testing::config_without_scale("two_frame"), drive.camera};
+  PairEstimator estimator{testing::config_without_scale(OdometryMode::kTwoFrame), drive.camera};
   EstimatorRun run{estimator, drive};
 
   explicit Driven(DriveTracks tracks = DriveTracks(20, 0.1, 41)) : drive(std::move(tracks)) {}

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "odometry/road_dense.hpp"
+#include "odometry/road/estimators.hpp"
 #include "support/road_scene.hpp"
 
 namespace stemvo {
@@ -39,7 +39,7 @@ TEST_P(RoadDensePlane, FindsThePlantedPlane) {
   options.camera_height_m = c.height_m;
   RoadPrior prior = near(2.0 * 1.02);  // 2 % off
   const RoadMeasurement road =
-      RoadDense(options).measure(pair.prev, pair.cur, in_units(pair.cur_from_prev, 2.0), prior);
+      measure_dense({pair.prev, pair.cur, in_units(pair.cur_from_prev, 2.0), prior, options});
   ASSERT_TRUE(road.is_valid) << road.reason;
   EXPECT_NEAR(road.log_scale, std::log(2.0), 0.015);
   EXPECT_LT(std::abs(road.log_scale - std::log(2.0)), 4.0 * road.sigma);
@@ -65,8 +65,7 @@ TEST(RoadDense, FindsAnUnknownScale) {
   prior.log_scale = std::log(0.8);
   prior.log_scale_sigma = 1.0;
   const RoadMeasurement road =
-      RoadDense(RoadOptions{})
-          .measure(pair.prev, pair.cur, in_units(pair.cur_from_prev, 1.1), prior);
+      measure_dense({pair.prev, pair.cur, in_units(pair.cur_from_prev, 1.1), prior, RoadOptions{}});
   ASSERT_TRUE(road.is_valid) << road.reason;
   EXPECT_NEAR(road.log_scale, std::log(1.1), 0.01);
 }
@@ -78,9 +77,9 @@ TEST(RoadDense, SmallErrorsOfTheGivenRotationAreTakenUp) {
   motion.rotation = so3_exp({2e-4, -2e-4, 1e-4}) * motion.rotation;
   RoadOptions options;
   options.rotation_sigma_rad = 3e-4;
-  const RoadMeasurement free = RoadDense(options).measure(pair.prev, pair.cur, motion, near(1.0));
+  const RoadMeasurement free = measure_dense({pair.prev, pair.cur, motion, near(1.0), options});
   options.rotation_sigma_rad = 1e-7;
-  const RoadMeasurement fixed = RoadDense(options).measure(pair.prev, pair.cur, motion, near(1.0));
+  const RoadMeasurement fixed = measure_dense({pair.prev, pair.cur, motion, near(1.0), options});
   ASSERT_TRUE(free.is_valid) << free.reason;
   ASSERT_TRUE(fixed.is_valid) << fixed.reason;
   EXPECT_NEAR(free.log_scale, 0.0, 0.012);
@@ -92,7 +91,7 @@ TEST(RoadDense, ACarAheadThatCoversHalfOfTheStripIsLeftOut) {
   scene.is_covered = [](int u, int v) { return u > 320 && u < 480 && v > 110 && v < 230; };
   const RoadPair pair = render_pair(scene, 0.8);
   const RoadMeasurement road =
-      RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
+      measure_dense({pair.prev, pair.cur, pair.cur_from_prev, near(1.0), RoadOptions{}});
   ASSERT_TRUE(road.is_valid) << road.reason;
   EXPECT_NEAR(road.log_scale, 0.0, 0.015);
 }
@@ -102,53 +101,53 @@ TEST(RoadDense, AKerbAtTheSideCostsLittle) {
   scene.bump = [](double x, double /*z*/) { return x > 1.1 ? 0.12 : 0.0; };
   const RoadPair pair = render_pair(scene, 0.8);
   const RoadMeasurement road =
-      RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.0));
+      measure_dense({pair.prev, pair.cur, pair.cur_from_prev, near(1.0), RoadOptions{}});
   ASSERT_TRUE(road.is_valid) << road.reason;
   EXPECT_NEAR(road.log_scale, 0.0, 0.025);
 }
 
 TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
-  const RoadDense dense{RoadOptions{}};
+  const RoadOptions options;
   RoadScene blank;
   blank.has_road = false;
   const RoadPair plain = render_pair(blank, 0.8);
   const RoadMeasurement no_texture =
-      dense.measure(plain.prev, plain.cur, plain.cur_from_prev, near(1.0));
+      measure_dense({plain.prev, plain.cur, plain.cur_from_prev, near(1.0), options});
   EXPECT_FALSE(no_texture.is_valid);
   EXPECT_EQ(no_texture.reason, "nothing moves like a road");
 
-  blank.noise_gray = 20.0;  // two pictures that have nothing to do with each other
+  blank.noise_gray = 20.0;  // two images that have nothing to do with each other
   const RoadPair noise = render_pair(blank, 0.8);
-  EXPECT_FALSE(dense.measure(noise.prev, noise.cur, noise.cur_from_prev, near(1.0)).is_valid);
+  EXPECT_FALSE(
+      measure_dense({noise.prev, noise.cur, noise.cur_from_prev, near(1.0), options}).is_valid);
 
   const RoadPair road = render_pair(RoadScene{}, 0.8);
-  EXPECT_EQ(dense.measure(road.prev, road.cur, Rigid3{}, near(1.0)).reason, "no motion");
+  EXPECT_EQ(measure_dense({road.prev, road.cur, Rigid3{}, near(1.0), options}).reason, "no motion");
   Rigid3 bad = road.cur_from_prev;
   bad.translation.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(dense.measure(road.prev, road.cur, bad, near(1.0)).reason, "no motion");
+  EXPECT_EQ(measure_dense({road.prev, road.cur, bad, near(1.0), options}).reason, "no motion");
   RoadPrior wild = near(1.0);
   wild.slope_rad = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(dense.measure(road.prev, road.cur, road.cur_from_prev, wild).is_valid);
+  EXPECT_FALSE(measure_dense({road.prev, road.cur, road.cur_from_prev, wild, options}).is_valid);
 
-  // A picture that ends at the horizon.
+  // An image that ends at the horizon.
   const cv::Mat sky(130, 660, CV_8U, cv::Scalar(200));
-  const RoadPicture above = make_road_picture({sky, {}}, RoadScene{}.camera);
-  EXPECT_EQ(dense.measure(above, above, road.cur_from_prev, near(1.0)).reason,
+  const RoadImage above = make_road_image({sky, {}}, RoadScene{}.camera);
+  EXPECT_EQ(measure_dense({above, above, road.cur_from_prev, near(1.0), options}).reason,
             "the picture ends above the road");
 }
 
-TEST(RoadDense, APictureOfHalfTheSizeGivesTheSameScale) {
+TEST(RoadDense, AnImageOfHalfTheSizeGivesTheSameScale) {
   const RoadScene scene;
   RoadPair pair = render_pair(scene, 0.8);
-  const auto halve = [&](const RoadPicture& full) {
+  const auto halve = [&](const RoadImage& full) {
     ChannelImage image;
     cv::resize(full.pixels, image.pixels, {}, 0.5, 0.5, cv::INTER_AREA);
     image.map = {{2.0, 2.0}, {0.5, 0.5}};
-    return make_road_picture(image, scene.camera);
+    return make_road_image(image, scene.camera);
   };
-  const RoadMeasurement road =
-      RoadDense(RoadOptions{})
-          .measure(halve(pair.prev), halve(pair.cur), pair.cur_from_prev, near(1.0));
+  const RoadMeasurement road = measure_dense(
+      {halve(pair.prev), halve(pair.cur), pair.cur_from_prev, near(1.0), RoadOptions{}});
   ASSERT_TRUE(road.is_valid) << road.reason;
   EXPECT_NEAR(road.log_scale, 0.0, 0.02);
 }
@@ -160,7 +159,7 @@ TEST(RoadDense, SameBytesForAnyNumberOfThreads) {
     cv::setNumThreads(n);
     const RoadPair pair = render_pair(RoadScene{}, 0.8);
     results.push_back(
-        RoadDense(RoadOptions{}).measure(pair.prev, pair.cur, pair.cur_from_prev, near(1.02)));
+        measure_dense({pair.prev, pair.cur, pair.cur_from_prev, near(1.02), RoadOptions{}}));
   }
   cv::setNumThreads(threads);
   EXPECT_EQ(results[0].log_scale, results[1].log_scale);

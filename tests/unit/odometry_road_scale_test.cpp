@@ -6,10 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "odometry/road_filter.hpp"
-#include "odometry/road_path.hpp"
-#include "odometry/road_region.hpp"
-#include "odometry/road_scale.hpp"
+#include "odometry/road/filter.hpp"
+#include "odometry/road/region.hpp"
+#include "odometry/road/scale.hpp"
 #include "support/road_scene.hpp"
 
 namespace stemvo {
@@ -132,20 +131,19 @@ class Drive {
   RoadScaleEstimate next(RoadScale& scale, bool has_road = true) {
     scene_.has_road = has_road;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
-    const cv::Mat picture =
+    const cv::Mat image =
         testing::render_road(scene_, camera_from_first, static_cast<std::uint64_t>(frame_));
     ++frame_;
-    return scale.update(make_road_picture({picture, {}}, scene_.camera), step());
+    return scale.update(make_road_image({image, {}}, scene_.camera), step());
   }
   /// A frame that shows the last place again.
   RoadScaleEstimate stand(RoadScale& scale) {
     --frame_;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     ++frame_;
-    const cv::Mat picture = testing::render_road(scene_, camera_from_first, 5);
-    return scale.update(make_road_picture({picture, {}}, scene_.camera), Rigid3{});
+    const cv::Mat image = testing::render_road(scene_, camera_from_first, 5);
+    return scale.update(make_road_image({image, {}}, scene_.camera), Rigid3{});
   }
-  [[nodiscard]] const Camera& camera() const { return scene_.camera; }
   double metres_per_unit = kMetresPerUnit;
 
  private:
@@ -158,7 +156,7 @@ class Drive {
 
 TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
   Drive drive;
-  RoadScale scale(RoadOptions{}, drive.camera());
+  RoadScale scale(RoadOptions{});
   EXPECT_EQ(drive.next(scale).reason, "first frame");
   RoadScaleEstimate estimate;
   for (int i = 0; i < 12; ++i) {
@@ -181,7 +179,7 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
 
 TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
   Drive drive;
-  RoadScale scale(RoadOptions{}, drive.camera());
+  RoadScale scale(RoadOptions{});
   RoadScaleEstimate seen;
   for (int i = 0; i < 6; ++i) {
     seen = drive.next(scale);
@@ -209,13 +207,13 @@ double error_on_a_crest(const RoadOptions& options) {
     const double z = kCrestStep_m * (frame - kFrames);
     return Rigid3(so3_exp({-2.0 * kBend_per_m * z, 0.0, 0.0}), {0.0, kBend_per_m * z * z, z});
   };
-  RoadScale scale(options, scene.camera);
+  RoadScale scale(options);
   RoadScaleEstimate estimate;
   for (int frame = 0; frame <= kFrames; ++frame) {
     const Rigid3 camera_from_first = first_from_camera(frame).inverse();
-    const cv::Mat picture =
+    const cv::Mat image =
         testing::render_road(scene, camera_from_first, static_cast<std::uint64_t>(frame));
-    estimate = scale.update(make_road_picture({picture, {}}, scene.camera),
+    estimate = scale.update(make_road_image({image, {}}, scene.camera),
                             camera_from_first * first_from_camera(frame - 1));
   }
   EXPECT_TRUE(estimate.is_measured) << estimate.reason;
@@ -232,7 +230,7 @@ TEST(RoadScale, ACrestIsNoBiasBecauseThePathTellsTheBend) {
 
 TEST(RoadScale, ANonsenseMotionOrARestartForgetsTheUnit) {
   Drive drive;
-  RoadScale scale(RoadOptions{}, drive.camera());
+  RoadScale scale(RoadOptions{});
   for (int i = 0; i < 4; ++i) {
     drive.next(scale);
   }

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "odometry/stationary.hpp"
+#include "odometry/localization.hpp"
 #include "support/synthetic_scene.hpp"
 
 namespace stemvo {
@@ -61,23 +61,6 @@ TEST(TurnedPose, FewLandmarksTellNothingAndFarOnesAreLeftOut) {
   Moved wrong(none, 10.0, 0.2, 10);
   wrong.seen.uv.front().x() += 2.0 * kBound_px;
   EXPECT_FALSE(wrong.turned(0.45).has_value());
-}
-
-TEST(IsStationary, ByTheMedianFlowOfTwentyTracks) {
-  TrackPoints before;
-  TrackPoints now;
-  for (int i = 0; i < 21; ++i) {
-    const Eigen::Vector2d uv(10.0 * i, 50.0);
-    before.push_back({i, uv});
-    now.push_back({i, uv + Eigen::Vector2d(i < 10 ? 30.0 : 0.1, 0.0)});  // others pass by
-  }
-  EXPECT_TRUE(is_stationary(before, now, 0.15, 20));
-  EXPECT_FALSE(is_stationary(before, now, 0.05, 20));
-  now[10].uv.x() += 30.0;
-  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
-  now[10].uv.x() -= 30.0;
-  now.resize(19);
-  EXPECT_FALSE(is_stationary(before, now, 0.15, 20));
 }
 
 }  // namespace

@@ -326,7 +326,7 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
   const testing::RoadDrive drive(24);
   WindowEstimator estimator(testing::metric_config(), drive.scene.camera);
   EstimatorRun run(estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_picture(i, true); };
+  run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_range(0, 10);
   EXPECT_EQ(run.results.back().road, RoadState::kMeasured);
   const FrameResult lost = run.add_matches({}, 10);

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "odometry/bundle_adjustment.hpp"
-#include "odometry/landmarks.hpp"
-#include "odometry/reprojection_cost.hpp"
 #include "odometry/window.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
@@ -113,9 +111,7 @@ TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
   }
   BundleAdjustmentOptions refinement;
   refinement.max_iterations = 30;
-  const BundleAdjustmentReport report = refine_window(window, drive.camera, refinement);
-  ASSERT_TRUE(report.is_usable);
-  EXPECT_LT(report.final_cost, 0.01 * report.initial_cost);
+  ASSERT_TRUE(refine_window(window, drive.camera, refinement));
   for (std::size_t i = 0; i < window.keyframes.size(); ++i) {
     const Rigid3& truth = drive.world_from_camera[i];
     const Rigid3& pose = window.keyframes[i].world_from_camera;
@@ -130,18 +126,20 @@ TEST(BundleAdjustment, ALandmarkBehindAKeyframeDoesNotStopTheRest) {
   const int behind = window.landmarks.begin()->first;
   window.landmarks.begin()->second.z() = -5.0;
   window.keyframes.back().world_from_camera.translation.x() += 0.02;
-  const BundleAdjustmentReport report = refine_window(window, drive.camera, {});
-  ASSERT_TRUE(report.is_usable);
-  EXPECT_LT(report.final_cost, 0.1 * report.initial_cost);
+  ASSERT_TRUE(refine_window(window, drive.camera, {}));
+  EXPECT_LE((window.keyframes.back().world_from_camera.translation -
+             drive.world_from_camera.back().translation)
+                .norm(),
+            2e-3);
   EXPECT_EQ(window.landmarks.at(behind).z(), -5.0);
 }
 
 TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
   const DriveTracks drive(2, 0.0, 4);
   Window window = window_of(drive, {});
-  EXPECT_FALSE(refine_window(window, drive.camera, {}).is_usable);
+  EXPECT_FALSE(refine_window(window, drive.camera, {}));
   Window empty;
-  EXPECT_FALSE(refine_window(empty, drive.camera, {}).is_usable);
+  EXPECT_FALSE(refine_window(empty, drive.camera, {}));
 }
 
 }  // namespace

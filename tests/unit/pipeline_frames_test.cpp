@@ -11,9 +11,9 @@
 #include <opencv2/imgproc.hpp>
 #include <unistd.h>
 
+#include "dataset/sequence.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "stemvo/dataset/sequence.hpp"
 
 namespace stemvo {
 namespace {
@@ -57,8 +57,9 @@ class FramePipeline : public ::testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  [[nodiscard]] Odometry odometry() const {
-    return Odometry::create(config_, sequence_->camera(), STEMVO_SOURCE_DIR "/models").value();
+  [[nodiscard]] PhasedOdometry odometry() const {
+    return pipeline::create_odometry(config_, sequence_->camera(), STEMVO_SOURCE_DIR "/models")
+        .value();
   }
 
   Config config_;
@@ -68,17 +69,17 @@ class FramePipeline : public ::testing::Test {
 
 TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThreads) {
   std::vector<FrameResult> expected;
-  Odometry plain = odometry();
+  PhasedOdometry plain = odometry();
   for (std::size_t i = 0; i < sequence_->size(); ++i) {
     const Expected<cv::Mat> frame = sequence_->read(i);
-    expected.push_back(frame ? plain.process(*frame) : plain.process_missing());
+    expected.push_back(frame ? plain.process(plain.prepare(*frame)) : plain.process({}));
   }
   EXPECT_EQ(expected[4].state, FrameState::kNoImage);
   EXPECT_EQ(expected.back().state, FrameState::kNoImage);
   EXPECT_GT(expected[8].num_inliers, 50);
   for (const int num_threads : {1, 2, 4}) {
     const pipeline::ThreadScope threads(num_threads);
-    Odometry piped = odometry();
+    PhasedOdometry piped = odometry();
     std::size_t num_visited = 0;
     pipeline::run_frames(
         *sequence_, piped,
@@ -88,8 +89,9 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
           EXPECT_EQ(result.state, expected[i].state) << i;
           EXPECT_EQ(result.num_inliers, expected[i].num_inliers) << i;
           EXPECT_EQ(result.world_from_camera.matrix(), expected[i].world_from_camera.matrix()) << i;
-          EXPECT_EQ(piped.matches().cur_uv.size(), static_cast<std::size_t>(result.num_matches));
-          EXPECT_FALSE(piped.channel_image().pixels.empty());
+          EXPECT_EQ(piped.frames().matches().cur_uv.size(),
+                    static_cast<std::size_t>(result.num_matches));
+          EXPECT_FALSE(piped.frames().image().pixels.empty());
           return true;
         });
     EXPECT_EQ(num_visited, sequence_->size()) << num_threads << " threads";
@@ -97,7 +99,7 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
 }
 
 TEST_F(FramePipeline, StopsAtTheFrameWhoseVisitorSaysSo) {
-  Odometry piped = odometry();
+  PhasedOdometry piped = odometry();
   std::vector<std::size_t> visited;
   pipeline::run_frames(*sequence_, piped,
                        [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
@@ -108,7 +110,7 @@ TEST_F(FramePipeline, StopsAtTheFrameWhoseVisitorSaysSo) {
 }
 
 TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
-  Odometry piped = odometry();
+  PhasedOdometry piped = odometry();
   const auto visit = [](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
     if (i == 3) {
       throw std::runtime_error("disk on fire");
@@ -121,7 +123,7 @@ TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
 /// The last frame is finished after the graph has ended.
 TEST_F(FramePipeline, CarriesWhatTheVisitorThrowsAtTheFirstAndTheLastFrame) {
   for (const std::size_t bad : {std::size_t{0}, std::size_t{kNumFrames - 1}}) {
-    Odometry piped = odometry();
+    PhasedOdometry piped = odometry();
     std::size_t num_visited = 0;
     const auto visit = [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
       ++num_visited;
@@ -141,7 +143,7 @@ TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
         KittiSequence::open(folder_ / "sequences/08",
                             {.frames = parse_frame_range(fmt::format("0:{}", num_frames)).value()});
     ASSERT_TRUE(sequence) << sequence.error().message;
-    Odometry piped = odometry();
+    PhasedOdometry piped = odometry();
     std::vector<std::size_t> visited;
     pipeline::run_frames(*sequence, piped,
                          [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
@@ -154,21 +156,21 @@ TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
 }
 
 TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
-  Odometry whole = odometry();
-  Odometry parts = odometry();
+  PhasedOdometry whole = odometry();
+  PhasedOdometry parts = odometry();
   for (std::size_t i = 0; i < 3; ++i) {
     const cv::Mat frame = sequence_->read(i).value();
     parts.track(parts.prepare(frame));
     if (i > 0) {  // of the frame before
       EXPECT_EQ(parts.optimize().num_matches,
-                whole.process(sequence_->read(i - 1).value()).num_matches);
+                whole.process(whole.prepare(sequence_->read(i - 1).value())).num_matches);
     }
     parts.localize();
   }
   const FrameResult last = parts.optimize();
   EXPECT_GT(last.num_matches, 50);
   EXPECT_EQ(last.world_from_camera.translation,
-            whole.process(sequence_->read(2).value()).world_from_camera.translation);
+            whole.process(whole.prepare(sequence_->read(2).value())).world_from_camera.translation);
 }
 
 }  // namespace

@@ -12,10 +12,10 @@
 #include <opencv2/imgproc.hpp>
 #include <unistd.h>
 
-#include "stemvo/evaluation/trajectory.hpp"
-#include "stemvo/pipeline/channel_pictures.hpp"
-#include "stemvo/pipeline/run.hpp"
-#include "stemvo/report/map_ply.hpp"
+#include "evaluation/trajectory.hpp"
+#include "pipeline/channel_pictures.hpp"
+#include "pipeline/run.hpp"
+#include "report/map_ply.hpp"
 #include "support/ply_reader.hpp"
 
 namespace stemvo {
@@ -105,11 +105,11 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
 }
 
 TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
-  request_.config.odometry.mode = "two_frame";
-  request_.config.scale.source = "constant";
+  request_.config.odometry.mode = OdometryMode::kTwoFrame;
+  request_.config.scale.source = ScaleSource::kConstant;
   ASSERT_TRUE(run_sequence(request_).value().written);
   const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
-  request_.config.scale.source = "ground_truth";
+  request_.config.scale.source = ScaleSource::kGroundTruth;
   ASSERT_TRUE(run_sequence(request_).value().written);
   const auto rescaled = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   ASSERT_TRUE(constant && rescaled);
@@ -155,8 +155,8 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
 }
 
 TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
-  request_.config.odometry.mode = "two_frame";
-  request_.config.scale.source = "none";
+  request_.config.odometry.mode = OdometryMode::kTwoFrame;
+  request_.config.scale.source = ScaleSource::kNone;
   request_.config.scale.constant_m = 0.25;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -174,8 +174,8 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
 }
 
 TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
-  request_.config.odometry.mode = "map";
-  request_.config.scale.source = "ground_truth";
+  request_.config.odometry.mode = OdometryMode::kMap;
+  request_.config.scale.source = ScaleSource::kGroundTruth;
   request_.write_map = true;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -204,8 +204,8 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
 }
 
 TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
-  request_.config.odometry.mode = "two_frame";
-  request_.config.scale.source = "constant";
+  request_.config.odometry.mode = OdometryMode::kTwoFrame;
+  request_.config.scale.source = ScaleSource::kConstant;
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
   const auto summary = run_sequence(request_);
@@ -266,7 +266,7 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
   request.config.stem.model = "nothing";
   EXPECT_THAT(error_of(request), HasSubstr("nothing"));
   request = request_;
-  request.config.scale.source = "ground_truth";
+  request.config.scale.source = ScaleSource::kGroundTruth;
   fs::remove(folder_ / "poses/07.txt");
   EXPECT_THAT(error_of(request), HasSubstr("poses/07.txt: expected a pose file"));
   EXPECT_FALSE(fs::exists(request_.out_dir));

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/report/check.hpp"
+#include "report/check.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {
@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(
         std::tuple("t_rel_percent: {max: nan}\n", "expected a finite number"),
         std::tuple("t_rel_percent: {max: .nan}\n", "expected a finite number"),
         std::tuple("t_rel_percent: {max: .inf}\n", "expected a finite number"),
-        std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 numbers, found 0"),
+        std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 number, found 0"),
         std::tuple("frames: {min: 1}\nframes: {min: 2}\n", ":2: expected frames once"),
         std::tuple("frames: {min: 1, min: 2}\n", "expected min once"),
         std::tuple("frames: {min: 1\n", "not YAML"),

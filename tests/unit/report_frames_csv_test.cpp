@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/report/frames_csv.hpp"
+#include "report/frames_csv.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {

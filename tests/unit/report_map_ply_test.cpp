@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stemvo/report/map_ply.hpp"
+#include "report/map_ply.hpp"
 #include "support/ply_reader.hpp"
 #include "support/temp_folder.hpp"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "stemvo/report/metrics_json.hpp"
+#include "report/metrics_json.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {

@@ -12,7 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "report/plot_layout.hpp"
-#include "stemvo/report/trajectory_plot.hpp"
+#include "report/trajectory_plot.hpp"
 #include "support/temp_folder.hpp"
 
 /// Asked by the leak checker where there is one: fontconfig keeps the fonts it has found to the end
@@ -140,9 +140,9 @@ TEST(TrajectoryPng, ALongLegendFitsTheFigure) {
     plot.others.push_back({name, {at(0, 0), at(1, 20), at(0, 30)}});
   }
   ASSERT_TRUE(write_trajectory_png(folder / "a.png", plot));
-  const cv::Mat picture = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
-  ASSERT_FALSE(picture.empty());
-  EXPECT_EQ(cv::countNonZero(picture.colRange(picture.cols - 12, picture.cols) != 255), 0);
+  const cv::Mat image = cv::imread((folder / "a.png").string(), cv::IMREAD_GRAYSCALE);
+  ASSERT_FALSE(image.empty());
+  EXPECT_EQ(cv::countNonZero(image.colRange(image.cols - 12, image.cols) != 255), 0);
 }
 
 TEST(TrajectorySvg, HasBothPathsWithEqualAxes) {
@@ -189,13 +189,13 @@ int count_color(const cv::Mat& bgr, const cv::Vec3b& rgb) {
 TEST(TrajectoryPng, ShowsBothPathsAndTheMarkers) {
   const TempFolder folder;
   ASSERT_TRUE(write_trajectory_png(folder / "a.png", corner()));
-  const cv::Mat picture = cv::imread((folder / "a.png").string());
-  ASSERT_FALSE(picture.empty());
-  EXPECT_GE(picture.cols, 1000);
-  EXPECT_GT(count_color(picture, {0, 114, 178}), 2000) << "estimate";
-  EXPECT_GT(count_color(picture, {158, 158, 158}), 2000) << "ground truth";
-  EXPECT_GT(count_color(picture, {0, 158, 115}), 300) << "start, in the plot and the legend";
-  EXPECT_GT(count_color(picture, {213, 94, 0}), 500) << "end, in the plot and the legend";
+  const cv::Mat image = cv::imread((folder / "a.png").string());
+  ASSERT_FALSE(image.empty());
+  EXPECT_GE(image.cols, 1000);
+  EXPECT_GT(count_color(image, {0, 114, 178}), 2000) << "estimate";
+  EXPECT_GT(count_color(image, {158, 158, 158}), 2000) << "ground truth";
+  EXPECT_GT(count_color(image, {0, 158, 115}), 300) << "start, in the plot and the legend";
+  EXPECT_GT(count_color(image, {213, 94, 0}), 500) << "end, in the plot and the legend";
 
   TrajectoryPlot alone = corner();
   alone.ground_truth.reset();

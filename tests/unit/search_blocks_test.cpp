@@ -1,56 +1,56 @@
 // SPDX-License-Identifier: MIT
 #include <gmock/gmock.h>
 
-#include "search/blocks.hpp"
+#include "search/race.hpp"
 
 namespace stemvo::search {
 namespace {
 
 using ::testing::ElementsAre;
 
-void add(std::vector<Flight>& flights, std::size_t count, const Flight& one) {
-  flights.insert(flights.end(), count, one);
-}
+struct LayerShape {
+  std::size_t filters = 0;
+  std::size_t max_in_flight = 0;
+  std::size_t pass = 0;
+};
 
-std::vector<std::size_t> sizes(const std::vector<std::vector<std::size_t>>& blocks) {
-  std::vector<std::size_t> sizes;
-  std::size_t next = 0;
-  for (const auto& block : blocks) {
-    sizes.push_back(block.size());
-    for (const std::size_t index : block) {
-      EXPECT_EQ(index, next++);  // each once, in order
+/// The sizes of the blocks of these layers.
+std::vector<std::size_t> sizes(const std::vector<LayerShape>& layers, std::size_t block = 0) {
+  SearchPlan plan;
+  std::vector<std::size_t> all;
+  for (const LayerShape& layer : layers) {
+    StemOptions gray;
+    gray.model = "gray";
+    plan.layers.push_back({Config(), Stem::create(gray).value(), layer.pass, layer.max_in_flight});
+    for (std::size_t i = 0; i < layer.filters; ++i) {
+      all.push_back(plan.candidates.size());
+      plan.candidates.push_back({.key = {}, .layer = plan.layers.size() - 1});
     }
   }
+  std::vector<std::size_t> sizes;
+  std::vector<std::size_t> joined;
+  for (const auto& one : cut_into_blocks(plan, all, block)) {
+    sizes.push_back(one.size());
+    joined.insert(joined.end(), one.begin(), one.end());
+  }
+  EXPECT_EQ(joined, all);  // each once, in order
   return sizes;
 }
 
 TEST(Blocks, AWholeLayerWhereMemoryAllows) {
-  std::vector<Flight> flights;
-  add(flights, 256, {.layer = 0, .pass = 0, .bytes = bytes_in_flight({620, 188}, {620, 188}, 1)});
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0)), ElementsAre(256));
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 100)), ElementsAre(100, 100, 56));
-}
-
-TEST(Blocks, AreEqualPartsOfALayerThatIsTooLarge) {
-  std::vector<Flight> flights;
-  add(flights, 10, {.layer = 0, .pass = 0, .bytes = 100});
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0, 1000)), ElementsAre(10));
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0, 999)), ElementsAre(5, 5));
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0, 400)), ElementsAre(3, 3, 4));
-  EXPECT_EQ(cut_into_blocks(flights, 0, 1).size(), 10U);  // one is run, whatever it takes
+  EXPECT_THAT(sizes({{256, 511}}), ElementsAre(256));
+  EXPECT_THAT(sizes({{256, 511}}, 100), ElementsAre(100, 100, 56));
+  EXPECT_THAT(sizes({{10, 4}}), ElementsAre(4, 4, 2));
+  EXPECT_EQ(sizes({{10, 1}}).size(), 10U);
+  EXPECT_TRUE(sizes({}).empty());
 }
 
 TEST(Blocks, OfOnePassRunTogetherAndOthersApart) {
-  std::vector<Flight> flights;
-  add(flights, 3, {.layer = 0, .pass = 0, .bytes = 100});
-  add(flights, 4, {.layer = 1, .pass = 0, .bytes = 100});
-  add(flights, 5, {.layer = 2, .pass = 1, .bytes = 100});
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0, 1000)), ElementsAre(7, 5));
-  EXPECT_THAT(sizes(cut_into_blocks(flights, 0, 600)), ElementsAre(3, 4, 5));  // no layer is split
-  EXPECT_TRUE(cut_into_blocks({}, 0).empty());
+  EXPECT_THAT(sizes({{3, 10, 0}, {4, 10, 0}, {5, 10, 1}}), ElementsAre(7, 5));
+  EXPECT_THAT(sizes({{3, 10, 0}, {4, 10, 0}, {5, 10, 1}}, 10), ElementsAre(10, 2));
 }
 
-TEST(Blocks, LargerPicturesAndMoreSequencesTakeMore) {
+TEST(Blocks, LargerImagesAndMoreSequencesTakeMore) {
   const cv::Size half(620, 188);
   const cv::Size full(1241, 376);
   const double mb = 1e-6 * static_cast<double>(bytes_in_flight(half, half, 1));

@@ -3,10 +3,9 @@
 
 #include <gmock/gmock.h>
 
-#include "search/contact_sheet.hpp"
+#include "search/halving.hpp"
 #include "search/race.hpp"
-#include "search/ranking.hpp"
-#include "search/schedule.hpp"
+#include "search/results.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -23,8 +22,8 @@ DriveScore score(double t_rel, double r_rel) {
   return score;
 }
 
-Record record(int filter, int rung, std::vector<DriveScore> drives) {
-  return {.key = {"net", "stem", filter, "klt"},
+FilterRecord record(int filter, std::size_t rung, std::vector<DriveScore> drives) {
+  return {.key = {"net", "stem", "klt", filter},
           .rung = rung,
           .drives = std::move(drives),
           .held_out = std::nullopt,
@@ -43,9 +42,9 @@ std::vector<int> filters_of(const std::vector<FilterRow>& rows) {
 TEST(Ranking, ByTRelThenRRelThenNotDetected) {
   DriveScore lost = score(0.1, 0.1);  // good numbers do not help
   lost.is_detected = false;
-  const std::vector<Record> records = {record(0, 0, {score(2.0, 1.0)}), record(1, 0, {lost}),
-                                       record(2, 0, {score(1.0, 3.0)}),
-                                       record(3, 0, {score(1.0, 2.0)})};
+  const std::vector<FilterRecord> records = {record(0, 0, {score(2.0, 1.0)}), record(1, 0, {lost}),
+                                             record(2, 0, {score(1.0, 3.0)}),
+                                             record(3, 0, {score(1.0, 2.0)})};
   const auto rows = rank_filters(records, 1);
   EXPECT_THAT(filters_of(rows), ElementsAre(3, 2, 0, 1));
   EXPECT_EQ(rows.back().status, FilterStatus::kNotDetected);
@@ -54,9 +53,9 @@ TEST(Ranking, ByTRelThenRRelThenNotDetected) {
 TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
   DriveScore lost = score(0.0, 0.0);
   lost.is_detected = false;
-  const std::vector<Record> records = {record(0, 0, {score(1.0, 1.0), score(4.0, 1.0)}),
-                                       record(1, 0, {score(2.0, 1.0), score(2.0, 1.0)}),
-                                       record(2, 0, {score(0.5, 1.0), lost})};
+  const std::vector<FilterRecord> records = {record(0, 0, {score(1.0, 1.0), score(4.0, 1.0)}),
+                                             record(1, 0, {score(2.0, 1.0), score(2.0, 1.0)}),
+                                             record(2, 0, {score(0.5, 1.0), lost})};
   EXPECT_THAT(filters_of(rank_filters(records, 1)), ElementsAre(1, 0, 2));
   EXPECT_DOUBLE_EQ(*mean_score(records[0].drives).t_rel_percent, 2.5);
 }
@@ -65,7 +64,7 @@ TEST(Ranking, TheMeanOfWhatOneSequenceLacksIsNone) {
   DriveScore good = score(1.0, 1.0);
   good.average_offset_m = 2.0;
   good.translation_change_m = 0.5;
-  const MeanScore mean = mean_score({good, DriveScore()});
+  const DriveScore mean = mean_score({good, DriveScore()});
   EXPECT_FALSE(mean.average_offset_m);
   EXPECT_FALSE(mean.translation_change_m);
   EXPECT_FALSE(mean.early_error_percent);
@@ -73,12 +72,13 @@ TEST(Ranking, TheMeanOfWhatOneSequenceLacksIsNone) {
 }
 
 TEST(Ranking, HeldOutAndStandingRankNothing) {
-  Record good = record(1, 0, {score(1.0, 1.0)});
-  Record other = record(0, 0, {score(2.0, 1.0)});
+  FilterRecord good = record(1, 0, {score(1.0, 1.0)});
+  FilterRecord other = record(0, 0, {score(2.0, 1.0)});
   other.held_out = score(0.0, 0.0);
   good.held_out = score(9.0, 9.0);
   good.drives[0].translation_change_m = 5.0;  // E_t of `other` is that of a camera that stands
-  EXPECT_THAT(filters_of(rank_filters(std::vector<Record>{other, good}, 1)), ElementsAre(1, 0));
+  EXPECT_THAT(filters_of(rank_filters(std::vector<FilterRecord>{other, good}, 1)),
+              ElementsAre(1, 0));
 }
 
 TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
@@ -86,10 +86,10 @@ TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
   early.early_error_percent = 1.0;
   DriveScore worse = early;
   worse.early_error_percent = 2.0;
-  const std::vector<Record> records = {record(0, 0, {early}),           record(1, 0, {early}),
-                                       record(2, 0, {worse}),           record(3, 0, {early}),
-                                       record(0, 1, {score(9.0, 9.0)}), record(1, 1, {worse}),
-                                       record(0, 2, {score(9.0, 9.0)})};
+  const std::vector<FilterRecord> records = {record(0, 0, {early}),           record(1, 0, {early}),
+                                             record(2, 0, {worse}),           record(3, 0, {early}),
+                                             record(0, 1, {score(9.0, 9.0)}), record(1, 1, {worse}),
+                                             record(0, 2, {score(9.0, 9.0)})};
   const auto rows = rank_filters(records, 3);
   EXPECT_THAT(filters_of(rows), ElementsAre(0, 1, 3, 2));
   EXPECT_EQ(rows[0].status, FilterStatus::kRanked);
@@ -98,9 +98,11 @@ TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
 
 /// Filter 0 ran to the end, 1 to 4 were stopped, 5 was not detected; the best is a baseline.
 TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
-  SearchReport report;
-  const auto add = [&report](int filter, FilterStatus status, const std::string& model = "net") {
-    report.rows.push_back({{model, "stem", filter, "klt"}, status, 0, {score(1.0, 1.0)}, {}});
+  std::vector<FilterRow> rows;
+  const auto add = [&rows](int filter, FilterStatus status, const std::string& model = "net") {
+    FilterRow& row = rows.emplace_back();
+    row.key = {model, "stem", "klt", filter};
+    row.status = status;
   };
   add(0, FilterStatus::kRanked, "input_layer");
   add(0, FilterStatus::kRanked);
@@ -115,19 +117,19 @@ TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
     layer.layer = "stem";
     layer.features = "klt";
     layer.last = 6;
-    layer.is_baseline = model != "net";
+    layer.baseline = model != "net";
   }
-  const auto shown = choose_rows(identity, report);
+  const auto shown = choose_rows(identity, rows);
   ASSERT_EQ(shown.size(), 3U);
-  EXPECT_EQ(shown[0].row, &report.rows[1]);
+  EXPECT_EQ(shown[0].row, &rows[1]);
   EXPECT_EQ(shown[1].row->key.filter, 2);
   EXPECT_EQ(shown[2].row->key.filter, 4);
-  report.rows.clear();
-  EXPECT_TRUE(choose_rows(identity, report).empty());
+  rows.clear();
+  EXPECT_TRUE(choose_rows(identity, rows).empty());
 }
 
 TEST(Ranking, DoesNotDependOnTheOrderOfRecords) {
-  std::vector<Record> records;
+  std::vector<FilterRecord> records;
   for (int i = 0; i < 6; ++i) {
     records.push_back(record(i, 0, {score(i < 3 ? 1.0 : 2.0, 1.0)}));
   }
@@ -137,54 +139,51 @@ TEST(Ranking, DoesNotDependOnTheOrderOfRecords) {
 }
 
 TEST(Ranking, SurvivorsAreTheLeastWrongOfThoseDetected) {
-  std::vector<Record> records;
+  std::vector<FilterRecord> records;
   for (int i = 0; i < 4; ++i) {
     records.push_back(record(i, 0, {score(1.0, 1.0)}));
     records.back().drives[0].early_error_percent = 4.0 - i;
   }
   records[3].drives[0].is_detected = false;
-  std::vector<const Record*> all;
-  for (const Record& one : records) {
+  std::vector<const FilterRecord*> all;
+  for (const FilterRecord& one : records) {
     all.push_back(&one);
   }
   const auto chosen = choose_survivors(all, 2);
   ASSERT_EQ(chosen.size(), 2U);
-  EXPECT_EQ(chosen[0].filter, 2);
-  EXPECT_EQ(chosen[1].filter, 1);
+  EXPECT_EQ(chosen[0], 2U);
+  EXPECT_EQ(chosen[1], 1U);
   EXPECT_EQ(choose_survivors(all, 9).size(), 4U);
 }
 
 TEST(Ranking, MoreInliersDecideBetweenErrorsThatAreNearlyEqual) {
   const auto best = [](double error, double inliers) {
-    std::vector<Record> records = {record(0, 0, {score(1.0, 1.0)}),
-                                   record(1, 0, {score(1.0, 1.0)})};
+    std::vector<FilterRecord> records = {record(0, 0, {score(1.0, 1.0)}),
+                                         record(1, 0, {score(1.0, 1.0)})};
     records[0].drives[0].early_error_percent = 4.0;
     records[0].drives[0].mean_inliers = 160.0;
     records[1].drives[0].early_error_percent = error;
     records[1].drives[0].mean_inliers = inliers;
-    return choose_survivors({&records[0], &records[1]}, 1).front().filter;
+    const std::vector<const FilterRecord*> both = {&records[0], &records[1]};
+    return choose_survivors(both, 1).front();
   };
-  EXPECT_EQ(best(4.02, 160.0), 0);
-  EXPECT_EQ(best(4.02, 200.0), 1);
-  EXPECT_EQ(best(4.20, 200.0), 0);  // a larger error is not made up for
+  EXPECT_EQ(best(4.02, 160.0), 0U);
+  EXPECT_EQ(best(4.02, 200.0), 1U);
+  EXPECT_EQ(best(4.20, 200.0), 0U);  // a larger error is not made up for
 }
 
 TEST(Ranking, OfTheSameChannelOneSurvives) {
-  std::vector<Record> records;
+  std::vector<FilterRecord> records;
   for (int i = 0; i < 5; ++i) {
     records.push_back(record(i, 0, {score(1.0, 1.0)}));
     records.back().drives[0].early_error_percent = i < 3 ? 1.0 : i;
     records.back().drives[0].mean_inliers = i == 2 ? 50.0 : 60.0;  // as wrong, and yet another one
   }
-  std::vector<const Record*> all;
-  for (const Record& one : records) {
+  std::vector<const FilterRecord*> all;
+  for (const FilterRecord& one : records) {
     all.push_back(&one);
   }
-  std::vector<int> chosen;
-  for (const FilterKey& key : choose_survivors(all, 5)) {
-    chosen.push_back(key.filter);
-  }
-  EXPECT_THAT(chosen, ElementsAre(0, 2, 3, 4, 1));
+  EXPECT_THAT(choose_survivors(all, 5), ElementsAre(0, 2, 3, 4, 1));
 }
 
 TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
@@ -192,11 +191,11 @@ TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
     const Schedule schedule = halving_schedule(count);
     EXPECT_LE(cost_share(schedule), 0.25) << count;
     EXPECT_GE(cost_share(schedule), 0.20) << count;  // what is allowed is used
-    EXPECT_EQ(schedule.front().num_filters, count);
+    EXPECT_EQ(schedule.front().filters, count);
     EXPECT_EQ(schedule.back().frame_share, 1.0);
-    EXPECT_GE(schedule.back().num_filters, count < 16 ? 1U : 2U);
+    EXPECT_GE(schedule.back().filters, count < 16 ? 1U : 2U);
     for (std::size_t i = 1; i < schedule.size(); ++i) {
-      EXPECT_LE(schedule[i].num_filters, schedule[i - 1].num_filters);
+      EXPECT_LE(schedule[i].filters, schedule[i - 1].filters);
       EXPECT_GT(schedule[i].frame_share, schedule[i - 1].frame_share);
     }
   }
@@ -204,18 +203,18 @@ TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
 
 /// Of more filters than docs/search.md says more go on to a rung than odometries are kept.
 TEST(HalvingSchedule, HowManyFiltersFitIntoMemory) {
-  EXPECT_LE(halving_schedule(892)[1].num_filters, kMostKept);
-  EXPECT_GT(halving_schedule(893)[1].num_filters, kMostKept);
+  EXPECT_LE(halving_schedule(892)[1].filters, kMaxKept);
+  EXPECT_GT(halving_schedule(893)[1].filters, kMaxKept);
 }
 
 TEST(HalvingSchedule, FewFilters) {
   for (const std::size_t count : {8U, 9U, 10U, 11U, 12U, 13U, 14U, 15U}) {
     EXPECT_LE(cost_share(halving_schedule(count)), count < 12 ? 0.28 : 0.25) << count;
   }
-  EXPECT_EQ(halving_schedule(0).back().num_filters, 0U);
-  EXPECT_EQ(halving_schedule(1).back().num_filters, 1U);
-  EXPECT_EQ(halving_schedule(3).front().num_filters, 3U);
-  EXPECT_EQ(cost_share(exhaustive_schedule(7)), 1.0);
+  EXPECT_EQ(halving_schedule(0).back().filters, 0U);
+  EXPECT_EQ(halving_schedule(1).back().filters, 1U);
+  EXPECT_EQ(halving_schedule(3).front().filters, 3U);
+  EXPECT_EQ(cost_share({{1.0, 7}}), 1.0);
 }
 
 TEST(HalvingSchedule, FramesOfARungLieInTheSequence) {

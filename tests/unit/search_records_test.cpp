@@ -4,8 +4,8 @@
 
 #include <gmock/gmock.h>
 
-#include "search/record_file.hpp"
-#include "search/record_json.hpp"
+#include "search/halving.hpp"
+#include "search/records.hpp"
 #include "support/matchers.hpp"
 #include "support/temp_folder.hpp"
 
@@ -30,10 +30,10 @@ SearchIdentity identity(int first, int last) {
   SearchIdentity identity;
   identity.program = "program";
   identity.configuration = "seed: 1\nfeatures:\n  # levels\n  klt_levels: 3\n";
-  identity.schedule = exhaustive_schedule(static_cast<std::size_t>(last - first));
+  identity.rungs = {{1.0, static_cast<std::size_t>(last - first)}};
   identity.layers = {layer(first, last)};
   identity.sequences = {{.name = "00",
-                         .is_held_out = false,
+                         .held_out = false,
                          .first_frame = 0,
                          .num_frames = 100,
                          .frames = "f",
@@ -43,9 +43,9 @@ SearchIdentity identity(int first, int last) {
   return identity;
 }
 
-Record record(int filter, double t_rel = 1.0) {
-  Record record;
-  record.key = {"net", "stem", filter, "klt"};
+FilterRecord record(int filter, double t_rel = 1.0) {
+  FilterRecord record;
+  record.key = {"net", "stem", "klt", filter};
   record.filter_frames = 100;
   DriveScore score;
   score.sequence = "00";
@@ -60,9 +60,9 @@ Record record(int filter, double t_rel = 1.0) {
 
 class Records : public ::testing::Test {
  protected:
-  void write(const std::string& name, const SearchIdentity& of, std::vector<Record> records) {
+  void write(const std::string& name, const SearchIdentity& of, std::vector<FilterRecord> records) {
     std::filesystem::create_directories(folder_ / name);
-    auto writer = RecordWriter::create(file(name), of);
+    auto writer = RecordWriter::open(file(name), of);
     ASSERT_TRUE(writer) << writer.error().message;
     ASSERT_TRUE(writer->append(records));
   }
@@ -85,7 +85,8 @@ TEST_F(Records, ComeBackToTheBit) {
   const auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
-  EXPECT_EQ(record_line(content->records[1]), record_line(record(1, 1e-17)));
+  EXPECT_EQ(content->records[1].key, record(1).key);
+  EXPECT_EQ(content->records[1].drives, record(1, 1e-17).drives);
   EXPECT_EQ(*content->records[0].drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
   EXPECT_EQ(describe_change(content->identity, identity(0, 2), false), "");
   EXPECT_EQ(content->num_good_bytes, std::filesystem::file_size(file("a")));
@@ -93,14 +94,13 @@ TEST_F(Records, ComeBackToTheBit) {
 
 TEST_F(Records, ATornLineIsLeftOutAndOverwritten) {
   write("a", identity(0, 3), {record(0)});
-  const std::string torn = record_line(record(1)).substr(0, 50);
-  std::ofstream(file("a"), std::ios::app) << torn;
+  std::ofstream(file("a"), std::ios::app) << R"({"model":"net","layer":"stem","filter":1,"feat)";
   auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   EXPECT_EQ(content->records.size(), 1U);
-  auto writer = RecordWriter::go_on(file("a"), content->num_good_bytes);
+  auto writer = RecordWriter::open(file("a"), content->identity, content->num_good_bytes);
   ASSERT_TRUE(writer);
-  ASSERT_TRUE(writer->append(std::vector<Record>{record(2)}));
+  ASSERT_TRUE(writer->append(std::vector<FilterRecord>{record(2)}));
   content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
@@ -111,13 +111,13 @@ TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
   write("a", identity(0, 3), {record(0)});
   std::ofstream(file("a"), std::ios::app) << "{\"model\": 1}\n";
   EXPECT_THAT(read_records(file("a")).error().message, HasSubstr("records.jsonl:3: expected"));
-  EXPECT_FALSE(RecordWriter::create(file("a"), identity(0, 3)));  // never replaced
+  EXPECT_FALSE(RecordWriter::open(file("a"), identity(0, 3)));  // never replaced
 }
 
 TEST_F(Records, OneWriterAtATime) {
-  const auto writer = RecordWriter::create(folder_ / "records.jsonl", identity(0, 3));
+  const auto writer = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3));
   ASSERT_TRUE(writer);
-  const auto second = RecordWriter::go_on(folder_ / "records.jsonl", 0);
+  const auto second = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3), 1);
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("another search is writing it"));
 }
@@ -134,7 +134,8 @@ TEST_F(Records, ChangesAreNamed) {
   EXPECT_EQ(describe_change(before, now, true), "the model net stem changed");
   now = before;
   now.layers[0].sampling_px = 4;
-  EXPECT_THAT(describe_change(before, now, true), HasSubstr("the sampling of net stem"));
+  EXPECT_THAT(describe_change(before, now, true),
+              HasSubstr("the sampling of net stem (2 px, now 4 px)"));
   now = identity(0, 4);
   EXPECT_THAT(describe_change(before, now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
   EXPECT_EQ(describe_change(before, now, true), "");
@@ -167,7 +168,7 @@ TEST_F(Records, PartsThatDoNotFitAreRefused) {
   write("twice", identity(1, 2), {record(1, 7.0)});
   EXPECT_THAT(merge({"a", "twice"}).error().message, HasSubstr("net stem 1"));
   SearchIdentity halving = identity(2, 3);
-  halving.schedule = halving_schedule(1);
+  halving.rungs = halving_schedule(1);
   write("halving", halving, {record(2)});
   EXPECT_THAT(merge({"a", "halving"}).error().message, HasSubstr("--exhaustive"));
   EXPECT_FALSE(merge({"a", "nothing"}));

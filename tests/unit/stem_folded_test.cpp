@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include "stemvo/stem/manifest.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "models/manifest.hpp"
+#include "stem/stem.hpp"
 #include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -18,6 +18,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
+StemOptions options_of(const std::string& model, int filter = -1) {
+  StemOptions options;
+  options.model = model;
+  options.filter = filter;
+  return options;
+}
+
 TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
   const testing::TempFolder folder;
   testing::write_folded(folder);
@@ -25,8 +32,8 @@ TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
     // With and without a remainder by 4; the last is computed in strips of rows.
     for (const cv::Size size : {cv::Size(96, 64), {97, 66}, {94, 63}, {95, 61}, {800, 93}}) {
       const cv::Mat frame = testing::textured_frame(size, type);
-      StemOptions options{.model = "gray_k4s4"};
-      const auto folded = Stem::create(options, folder.path());
+      StemOptions options = options_of("gray_k4s4");
+      const auto folded = create_stem(options, folder.path());
       ASSERT_TRUE(folded) << folded.error().message;
       EXPECT_EQ(folded->info().num_filters, 6);
       const cv::Mat alone = folded->apply(frame)->values;
@@ -67,7 +74,7 @@ TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
     return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
   });
   for (const int filter : {0, 1, 5}) {  // 1 has a file of its own
-    const auto stem = Stem::create({.model = "gray_k4s4", .filter = filter}, folder.path());
+    const auto stem = create_stem(options_of("gray_k4s4", filter), folder.path());
     const cv::Mat1f values = stem->apply(frame)->values;
     for (const cv::Point at : {cv::Point(0, 0), cv::Point(11, 7), cv::Point(46, 30)}) {
       EXPECT_NEAR(values(at), gray_response(gray, at, filter), 1e-5);
@@ -80,7 +87,7 @@ TEST(StemFolded, ADamagedFileIsNotLoaded) {
   testing::write_folded(folder);
   (void)folder.file("gray_k4s4_filter_1.onnx", "no longer what it was");
   const auto error_of = [&](int filter) {
-    const auto stem = Stem::create({.model = "gray_k4s4", .filter = filter}, folder.path());
+    const auto stem = create_stem(options_of("gray_k4s4", filter), folder.path());
     return stem ? "no error" : stem.error().message;
   };
   EXPECT_THAT(error_of(1), HasSubstr("gray_k4s4_filter_1.onnx: expected sha256 "));

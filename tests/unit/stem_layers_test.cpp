@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include "stemvo/stem/manifest.hpp"
-#include "stemvo/stem/stem.hpp"
+#include "models/manifest.hpp"
+#include "stem/stem.hpp"
 #include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -39,12 +39,12 @@ TEST(StemLayers, EachLayerHasItsOwnFiltersAndPixelMap) {
 
   const cv::Mat frame = testing::textured_frame({96, 64}, CV_8UC3);
   const auto expected = testing::reference_channels(testing::kPlain4, frame, 4);
-  const auto first = Stem::create(layer_options("two", "first", 4), folder.path());
+  const auto first = create_stem(layer_options("two", "first", 4), folder.path());
   ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(first->info().layer, "stem");
   EXPECT_LE(testing::relative_error(first->apply_all(frame)->at(2).values, expected[2]), 1e-5);
 
-  const auto deep = Stem::create(layer_options("two", "deep"), folder.path());
+  const auto deep = create_stem(layer_options("two", "deep"), folder.path());
   ASSERT_TRUE(deep) << deep.error().message;
   EXPECT_EQ(deep->info().sampling_px, 4);
   const auto channel = deep->apply_range(frame, 0, 1);
@@ -59,7 +59,7 @@ TEST(StemLayers, RefusesUnknownLayersAndDenserSampling) {
   const testing::TempFolder folder;
   testing::write_two_layers(folder);
   const auto error_of = [&](const StemOptions& options) {
-    const auto stem = Stem::create(options, folder.path());
+    const auto stem = create_stem(options, folder.path());
     return stem ? "no error" : stem.error().message;
   };
   EXPECT_EQ(error_of(layer_options("two", "top")),
@@ -79,7 +79,7 @@ std::string error_with(const std::string& word, const std::string& instead) {
   testing::write_two_layers(folder);
   std::string text = testing::read_all(folder / "manifest.yaml");
   (void)folder.file("manifest.yaml", text.replace(text.find(word), word.size(), instead));
-  const auto stem = Stem::create(layer_options("two", "deep"), folder.path());
+  const auto stem = create_stem(layer_options("two", "deep"), folder.path());
   return stem ? "no error" : stem.error().message;
 }
 

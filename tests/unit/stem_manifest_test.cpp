@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "models/manifest.hpp"
 #include "stem/model_file.hpp"
-#include "stemvo/stem/manifest.hpp"
 #include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -199,9 +199,9 @@ TEST(CheckModel, FindsTheFirstThingThatIsWrong) {
   EXPECT_EQ(error_of([](ModelEntry&) {}), "no error");
   EXPECT_THAT(error_of([](ModelEntry& e) { e.file += ".gone"; }), HasSubstr("cannot read"));
   EXPECT_THAT(error_of([](ModelEntry& e) { e.sha256[0] = e.sha256[0] == '0' ? '1' : '0'; }),
-              HasSubstr("as in the manifest, found " + good.sha256));
+              HasSubstr(", found " + good.sha256));
   EXPECT_THAT(error_of([](ModelEntry& e) { e.num_filters = 4; }),
-              HasSubstr("expected 4 filters as in the manifest, found 3"));
+              HasSubstr("expected 4 filters, found 3"));
   EXPECT_THAT(error_of([](ModelEntry& e) { e.stride_px = 1; }), HasSubstr("expected channels of"));
   EXPECT_THAT(error_of([](ModelEntry& e) { e.kernel_px = {5, 5}; }),
               HasSubstr("expected channels of"));

@@ -6,7 +6,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "stemvo/stem/stem.hpp"
+#include "models/manifest.hpp"
+#include "stem/stem.hpp"
 #include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -99,9 +100,9 @@ TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsFineEnough) {
     channel.map.scale = Eigen::Vector2d::Constant(sampling);
     channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
     StemOptions options;
-    options.upsample = "native";
+    options.upsample = Upsample::kNative;
     const ChannelImage native = ChannelStretch(options).apply(channel);
-    options.upsample = "half";
+    options.upsample = Upsample::kHalf;
     const ChannelImage half = ChannelStretch(options).apply(channel);
     EXPECT_EQ(cv::norm(native.pixels, half.pixels, cv::NORM_INF), 0.0);
     EXPECT_EQ(native.map.scale, half.map.scale);
@@ -111,7 +112,7 @@ TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsFineEnough) {
 
 TEST(ChannelStretch, NativeKeepsTheSize) {
   StemOptions options;
-  options.upsample = "native";
+  options.upsample = Upsample::kNative;
   ChannelStretch stretch(options);
   Channel channel = ramp(0.0F, 1.0F);
   channel.map.scale = Eigen::Vector2d(2, 2);
@@ -137,7 +138,7 @@ Eigen::Vector2d centre_of(const cv::Mat& pixels) {
 struct Case {
   const TinyStem* stem;
   int sampling;
-  const char* upsample;
+  Upsample upsample;
 };
 
 class BrightSpot : public ::testing::TestWithParam<Case> {};
@@ -153,7 +154,7 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
   options.upsample = upsample;
   options.stretch_low_percent = 0.0;
   options.stretch_high_percent = 100.0;
-  auto stem = Stem::create(options, folder.path());
+  auto stem = create_stem(options, folder.path());
   ASSERT_TRUE(stem) << stem.error().message;
   for (const Eigen::Vector2d& spot :
        {Eigen::Vector2d(60.0, 45.0), Eigen::Vector2d(61.3, 43.8), Eigen::Vector2d(58.5, 47.25)}) {
@@ -171,11 +172,11 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
-    if (std::string(upsample) == "half") {
+    if (upsample == Upsample::kHalf) {
       EXPECT_EQ(image.pixels.size(), channel->values.size() * std::max(1, sampling / 2));
       EXPECT_EQ(image.map.scale, Eigen::Vector2d::Constant(std::min(sampling, 2)));
     }
-    if (std::string(upsample) == "bicubic") {
+    if (upsample == Upsample::kBicubic) {
       EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(1, 1));
     }
@@ -184,24 +185,37 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
 
 INSTANTIATE_TEST_SUITE_P(All,
                          BrightSpot,
-                         ::testing::Values(Case{&testing::kPlain4, 4, "bicubic"},
-                                           Case{&testing::kPlain4, 2, "bicubic"},
-                                           Case{&testing::kPlain4, 2, "native"},
-                                           Case{&testing::kPlain4, 4, "half"},
-                                           Case{&testing::kPlain4, 2, "half"},
-                                           Case{&testing::kPlain4, 1, "half"},
-                                           Case{&testing::kPlain4, 1, "bicubic"},
-                                           Case{&testing::kPadded3, 2, "bicubic"},
-                                           Case{&testing::kPadded3, 2, "native"},
-                                           Case{&testing::kPadded3, 1, "bicubic"},
-                                           Case{&testing::kSame3, 2, "bicubic"},
-                                           Case{&testing::kPadded7, 2, "bicubic"},
-                                           Case{&testing::kPadded7, 1, "bicubic"}),
+                         ::testing::Values(Case{&testing::kPlain4, 4, Upsample::kBicubic},
+                                           Case{&testing::kPlain4, 2, Upsample::kBicubic},
+                                           Case{&testing::kPlain4, 2, Upsample::kNative},
+                                           Case{&testing::kPlain4, 4, Upsample::kHalf},
+                                           Case{&testing::kPlain4, 2, Upsample::kHalf},
+                                           Case{&testing::kPlain4, 1, Upsample::kHalf},
+                                           Case{&testing::kPlain4, 1, Upsample::kBicubic},
+                                           Case{&testing::kPadded3, 2, Upsample::kBicubic},
+                                           Case{&testing::kPadded3, 2, Upsample::kNative},
+                                           Case{&testing::kPadded3, 1, Upsample::kBicubic},
+                                           Case{&testing::kSame3, 2, Upsample::kBicubic},
+                                           Case{&testing::kPadded7, 2, Upsample::kBicubic},
+                                           Case{&testing::kPadded7, 1, Upsample::kBicubic}),
                          [](const auto& tested) {
                            return tested.param.stem->name + "_at_" +
                                   std::to_string(tested.param.sampling) + "_" +
-                                  tested.param.upsample;
+                                  std::to_string(static_cast<int>(tested.param.upsample));
                          });
+
+TEST(Upsampling, AutoGoesByFeaturesAndWidth) {
+  using enum Upsample;
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1241), kHalf);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1000), kHalf);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 999), kBicubic);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, 1241), kBicubic);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, 1241), kBicubic);
+  for (const Upsample asked : {kBicubic, kHalf, kNative}) {
+    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kKlt, 1241), asked);
+    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kOrb, 640), asked);
+  }
+}
 
 }  // namespace
 }  // namespace stemvo

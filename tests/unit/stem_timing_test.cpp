@@ -10,7 +10,8 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include "stemvo/stem/stem.hpp"
+#include "models/manifest.hpp"
+#include "stem/stem.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -39,8 +40,8 @@ TEST(DISABLED_StemTiming, DefaultModelOnAFrameOfKitti) {
     for (const int sampling : {4, 2, 1}) {
       StemOptions options;
       options.sampling_px = sampling;
-      const double create_ms = median_cpu_ms([&] { (void)Stem::create(options, models); });
-      const auto stem = Stem::create(options, models);
+      const double create_ms = median_cpu_ms([&] { (void)create_stem(options, models); });
+      const auto stem = create_stem(options, models);
       ASSERT_TRUE(stem) << stem.error().message;
       ChannelStretch stretch(options);
       const cv::Mat gray = testing::textured_frame({1242, 376}, CV_8UC1);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "stemvo/report/timing.hpp"
-
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -11,9 +9,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
-#include "report/timing_json.hpp"
-#include "timing/peak_memory.hpp"
+#include "report/metrics_json.hpp"
+#include "support/temp_folder.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -124,12 +123,13 @@ TEST(Timing, OneRecorderAtATime) {
 }
 
 TEST(Timing, PeakMemoryGrowsWithWhatIsUsed) {
-  const double before = peak_memory_mib();
+  const StageRecorder recorder;
+  const double before = recorder.report().peak_memory_mib;
   ASSERT_GT(before, 1.0);
   constexpr std::size_t kSize = std::size_t{1} << 28U;
   const std::vector<char> much(kSize, 1);
-  EXPECT_GE(peak_memory_mib(), 256.0) << much[kSize / 2];
-  EXPECT_GE(peak_memory_mib(), before);
+  EXPECT_GE(recorder.report().peak_memory_mib, 256.0) << much[kSize / 2];
+  EXPECT_GE(recorder.report().peak_memory_mib, before);
 }
 
 TimingReport example() {
@@ -160,7 +160,11 @@ TEST(Timing, TableHasARowPerStageAndTheWhole) {
 }
 
 TEST(Timing, JsonHasTheSameNumbers) {
-  const nlohmann::ordered_json json = timing_json(example());
+  const testing::TempFolder folder;
+  MetricsReport report;
+  report.timing = example();
+  ASSERT_TRUE(write_metrics_json(folder / "metrics.json", report));
+  const auto json = nlohmann::json::parse(testing::read_all(folder / "metrics.json"))["timing"];
   EXPECT_EQ(json["stages"]["stem"]["calls"], 400);
   EXPECT_EQ(json["stages"]["stem"]["median_ms"], 3.25);
   EXPECT_EQ(json["stages"]["tracking"]["p95_ms"], 7.0);

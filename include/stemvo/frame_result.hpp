@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <Eigen/Core>
+
+#include "stemvo/rigid3.hpp"
+#include "stemvo/two_view_model.hpp"
+
+namespace stemvo {
+
+/// What became of a frame. Every frame has a pose whatever its state.
+enum class FrameState {
+  kFirst,         ///< the world's origin
+  kInitializing,  ///< no landmarks yet: the initial H/F selection waits for parallax, or decided
+  kTracking,      ///< rotation and translation measured
+  kStationary,    ///< no motion
+  kLowParallax,   ///< rotation measured; too little parallax for a translation
+  kRotating,      ///< pure rotation measured
+  kGated,         ///< two_frame: rotation measured; the forward motion gate refused the direction
+  kLost,          ///< nothing measured: the last motion is continued
+  kNoImage,       ///< nothing to be seen: the last motion is continued
+};
+[[nodiscard]] std::string_view to_string(FrameState state);
+/// All count as measured but gated, lost and no_image.
+[[nodiscard]] bool is_measured(FrameState state);
+
+/// The road measurement of a frame's scale (`scale.source: camera_height`).
+enum class RoadState {
+  kDisabled,  ///< the scale comes from elsewhere
+  kNone,      ///< no road was measured since the map started: the scale is a guess
+  kHeld,      ///< measured before, not on this frame: the last scale is kept, its sigma grows
+  kMeasured,  ///< measured on this frame and believed
+};
+/// `disabled`, `none`, `held`, `measured`.
+[[nodiscard]] std::string_view to_string(RoadState state);
+
+/// Milliseconds per stage of one frame. Stages of different frames overlap: their sum is no frame's
+/// time.
+struct StageTimes {
+  double stem_ms = 0.0;
+  double features_ms = 0.0;
+  double pose_ms = 0.0;
+};
+
+/// The pose of a frame and how it came about.
+struct FrameResult {
+  FrameState state = FrameState::kFirst;
+  Rigid3 world_from_camera;
+  int num_matches = 0;
+  int num_inliers = 0;
+  double homography_score = 0.0;   ///< S_H
+  double fundamental_score = 0.0;  ///< S_F
+  double homography_ratio = 0.0;   ///< R_H
+  TwoViewModel model = TwoViewModel::kNone;
+  RoadState road = RoadState::kDisabled;
+  std::string_view road_reason;       ///< why the road was not measured, else empty
+  std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
+  StageTimes times;
+  std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty
+};
+
+/// A landmark of the window of keyframes, where it was seen last: in the camera of that frame, in
+/// units of the trajectory. refined_trajectory()[frame] * position is its place in the world.
+struct MapLandmark {
+  int frame = 0;  ///< counted from the first one given
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();
+  std::array<std::uint8_t, 3> rgb{};  ///< of the frame's pixel; gray where the camera is gray
+};
+
+/// A point of the image, tracked from an earlier frame.
+struct TrackedPoint {
+  int id = 0;                                         ///< the same while the point is tracked
+  Eigen::Vector2d prev_uv = Eigen::Vector2d::Zero();  ///< input pixels
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();
+  bool is_inlier = false;
+};
+
+}  // namespace stemvo

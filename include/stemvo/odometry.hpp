@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/camera.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
+
+namespace stemvo {
+
+/// What the values of a pixel stand for. OpenCV's own imread and VideoCapture give kBgr.
+enum class PixelOrder { kGray, kRgb, kBgr };
+
+/// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
+/// for what a caller hands in.
+class Odometry {
+ public:
+  /// Errors: a camera or an option out of range (named); scale.source ground_truth, which only the
+  /// program knows; a network that cannot be loaded or does not take images of the camera's size.
+  [[nodiscard]] static Expected<Odometry> create(const Camera& camera, const Options& options = {});
+  Odometry(Odometry&&) noexcept;
+  Odometry& operator=(Odometry&&) noexcept;
+  ~Odometry();
+
+  /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size, without distortion.
+  /// The pixels are read before it returns. Error: another type or size; nothing changes then.
+  [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image, PixelOrder order);
+  /// In place of an image that never came: keeps the clock running.
+  FrameResult process_missing();
+
+  /// world_from_camera of every frame so far, as the window of keyframes last knew it: with its
+  /// look-ahead. Mode two_frame refines nothing: the poses as they came.
+  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
+  /// Landmarks seen from at least 3 keyframes under at least 1.5 degrees of parallax, as they were
+  /// when they left the window, or are now.
+  [[nodiscard]] std::vector<MapLandmark> landmarks() const;
+
+  /// Of the last image: the points tracked on it.
+  [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
+  /// The filter's channel of the last image as points are tracked on it: CV_8UC1, own size.
+  [[nodiscard]] cv::Mat channel_image() const;
+
+ private:
+  struct Impl;
+  explicit Odometry(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace stemvo

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo {
+
+/// A file of one filter alone: the same values as the network's, at less cost. Its graph has the
+/// network's kernel and padding, and stride `sampling_px`.
+struct FoldedFilter {
+  int filter = 0;
+  int sampling_px = 1;
+  std::filesystem::path file;
+  std::string sha256;  ///< empty: not checked
+};
+
+/// One layer of a network: an ONNX graph 1x3xHxW (RGB, 0 to 255) or 1x1xHxW -> 1xCxhxw, float.
+/// Kernel, stride and padding are held against the graph when it is loaded.
+struct StemNetwork {
+  std::string name;  ///< for messages
+  std::filesystem::path file;
+  std::string sha256;  ///< empty: not checked
+  std::string layer;   ///< the graph's output
+  int num_filters = 0;
+  std::array<int, 2> kernel_px{};  ///< y, x
+  int stride_px = 0;
+  std::array<int, 4> padding_px{};  ///< top, left, bottom, right, inside the graph
+  /// A deeper layer, padded inside or seeing more than its window, so that passes over a shifted
+  /// frame would not fit together. Kernel and padding then are those of one convolution with the
+  /// same centre and the same sizes of channels.
+  bool native_sampling_only = false;
+  int default_filter = 0;
+  std::optional<FoldedFilter> folded;
+};
+
+/// Size of the image that points are tracked on. kAuto: kHalf for KLT on frames of 1000 columns and
+/// more, else kBicubic.
+enum class Upsample {
+  kAuto,
+  kBicubic,  ///< the input's
+  kHalf,     ///< half the input's, where the channel is coarser than that; else the channel's
+  kNative,   ///< the channel's
+};
+
+/// Keys `stem.*`: the filter channel a frame is seen through.
+struct StemOptions {
+  /// `default` (built in), `gray` or `input_layer` (filters 0, 1, 2 = R, G, B). Any other name, or
+  /// path, needs `network`, which the program takes from a manifest; `default` may have one.
+  std::string model = "default";
+  std::string layer = "first";  ///< of a model that has several in its manifest
+  std::optional<StemNetwork> network;
+  int filter = -1;      ///< -1: the network's default_filter (gray, input_layer: 0)
+  int sampling_px = 0;  ///< input pixels per channel pixel, a divisor of the stride; 0: 2, or 1
+  Upsample upsample = Upsample::kAuto;
+  double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
+  double stretch_high_percent = 99.5;
+  double stretch_memory = 0.95;  ///< share of the last limits kept at each frame
+};
+
+enum class FeatureMethod {
+  kKlt,   ///< corners, tracked by Lucas-Kanade
+  kOrb,   ///< described and matched (the paper's)
+  kSift,  ///< described and matched
+};
+
+/// Keys `features.*`.
+struct FeatureOptions {
+  FeatureMethod method = FeatureMethod::kKlt;
+  int max_features = 500;  ///< keypoints aimed at per frame
+  int grid_columns = 16;   ///< quota per cell = max_features / (columns * rows)
+  int grid_rows = 6;
+  double corner_quality = 0.005;          ///< klt: least corner response over the strongest
+  double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
+  int klt_window = 11;                    ///< klt: input pixels, odd; at least 7 of the image
+  int klt_levels = 4;                     ///< klt: of the pyramid over the input's size
+  double max_forward_backward_px = 0.25;  ///< klt: input pixels
+  int fast_threshold = 10;                ///< orb
+  double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
+};
+
+enum class RobustEstimator { kMagsac, kRansac };
+
+/// Keys `two_view.*`: motion from two views, while initializing and in mode two_frame.
+struct TwoViewOptions {
+  double sigma_px = 1.0;           ///< of eq. (5)-(6), in input pixels
+  double homography_ratio = 0.40;  ///< R_H above it: homography (while initializing)
+  RobustEstimator estimator = RobustEstimator::kMagsac;
+  double inlier_threshold_px = 0.5;  ///< of the robust estimators
+  double confidence = 0.9999;
+  int max_iterations = 1000;
+  bool refine = true;  ///< nonlinear refinement of R, t on the inliers
+  double refine_loss_px = 0.3;
+};
+
+enum class OdometryMode {
+  kTwoFrame,  ///< motions of pairs of frames are chained (the paper's)
+  kMap,       ///< frames are localized against landmarks of a window of keyframes
+};
+enum class Composition {
+  kRight,  ///< R_c R
+  kPaper,  ///< R R_c, as printed in eq. (12)
+};
+/// What a step of mode two_frame that does not go forward loses.
+enum class ForwardGate { kTranslation, kPaper /* its rotation too */, kOff };
+
+/// Keys `odometry.*`.
+struct OdometryOptions {
+  OdometryMode mode = OdometryMode::kMap;
+  Composition composition = Composition::kRight;
+  ForwardGate gate = ForwardGate::kOff;
+  int min_inliers = 20;              ///< fewer: the frame is lost
+  double stationary_flow_px = 0.15;  ///< median flow below it: stationary
+  double min_parallax_px = 0.6;      ///< median rotation-free flow below it: low parallax
+};
+
+/// Keys `refine.*`: bundle adjustment of the window (mode map).
+struct RefineOptions {
+  int every = 1;   ///< keyframes between refinements, the paper's m; 0: never
+  int window = 8;  ///< keyframes refined together
+  int max_iterations = 10;
+  double loss_px = 0.2;  ///< Cauchy scale on the reprojection error
+};
+
+enum class ScaleSource {
+  kNone,          ///< up to scale
+  kConstant,      ///< steps of the same length
+  kCameraHeight,  ///< from the road, whose distance below the camera is known
+  kGroundTruth,   ///< of the program only, which rescales every step of the output
+};
+enum class RoadEstimators { kBoth, kDense /* aligned image */, kPoints /* tracked corners */ };
+
+/// Keys `scale.*`.
+struct ScaleOptions {
+  ScaleSource source = ScaleSource::kCameraHeight;
+  double constant_m = 1.0;        ///< per frame
+  double camera_height_m = 1.65;  ///< above the road
+  RoadEstimators estimators = RoadEstimators::kBoth;
+  bool temporal_filter = true;  ///< of the road's measurements
+};
+
+/// Everything that steers the odometry. Defaults stand here, once.
+struct Options {
+  StemOptions stem;
+  FeatureOptions features;
+  TwoViewOptions two_view;
+  OdometryOptions odometry;
+  RefineOptions refine;
+  ScaleOptions scale;
+  std::uint64_t seed = 1;  ///< of every random number
+};
+
+/// Ranges of all members; infinite, NaN and undefined enumerators fail. The error names the key as
+/// in config/default.yaml, e.g. "stem.filter: expected ..., found ...".
+[[nodiscard]] Status validate(const Options& options);
+
+}  // namespace stemvo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "pipeline/run.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo {
+
+/// What is measured: a configuration under a name that is also a folder's, e.g. "default".
+struct BenchmarkConfiguration {
+  std::string name;
+  Config config;
+};
+
+struct BenchmarkRequest {
+  std::filesystem::path kitti_root;  ///< holds sequences/NN and poses/NN.txt
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+  std::filesystem::path published;     ///< the official sequences and published numbers
+  std::vector<std::string> sequences;  ///< names of folders; empty: every folder that is there
+  std::vector<BenchmarkConfiguration> configurations;
+  int num_threads = 0;  ///< 0: all cores
+};
+
+/// What may be watched; either returns false to stop.
+struct BenchmarkCallbacks {
+  /// Before a run: "2/12 03, default, ground_truth", and why an earlier result does not count any
+  /// more. Not called for results that are kept.
+  std::function<bool(const std::string& run)> on_run;
+  RunProgress on_frame;
+};
+
+/// One line each, with the names of sequence, configuration and scale source.
+struct BenchmarkSummary {
+  std::vector<std::string> failures;  ///< sequences that cannot be read, runs that failed
+  std::vector<std::string> warnings;  ///< of the runs done now
+  bool interrupted = false;
+};
+
+/// Runs every sequence under every configuration, with metres from the road (scale.source
+/// camera_height) and with per-step ground-truth scale (ground_truth, the paper's protocol);
+/// neither aligns anything afterwards. OUT gets runs/NN/NAME_SOURCE (all files of run_sequence),
+/// benchmark.md, benchmark.json (no times in either), speed.json and a figure NN.png per sequence;
+/// they are written after each sequence and when stopped. A run whose configuration, program,
+/// model, frames (names, sizes), calib, times and pose file are those of a result in OUT is not
+/// repeated. A sequence or run that fails is a row with its reason. Errors: no folder
+/// kitti_root/sequences, none in it, `published` cannot be read, OUT cannot be written.
+[[nodiscard]] Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
+                                                       const BenchmarkCallbacks& callbacks = {});
+
+}  // namespace stemvo

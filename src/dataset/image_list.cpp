@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: MIT
+#include "dataset/image_list.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <string>
+#include <system_error>
+#include <tuple>
+
+#include <fmt/format.h>
+#include <fnmatch.h>
+
+#include "dataset/frame_files.hpp"
+
+namespace stemvo::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Each whole number becomes '0', the number of its digits without leading zeros, and these
+/// digits: compared as text, it is compared by its value.
+std::string sort_key(std::string_view name) {
+  constexpr std::string_view kDigits = "0123456789";
+  std::string key;
+  while (!name.empty()) {
+    const std::size_t length = std::min(name.find_first_not_of(kDigits), name.size());
+    if (length == 0) {
+      key += name.front();
+      name.remove_prefix(1);
+      continue;
+    }
+    std::string_view number = name.substr(0, length);
+    number.remove_prefix(std::min(number.find_first_not_of('0'), length));
+    key += '0';
+    key += static_cast<char>(number.size());  // names have at most 255 characters
+    key += number;
+    name.remove_prefix(length);
+  }
+  return key;
+}
+
+bool has_image_name(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return !file.filename().string().starts_with('.') &&
+         (extension == ".png" || extension == ".jpg" || extension == ".jpeg");
+}
+
+}  // namespace
+
+bool comes_before(std::string_view a, std::string_view b) {
+  return std::make_tuple(sort_key(a), a) < std::make_tuple(sort_key(b), b);
+}
+
+bool matches_pattern(std::string_view name, std::string_view pattern) {
+  std::string escaped;  // brackets and backslashes stand for themselves
+  for (const char c : pattern) {
+    escaped += c == '[' || c == '\\' ? "\\" : "";
+    escaped += c;
+  }
+  return fnmatch(escaped.c_str(), std::string(name).c_str(), 0) == 0;
+}
+
+bool is_pattern(const fs::path& path) {
+  std::error_code code;
+  return path.string().find_first_of("*?") != std::string::npos && !fs::exists(path, code);
+}
+
+Expected<ImageList> list_images(const fs::path& given) {
+  ImageList result{given, {}};
+  std::string pattern = "*";
+  if (is_pattern(given)) {
+    result.folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
+    pattern = given.filename().string();
+  }
+  if (is_pattern(result.folder)) {
+    return fail(fmt::format("{}: expected * and ? in the last part only, found them in '{}'",
+                            given.string(), result.folder.string()));
+  }
+  if (!is_folder(result.folder)) {
+    return fail(fmt::format("{}: expected a folder of images or a pattern with * or ?, found none",
+                            result.folder.string()));
+  }
+  const auto found = list_folder(result.folder);
+  if (!found) {
+    return found.error();
+  }
+  for (const fs::path& file : *found) {
+    if (has_image_name(file) && matches_pattern(file.filename().string(), pattern) &&
+        !is_folder(file)) {
+      result.files.push_back(file);
+    }
+  }
+  if (result.files.empty()) {
+    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none", given.string()));
+  }
+  std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
+    return comes_before(a.filename().string(), b.filename().string());
+  });
+  return result;
+}
+
+}  // namespace stemvo::dataset

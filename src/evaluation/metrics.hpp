@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "evaluation/trajectory.hpp"
+#include "geometry/alignment.hpp"
+
+namespace stemvo {
+
+/// Keys `evaluation.*` of the configuration.
+struct EvaluationOptions {
+  /// Empty: 100, 200, .. 800 m, or 10, 20, .. 50 m where the path is shorter than 100 m.
+  std::vector<double> segment_lengths_m;
+};
+
+/// Root mean square position error after each kind of alignment.
+struct AbsoluteTrajectoryError {
+  double none_m = 0.0;
+  double scale_m = 0.0;
+  double se3_m = 0.0;
+  double sim3_m = 0.0;
+
+  [[nodiscard]] double after_m(Alignment alignment) const {
+    return alignment == Alignment::kScale  ? scale_m
+           : alignment == Alignment::kSe3  ? se3_m
+           : alignment == Alignment::kSim3 ? sim3_m
+                                           : none_m;
+  }
+};
+
+/// Everything that needs ground truth. Both trajectories are first moved to start at the identity.
+struct Metrics {
+  /// What was fitted before the offset, t_rel, r_rel and the RPE were taken.
+  Alignment alignment = Alignment::kNone;
+  double path_length_m = 0.0;     ///< of the ground truth
+  double average_offset_m = 0.0;  ///< paper: mean of |dx| + |dz|
+  double null_offset_m = 0.0;  ///< the same for the zero-motion baseline, which stays at the origin
+  std::optional<double> t_rel_percent;  ///< nullopt: no segment fits
+  std::optional<double> r_rel_deg_per_100m;
+  std::vector<double> segment_lengths_m;
+  int num_segments = 0;
+  AbsoluteTrajectoryError ate_rmse;
+  double rpe_rotation_deg = 0.0;  ///< mean over steps of 1 frame
+};
+
+/// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. Both have the same length
+/// (checked), at least one pose.
+[[nodiscard]] Metrics evaluate(std::span<const Rigid3> estimate,
+                               std::span<const Rigid3> ground_truth,
+                               const EvaluationOptions& options = {});
+
+/// t_rel of a path that may be too short for the devkit's: segments of these shares of its length,
+/// one from every frame on. nullopt: none fits (a path of length zero). Same length, at least one
+/// pose (checked).
+[[nodiscard]] std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
+                                                        std::span<const Rigid3> ground_truth,
+                                                        std::span<const double> path_shares);
+
+/// As evaluate(), after the estimate was fitted to the ground truth, for trajectories without a
+/// scale. The four kinds of ATE and the null offset are those of the estimate as it comes.
+[[nodiscard]] Metrics evaluate_aligned(std::span<const Rigid3> estimate,
+                                       std::span<const Rigid3> ground_truth,
+                                       Alignment alignment,
+                                       const EvaluationOptions& options = {});
+
+/// The paper's offset, (E_x + E_y) / N_f: mean of |dx| + |dz| between the poses as they are
+/// (KITTI's ground plane is x-z). Same length, at least one pose (checked).
+[[nodiscard]] double average_offset_m(std::span<const Rigid3> estimate,
+                                      std::span<const Rigid3> ground_truth);
+
+/// The estimate moved to start at the identity and then fitted to the ground truth (also moved).
+[[nodiscard]] Trajectory align_trajectory(std::span<const Rigid3> estimate,
+                                          std::span<const Rigid3> ground_truth,
+                                          Alignment alignment);
+
+}  // namespace stemvo

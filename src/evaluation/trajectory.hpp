@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "stemvo/error.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// Poses world_from_camera, one per frame; metres.
+using Trajectory = std::vector<Rigid3>;
+
+/// KITTI pose file: 12 numbers a line, row-major [R | t]. Errors name file and line: wrong count of
+/// numbers, not a number, not finite, not a rotation (by more than 1e-3), empty file.
+[[nodiscard]] Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file);
+/// At least 9 significant digits, single spaces, no trailing space.
+[[nodiscard]] Status write_kitti_trajectory(const std::filesystem::path& file,
+                                            std::span<const Rigid3> world_from_camera);
+/// TUM: `t tx ty tz qx qy qz qw`, seconds; one timestamp per pose.
+[[nodiscard]] Status write_tum_trajectory(const std::filesystem::path& file,
+                                          std::span<const double> timestamps_s,
+                                          std::span<const Rigid3> world_from_camera);
+/// Also `#` comments and blank lines; timestamps are returned beside the poses.
+struct TimedTrajectory {
+  std::vector<double> timestamps_s;
+  Trajectory world_from_camera;
+};
+[[nodiscard]] Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file);
+
+/// Moves all poses so that the first one is the identity.
+[[nodiscard]] Trajectory relative_to_first(std::span<const Rigid3> world_from_camera);
+
+/// The paper's protocol: each step keeps its direction and takes the true step's length. A step of
+/// length zero stays. Rotations are untouched. Both have the same length.
+[[nodiscard]] Trajectory rescale_steps(std::span<const Rigid3> estimate,
+                                       std::span<const Rigid3> ground_truth);
+
+}  // namespace stemvo

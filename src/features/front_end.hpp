@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "stem/channel.hpp"
+#include "stemvo/options.hpp"
+
+namespace stemvo {
+
+/// Correspondences of two frames, in input pixels.
+struct Matches {
+  std::vector<Eigen::Vector2d> prev_uv;
+  std::vector<Eigen::Vector2d> cur_uv;
+  std::vector<int> track_ids;  ///< the same id while a point is followed
+  int prev_frame = -1;         ///< the number of the frame that prev_uv is on; -1: none
+  int num_keypoints = 0;       ///< found or asked for, before matching
+};
+
+/// What a front end makes of a picture on its own, without those before it.
+struct PreparedPicture {
+  explicit PreparedPicture(ChannelImage channel_image) : image(std::move(channel_image)) {}
+  virtual ~PreparedPicture() = default;
+  ChannelImage image;
+};
+
+/// Finds correspondences between the last picture it was given and the next one. Stateful (it holds
+/// the last picture); the same pictures give the same matches, whatever the number of threads.
+class FrontEnd {
+ public:
+  virtual ~FrontEnd() = default;
+  /// The part of process() that needs only the picture: it may run ahead, in another thread than
+  /// the rest, one call at a time.
+  [[nodiscard]] virtual std::shared_ptr<const PreparedPicture> prepare(
+      const ChannelImage& image) const = 0;
+  /// Matches from the previous picture (none on the first). A picture of another size starts over.
+  /// `picture` was prepared by this front end.
+  /// `frame` is the picture's number for Matches::prev_frame.
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedPicture> picture,
+                                        int frame) = 0;
+  [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
+    return process(prepare(image), frame);
+  }
+  /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
+  /// not followed further.
+  virtual void keep(const std::vector<char>& is_good) = 0;
+};
+
+[[nodiscard]] std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options);
+
+}  // namespace stemvo

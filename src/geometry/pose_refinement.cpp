@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: MIT
+#include "geometry/pose_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Cholesky>
+
+#include "internal_check.hpp"
+#include "sampson.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A shorter step ends the minimization: rad, and units of length.
+constexpr double kMotionTolerance = 1e-10;
+constexpr double kPoseTolerance = 1e-9;
+constexpr double kMinDepth = 1e-6;
+/// What a point behind the camera costs, so that no step gains by pushing points behind it.
+constexpr double kBehindErrorPx = 1e3;
+
+/// Cauchy loss rho(r^2) = s^2 log(1 + r^2 / s^2) and its sum. One logarithm serves many terms: the
+/// sum of logarithms is the logarithm of the product.
+class CauchyLoss {
+ public:
+  explicit CauchyLoss(double scale) : squared_scale_(scale * scale) {}
+
+  /// Adds a term; returns its weight rho'(r^2) in the normal equations.
+  double add(double squared_residual) {
+    const double argument = 1.0 + squared_residual / squared_scale_;
+    product_ *= argument;
+    if (!(product_ < 1e150)) {
+      log_sum_ += std::log(product_ / argument) + std::log(argument);
+      product_ = 1.0;
+    }
+    return 1.0 / argument;
+  }
+  [[nodiscard]] double sum() const { return squared_scale_ * (log_sum_ + std::log(product_)); }
+
+ private:
+  double squared_scale_;
+  double product_ = 1.0;
+  double log_sum_ = 0.0;
+};
+
+/// Second-order model of a cost around a state; the constant factor 1/2 is left out.
+template <int N>
+struct NormalEquations {
+  Eigen::Matrix<double, N, N> hessian = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> gradient = Eigen::Matrix<double, N, 1>::Zero();
+  double cost = 0.0;
+};
+
+/// Levenberg-Marquardt with Marquardt's scaling. A step is taken only if the cost falls, so the
+/// cost never rises and a state that gives NaN is never entered. Returns the last cost.
+/// linearize(state) -> NormalEquations<N>; retract(state, step) -> state.
+template <int N, typename State, typename Linearize, typename Retract>
+double minimize(State& state,
+                const Linearize& linearize,
+                const Retract& retract,
+                int max_iterations,
+                double step_tolerance) {
+  NormalEquations<N> current = linearize(state);
+  double damping = 1e-4;
+  for (int iteration = 0; iteration < max_iterations && damping < 1e8; ++iteration) {
+    Eigen::Matrix<double, N, N> damped = current.hessian;
+    // A direction that no residual depends on still needs a positive pivot.
+    const double floor = 1e-12 * damped.diagonal().maxCoeff();
+    damped.diagonal() += damping * damped.diagonal().cwiseMax(floor);
+    const Eigen::Matrix<double, N, 1> step = damped.ldlt().solve(-current.gradient);
+    const double expected_decrease = -step.dot(current.gradient);
+    if (!step.allFinite() || step.norm() < step_tolerance ||
+        !(expected_decrease > 1e-14 * current.cost)) {
+      break;
+    }
+    const State trial_state = retract(state, step);
+    const NormalEquations<N> trial = linearize(trial_state);
+    if (trial.cost < current.cost) {
+      state = trial_state;
+      current = trial;
+      damping = std::max(0.1 * damping, 1e-12);
+    } else {
+      damping *= 10.0;
+    }
+  }
+  return current.cost;
+}
+
+struct RayPair {
+  Eigen::Vector3d prev;  ///< viewing rays, z = 1
+  Eigen::Vector3d cur;
+};
+
+std::vector<RayPair> finite_rays(const PixelPairs& pairs, const Camera& camera) {
+  std::vector<RayPair> rays;
+  rays.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const RayPair pair{camera.normalize(pairs.prev_uv[i]).homogeneous(),
+                       camera.normalize(pairs.cur_uv[i]).homogeneous()};
+    if (pair.prev.allFinite() && pair.cur.allFinite()) {
+      rays.push_back(pair);
+    }
+  }
+  return rays;
+}
+
+using Vector5d = Eigen::Matrix<double, 5, 1>;
+
+/// Two unit vectors that span the plane at right angles to a unit vector.
+Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = direction.unitOrthogonal();
+  basis.col(1) = direction.cross(basis.col(0));
+  return basis;
+}
+
+NormalEquations<5> linearize_motion(const Rigid3& motion,
+                                    const std::vector<RayPair>& rays,
+                                    const Camera& camera,
+                                    double loss_scale_px) {
+  const Eigen::Matrix3d rotation = motion.rotation_matrix();
+  const Eigen::Matrix<double, 2, 3> to_tangent = tangent_basis(motion.translation).transpose();
+  const Eigen::Vector3d squared_inverse_focal(1.0 / (camera.fx_px * camera.fx_px),
+                                              1.0 / (camera.fy_px * camera.fy_px), 0.0);
+  NormalEquations<5> equations;
+  CauchyLoss loss(loss_scale_px);
+  for (const RayPair& pair : rays) {
+    const internal::SampsonTerm term = internal::sampson_term(
+        rotation, motion.translation, squared_inverse_focal, pair.prev, pair.cur);
+    const double weight = loss.add(term.residual_px * term.residual_px);
+    Vector5d jacobian;
+    jacobian << term.by_rotation, to_tangent * term.by_translation;
+    const Vector5d weighted = weight * jacobian;
+    equations.hessian.noalias() += weighted * jacobian.transpose();
+    equations.gradient += term.residual_px * weighted;
+  }
+  equations.cost = loss.sum();
+  return equations;
+}
+
+Rigid3 move_motion(const Rigid3& motion, const Vector5d& step) {
+  const Eigen::Vector3d tangent = tangent_basis(motion.translation) * step.tail<2>();
+  // The rotation that carries the direction along the tangent keeps it on the sphere.
+  const Eigen::Vector3d moved = so3_exp(motion.translation.cross(tangent)) * motion.translation;
+  return {so3_exp(step.head<3>()) * motion.rotation, moved.normalized()};
+}
+
+/// Residual f (cur - R prev) of unit rays: the angle in px, without the singularity of a
+/// projection. Its Jacobian for R <- exp(w) R is f [R prev]x.
+NormalEquations<3> linearize_rotation(const Eigen::Quaterniond& rotation,
+                                      const std::vector<RayPair>& unit_rays,
+                                      double focal_px,
+                                      double loss_scale_px) {
+  const Eigen::Matrix3d r = rotation.toRotationMatrix();
+  const double squared_focal = focal_px * focal_px;
+  NormalEquations<3> equations;
+  CauchyLoss loss(loss_scale_px);
+  for (const RayPair& pair : unit_rays) {
+    const Eigen::Vector3d y = r * pair.prev;
+    const double weight = squared_focal * loss.add(squared_focal * (pair.cur - y).squaredNorm());
+    equations.hessian += weight * (Eigen::Matrix3d::Identity() - y * y.transpose());
+    equations.gradient += weight * pair.cur.cross(y);
+  }
+  equations.cost = loss.sum();
+  return equations;
+}
+
+/// Residual projected - measured, px; its Jacobian by (w, v), x_in_camera <- exp(w) x_in_camera +
+/// v.
+NormalEquations<6> linearize_pose(const Rigid3& camera_from_world,
+                                  const std::vector<Eigen::Vector3d>& points,
+                                  const std::vector<Eigen::Vector2d>& uv,
+                                  const Camera& camera,
+                                  double loss_scale_px) {
+  const Eigen::Matrix3d rotation = camera_from_world.rotation_matrix();
+  NormalEquations<6> equations;
+  CauchyLoss loss(loss_scale_px);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d x = rotation * points[i] + camera_from_world.translation;
+    if (!(x.z() > kMinDepth)) {
+      loss.add(kBehindErrorPx * kBehindErrorPx);
+      continue;
+    }
+    const double inverse_z = 1.0 / x.z();
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << camera.fx_px * inverse_z, 0.0, -camera.fx_px * x.x() * inverse_z * inverse_z,  //
+        0.0, camera.fy_px * inverse_z, -camera.fy_px * x.y() * inverse_z * inverse_z;
+    const Eigen::Vector2d error = camera.project(x) - uv[i];
+    Eigen::Matrix<double, 2, 6> jacobian;
+    jacobian.leftCols<3>() = -projection * skew(x);
+    jacobian.rightCols<3>() = projection;
+    const double weight = loss.add(error.squaredNorm());
+    equations.hessian += weight * jacobian.transpose() * jacobian;
+    equations.gradient += weight * jacobian.transpose() * error;
+  }
+  equations.cost = loss.sum();
+  return equations;
+}
+
+}  // namespace
+
+RefinedMotion refine_relative_pose(const Rigid3& cur_from_prev,
+                                   const PixelPairs& pairs,
+                                   const Camera& camera,
+                                   const RefinementOptions& options) {
+  const std::vector<RayPair> rays = finite_rays(pairs, camera);
+  const double length = cur_from_prev.translation.norm();
+  if (!std::isfinite(length) || !(length > 0.0) || !cur_from_prev.rotation.coeffs().allFinite() ||
+      rays.size() < 5) {
+    return {cur_from_prev};
+  }
+  RefinedMotion result{Rigid3(cur_from_prev.rotation, cur_from_prev.translation / length)};
+  result.cost = minimize<5>(
+      result.cur_from_prev,
+      [&](const Rigid3& state) {
+        return linearize_motion(state, rays, camera, options.loss_scale_px);
+      },
+      move_motion, options.max_iterations, kMotionTolerance);
+  return result;
+}
+
+Eigen::Quaterniond refine_rotation(const Eigen::Quaterniond& rotation,
+                                   const PixelPairs& pairs,
+                                   const Camera& camera,
+                                   const RefinementOptions& options) {
+  std::vector<RayPair> rays = finite_rays(pairs, camera);
+  if (rays.size() < 2 || !rotation.coeffs().allFinite()) {
+    return rotation;
+  }
+  for (RayPair& pair : rays) {
+    pair.prev.normalize();
+    pair.cur.normalize();
+  }
+  Eigen::Quaterniond refined = rotation.normalized();
+  minimize<3>(
+      refined,
+      [&](const Eigen::Quaterniond& state) {
+        return linearize_rotation(state, rays, camera.mean_focal_px(), options.loss_scale_px);
+      },
+      [](const Eigen::Quaterniond& state, const Eigen::Vector3d& step) {
+        return (so3_exp(step) * state).normalized();
+      },
+      options.max_iterations, kMotionTolerance);
+  return refined;
+}
+
+Rigid3 refine_absolute_pose(const Rigid3& camera_from_world,
+                            std::span<const Eigen::Vector3d> points_in_world,
+                            std::span<const Eigen::Vector2d> uv,
+                            const Camera& camera,
+                            const RefinementOptions& options) {
+  STEMVO_CHECK(points_in_world.size() == uv.size(), "points and pixels are paired");
+  std::vector<Eigen::Vector3d> finite_points;
+  std::vector<Eigen::Vector2d> finite_uv;
+  for (std::size_t i = 0; i < uv.size(); ++i) {
+    if (points_in_world[i].allFinite() && uv[i].allFinite()) {
+      finite_points.push_back(points_in_world[i]);
+      finite_uv.push_back(uv[i]);
+    }
+  }
+  Rigid3 refined = camera_from_world;
+  if (finite_points.size() >= 4) {
+    minimize<6>(
+        refined,
+        [&](const Rigid3& pose) {
+          return linearize_pose(pose, finite_points, finite_uv, camera, options.loss_scale_px);
+        },
+        [](const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& step) {
+          return Rigid3(so3_exp(step.head<3>()), step.tail<3>()) * pose;
+        },
+        options.max_iterations, kPoseTolerance);
+  }
+  return refined;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include "io/image_file.hpp"
+
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "io/png.hpp"
+
+namespace stemvo::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The whole file; `expected` is what it should be.
+Expected<Bytes> read_bytes(const fs::path& file, std::string_view expected) {
+  std::error_code code;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file, code)) {
+    return fail(fmt::format("{}: expected a readable {}, cannot open it", file.string(), expected));
+  }
+  const std::uintmax_t size = fs::file_size(file, code);
+  Bytes bytes(code ? 0 : size);
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
+// JPEG's markers: this byte and a code.
+constexpr std::uint8_t kMark = 0xff;
+constexpr std::uint8_t kStartOfImage = 0xd8;
+constexpr std::uint8_t kEndOfImage = 0xd9;
+
+bool is_jpeg(const Bytes& bytes) {
+  return bytes.size() >= 2 && bytes[0] == kMark && bytes[1] == kStartOfImage;
+}
+
+/// The segment behind the first marker of a JPEG that `is_wanted`. The bytes of other segments
+/// (thumbnails among them) are skipped.
+template <typename Predicate>
+std::optional<std::size_t> find_segment(const Bytes& bytes, const Predicate& is_wanted) {
+  const auto byte = [&](std::size_t i) { return i < bytes.size() ? bytes[i] : std::uint8_t{0}; };
+  // What the mark stands before within an image's data: itself, stuffing and restarts.
+  const auto is_data = [](int code) {
+    return code == 0 || code == kMark || (code >= 0xd0 && code <= 0xd7);
+  };
+  for (std::size_t at = 2; at + 1 < bytes.size();) {
+    const std::uint8_t code = bytes[at + 1];
+    if (bytes[at] != kMark || is_data(code)) {
+      ++at;
+    } else if (is_wanted(code)) {
+      return at + 2;
+    } else {
+      at += 2U + (code == kEndOfImage ? 0U : 256U * byte(at + 2) + byte(at + 3));
+    }
+  }
+  return std::nullopt;
+}
+
+/// More than one component.
+bool is_color_jpeg(const Bytes& bytes) {
+  constexpr std::size_t kNumComponents = 7;  // behind length, precision, height and width
+  const auto frame = find_segment(bytes, [](int code) {  // all but three, which define tables
+    return code >= 0xc0 && code <= 0xcf && code != 0xc4 && code != 0xc8 && code != 0xcc;
+  });
+  return frame && *frame + kNumComponents < bytes.size() && bytes[*frame + kNumComponents] > 1;
+}
+
+/// The markers are walked to the end first, because the decoder fills what is missing with gray.
+Expected<cv::Mat> decode_jpeg(const Bytes& bytes, const std::string& name, bool as_color) {
+  if (!find_segment(bytes, [](int code) { return code == kEndOfImage; })) {
+    return fail(fmt::format("{}: expected a complete JPEG image, found one cut off after {} bytes",
+                            name, bytes.size()));
+  }
+  cv::Mat image = decode_by_opencv(bytes, as_color, cv::IMREAD_IGNORE_ORIENTATION);
+  if (image.empty()) {
+    return fail(fmt::format("{}: expected a sound JPEG image, found damaged data", name));
+  }
+  return image;
+}
+
+Expected<cv::Mat> decode(const Bytes& bytes, const std::string& name, bool as_color) {
+  if (is_png(bytes)) {
+    return decode_png(bytes, name, as_color);
+  }
+  if (is_jpeg(bytes)) {
+    return decode_jpeg(bytes, name, as_color);
+  }
+  return fail(fmt::format("{}: expected a PNG or JPEG image, found {}", name,
+                          bytes.empty() ? "an empty file" : "another kind of file"));
+}
+
+}  // namespace
+
+Expected<ImageKind> read_image_kind(const fs::path& file) {
+  const auto bytes = read_bytes(file, "PNG or JPEG image");
+  if (!bytes) {
+    return bytes.error();
+  }
+  const bool is_color = is_png(*bytes) ? is_color_png(*bytes) : is_color_jpeg(*bytes);
+  return decode(*bytes, file.string(), is_color).map([&](const cv::Mat& image) {
+    return ImageKind{image.size(), is_color};
+  });
+}
+
+Expected<cv::Mat> read_image(const fs::path& file, bool as_color) {
+  return read_bytes(file, "PNG or JPEG image").and_then([&](const Bytes& bytes) {
+    return decode(bytes, file.string(), as_color);
+  });
+}
+
+Expected<cv::Mat> read_png(const fs::path& file, bool as_color) {
+  return read_bytes(file, "PNG image").and_then([&](const Bytes& bytes) {
+    return decode_png(bytes, file.string(), as_color);
+  });
+}
+
+}  // namespace stemvo::io

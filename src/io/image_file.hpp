@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::io {
+
+/// What all images of a folder have in common.
+struct ImageKind {
+  cv::Size size;
+  bool is_color = false;
+  bool operator==(const ImageKind&) const = default;
+};
+
+/// A PNG or a JPEG, told by its first bytes and decoded whole. Error (file named): neither, or
+/// cut off, or damaged. Of a JPEG the sensor's rows and columns: a wish to be shown turned (EXIF)
+/// is ignored, since the calibration knows nothing of it.
+[[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
+/// The same as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`.
+[[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file, bool as_color);
+/// The same where only a PNG is expected.
+[[nodiscard]] Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color);
+
+}  // namespace stemvo::io

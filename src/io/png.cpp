@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+#include "io/png.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <memory>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <libdeflate.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace stemvo::io {
+namespace {
+
+using View = std::span<const std::uint8_t>;
+
+constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+
+/// The first four bytes.
+std::uint32_t big_endian_32(View bytes) {
+  return (std::uint32_t{bytes[0]} << 24U) | (std::uint32_t{bytes[1]} << 16U) |
+         (std::uint32_t{bytes[2]} << 8U) | std::uint32_t{bytes[3]};
+}
+
+/// PNG specification, section 5.3.
+struct Chunk {
+  std::string_view type;  ///< empty: there is no such chunk inside the file
+  View data;
+  View checked;                ///< type and data: what the checksum is of
+  std::uint32_t checksum = 0;  ///< CRC-32, as it stands in the file
+
+  [[nodiscard]] bool is_sound() const {
+    return libdeflate_crc32(0, checked.data(), checked.size()) == checksum;
+  }
+};
+
+/// Takes the next chunk off the `rest` of a file.
+Chunk next_chunk(View& rest) {
+  constexpr std::size_t kFrame = 12;  // length, type and CRC, 4 bytes each
+  if (rest.size() < kFrame || big_endian_32(rest) > rest.size() - kFrame) {
+    return {};
+  }
+  const std::size_t length = big_endian_32(rest);
+  const View checked = rest.subspan(4, 4 + length);
+  const Chunk chunk{{reinterpret_cast<const char*>(checked.data()), 4},
+                    checked.subspan(4),
+                    checked,
+                    big_endian_32(rest.subspan(8 + length))};
+  rest = rest.subspan(kFrame + length);
+  return chunk;
+}
+
+/// Each chunk must lie inside the file, the last is IEND.
+bool is_complete(View bytes) {
+  View rest = bytes.subspan(kSignature.size());
+  for (Chunk chunk = next_chunk(rest); !chunk.type.empty(); chunk = next_chunk(rest)) {
+    if (chunk.type == "IEND") {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// IHDR (specification, section 11.2.2) of an image that is not interlaced.
+bool is_plain_header(const Chunk& chunk, bool as_color) {
+  constexpr std::uint8_t kGray = 0;
+  constexpr std::uint8_t kRgb = 2;
+  const std::array<std::uint8_t, 5> wanted = {8, as_color ? kRgb : kGray, 0, 0, 0};
+  return chunk.type == "IHDR" && chunk.data.size() == 13 && chunk.is_sound() &&
+         std::equal(wanted.begin(), wanted.end(), chunk.data.begin() + 8);
+}
+
+/// The parts of the zlib stream, one behind the other. False: a chunk that is damaged or may change
+/// pixels.
+bool collect_pixel_data(View rest, Bytes& packed) {
+  /// Chunks that say something about the image and change no pixel of it.
+  static constexpr std::array<std::string_view, 7> kHarmless = {"tEXt", "tIME", "pHYs", "gAMA",
+                                                                "cHRM", "sRGB", "bKGD"};
+  packed.clear();
+  for (Chunk chunk = next_chunk(rest); chunk.type != "IEND"; chunk = next_chunk(rest)) {
+    if (chunk.type == "IDAT" && chunk.is_sound()) {
+      packed.insert(packed.end(), chunk.data.begin(), chunk.data.end());
+    } else if (std::find(kHarmless.begin(), kHarmless.end(), chunk.type) == kHarmless.end()) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// One row: the filtered bytes, the row above, and where the row goes.
+struct Row {
+  const std::uint8_t* filtered;
+  const std::uint8_t* above;
+  std::uint8_t* out;
+  std::size_t size;
+};
+
+/// Of left, above and above left the nearest to left + above - above left.
+int paeth(int left, int above, int above_left) {
+  const int to_left = std::abs(above - above_left);
+  const int to_above = std::abs(left - above_left);
+  const int to_above_left = std::abs(left + above - 2 * above_left);
+  const int best = to_left <= to_above ? left : above;
+  return to_above_left < std::min(to_left, to_above) ? above_left : best;
+}
+
+/// Each byte plus what `predict` says by its neighbours; a pixel has kChannels bytes.
+template <int kChannels, typename Predict>
+void add_prediction(const Row& row, const Predict& predict) {
+  std::array<int, kChannels> left{};
+  std::array<int, kChannels> above_left{};
+  for (std::size_t i = 0; i < row.size; i += kChannels) {
+    for (std::size_t c = 0; c < kChannels; ++c) {
+      const int above = row.above[i + c];
+      const int value = row.filtered[i + c] + predict(left[c], above, above_left[c]);
+      row.out[i + c] = static_cast<std::uint8_t>(value);
+      left[c] = row.out[i + c];
+      above_left[c] = above;
+    }
+  }
+}
+
+/// Section 9 of the specification. False: there is no such filter.
+template <int kChannels>
+bool undo_filter(int filter, const Row& row) {
+  switch (filter) {
+    case 0:
+      std::copy_n(row.filtered, row.size, row.out);
+      return true;
+    case 1:
+      add_prediction<kChannels>(row, [](int left, int, int) { return left; });
+      return true;
+    case 2:
+      for (std::size_t i = 0; i < row.size; ++i) {
+        row.out[i] = static_cast<std::uint8_t>(row.filtered[i] + row.above[i]);
+      }
+      return true;
+    case 3:
+      add_prediction<kChannels>(row, [](int left, int above, int) { return (left + above) / 2; });
+      return true;
+    case 4:
+      add_prediction<kChannels>(row, paeth);
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// `filtered`: per row of the image one byte that names the filter, then the row.
+template <int kChannels>
+cv::Mat undo_filters(const Bytes& filtered, int rows, int cols) {
+  cv::Mat image(rows, cols, CV_8UC(kChannels));
+  const std::size_t row_size = filtered.size() / static_cast<std::size_t>(rows) - 1;
+  const Bytes zeros(row_size, 0);
+  const std::uint8_t* above = zeros.data();
+  const std::uint8_t* in = filtered.data();
+  for (int v = 0; v < rows; ++v) {
+    const Row row{in + 1, above, image.ptr(v), row_size};
+    if (!undo_filter<kChannels>(*in, row)) {
+      return {};
+    }
+    above = row.out;
+    in += row_size + 1;
+  }
+  return image;
+}
+
+/// Kept from frame to frame.
+struct Workspace {
+  std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor{
+      libdeflate_alloc_decompressor(), &libdeflate_free_decompressor};
+  Bytes packed;
+  Bytes unpacked;
+};
+
+}  // namespace
+
+bool is_png(View bytes) {
+  return bytes.size() >= kSignature.size() &&
+         std::equal(kSignature.begin(), kSignature.end(), bytes.begin());
+}
+
+bool is_color_png(const Bytes& bytes) {
+  constexpr std::size_t kColorType = 25;  // of IHDR, which comes first
+  constexpr std::uint8_t kColorBit = 2;
+  return bytes.size() > kColorType && (bytes[kColorType] & kColorBit) != 0;
+}
+
+cv::Mat decode_plain_png(View bytes, bool as_color) {
+  constexpr std::uint64_t kMaxSide = 1U << 16U;
+  constexpr std::uint64_t kMaxExpansion = 1032;  // deflate makes at most that many bytes of one
+  thread_local Workspace work;
+  View rest = bytes.subspan(kSignature.size());
+  const Chunk header = next_chunk(rest);
+  if (work.decompressor == nullptr || !is_plain_header(header, as_color) ||
+      !collect_pixel_data(rest, work.packed)) {
+    return {};
+  }
+  const std::uint64_t cols = big_endian_32(header.data);
+  const std::uint64_t rows = big_endian_32(header.data.subspan(4));
+  const std::uint64_t unpacked_size = (cols * (as_color ? 3 : 1) + 1) * rows;
+  if (cols == 0 || rows == 0 || cols > kMaxSide || rows > kMaxSide ||
+      unpacked_size > kMaxExpansion * work.packed.size()) {
+    return {};
+  }
+  work.unpacked.resize(unpacked_size);
+  // Fills it exactly, or fails; compares the checksum of zlib.
+  if (libdeflate_zlib_decompress(work.decompressor.get(), work.packed.data(), work.packed.size(),
+                                 work.unpacked.data(), work.unpacked.size(),
+                                 nullptr) != LIBDEFLATE_SUCCESS) {
+    return {};
+  }
+  return (as_color ? undo_filters<3> : undo_filters<1>)(work.unpacked, static_cast<int>(rows),
+                                                        static_cast<int>(cols));
+}
+
+cv::Mat decode_by_opencv(const Bytes& bytes, bool as_color, int flags) {
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes, (as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE) | flags);
+  } catch (const cv::Exception&) {
+    return {};
+  }
+  if (as_color && !image.empty()) {
+    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
+  }
+  return image;
+}
+
+Expected<cv::Mat> decode_png(const Bytes& bytes, const std::string& name, bool as_color) {
+  if (!is_png(bytes)) {
+    return fail(fmt::format("{}: expected a PNG image, found {}", name,
+                            bytes.empty() ? "an empty file" : "another kind of file"));
+  }
+  if (!is_complete(bytes)) {
+    return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
+                            name, bytes.size()));
+  }
+  cv::Mat image = decode_plain_png(bytes, as_color);
+  if (image.empty()) {
+    image = decode_by_opencv(bytes, as_color);
+  }
+  if (image.empty()) {
+    return fail(fmt::format("{}: expected a sound PNG image, found damaged data", name));
+  }
+  return image;
+}
+
+}  // namespace stemvo::io

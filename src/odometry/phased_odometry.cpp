@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/phased_odometry.hpp"
+
+#include <utility>
+
+#include "internal_check.hpp"
+#include "odometry/stopwatch.hpp"
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+
+Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera, const Options& options) {
+  Expected<Stem> stem = Stem::create(options.stem);
+  if (!stem) {
+    return stem.error();
+  }
+  // A network that cannot take this camera's images is found before work starts.
+  const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
+  if (const Expected<Channel> channel = stem->apply(blank); !channel) {
+    return channel.error();
+  }
+  return PhasedOdometry(camera, options, *std::move(stem));
+}
+
+PhasedOdometry::PhasedOdometry(const Camera& camera, const Options& options, Stem stem)
+    : camera_(camera), stem_(std::move(stem)), channel_odometry_(options, camera) {}
+
+PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
+  STEMVO_CHECK(image.cols == camera_.width_px && image.rows == camera_.height_px,
+               "the image has the camera's size");
+  Stopwatch watch;
+  const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image); });
+  const double stem_ms = watch.lap_ms();
+  PreparedFrame prepared;
+  if (!channel) {
+    prepared.problem = channel.error().message;
+    return prepared;
+  }
+  prepared = channel_odometry_.prepare(*channel, image);
+  prepared.stem_ms += stem_ms;
+  return prepared;
+}
+
+FrameResult PhasedOdometry::process(PreparedFrame frame) {
+  track(std::move(frame));
+  localize();
+  return optimize();
+}
+
+}  // namespace stemvo

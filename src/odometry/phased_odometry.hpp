@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "odometry/channel_odometry.hpp"
+#include "stem/stem.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/options.hpp"
+
+namespace stemvo {
+
+/// What Odometry::process does, in four phases that can work on three frames at a time; the results
+/// are the same.
+class PhasedOdometry {
+ public:
+  /// As Odometry::create, for options and a camera that are valid.
+  [[nodiscard]] static Expected<PhasedOdometry> create(const Camera& camera,
+                                                       const Options& options);
+
+  /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked). Frames are prepared in their order,
+  /// one call at a time, which may run ahead of the others in another thread.
+  [[nodiscard]] PreparedFrame prepare(const cv::Mat& image);
+  /// Tracks the points to this frame, once the one before is localized.
+  void track(PreparedFrame frame) { channel_odometry_.track(std::move(frame)); }
+  /// Localizes the frame tracked, once the one before is optimized.
+  void localize() { channel_odometry_.localize(); }
+  /// Optimizes the frame localized last, and returns its result. May run beside track() of the next
+  /// frame, in another thread.
+  [[nodiscard]] FrameResult optimize() { return channel_odometry_.optimize(); }
+
+  /// All four for one frame; one without an image stands for a frame that could not be read.
+  [[nodiscard]] FrameResult process(PreparedFrame frame);
+
+  /// Of the frames optimized.
+  [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }
+  [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
+
+ private:
+  PhasedOdometry(const Camera& camera, const Options& options, Stem stem);
+
+  Camera camera_;
+  Stem stem_;
+  ChannelOdometry channel_odometry_;
+};
+
+}  // namespace stemvo

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "odometry/road/estimators.hpp"
+#include "odometry/road/region.hpp"
+
+namespace stemvo {
+
+namespace {
+
+constexpr double kMinTileCorrelation = 0.2;
+constexpr int kMinTiles = 6;
+constexpr double kMinCorrelation = 0.25;
+constexpr double kMaxSigma = 0.2;
+constexpr std::size_t kMinSamples = 600;
+/// Fewer than this at every second pixel: take every pixel.
+constexpr std::size_t kFewSamples = 2400;
+constexpr int kMaxIterations = 5;  ///< per level
+/// Of a tile's mean square residual, in normalised images.
+constexpr double kNoiseFloor = 0.05;
+constexpr double kSearchSigma = 0.05;  ///< prior knowledge of log_scale worse than this: search
+constexpr double kSearchStep = 0.03;
+constexpr double kMaxSearch = 1.8;
+constexpr int kMinTileSamples = 20;
+/// Residuals beyond the images' own standard deviation count linearly.
+constexpr float kHuber = 1.0F;
+
+double correlation_of(double cc, double pp, double cp) {
+  return cc > 0.0 && pp > 0.0 ? cp / std::sqrt(cc * pp) : 0.0;
+}
+
+/// Sums over the samples of one tile of the strip, of the residual r = prev(warp) - cur.
+struct Tile {
+  /// Sum of a a^T with Huber weights, a = (J, r): J^T J and J^T r at once. Single precision is
+  /// enough for the few hundred samples of a tile, and four times as fast.
+  Eigen::Matrix<float, 8, 8> sums = Eigen::Matrix<float, 8, 8>::Zero();
+  float cur_cur = 0.0F;
+  float prev_prev = 0.0F;
+  float cur_prev = 0.0F;
+  int num_samples = 0;
+
+  RoadMatrix information() const { return sums.topLeftCorner<7, 7>().cast<double>(); }
+  RoadVector gradient() const { return sums.topRightCorner<7, 1>().cast<double>(); }
+  /// Normalised cross-correlation, 0 where the tile is too small.
+  double correlation() const {
+    return num_samples < kMinTileSamples ? 0.0 : correlation_of(cur_cur, prev_prev, cur_prev);
+  }
+  /// Mean square of the residual.
+  double noise() const { return (cur_cur + prev_prev - 2.0 * cur_prev) / std::max(1, num_samples); }
+};
+using Tiles = std::array<Tile, RoadRegion::kTiles>;
+
+/// Walks over the samples; `visit(sample, ray, point in prev, interpolated prev, cur value)`.
+template <typename Visit>
+void for_each_match(const RoadImage::Level& prev,
+                    const RoadImage::Level& cur,
+                    const std::vector<RoadRegion::Sample>& samples,
+                    const RoadWarp& warp,
+                    const Visit& visit) {
+  const Camera& camera = cur.camera;
+  const Eigen::Matrix3f rotation = warp.rotation().cast<float>();
+  const Eigen::Vector3f translation = warp.translation.cast<float>();
+  const Eigen::Vector3f plane = warp.plane.cast<float>();
+  // RoadWarp::inverse_depth(), written out.
+  const auto bend = static_cast<float>(4.0 * warp.drop * warp.plane.squaredNorm());
+  const auto fx = static_cast<float>(camera.fx_px);
+  const auto fy = static_cast<float>(camera.fy_px);
+  const auto cx = static_cast<float>(camera.cx_px);
+  const auto cy = static_cast<float>(camera.cy_px);
+  const auto first_row = static_cast<float>(prev.first_row);
+  const auto last_u = static_cast<float>(prev.values.cols - 2);
+  const auto last_v = static_cast<float>(prev.values.rows - 2);
+  const auto stride = static_cast<std::ptrdiff_t>(prev.values.step1());
+  for (const RoadRegion::Sample& sample : samples) {
+    const Eigen::Vector3f ray((static_cast<float>(sample.u) - cx) / fx,
+                              (static_cast<float>(sample.v) - cy) / fy, 1.0F);
+    const float flat = plane.dot(ray);
+    const float root = 1.0F - bend / (flat * flat);
+    if (!(flat > 0.0F && root > static_cast<float>(kMinRoadRoot))) {
+      continue;  // behind a crest
+    }
+    const Eigen::Vector3f p =
+        rotation * ray + (0.5F * flat * (1.0F + std::sqrt(root))) * translation;
+    const float u = fx * p.x() / p.z() + cx;
+    const float v = fy * p.y() / p.z() + cy - first_row;
+    if (!(p.z() > 1e-3F && u >= 1.0F && v >= 1.0F && u < last_u && v < last_v)) {
+      continue;
+    }
+    const int iu = static_cast<int>(u);
+    const int iv = static_cast<int>(v);
+    const float a = u - static_cast<float>(iu);
+    const float b = v - static_cast<float>(iv);
+    const float* top = prev.values.ptr<float>(iv) + 4 * static_cast<std::ptrdiff_t>(iu);
+    using Map = Eigen::Map<const Eigen::Array4f>;
+    const Eigen::Array4f upper = Map(top) + a * (Map(top + 4) - Map(top));
+    const Eigen::Array4f lower =
+        Map(top + stride) + a * (Map(top + stride + 4) - Map(top + stride));
+    const Eigen::Array4f value = upper + b * (lower - upper);
+    visit(
+        sample, ray, p, value,
+        cur.values.ptr<float>(sample.v - cur.first_row)[4 * static_cast<std::ptrdiff_t>(sample.u)]);
+  }
+}
+
+Tiles align_road(const RoadImage::Level& prev,
+                 const RoadImage::Level& cur,
+                 const std::vector<RoadRegion::Sample>& samples,
+                 const RoadWarp& warp) {
+  Tiles tiles;
+  const Eigen::Vector3f t = warp.translation.cast<float>();
+  const Eigen::Vector3f plane = warp.plane.cast<float>();
+  const auto bend_unit = static_cast<float>(warp.plane.squaredNorm());
+  const auto fx = static_cast<float>(cur.camera.fx_px);
+  const auto fy = static_cast<float>(cur.camera.fy_px);
+  for_each_match(prev, cur, samples, warp,
+                 [&](const RoadRegion::Sample& sample, const Eigen::Vector3f& ray,
+                     const Eigen::Vector3f& p, const Eigen::Array4f& value, float cur_value) {
+                   Tile& tile = tiles[static_cast<std::size_t>(sample.tile)];
+                   tile.cur_cur += cur_value * cur_value;
+                   tile.prev_prev += value[0] * value[0];
+                   tile.cur_prev += cur_value * value[0];
+                   ++tile.num_samples;
+                   // Gradient of the previous image along the point p: g = grad . dpi/dp.
+                   const float gx = value[1] * fx / p.z();
+                   const float gy = value[2] * fy / p.z();
+                   const Eigen::Vector3f g(gx, gy, -(gx * p.x() + gy * p.y()) / p.z());
+                   const float along = g.dot(t);
+                   Eigen::Matrix<float, 8, 1> a;
+                   a.head<3>() = along * ray;
+                   a[3] = -along * bend_unit / plane.dot(ray);
+                   a.segment<3>(4) = p.cross(g);  // of exp(w) p
+                   a[7] = value[0] - cur_value;
+                   const float size = std::abs(a[7]);
+                   const float weight = size <= kHuber ? 1.0F : kHuber / size;
+                   tile.sums.noalias() += (weight * a) * a.transpose();
+                 });
+  return tiles;
+}
+
+double correlate_road(const RoadImage::Level& prev,
+                      const RoadImage::Level& cur,
+                      const std::vector<RoadRegion::Sample>& samples,
+                      const RoadWarp& warp) {
+  double cc = 0.0;
+  double pp = 0.0;
+  double cp = 0.0;
+  std::size_t count = 0;
+  for_each_match(prev, cur, samples, warp,
+                 [&](const RoadRegion::Sample&, const Eigen::Vector3f&, const Eigen::Vector3f&,
+                     const Eigen::Array4f& value, float cur_value) {
+                   cc += cur_value * cur_value;
+                   pp += value[0] * value[0];
+                   cp += cur_value * value[0];
+                   ++count;
+                 });
+  // A warp that leaves the image with all but a few samples has proven nothing.
+  return 2 * count < samples.size() ? 0.0 : correlation_of(cc, pp, cp);
+}
+
+/// Joins the tiles. A tile counts by how well it correlates: plain or occluded ones do not. The
+/// samples of a tile are not independent (the images are smooth, and a bump or a kerb moves all
+/// of them): the spread of the tiles' gradients tells how much less they are worth together.
+/// Returns the number of tiles that count.
+int join(const Tiles& tiles, RoadNormal& normal) {
+  int num_tiles = 0;
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  for (const Tile& tile : tiles) {
+    const double correlation = tile.correlation();
+    if (!(correlation >= kMinTileCorrelation)) {
+      continue;
+    }
+    ++num_tiles;
+    const double weight = correlation * correlation / (tile.noise() + kNoiseFloor);
+    const RoadVector gradient = weight * tile.gradient();
+    normal.information += weight * tile.information();
+    normal.gradient += gradient;
+    spread += gradient.head<3>().cwiseAbs2();
+  }
+  normal.discount(spread);
+  return num_tiles;
+}
+
+double total_correlation(const Tiles& tiles) {
+  Tile sum;
+  for (const Tile& tile : tiles) {
+    sum.cur_cur += tile.cur_cur;
+    sum.prev_prev += tile.prev_prev;
+    sum.cur_prev += tile.cur_prev;
+    sum.num_samples += tile.num_samples;
+  }
+  return sum.correlation();
+}
+
+using LevelSamples = std::array<std::vector<RoadRegion::Sample>, 2>;
+
+/// The plane of the prior, at the scale with the best correlation at half size.
+Eigen::Vector3d search_plane(const RoadStep& step, const LevelSamples& samples, RoadWarp warp) {
+  const RoadPrior& prior = step.prior;
+  const int reach =
+      static_cast<int>(std::min(kMaxSearch, 2.5 * prior.log_scale_sigma) / kSearchStep);
+  const auto plane_at = [&](double log_scale) {
+    return road_plane(log_scale, prior.slope_rad, prior.roll_rad, step.options.camera_height_m);
+  };
+  double best = -1.0;
+  Eigen::Vector3d best_plane = plane_at(prior.log_scale);
+  for (int i = -reach; i <= reach; ++i) {
+    warp.plane = plane_at(prior.log_scale + kSearchStep * i);
+    const double correlation =
+        correlate_road(step.prev.levels[1], step.cur.levels[1], samples[1], warp);
+    if (correlation > best) {
+      best = correlation;
+      best_plane = warp.plane;
+    }
+  }
+  return best_plane;
+}
+
+/// Gauss-Newton at half size where there are samples, then at full size.
+RoadMeasurement refine(const RoadStep& step, const LevelSamples& samples, RoadWarp warp) {
+  RoadMatrix covariance = RoadMatrix::Zero();
+  double correlation = 0.0;
+  for (const std::size_t level : {std::size_t{1}, std::size_t{0}}) {
+    for (int iteration = 0; !samples[level].empty() && iteration < kMaxIterations; ++iteration) {
+      const Tiles tiles =
+          align_road(step.prev.levels[level], step.cur.levels[level], samples[level], warp);
+      RoadNormal normal;
+      if (join(tiles, normal) < kMinTiles) {
+        return no_road("nothing moves like a road");
+      }
+      normal.add_prior(warp, step.prior, step.options.rotation_sigma_rad);
+      if (!normal.step(warp)) {
+        return no_road("the alignment diverged");
+      }
+      correlation = total_correlation(tiles);
+      covariance = normal.covariance;
+      if (normal.relative_change < (level == 1 ? 5.0 : 1.0) * step.options.convergence) {
+        break;
+      }
+    }
+  }
+  RoadMeasurement result = read_road(warp, covariance, step.options.camera_height_m);
+  result.is_valid = correlation > kMinCorrelation && result.sigma < kMaxSigma;
+  result.reason = result.is_valid ? "" : "the pictures of the road hardly agree";
+  return result;
+}
+
+bool has_values(const RoadImage& image) {
+  return !image.levels[0].values.empty() && !image.levels[1].values.empty();
+}
+
+}  // namespace
+
+RoadMeasurement measure_dense(const RoadStep& step) {
+  if (!is_motion(step.cur_from_prev)) {
+    return no_road("no motion");
+  }
+  if (!has_values(step.prev) || !has_values(step.cur)) {
+    return no_road("the picture ends above the road");
+  }
+  const RoadRegion region(step.cur_from_prev, step.prior, step.options);
+  // A scale that is known well starts within a pixel: half size is for the search.
+  const bool is_searched = step.prior.log_scale_sigma > kSearchSigma;
+  LevelSamples samples;
+  for (std::size_t k = 0; k < (is_searched ? 2 : 1); ++k) {
+    const RoadImage::Level& level = step.cur.levels[k];
+    samples[k] = region.samples(level.camera, level.first_row, 2);
+    if (samples[k].size() < kFewSamples) {
+      samples[k] = region.samples(level.camera, level.first_row, 1);
+    }
+  }
+  if (samples[0].size() < kMinSamples) {
+    return no_road("too little road in sight");
+  }
+  RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
+  if (is_searched) {
+    warp.plane = search_plane(step, samples, warp);
+  }
+  return refine(step, samples, warp);
+}
+
+}  // namespace stemvo

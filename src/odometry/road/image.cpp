@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road/image.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace stemvo {
+
+namespace {
+
+/// Reach of the local contrast, input pixels (level 1: its own, twice as wide).
+constexpr double kContrast_px = 8.0;
+
+/// The camera in the pixels of an image that is `map` away from the camera's own pixels.
+Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size) {
+  const Eigen::Vector2d centre = map.from_input({camera.cx_px, camera.cy_px});
+  return {camera.fx_px / map.scale.x(),
+          camera.fy_px / map.scale.y(),
+          centre.x(),
+          centre.y(),
+          size.width,
+          size.height};
+}
+
+/// Values, their gradient (central differences) and the contrast, pixel by pixel.
+cv::Mat interleave(const cv::Mat& values, const cv::Mat& contrast) {
+  cv::Mat result(values.size(), CV_32FC4);
+  for (int v = 0; v < values.rows; ++v) {
+    const auto* here = values.ptr<float>(v);
+    const auto* above = values.ptr<float>(std::max(v - 1, 0));
+    const auto* below = values.ptr<float>(std::min(v + 1, values.rows - 1));
+    const auto* strength = contrast.ptr<float>(v);
+    auto* out = result.ptr<cv::Vec4f>(v);
+    for (int u = 1; u + 1 < values.cols; ++u) {
+      out[u] = {here[u], 0.5F * (here[u + 1] - here[u - 1]), 0.5F * (below[u] - above[u]),
+                strength[u]};
+    }
+    out[0] = {here[0], 0.0F, 0.0F, strength[0]};
+    const int last = values.cols - 1;
+    out[last] = {here[last], 0.0F, 0.0F, strength[last]};
+  }
+  return result;
+}
+
+RoadImage::Level make_level(const cv::Mat& pixels, const Camera& camera, int contrast_px) {
+  RoadImage::Level level;
+  level.camera = camera;
+  level.first_row = std::clamp(static_cast<int>(camera.cy_px), 0, pixels.rows);
+  if (pixels.rows - level.first_row < 4 * contrast_px || pixels.cols < 4 * contrast_px) {
+    return level;
+  }
+  cv::Mat values;
+  pixels.rowRange(level.first_row, pixels.rows).convertTo(values, CV_32F);
+  cv::GaussianBlur(values, values, {5, 5}, 1.0, 1.0, cv::BORDER_REFLECT_101);
+  cv::Mat mean;
+  const cv::Size window(2 * contrast_px + 1, 2 * contrast_px + 1);
+  cv::blur(values, mean, window);
+  values -= mean;
+  cv::Mat contrast;
+  cv::blur(values.mul(values), contrast, window);
+  cv::sqrt(contrast, contrast);
+  // Half a gray value: the noise of a plain surface is not blown up to the size of texture.
+  values /= contrast + 0.5;
+  level.values = interleave(values, contrast);
+  return level;
+}
+
+}  // namespace
+
+RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
+  RoadImage road;
+  road.pixels = image.pixels;
+  road.camera = camera_in(camera, image.map, image.pixels.size());
+  road.scale = image.map.scale.x();
+  const int contrast_px = std::max(4, cvRound(kContrast_px / road.scale));
+  cv::Mat half;
+  cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  // The centre of a pixel of half size lies between two of full size.
+  const PixelMap map{{2.0, 2.0}, {0.5, 0.5}};
+  road.levels = {make_level(image.pixels, road.camera, contrast_px),
+                 make_level(half, camera_in(road.camera, map, half.size()), contrast_px)};
+  return road;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+
+#include <opencv2/core.hpp>
+
+#include "stem/channel.hpp"
+#include "stemvo/camera.hpp"
+
+namespace stemvo {
+
+/// The part of an image below the horizon, made comparable between frames: band-passed, divided by
+/// the local contrast, with its gradient. Level 1 has half the size of level 0.
+struct RoadImage {
+  struct Level {
+    Camera camera;  ///< in pixels of this level, whole image
+    int first_row = 0;
+    cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, local contrast; row 0 is `first_row`
+  };
+  cv::Mat pixels;               ///< CV_8U, the image itself
+  Camera camera;                ///< in its pixels
+  double scale = 1.0;           ///< input pixels per pixel of it
+  std::array<Level, 2> levels;  ///< without values where too little is below the horizon
+};
+
+[[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
+
+}  // namespace stemvo

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road/model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace stemvo {
+
+RoadWarp::RoadWarp(const Rigid3& cur_from_prev, const RoadPrior& prior, double camera_height_m)
+    : given_rotation(cur_from_prev.inverse().rotation_matrix()),
+      translation(cur_from_prev.inverse().translation),
+      plane(road_plane(prior.log_scale, prior.slope_rad, prior.roll_rad, camera_height_m)),
+      drop(prior.drop) {}
+
+Eigen::Matrix3d RoadWarp::rotation() const {
+  return so3_exp(correction).toRotationMatrix() * given_rotation;
+}
+
+double RoadWarp::inverse_depth(const Eigen::Vector3d& ray) const {
+  const double flat = plane.dot(ray);
+  const double root = 1.0 - 4.0 * drop * plane.squaredNorm() / (flat * flat);
+  return flat > 0.0 && root > kMinRoadRoot ? 0.5 * flat * (1.0 + std::sqrt(root)) : 0.0;
+}
+
+void RoadNormal::discount(const Eigen::Vector3d& spread) {
+  const Eigen::Vector3d expected = information.diagonal().head<3>().cwiseMax(1e-12);
+  const double excess = std::max(1.0, spread.cwiseQuotient(expected).mean());
+  information /= excess;
+  gradient /= excess;
+}
+
+void RoadNormal::add_prior(const RoadWarp& warp,
+                           const RoadPrior& prior,
+                           double rotation_sigma_rad) {
+  const Eigen::Vector3d& m = warp.plane;
+  // Slope = -m_z / m_y and drop, together; then roll = -m_x / m_y.
+  Eigen::Matrix<double, 2, 7> profile = Eigen::Matrix<double, 2, 7>::Zero();
+  profile(0, 1) = m.z() / (m.y() * m.y());
+  profile(0, 2) = -1.0 / m.y();
+  profile(1, 3) = 1.0;
+  const Eigen::Vector2d error(-m.z() / m.y() - prior.slope_rad, warp.drop - prior.drop);
+  information += profile.transpose() * prior.profile_information * profile;
+  gradient += profile.transpose() * (prior.profile_information * error);
+  RoadVector roll = RoadVector::Zero();
+  roll[0] = -1.0 / m.y();
+  roll[1] = m.x() / (m.y() * m.y());
+  const double roll_weight = 1.0 / (prior.roll_sigma * prior.roll_sigma);
+  information += roll_weight * roll * roll.transpose();
+  gradient += roll_weight * (-m.x() / m.y() - prior.roll_rad) * roll;
+  const double rotation_weight = 1.0 / (rotation_sigma_rad * rotation_sigma_rad);
+  information.diagonal().tail<3>().array() += rotation_weight;
+  gradient.tail<3>() += rotation_weight * warp.correction;
+}
+
+bool RoadNormal::step(RoadWarp& warp) {
+  const Eigen::LDLT<RoadMatrix> solver(information);
+  const RoadVector step = solver.solve(-gradient);
+  covariance = solver.solve(RoadMatrix::Identity());
+  relative_change = step.head<3>().norm() / warp.plane.norm();
+  warp.plane += step.head<3>();
+  warp.drop += step[3];
+  warp.correction += step.tail<3>();
+  return step.allFinite() && covariance.allFinite() && warp.plane.y() > 0.0;
+}
+
+RoadMeasurement read_road(const RoadWarp& warp,
+                          const RoadMatrix& covariance,
+                          double camera_height_m) {
+  RoadMeasurement result;
+  const Eigen::Vector3d& m = warp.plane;
+  const Eigen::Vector3d gain = m / m.squaredNorm();  // of log |m|
+  result.log_scale = std::log(camera_height_m * m.norm());
+  result.sigma = std::sqrt(gain.dot(covariance.topLeftCorner<3, 3>() * gain));
+  result.slope_rad = -m.z() / m.y();
+  result.roll_rad = -m.x() / m.y();
+  result.drop = warp.drop;
+  return result;
+}
+
+RoadMeasurement no_road(std::string_view reason) {
+  RoadMeasurement result;
+  result.reason = reason;
+  return result;
+}
+
+bool is_motion(const Rigid3& cur_from_prev) {
+  return cur_from_prev.matrix().allFinite() && cur_from_prev.translation.norm() > 0.0;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <deque>
+#include <string_view>
+
+#include "odometry/road/estimators.hpp"
+#include "odometry/road/filter.hpp"
+#include "odometry/road/image.hpp"
+#include "odometry/road/model.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// What is known of the scale after a frame; nothing of it looks ahead.
+struct RoadScaleEstimate {
+  double metres_per_unit = 1.0;  ///< metres = metres_per_unit * units of the given motions
+  double sigma = 0.0;            ///< of log(metres_per_unit)
+  bool is_initialized = false;   ///< a road was seen since the start (or since restart())
+  bool is_measured = false;      ///< this frame's road was measured and believed
+  std::string_view reason = "";  ///< where is_measured is false
+};
+
+/// Metres per unit of a monocular odometry from the road: joins the estimators, and frames.
+class RoadScale {
+ public:
+  explicit RoadScale(const RoadOptions& options)
+      : options_(options), filter_(options), path_(options) {}
+
+  /// One call per frame with an image. `cur_from_prev`: the motion since the
+  /// last call, in units of the map (ignored at the first call and after restart()).
+  RoadScaleEstimate update(RoadImage image, const Rigid3& cur_from_prev);
+  /// A frame on which the road cannot be measured: the doubt grows. Returns the sigma.
+  double skip();
+  /// The map was multiplied by `factor` (new units = factor * old units).
+  void rescale(double factor);
+  /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
+  void restart();
+
+ private:
+  struct Past {
+    RoadImage image;
+    Rigid3 now_from_past;
+  };
+  /// The nearest past frame that is far enough away; nullptr where the car did not move.
+  [[nodiscard]] const Past* pick_past() const;
+  [[nodiscard]] RoadPrior make_prior(const Rigid3& motion) const;
+  void remember(RoadImage image);
+  /// Both estimators, joined and given to the filter. Returns why nothing is believed, else empty.
+  std::string_view measure(const Past& past, const RoadImage& image);
+
+  RoadOptions options_;
+  RoadFilter filter_;
+  RoadPath path_;
+  std::deque<Past> past_;  ///< newest first
+  int frames_unmeasured_ = 0;
+};
+
+}  // namespace stemvo

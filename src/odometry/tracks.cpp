@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/tracks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "geometry/decomposition.hpp"
+#include "geometry/median.hpp"
+#include "geometry/two_view_scores.hpp"
+
+namespace stemvo {
+namespace {
+
+bool is_before(const TrackPoint& a, const TrackPoint& b) { return a.track_id < b.track_id; }
+
+void sort_by_id(TrackPoints& points) {
+  if (!std::is_sorted(points.begin(), points.end(), is_before)) {
+    std::sort(points.begin(), points.end(), is_before);
+  }
+}
+
+/// What is left of the flow once the rotation is taken out, of each match.
+std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
+                                  const PixelPairs& pairs,
+                                  const Camera& camera) {
+  std::vector<double> lengths;
+  lengths.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Eigen::Vector3d ray = rotation * camera.normalize(pairs.prev_uv[i]).homogeneous();
+    lengths.push_back((pairs.cur_uv[i] - camera.project(ray)).norm());
+  }
+  return lengths;
+}
+
+Eigen::Matrix3d fundamental_of(const Rigid3& cur_from_prev, const Camera& camera) {
+  return fundamental_from_essential(essential_from_motion(cur_from_prev), camera);
+}
+
+}  // namespace
+
+TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept) {
+  TrackPoints points;
+  points.reserve(matches.cur_uv.size());
+  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+    if (is_kept[i] != 0) {
+      points.push_back({matches.track_ids[i], matches.cur_uv[i]});
+    }
+  }
+  sort_by_id(points);
+  return points;
+}
+
+void add_begun_points(const Matches& matches,
+                      const std::vector<char>& is_kept,
+                      TrackPoints& points) {
+  TrackPoints begun;
+  for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
+    if (is_kept[i] != 0 && find_point(points, matches.track_ids[i]) == nullptr) {
+      begun.push_back({matches.track_ids[i], matches.prev_uv[i]});
+    }
+  }
+  points.insert(points.end(), begun.begin(), begun.end());
+  sort_by_id(points);
+}
+
+const TrackPoint* find_point(const TrackPoints& points, int track_id) {
+  const auto found =
+      std::lower_bound(points.begin(), points.end(), TrackPoint{track_id, {}}, is_before);
+  return found != points.end() && found->track_id == track_id ? &*found : nullptr;
+}
+
+PointPairs common_points(const TrackPoints& prev, const TrackPoints& cur) {
+  PointPairs pairs;
+  auto other = prev.begin();
+  for (const TrackPoint& point : cur) {
+    while (other != prev.end() && is_before(*other, point)) {
+      ++other;
+    }
+    if (other != prev.end() && other->track_id == point.track_id) {
+      pairs.track_ids.push_back(point.track_id);
+      pairs.prev_uv.push_back(other->uv);
+      pairs.cur_uv.push_back(point.uv);
+    }
+  }
+  return pairs;
+}
+
+double median_flow_px(const PixelPairs& pairs) {
+  std::vector<double> lengths;
+  lengths.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    lengths.push_back((pairs.cur_uv[i] - pairs.prev_uv[i]).norm());
+  }
+  return median(std::move(lengths));
+}
+
+bool is_stationary(const TrackPoints& before,
+                   const TrackPoints& now,
+                   double min_flow_px,
+                   int min_tracks) {
+  const PointPairs pairs = common_points(before, now);
+  return pairs.size() >= min_tracks && median_flow_px({pairs.prev_uv, pairs.cur_uv}) < min_flow_px;
+}
+
+double median_parallax_px(const Eigen::Quaterniond& rotation,
+                          const PixelPairs& pairs,
+                          const Camera& camera) {
+  return median(parallaxes_px(rotation, pairs, camera));
+}
+
+double rms_parallax_px(const Eigen::Quaterniond& rotation,
+                       const PixelPairs& pairs,
+                       const Camera& camera) {
+  double sum = 0.0;
+  for (const double length : parallaxes_px(rotation, pairs, camera)) {
+    sum += length * length;
+  }
+  return std::sqrt(sum / static_cast<double>(pairs.size()));
+}
+
+double median_epipolar_px(const Rigid3& cur_from_prev,
+                          const PixelPairs& pairs,
+                          const Camera& camera) {
+  if (!(cur_from_prev.translation.norm() > 0.0)) {
+    return 0.0;
+  }
+  const Eigen::Matrix3d fundamental = fundamental_of(cur_from_prev, camera);
+  std::vector<double> distances;
+  distances.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Eigen::Vector3d cur = pairs.cur_uv[i].homogeneous();
+    const Eigen::Vector3d line_in_cur = fundamental * pairs.prev_uv[i].homogeneous();
+    const Eigen::Vector3d line_in_prev = fundamental.transpose() * cur;
+    const double gradient = std::hypot(line_in_cur.head<2>().norm(), line_in_prev.head<2>().norm());
+    distances.push_back(std::abs(cur.dot(line_in_cur)) / gradient);
+  }
+  return median(std::move(distances));
+}
+
+std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,
+                                   const PixelPairs& pairs,
+                                   const Camera& camera,
+                                   double bound_px) {
+  // score_fundamental counts d^2 <= 3.841 sigma^2
+  const double sigma_px = bound_px / std::sqrt(kFundamentalChi2);
+  return score_fundamental(fundamental_of(cur_from_prev, camera), pairs, sigma_px).inlier_mask;
+}
+
+}  // namespace stemvo

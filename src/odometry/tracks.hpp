@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "features/front_end.hpp"
+#include "geometry/pixel_pairs.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// A track seen in a frame.
+struct TrackPoint {
+  int track_id = -1;
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
+};
+/// Of one frame, ordered by track id.
+using TrackPoints = std::vector<TrackPoint>;
+
+/// Where the matches end, of those kept (one flag per match).
+[[nodiscard]] TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept);
+
+/// Adds where kept matches start that `points`, of the frame they start at, lacks: new corners are
+/// looked for once a frame's other points are known.
+void add_begun_points(const Matches& matches,
+                      const std::vector<char>& is_kept,
+                      TrackPoints& points);
+
+/// The track's point, or nullptr.
+[[nodiscard]] const TrackPoint* find_point(const TrackPoints& points, int track_id);
+
+/// Tracks that two frames share.
+struct PointPairs {
+  std::vector<int> track_ids;
+  std::vector<Eigen::Vector2d> prev_uv;
+  std::vector<Eigen::Vector2d> cur_uv;
+
+  [[nodiscard]] int size() const { return static_cast<int>(track_ids.size()); }
+};
+[[nodiscard]] PointPairs common_points(const TrackPoints& prev, const TrackPoints& cur);
+
+/// Those that the mask keeps.
+template <typename T>
+[[nodiscard]] std::vector<T> select(std::span<const T> values, const std::vector<char>& mask) {
+  std::vector<T> selected;
+  selected.reserve(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (mask[i] != 0) {
+      selected.push_back(values[i]);
+    }
+  }
+  return selected;
+}
+
+// Medians: up to half of the matches may be wrong.
+
+/// Length of the flow.
+[[nodiscard]] double median_flow_px(const PixelPairs& pairs);
+
+/// The tracks stay where they were: their median flow is less than `min_flow_px`. False where the
+/// two share fewer than `min_tracks`.
+[[nodiscard]] bool is_stationary(const TrackPoints& before,
+                                 const TrackPoints& now,
+                                 double min_flow_px,
+                                 int min_tracks);
+
+/// What is left of the flow once the rotation, cur_from_prev, is taken out.
+[[nodiscard]] double median_parallax_px(const Eigen::Quaterniond& rotation,
+                                        const PixelPairs& pairs,
+                                        const Camera& camera);
+
+/// The same, root mean square: every match counts, so wrong ones must be out.
+[[nodiscard]] double rms_parallax_px(const Eigen::Quaterniond& rotation,
+                                     const PixelPairs& pairs,
+                                     const Camera& camera);
+
+/// Distance to the epipolar lines in both images (Sampson).
+[[nodiscard]] double median_epipolar_px(const Rigid3& cur_from_prev,
+                                        const PixelPairs& pairs,
+                                        const Camera& camera);
+
+/// Matches within `bound_px` of their epipolar lines; one flag per match.
+[[nodiscard]] std::vector<char> epipolar_inliers(const Rigid3& cur_from_prev,
+                                                 const PixelPairs& pairs,
+                                                 const Camera& camera,
+                                                 double bound_px);
+
+}  // namespace stemvo

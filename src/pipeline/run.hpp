@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "dataset/frame_source.hpp"
+#include "report/metrics_json.hpp"
+#include "stem/stem.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/odometry.hpp"
+
+namespace stemvo {
+
+/// Keys that were chosen for this run, whatever a camera file says.
+struct ChosenScale {
+  bool source = false;         ///< scale.source; always, where it is not the default
+  bool camera_height = false;  ///< scale.camera_height_m
+};
+
+/// Everything `stemvo run` was asked for.
+struct RunRequest {
+  std::filesystem::path sequence_dir;  ///< with camera_file: pictures, FrameSourceRequest::path
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+  Config config;
+  std::optional<FrameRangeRequest> frames;
+  std::optional<std::filesystem::path> ground_truth;
+  std::optional<std::filesystem::path> calibration;  ///< else calib.txt of the sequence
+  /// Of a folder of pictures. Its camera_height sets scale.camera_height_m; without one
+  /// scale.source becomes none; neither where the key was chosen.
+  std::optional<std::filesystem::path> camera_file;
+  std::optional<std::filesystem::path> times;  ///< of a folder of pictures; else its rate_hz
+  ChosenScale chosen;
+  int num_threads = 0;         ///< 0: all cores
+  int picture_every = 0;       ///< 0: no per-frame pictures
+  bool write_map = false;      ///< map.ply; needs odometry.mode map
+  bool measure_times = false;  ///< RunSummary::report.timing
+  /// Where `fps` counts from; the program sets the start of the process.
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+};
+
+/// What became of a run. Every file is written, also after an interrupt.
+struct RunSummary {
+  MetricsReport report;  ///< what metrics.json holds
+  StemInfo stem;
+  std::vector<std::string> warnings;  ///< broken frames and the like, one line each
+  bool interrupted = false;           ///< stopped early; results hold what was computed
+  Status written;                     ///< the first result that could not be written, if any
+};
+
+/// Called after each frame: frames done, frames in all; false stops the run (results are written).
+using RunProgress = std::function<bool(std::size_t, std::size_t)>;
+
+/// Opens the sequence, runs the odometry over it and writes every result file into out_dir
+/// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
+/// else an old one is removed, frames.csv, config.yaml, metrics.json,
+/// trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request (configuration,
+/// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
+/// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
+/// result cannot be written the others still are; `written` says so.
+/// One run with measure_times at a time in a process. OpenCV is told, for the whole process, how
+/// many threads it may use, and by whom its loops are run: call nothing of it in another thread
+/// while a run begins or ends.
+[[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
+                                                const RunProgress& progress = {});
+
+}  // namespace stemvo

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "evaluation/metrics.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo {
+
+/// Everything `stemvo evaluate` was asked for.
+struct EvaluationRequest {
+  std::filesystem::path ground_truth;            ///< KITTI poses
+  std::vector<std::filesystem::path> estimates;  ///< KITTI poses, or TUM with as many poses
+  Alignment alignment = Alignment::kNone;
+};
+
+/// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
+/// holds all four alignments.
+struct EvaluationRow {
+  std::string name;  ///< the path as given, or "(zero motion)"
+  Metrics metrics;
+};
+
+struct EvaluationReport {
+  std::string ground_truth;
+  std::size_t num_poses = 0;
+  Alignment alignment = Alignment::kNone;
+  std::vector<EvaluationRow> rows;  ///< in the order asked for
+  EvaluationRow zero_motion;        ///< the baseline that stays at the origin
+};
+
+/// Both files start at the identity; nothing is matched by time. Errors: those of the readers; an
+/// estimate with another number of poses than the ground truth.
+[[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
+
+/// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a
+/// newline.
+[[nodiscard]] std::string format_evaluation_table(const EvaluationReport& report);
+/// The same as JSON: {ground_truth, poses, alignment, estimates: [{file, t_rel_percent, ...}],
+/// never_moves: {...}}, with the keys of metrics.json. Error: the file cannot be written.
+[[nodiscard]] Status write_evaluation_json(const std::filesystem::path& file,
+                                           const EvaluationReport& report);
+
+/// `none`, `scale`, `se3`, `sim3`. Error: another word (lists the known ones).
+[[nodiscard]] Expected<Alignment> parse_alignment(const std::string& text);
+[[nodiscard]] std::string_view to_string(Alignment alignment);
+
+}  // namespace stemvo

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+#include "report/frame_image.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "internal_check.hpp"
+#include "report/plot_layout.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo {
+
+namespace {
+
+constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
+
+constexpr int kBand_px = 40;  // above a frame's images: caption and legend
+constexpr int kGap_px = 4;
+constexpr int kDefaultWidth_px = 1241;  // where there is neither frame nor channel
+constexpr int kSubpixelBits = 4;
+const cv::Scalar kBandColor(24, 24, 28);
+const cv::Scalar kBandText(235, 235, 235);
+const cv::Scalar kOutlier(230, 40, 30);
+
+constexpr int kSheetWidth_px = 2000;
+constexpr int kSheetGap_px = 16;
+constexpr int kLabel_px = 34;
+constexpr double kSheetAspect = 1.4;  // width over height aimed at
+const cv::Scalar kPaper(255, 255, 255);
+const cv::Scalar kInk(34, 34, 34);
+
+/// A copy as CV_8UC3, RGB, from gray or RGB.
+cv::Mat to_rgb(const cv::Mat& image) {
+  STEMVO_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3, "8-bit gray or RGB");
+  cv::Mat rgb = image.clone();
+  if (image.channels() == 1) {
+    cv::cvtColor(image, rgb, cv::COLOR_GRAY2RGB);
+  }
+  return rgb;
+}
+
+/// OpenCV's fonts know ASCII only: any other character becomes one '?'.
+std::string to_ascii(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte & 0xC0) != 0x80) {  // not the rest of a character
+      result += byte >= 0x20 && byte < 0x7F ? c : '?';
+    }
+  }
+  return result;
+}
+
+/// One line, centred in the height of `box`; shrinks until it fits into its width.
+void put_caption(cv::Mat& rgb,
+                 const cv::Rect& box,
+                 const std::string& text,
+                 const cv::Scalar& color) {
+  const std::string ascii = to_ascii(text);
+  if (ascii.empty() || box.width <= 0) {
+    return;
+  }
+  double scale = cv::getFontScaleFromHeight(kFont, std::max(6, box.height * 2 / 5));
+  const cv::Size natural = cv::getTextSize(ascii, kFont, scale, 1, nullptr);
+  scale *= std::min(1.0, static_cast<double>(box.width) / natural.width);
+  const cv::Size size = cv::getTextSize(ascii, kFont, scale, 1, nullptr);
+  cv::putText(rgb, ascii, {box.x, box.y + (box.height + size.height) / 2}, kFont, scale, color, 1,
+              cv::LINE_AA);
+}
+
+/// Colour of a flow of `share` (0..1) of the longest: blue over green to yellow, growing brighter.
+cv::Scalar flow_color(double share) {
+  // The upper two thirds of viridis: they stand out on dark and bright gray, and no red is in them.
+  static const std::array<cv::Vec3d, 5> kStops{
+      {{38, 110, 190}, {33, 150, 160}, {60, 190, 110}, {160, 218, 57}, {253, 231, 37}}};
+  const double position = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
+  const std::size_t below = std::min(static_cast<std::size_t>(position), kStops.size() - 2);
+  const double part = position - static_cast<double>(below);
+  const cv::Vec3d color = (1.0 - part) * kStops[below] + part * kStops[below + 1];
+  return {color[0], color[1], color[2]};
+}
+
+/// 8-bit image of a CV_32FC1 channel between its percentiles 0.5 and 99.5; values that are not
+/// finite are black.
+cv::Mat stretch_for_the_eye(const cv::Mat& values) {
+  std::vector<float> sorted;
+  std::copy_if(values.begin<float>(), values.end<float>(), std::back_inserter(sorted),
+               [](float value) { return std::isfinite(value); });
+  cv::Mat image = cv::Mat::zeros(values.size(), CV_8UC1);
+  if (sorted.empty()) {
+    return image;
+  }
+  std::sort(sorted.begin(), sorted.end());
+  const auto percentile = [&](double share) {
+    return static_cast<double>(
+        sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))]);
+  };
+  const double low = percentile(0.005);
+  const double high = percentile(0.995);
+  const double gain = high > low ? 255.0 / (high - low) : 0.0;
+  std::transform(values.begin<float>(), values.end<float>(), image.begin<uchar>(), [&](float v) {
+    const double gray = (static_cast<double>(v) - low) * gain;
+    return std::isfinite(gray) ? cv::saturate_cast<uchar>(gray) : uchar{0};
+  });
+  return image;
+}
+
+/// Flow that gets the brightest colour: 95 % of the inliers are below, rounded up to 1, 2, 5, 10...
+double longest_flow_px(const Matches& matches, const std::vector<char>& inlier_mask) {
+  std::vector<double> lengths;
+  for (std::size_t i = 0; i < inlier_mask.size(); ++i) {
+    const double length_px = (matches.cur_uv[i] - matches.prev_uv[i]).norm();
+    if (inlier_mask[i] != 0 && std::isfinite(length_px)) {
+      lengths.push_back(length_px);
+    }
+  }
+  if (lengths.empty()) {
+    return 1.0;
+  }
+  const auto at =
+      lengths.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(lengths.size() - 1));
+  std::nth_element(lengths.begin(), at, lengths.end());
+  return round_tick(std::max(1.0, *at));
+}
+
+cv::Point to_subpixels(const Eigen::Vector2d& uv) {
+  const Eigen::Vector2d scaled = uv * (1 << kSubpixelBits);
+  return {cvRound(scaled.x()), cvRound(scaled.y())};
+}
+
+bool is_drawable(const Eigen::Vector2d& uv) {
+  return uv.allFinite() && uv.cwiseAbs().maxCoeff() < 1e5;
+}
+
+/// `to_image` maps input pixels to pixels of `rgb`.
+template <typename Map>
+void draw_matches(cv::Mat& rgb,
+                  const Matches& matches,
+                  const std::vector<char>& inlier_mask,
+                  double longest_px,
+                  const Map& to_image) {
+  // Outliers first: they may not hide what counts.
+  for (const bool draw_inliers : {false, true}) {
+    for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
+      const bool is_inlier = i < inlier_mask.size() && inlier_mask[i] != 0;
+      const Eigen::Vector2d prev = to_image(matches.prev_uv[i]);
+      const Eigen::Vector2d cur = to_image(matches.cur_uv[i]);
+      if (is_inlier != draw_inliers || !is_drawable(prev) || !is_drawable(cur)) {
+        continue;
+      }
+      const double length_px = (matches.cur_uv[i] - matches.prev_uv[i]).norm();
+      const cv::Scalar color = is_inlier ? flow_color(length_px / longest_px) : kOutlier;
+      cv::line(rgb, to_subpixels(prev), to_subpixels(cur), color, is_inlier ? 2 : 1, cv::LINE_AA,
+               kSubpixelBits);
+      if (is_inlier) {
+        cv::circle(rgb, to_subpixels(cur), 2 << kSubpixelBits, color, cv::FILLED, cv::LINE_AA,
+                   kSubpixelBits);
+      }
+    }
+  }
+}
+
+/// Caption at the left, colours of the flow at the right.
+void draw_band(cv::Mat& rgb, const std::string& caption, double longest_px, bool has_matches) {
+  cv::Mat band = rgb.rowRange(0, kBand_px);
+  band.setTo(kBandColor);
+  const int legend_px = has_matches ? std::min(430, rgb.cols / 2) : 0;
+  put_caption(rgb, {12, 0, rgb.cols - legend_px - 24, kBand_px}, caption, kBandText);
+  if (!has_matches) {
+    return;
+  }
+  const int bar_px = legend_px / 4;
+  int x = rgb.cols - legend_px;
+  put_caption(rgb, {x, 0, legend_px / 6, kBand_px}, "flow 0", kBandText);
+  x += legend_px / 6 + 8;
+  for (int i = 0; i < bar_px; ++i) {
+    cv::line(rgb, {x + i, 12}, {x + i, kBand_px - 13}, flow_color(static_cast<double>(i) / bar_px),
+             1);
+  }
+  x += bar_px + 8;
+  put_caption(rgb, {x, 0, legend_px / 5, kBand_px}, fmt::format("{:g} px", longest_px), kBandText);
+  x += legend_px / 5 + 8;
+  cv::line(rgb, {x, kBand_px / 2}, {x + 24, kBand_px / 2}, kOutlier, 1, cv::LINE_AA);
+  put_caption(rgb, {x + 32, 0, rgb.cols - x - 36, kBand_px}, "outlier", kBandText);
+}
+
+int height_at_width(const cv::Mat& image, int width_px) {
+  return image.empty()
+             ? 0
+             : std::max(1, cvRound(static_cast<double>(width_px) * image.rows / image.cols));
+}
+
+/// Columns that bring the sheet nearest to its aspect.
+int count_columns(std::size_t num_cells, double cell_aspect) {
+  const double columns = std::sqrt(static_cast<double>(num_cells) * kSheetAspect / cell_aspect);
+  return std::clamp(static_cast<int>(std::lround(columns)), 1, static_cast<int>(num_cells));
+}
+
+/// Smaller by averaging; larger by repeating, so that a coarse channel shows its own pixels.
+cv::Mat fit(const cv::Mat& image, const cv::Size& size) {
+  const bool shrinks = image.cols > size.width;
+  cv::Mat fitted;
+  cv::resize(image, fitted, size, 0.0, 0.0, shrinks ? cv::INTER_AREA : cv::INTER_NEAREST);
+  return fitted;
+}
+
+}  // namespace
+
+cv::Mat draw_frame_image(const cv::Mat& frame,
+                         const ChannelImage& channel,
+                         const Matches& matches,
+                         const std::vector<char>& inlier_mask,
+                         const std::string& caption) {
+  STEMVO_CHECK(matches.prev_uv.size() == matches.cur_uv.size(), "matches come in pairs");
+  STEMVO_CHECK(inlier_mask.empty() || inlier_mask.size() == matches.cur_uv.size(),
+               "one entry per match");
+  const int width_px = !frame.empty()            ? frame.cols
+                       : !channel.pixels.empty() ? channel.pixels.cols
+                                                 : kDefaultWidth_px;
+  const int channel_height_px = height_at_width(channel.pixels, width_px);
+  const int gap_px = frame.empty() || channel.pixels.empty() ? 0 : kGap_px;
+  cv::Mat image(kBand_px + frame.rows + gap_px + channel_height_px, width_px, CV_8UC3, kBandColor);
+  const double longest_px = longest_flow_px(matches, inlier_mask);
+  if (!frame.empty()) {
+    cv::Mat part = image.rowRange(kBand_px, kBand_px + frame.rows);
+    to_rgb(frame).copyTo(part);
+    draw_matches(part, matches, inlier_mask, longest_px,
+                 [](const Eigen::Vector2d& uv) { return uv; });
+  }
+  if (!channel.pixels.empty()) {
+    cv::Mat part = image.rowRange(image.rows - channel_height_px, image.rows);
+    cv::resize(to_rgb(channel.pixels), part, part.size(), 0.0, 0.0, cv::INTER_LINEAR);
+    const Eigen::Vector2d zoom(static_cast<double>(width_px) / channel.pixels.cols,
+                               static_cast<double>(channel_height_px) / channel.pixels.rows);
+    draw_matches(part, matches, inlier_mask, longest_px, [&](const Eigen::Vector2d& uv) {
+      // resize() keeps the images' corners together, so pixel centres move by half a pixel.
+      return Eigen::Vector2d(
+          ((channel.map.from_input(uv).array() + 0.5) * zoom.array() - 0.5).matrix());
+    });
+  }
+  draw_band(image, caption, longest_px, !matches.cur_uv.empty());
+  return image;
+}
+
+cv::Mat draw_channel_sheet(const cv::Mat& frame,
+                           const std::vector<cv::Mat>& channels,
+                           const std::vector<std::string>& captions) {
+  STEMVO_CHECK(!frame.empty(), "a frame to show");
+  STEMVO_CHECK(captions.size() == channels.size() + 1, "one caption per image");
+  const double frame_aspect = static_cast<double>(frame.cols) / frame.rows;
+  const int columns = count_columns(captions.size(), frame_aspect);
+  const int rows = (static_cast<int>(captions.size()) + columns - 1) / columns;
+  const int cell_width_px =
+      std::min(frame.cols, (kSheetWidth_px - kSheetGap_px * (columns + 1)) / columns);
+  const cv::Size cell(std::max(1, cell_width_px),
+                      std::max(1, cvRound(cell_width_px / frame_aspect)));
+
+  cv::Mat sheet(kSheetGap_px + rows * (cell.height + kLabel_px + kSheetGap_px / 2),
+                kSheetGap_px + columns * (cell.width + kSheetGap_px), CV_8UC3, kPaper);
+  for (std::size_t i = 0; i < captions.size(); ++i) {
+    const int x = kSheetGap_px + (static_cast<int>(i) % columns) * (cell.width + kSheetGap_px);
+    const int y = kSheetGap_px +
+                  (static_cast<int>(i) / columns) * (cell.height + kLabel_px + kSheetGap_px / 2);
+    const cv::Mat& source = i == 0 ? frame : channels[i - 1];
+    STEMVO_CHECK(!source.empty(), "a channel to show");
+    fit(to_rgb(source.type() == CV_32FC1 ? stretch_for_the_eye(source) : source), cell)
+        .copyTo(sheet(cv::Rect({x, y}, cell)));
+    put_caption(sheet, {x, y + cell.height, cell.width, kLabel_px}, captions[i], kInk);
+  }
+  return sheet;
+}
+
+Status write_image(const std::filesystem::path& file, const cv::Mat& image) {
+  cv::Mat bgr = image;
+  if (image.channels() == 3) {
+    bgr = cv::Mat();  // else the caller's pixels would be converted in place
+    cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
+  }
+  std::vector<uchar> bytes;
+  if (bgr.empty() || !cv::imencode(".png", bgr, bytes)) {
+    return fail(fmt::format("{}: cannot encode an image of {} x {} pixels", file.string(),
+                            image.cols, image.rows));
+  }
+  return write_text_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+}  // namespace stemvo

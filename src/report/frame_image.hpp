@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "features/front_end.hpp"
+#include "stem/channel.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo {
+
+/// The paper's "optical flow": the input above, the channel below at the same width, on both the
+/// matches as lines from the previous to the current position. Inliers are coloured by the length
+/// of their flow, outliers thin and red. Frame: CV_8UC1 or CV_8UC3 (RGB); may be empty (an
+/// unreadable frame: the channel alone), as may the channel. `inlier_mask` has one entry per match,
+/// or is empty (all count as outliers). The caption may be empty. Returns CV_8UC3, RGB.
+[[nodiscard]] cv::Mat draw_frame_image(const cv::Mat& frame,
+                                       const ChannelImage& channel,
+                                       const Matches& matches,
+                                       const std::vector<char>& inlier_mask,
+                                       const std::string& caption);
+
+/// The paper's Figure 1: the input and the channels as a grid of labelled images. Channels are
+/// CV_8UC1 (as they are) or CV_32FC1 (stretched between their 0.5 and 99.5 percentiles, for the eye
+/// only). `captions` has one entry for the frame, then one per channel (checked). CV_8UC3, RGB.
+[[nodiscard]] cv::Mat draw_channel_sheet(const cv::Mat& frame,
+                                         const std::vector<cv::Mat>& channels,
+                                         const std::vector<std::string>& captions);
+
+/// Writes an RGB or gray image as PNG. Error: the file cannot be written.
+[[nodiscard]] Status write_image(const std::filesystem::path& file, const cv::Mat& image);
+
+}  // namespace stemvo

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "evaluation/metrics.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/timing/timing_report.hpp"
+
+namespace stemvo {
+
+/// What metrics.json holds. Everything in `metrics` is null in the file without ground truth.
+struct MetricsReport {
+  std::string stemvo_version;
+  std::string sequence;         ///< folder name, e.g. "03"
+  std::size_t first_frame = 0;  ///< in the folder's numbering
+  std::size_t num_frames = 0;   ///< key `frames`
+  std::string model;            ///< as asked for, e.g. "default", "gray"
+  int filter = 0;
+  double fps = 0.0;  ///< frames over wall time, process start to trajectory written
+  std::string scale_source;
+  double tracked_fraction = 0.0;                 ///< frames whose pose was measured, over all
+  std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
+  std::optional<Metrics> metrics;
+  std::optional<Metrics> refined;      ///< of trajectory_refined_kitti.txt
+  std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
+};
+
+/// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
+/// road_measured_fraction (of all frames; null where the road is not asked) alignment (of
+/// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
+/// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
+/// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
+/// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
+/// refined trajectory is written) and, only where it was asked for, timing{threads fps loop_fps
+/// interval{median_ms,p95_ms} latency{median_ms,p95_ms} peak_memory_mib cpu_s start_cpu_s
+/// other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s,share_percent}}}. Numbers round-trip; a
+/// number that is not finite becomes null. Error: the file cannot be written.
+[[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
+                                        const MetricsReport& report);
+
+/// What write_metrics_json wrote, bit for bit (of `refined` the four errors, of `timing` nothing);
+/// a null number that has no nullopt is NaN. Errors: the file cannot be read, is not JSON, lacks a
+/// key or has another type there.
+[[nodiscard]] Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file);
+
+/// The same numbers as an aligned table; each row names its alignment, the zero-motion baseline
+/// stands beside the offset. Ends with a newline.
+[[nodiscard]] std::string format_metrics_table(const MetricsReport& report);
+/// The stages as an aligned table, then what concerns the whole run. Ends with a newline.
+[[nodiscard]] std::string format_timing_table(const TimingReport& report);
+
+}  // namespace stemvo

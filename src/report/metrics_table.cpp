@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "report/evaluate_report.hpp"
+#include "report/metrics_json.hpp"
+#include "report/text_table.hpp"
+
+namespace stemvo {
+namespace {
+
+std::string scale_explained(const std::string& source) {
+  return source == "ground_truth" ? source + " (each step rescaled to its true length)"
+         : source == "constant"   ? source + " (every step the same length: not metric)"
+         : source == "none"       ? source + " (up to scale: units, not metres)"
+                                  : source;
+}
+
+std::string head(const MetricsReport& report) {
+  TextTable table("ll");
+  const std::size_t end = report.first_frame + report.num_frames;
+  table.add({"sequence", fmt::format("{}, {} frames ({}:{})", report.sequence, report.num_frames,
+                                     report.first_frame, end)});
+  table.add({"model", fmt::format("{}, filter {}", report.model, report.filter)});
+  table.add({"scale", scale_explained(report.scale_source)});
+  table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
+  table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
+                                    100.0 * report.tracked_fraction)});
+  if (report.road_measured_fraction) {
+    table.add({"road", fmt::format("measured on {:.1f} % of the frames",
+                                   100.0 * *report.road_measured_fraction)});
+  }
+  if (report.metrics) {
+    table.add({"path", fmt::format("{:.1f} m (ground truth)", report.metrics->path_length_m)});
+  }
+  return table.str();
+}
+
+std::string error_table(const MetricsReport& report) {
+  const Metrics& m = *report.metrics;
+  const std::string segments = m.num_segments == 0
+                                   ? "no segment fits into the drive"
+                                   : fmt::format("mean over {} segments of {}", m.num_segments,
+                                                 length_range(m.segment_lengths_m));
+  const std::string fitted(to_string(m.alignment));
+  TextTable table("lrlll");
+  table.add({"error", "value", "unit", "alignment", ""});
+  table.rule();
+  table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
+  if (report.refined) {
+    table.add({"  with look-ahead", number_or_dash(report.refined->t_rel_percent, 2), "%",
+               std::string(to_string(report.refined->alignment)), "trajectory_refined_kitti.txt"});
+  }
+  table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
+             "the same segments"});
+  table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
+             "mean of |dx| + |dz|"});
+  table.add({"  if it never moved", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
+             "the same for a camera that stays at the start"});
+  for (const auto& [alignment, note] :
+       {std::pair(Alignment::kNone, "root mean square position error"),
+        std::pair(Alignment::kScale, "one scale fitted"),
+        std::pair(Alignment::kSe3, "rotation and shift fitted"),
+        std::pair(Alignment::kSim3, "rotation, shift and scale fitted")}) {
+    table.add({"position ATE", fmt::format("{:.2f}", m.ate_rmse.after_m(alignment)), "m",
+               std::string(to_string(alignment)), note});
+  }
+  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
+             "mean over steps of one frame (RPE)"});
+  return table.str();
+}
+
+}  // namespace
+
+std::string format_metrics_table(const MetricsReport& report) {
+  if (!report.metrics) {
+    return head(report) + "\nNo ground truth: the errors are not known.\n";
+  }
+  return head(report) + '\n' + error_table(report);
+}
+
+std::string format_timing_table(const TimingReport& report) {
+  const auto num_frames = static_cast<double>(report.num_frames);
+  const auto ms_per_frame = [&](double cpu_s) {
+    return fmt::format("{:.3f}", 1e3 * cpu_s / num_frames);
+  };
+  TextTable table("lrrrrr");
+  table.add({"stage", "calls", "median ms", "p95 ms", "CPU ms/frame", "share %"});
+  table.rule();
+  for (const StageTiming& stage : report.stages) {
+    table.add({stage.name, fmt::format("{}", stage.calls),
+               fmt::format("{:.3f}", stage.wall.median_ms),
+               fmt::format("{:.3f}", stage.wall.p95_ms), ms_per_frame(stage.cpu_s),
+               fmt::format("{:.1f}", stage.share_percent)});
+  }
+  const auto add_rest = [&](const char* name, double cpu_s) {
+    table.add({name, "", "", "", ms_per_frame(cpu_s),
+               fmt::format("{:.1f}", 100.0 * cpu_s / report.cpu_s)});
+  };
+  add_rest("start of the program", report.start_cpu_s);
+  add_rest("other, and OpenCV's threads", report.rest_cpu_s);
+  table.rule();
+  add_rest("processor time", report.cpu_s);
+
+  TextTable whole("lrl");
+  const auto add_time = [&](const char* name, const TimeSummary& time) {
+    whole.add({name, fmt::format("{:.2f} ms", time.median_ms),
+               fmt::format("p95 {:.2f} ms", time.p95_ms)});
+  };
+  add_time("a frame's result every", report.interval);
+  add_time("from frame to result", report.latency);
+  whole.add({"speed, whole program", fmt::format("{:.1f} frames/s", report.fps),
+             fmt::format("{} frames, {} threads", report.num_frames, report.num_threads)});
+  whole.add(
+      {"speed, loop over frames", fmt::format("{:.1f} frames/s", num_frames / report.loop_s)});
+  whole.add({"peak memory", fmt::format("{:.0f} MiB", report.peak_memory_mib)});
+  return table.str() + '\n' + whole.str();
+}
+
+}  // namespace stemvo

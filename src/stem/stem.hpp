@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "stem/channel.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/options.hpp"
+
+namespace stemvo {
+
+/// What is known of the loaded network, for reports (config.yaml, metrics.json).
+struct StemInfo {
+  std::string model;   ///< as asked for
+  std::string layer;   ///< empty for gray and input_layer
+  std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
+  int filter = 0;      ///< the one chosen, never -1
+  int num_filters = 1;
+  int native_stride_px = 1;
+  int sampling_px = 1;
+};
+
+/// One filter of the first layer of a network: frame in, channel out. Movable; `apply` is const and
+/// gives the same bytes whatever the number of threads (cv::setNumThreads).
+class Stem {
+ public:
+  /// Loads and checks the network: the one filter's own file where it has one, for `apply` alone.
+  /// Errors: a name without a network, a hash other than said, not ONNX, inputs or outputs other
+  /// than 1x3xHxW -> 1xCxhxw float, filter outside [0, C), sampling_px not a divisor of the stride
+  /// (lists the allowed values).
+  [[nodiscard]] static Expected<Stem> create(const StemOptions& options);
+  /// The same with all filters, for `apply_all` and `apply_range` too.
+  [[nodiscard]] static Expected<Stem> create_all(const StemOptions& options);
+
+  Stem(Stem&&) noexcept;
+  Stem& operator=(Stem&&) noexcept;
+  ~Stem();
+
+  [[nodiscard]] const StemInfo& info() const;
+  /// Frame: CV_8UC3 in RGB order or CV_8UC1 (replicated to three planes). The one filter chosen.
+  /// Error: the frame is smaller than the kernel, or the runtime refused it.
+  [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
+  /// All filters of the layer from one pass, in order. Of a stem made by create_all, as
+  /// apply_range.
+  [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const;
+  /// Filters [first, last) of the layer from one pass: no more memory than theirs.
+  /// 0 <= first < last <= info().num_filters.
+  [[nodiscard]] Expected<std::vector<Channel>> apply_range(const cv::Mat& frame,
+                                                           int first,
+                                                           int last) const;
+
+ private:
+  struct Impl;
+  explicit Stem(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// What kAuto stands for, for frames of this width: kHalf for KLT on 1000 columns and more, else
+/// kBicubic. KLT finds subpixel positions on a channel of every second pixel as it is, but not on a
+/// coarser one (of 16 random filters of stride 16 none is tracked). orb and sift lose their
+/// keypoints on a smaller image, and small frames the texture of the road.
+[[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, int width_px);
+
+/// How many times larger than its channel an image is; `sampling`: input pixels per pixel of the
+/// channel.
+[[nodiscard]] int enlargement(Upsample upsample, int sampling_px);
+
+/// Float channel -> 8-bit image: percentile limits that follow the drive slowly, so that a patch
+/// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
+/// brings it to the input's size, or half of it (PixelMap is adjusted; no resampling between
+/// pixels). A channel without contrast becomes one gray and leaves the limits as they were; NaN
+/// becomes 0 (upsampled: its surroundings too).
+class ChannelStretch {
+ public:
+  /// Of `options.upsample`, kAuto stands for kBicubic: see choose_upsample.
+  explicit ChannelStretch(const StemOptions& options);
+  [[nodiscard]] ChannelImage apply(const Channel& channel);
+
+ private:
+  StemOptions options_;
+  bool has_limits_ = false;
+  double low_ = 0.0;
+  double high_ = 1.0;
+  cv::Mat upsampled_;  ///< buffer
+};
+
+}  // namespace stemvo

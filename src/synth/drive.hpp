@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "evaluation/trajectory.hpp"
+#include "synth/basics.hpp"
+
+namespace stemvo::synth {
+
+/// Spacing of the knots along a road: the arc length of knot i is i * 1 m.
+inline constexpr double kKnotSpacing_m = 1.0;
+/// Road beyond the first and the last camera, so that the view never ends in nothing.
+inline constexpr double kRoadBehind_m = 80.0;
+inline constexpr double kRoadAhead_m = 190.0;
+inline constexpr double kCameraHeight_m = 1.65;
+/// Half width of a street between the hedges, where it is not squeezed by a tight turn.
+inline constexpr double kStreetHalfWidth_m = 13.0;
+
+/// The road's own axes at one position, in the world (metres). right x (-up) = forward.
+struct RoadFrame {
+  Vec3 position = Vec3::Zero();
+  Vec3 forward = Vec3::UnitZ();
+  Vec3 right = Vec3::UnitX();
+  Vec3 up = -Vec3::UnitY();
+  double squeeze_left = 1.0;  ///< factor on lateral distances where a tight turn leaves less room
+  double squeeze_right = 1.0;
+
+  [[nodiscard]] double squeeze(double lateral_m) const {
+    return lateral_m < 0.0 ? squeeze_left : squeeze_right;
+  }
+  /// `lateral_m` to the right as planned (before squeezing), `height_m` above the road.
+  [[nodiscard]] Vec3 point(double lateral_m, double height_m) const {
+    return position + squeeze(lateral_m) * lateral_m * right + height_m * up;
+  }
+};
+
+/// A road as equally spaced frames.
+class RoadCurve {
+ public:
+  /// Points 1 m apart on the road's surface under the camera's path, and an up direction for each;
+  /// at least 3.
+  RoadCurve(const std::vector<Vec3>& points, const std::vector<Vec3>& ups);
+
+  [[nodiscard]] int num_knots() const { return static_cast<int>(knots_.size()); }
+  [[nodiscard]] const RoadFrame& knot(int index) const {
+    return knots_[static_cast<std::size_t>(index)];
+  }
+  /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
+  [[nodiscard]] RoadFrame at(double arc_m) const;
+  /// Arc length of the knot nearest to `point` among those within `reach_m` of `guess_m`.
+  [[nodiscard]] double nearest(const Vec3& point, double guess_m, double reach_m) const;
+
+ private:
+  void squeeze_in_turns();
+
+  std::vector<RoadFrame> knots_;
+};
+
+/// On which road a frame's camera is, and how far along it.
+struct RoadPosition {
+  std::size_t road = 0;
+  double arc_m = 0.0;
+};
+
+/// Camera poses and the roads under them. The world is any frame in which -y is roughly up.
+struct Drive {
+  Trajectory world_from_camera;
+  std::vector<RoadPosition> positions;  ///< one per pose
+  std::vector<RoadCurve> roads;         ///< more than one where the poses jump
+};
+
+/// Frames per second, and how fast the camera moves in the mean.
+struct Pace {
+  double rate_hz = 10.0;
+  std::optional<double> speed_m_s = std::nullopt;  ///< nullopt: the path's own
+};
+
+/// A street with turns to both sides, gentle hills and banks, driven at 8-12 m/s or at the given
+/// mean speed (slower in turns, above 12 m/s wider turns); the camera pitches and rolls against the
+/// road by about 0.4 deg (standard deviation) and bounces by 1-2 cm.
+[[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed, const Pace& pace = {});
+
+/// The road that fits given camera poses: 1.65 m below the smoothed path, with its elevation and
+/// bank. The poses are kept exactly; what the smoothing takes away is how the camera moves against
+/// the road. Standing, turning on the spot, reversing and jumps (over 12 m, at less than 10
+/// frames/s over 120 m/s) are fine.
+[[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera, double rate_hz = 10.0);
+
+}  // namespace stemvo::synth

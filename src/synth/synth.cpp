@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: MIT
+#include "synth/synth.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+#include <span>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "internal_check.hpp"
+#include "pipeline/out_folder.hpp"
+#include "synth/renderer.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> find_frames(const fs::path& folder, const std::string& extension) {
+  std::error_code code;
+  std::vector<fs::path> frames;
+  for (fs::directory_iterator entry(folder, code), end; !code && entry != end;
+       entry.increment(code)) {
+    const std::string stem = entry->path().stem().string();
+    if (entry->path().extension() == extension && stem.size() == 6 &&
+        stem.find_first_not_of("0123456789") == std::string::npos) {
+      frames.push_back(entry->path());
+    }
+  }
+  return frames;
+}
+
+/// OUT/sequences/NAME and OUT/poses in KITTI's layout. Every Error names the file.
+struct Output {
+  std::filesystem::path sequence_dir;
+  std::filesystem::path pose_file;
+
+  /// Makes the folders and removes the frames and the camera file of an earlier drive: a longer one
+  /// would leave images without times and poses behind.
+  [[nodiscard]] Status prepare(bool with_depth) const {
+    const fs::path images = sequence_dir / "image_2";
+    const fs::path depth = sequence_dir / "depth";
+    for (const fs::path& folder : {images, pose_file.parent_path(), depth}) {
+      if (with_depth || folder != depth) {
+        if (const Status made = pipeline::create_out_folder(folder); !made) {
+          return made;
+        }
+      }
+    }
+    std::vector<fs::path> old = find_frames(images, ".png");
+    std::ranges::copy(find_frames(depth, ".npy"), std::back_inserter(old));
+    old.push_back(sequence_dir / "camera.yaml");
+    for (const fs::path& file : old) {
+      std::error_code code;
+      fs::remove(file, code);
+      if (code) {
+        return fail(fmt::format("{}: cannot replace the file: {}", file.string(), code.message()));
+      }
+    }
+    return {};
+  }
+
+  /// image_2/%06d.png. May be called from several threads for different frames.
+  [[nodiscard]] Status write_image(std::size_t index, const cv::Mat& bgr) const {
+    const fs::path file = sequence_dir / "image_2" / fmt::format("{:06}.png", index);
+    std::vector<uchar> bytes;
+    // Noise does not compress: the fastest level costs a few per cent of size.
+    if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
+      return fail(fmt::format("{}: cannot encode the image", file.string()));
+    }
+    return write_text_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  }
+
+  /// depth/%06d.npy: NumPy format 1.0, little-endian float32, rows first; metres along z.
+  [[nodiscard]] Status write_depth(std::size_t index, const cv::Mat& depth_m) const {
+    static_assert(std::endian::native == std::endian::little, "the header says '<f4'");
+    STEMVO_CHECK(depth_m.type() == CV_32FC1 && depth_m.isContinuous(), "depth is one float plane");
+    const std::string header =
+        fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", depth_m.rows,
+                    depth_m.cols);
+    // Magic, version and the length of the header, which fills 128 bytes with them and a newline.
+    std::string bytes("\x93NUMPY\x01\x00\x76\x00", 10);
+    bytes += fmt::format("{:117}\n", header);
+    bytes.append(reinterpret_cast<const char*>(depth_m.data), depth_m.total() * sizeof(float));
+    return write_text_file(sequence_dir / "depth" / fmt::format("{:06}.npy", index), bytes);
+  }
+
+  /// calib.txt with the same intrinsics in P0 to P3, no baseline.
+  [[nodiscard]] Status write_calibration(const Camera& camera) const {
+    std::string text;
+    for (int i = 0; i < 4; ++i) {
+      text += fmt::format("P{}: {:.12e} 0 {:.12e} 0 0 {:.12e} {:.12e} 0 0 0 1 0\n", i, camera.fx_px,
+                          camera.cx_px, camera.fy_px, camera.cy_px);
+    }
+    return write_text_file(sequence_dir / "calib.txt", text);
+  }
+
+  /// camera.yaml beside calib.txt, for sources that read a folder of images.
+  [[nodiscard]] Status write_camera_file(const Camera& camera, double rate_hz) const {
+    return write_text_file(
+        sequence_dir / "camera.yaml",
+        fmt::format("image_width: {}\nimage_height: {}\ncamera_model: pinhole\n"
+                    "intrinsics: [{}, {}, {}, {}]\n"
+                    "distortion_model: none\ndistortion_coefficients: []\nrate_hz: {}\n",
+                    camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px,
+                    camera.cy_px, rate_hz));
+  }
+
+  /// times.txt and poses/NAME.txt, moved so that the first pose is the identity; 17 digits.
+  [[nodiscard]] Status write_truth(std::span<const Rigid3> world_from_camera,
+                                   double rate_hz) const {
+    const int digits = rate_hz == 10.0 ? 6 : 12;  // KITTI's own number of digits where it is exact
+    std::string times;
+    std::string poses;
+    for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
+      times += fmt::format("{:.{}e}\n", static_cast<double>(i) / rate_hz, digits);
+      const Matrix34d m =
+          i == 0 ? Rigid3().matrix()
+                 : (world_from_camera.front().inverse() * world_from_camera[i]).matrix();
+      for (int k = 0; k < 12; ++k) {
+        poses += fmt::format("{:.16e}{}", m(k / 4, k % 4), k == 11 ? '\n' : ' ');
+      }
+    }
+    return write_text_file(sequence_dir / "times.txt", times).and_then([&] {
+      return write_text_file(pose_file, poses);
+    });
+  }
+};
+
+/// What the options leave open is set here.
+struct Settings {
+  synth::Pace pace;
+  Camera camera;
+};
+
+Settings settings_of(const SyntheticDriveOptions& options) {
+  const int width_px = options.width_px.value_or(options.walk ? 640 : 1241);
+  const int height_px = options.height_px.value_or(options.walk ? 480 : 376);
+  if (options.walk) {
+    const double f_px = 585.0 * width_px / 640.0;
+    return {{options.rate_hz.value_or(30.0), options.speed_m_s},
+            {f_px, f_px, 0.5 * width_px, 0.5 * height_px, width_px, height_px}};
+  }
+  // The left colour camera of sequence 00, scaled to the image's width.
+  const double scale = width_px / 1241.0;
+  const double f_px = 718.856 * scale;
+  return {{options.rate_hz.value_or(10.0), options.speed_m_s},
+          {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px}};
+}
+
+Status check_options(const SyntheticDriveOptions& options, const Settings& settings) {
+  if (options.trajectory && options.walk) {
+    return fail("synth: expected a trajectory or a walk, found both");
+  }
+  if (options.trajectory && options.speed_m_s) {
+    return fail("synth: expected a trajectory or a speed, found both (the poses say how fast)");
+  }
+  struct Limits {
+    const char* name;
+    double value;
+    double low;
+    double high;
+  };
+  const auto& [pace, camera] = settings;
+  const double max_m_s = options.walk ? 1.0 : 60.0;  // faster, a turn on the spot would be a jerk
+  for (const auto& [name, value, low, high] :
+       {Limits{"width", 1.0 * camera.width_px, 16.0, 8192.0},
+        Limits{"height", 1.0 * camera.height_px, 16.0, 8192.0},
+        Limits{"frames", 1.0 * options.num_frames, 1.0, 1e6},  // %06d
+        Limits{"rate", pace.rate_hz, 1.0, 1000.0},
+        Limits{"speed", pace.speed_m_s.value_or(max_m_s), 0.1, max_m_s}}) {
+    if (!(value >= low && value <= high)) {
+      return fail(
+          fmt::format("synth: expected {} from {} to {}, found {}", name, low, high, value));
+    }
+  }
+  constexpr double kMaxWay_m = 2e6;  // a street's knots are kept in memory
+  const double way_m = pace.speed_m_s.value_or(1.0) / pace.rate_hz * options.num_frames;
+  if (way_m > kMaxWay_m) {
+    return fail(
+        fmt::format("synth: expected a way of at most {} km (frames / rate * speed), "
+                    "found {:.0f}",
+                    kMaxWay_m / 1000.0, way_m / 1000.0));
+  }
+  return {};
+}
+
+Expected<std::variant<synth::Drive, synth::Walk>> plan_path(const SyntheticDriveOptions& options,
+                                                            const synth::Pace& pace) {
+  if (options.walk) {
+    return synth::make_walk(options.num_frames, options.seed, pace);
+  }
+  if (!options.trajectory) {
+    return synth::make_own_drive(options.num_frames, options.seed, pace);
+  }
+  auto poses = read_kitti_trajectory(*options.trajectory);
+  if (!poses) {
+    return poses.error();
+  }
+  poses->resize(std::min(poses->size(), static_cast<std::size_t>(options.num_frames)));
+  return synth::make_drive_along(*poses, pace.rate_hz);
+}
+
+/// Frames [begin, end), at once.
+Status render_frames(const synth::Renderer& renderer,
+                     const Output& output,
+                     cv::Range frames,
+                     bool with_depth) {
+  std::vector<Status> results(static_cast<std::size_t>(frames.size()));
+  cv::parallel_for_(frames, [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto index = static_cast<std::size_t>(i);
+      const synth::RenderedFrame frame = renderer.render(index);
+      const Status written = output.write_image(index, frame.bgr);
+      results[static_cast<std::size_t>(i - frames.start)] =
+          written && with_depth ? output.write_depth(index, frame.depth_m) : written;
+    }
+  });
+  const auto failed = std::ranges::find(results, false, &Status::has_value);
+  return failed == results.end() ? Status() : *failed;
+}
+
+}  // namespace
+
+Status render_synthetic_drive(const std::filesystem::path& out_dir,
+                              const SyntheticDriveOptions& options,
+                              const RenderProgress& progress) {
+  const Settings settings = settings_of(options);
+  const auto& [pace, camera] = settings;
+  if (const Status valid = check_options(options, settings); !valid) {
+    return valid;
+  }
+  auto path = plan_path(options, pace);
+  if (!path) {
+    return path.error();
+  }
+  const Output output{out_dir / "sequences" / options.name,
+                      out_dir / "poses" / (options.name + ".txt")};
+  Status status = output.prepare(options.write_depth).and_then([&] {
+    return output.write_calibration(camera);
+  });
+  if (status && options.walk) {
+    status = output.write_camera_file(camera, pace.rate_hz);
+  }
+  if (!status) {
+    return status;
+  }
+  const synth::Renderer renderer(std::move(*path), camera, options.seed);
+  const Trajectory& poses = renderer.world_from_camera();
+  const int total = static_cast<int>(poses.size());
+  const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory
+  int done = 0;
+  for (bool go_on = true; go_on && done < total;) {
+    const cv::Range frames(done, std::min(done + batch, total));
+    status = render_frames(renderer, output, frames, options.write_depth);
+    if (!status) {
+      return status;
+    }
+    done = frames.end;
+    go_on = !progress || progress(done, total);
+  }
+  return output.write_truth(std::span(poses).first(static_cast<std::size_t>(done)), pace.rate_hz);
+}
+
+}  // namespace stemvo

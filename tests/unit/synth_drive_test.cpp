@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <opencv2/core/utility.hpp>
+
+#include "dataset/sequence.hpp"
+#include "support/temp_folder.hpp"
+#include "synth/synth.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class SyntheticDriveTest : public ::testing::Test {
+ protected:
+  void TearDown() override { cv::setNumThreads(-1); }
+  static SyntheticDriveOptions small(int num_frames) {
+    SyntheticDriveOptions options;
+    options.num_frames = num_frames;
+    options.width_px = 160;
+    options.height_px = 48;
+    return options;
+  }
+  fs::path write_poses(const Trajectory& poses) const {
+    const fs::path file = root_ / "given.txt";
+    EXPECT_TRUE(write_kitti_trajectory(file, poses));
+    return file;
+  }
+  static std::string bytes_of(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::string all_bytes(const std::string& name, int num_frames) const {
+    std::string bytes = bytes_of(root_ / name / "poses" / "00.txt");
+    for (int i = 0; i < num_frames; ++i) {
+      bytes +=
+          bytes_of(root_ / name / "sequences" / "00" / "image_2" / fmt::format("{:06}.png", i));
+    }
+    return bytes;
+  }
+
+  testing::TempFolder folder_;
+  const fs::path root_ = folder_.path();
+};
+
+TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), 3U);
+  EXPECT_EQ(sequence->camera().width_px, 160);
+  EXPECT_NEAR(sequence->camera().fx_px, 718.856 * 160 / 1241, 1e-9);
+  EXPECT_EQ(sequence->camera().fx_px, sequence->camera().fy_px);
+  EXPECT_DOUBLE_EQ(sequence->timestamps_s()[2], 0.2);
+  ASSERT_TRUE(sequence->ground_truth());
+  const Rigid3 step = sequence->ground_truth()->at(1);
+  EXPECT_GT(step.translation.z(), 0.75) << "8 m/s at least, forward";
+  EXPECT_LT(step.translation.norm(), 1.25) << "12 m/s at most";
+  EXPECT_EQ(sequence->read(2)->type(), CV_8UC3);
+  std::ifstream poses(root_ / "out" / "poses" / "00.txt");
+  std::string first;
+  std::string word;
+  std::getline(poses, first);
+  EXPECT_THAT(first, ::testing::StartsWith("1.0000000000000000e+00 0.0"));
+  poses >> word;
+  EXPECT_GE(word.find('e') - word.find('.'), 13U) << "12 digits or more: " << word;
+}
+
+TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
+  SyntheticDriveOptions options = small(2);
+  options.name = "street";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  for (const auto& [name, frames] : {std::pair("00", 3U), std::pair("street", 2U)}) {
+    const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / name);
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    EXPECT_EQ(sequence->size(), frames);
+    EXPECT_TRUE(sequence->ground_truth());
+  }
+}
+
+TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
+  for (const bool is_walk : {false, true}) {
+    SyntheticDriveOptions options = small(3);
+    options.walk = is_walk;
+    cv::setNumThreads(1);
+    ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
+    cv::setNumThreads(2);
+    ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
+    EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3)) << is_walk;
+    options.seed = 2;
+    ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
+    EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3)) << is_walk;
+  }
+}
+
+TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
+  cv::setNumThreads(1);
+  const auto stop_after_two = [](int done, int total) {
+    EXPECT_EQ(total, 6);
+    return done < 2;
+  };
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(6), stop_after_two));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 2U);
+  EXPECT_EQ(sequence->ground_truth()->size(), 2U);
+}
+
+TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 2U);
+}
+
+/// Standing, turning on the spot, a cut to another place, and a ring driven twice over itself.
+TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
+  Trajectory poses;
+  const auto add = [&](double heading_rad, double x, double z) {
+    poses.emplace_back(Eigen::Quaterniond(Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitY())),
+                       Eigen::Vector3d(x, 0.0, z));
+  };
+  add(0.0, 0.0, 0.0);
+  add(0.0, 0.0, 0.0);
+  add(0.5, 0.0, 0.0);
+  add(0.0, 0.0, 1.0);
+  add(1.0, 300.0, -70.0);
+  for (int i = 0; i < 40; ++i) {
+    const double angle = 4.0 * std::numbers::pi * i / 40;
+    add(angle, 500.0 + 12.0 * (1.0 - std::cos(angle)), 12.0 * std::sin(angle));
+  }
+  SyntheticDriveOptions options = small(1000);
+  options.write_depth = true;
+  options.trajectory = write_poses(poses);
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  ASSERT_EQ(sequence->size(), poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Rigid3 error = sequence->ground_truth()->at(i).inverse() * poses[i];
+    EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
+    // The last numbers of the file: the road before the car, which nothing may stand on.
+    const std::string depth =
+        bytes_of(root_ / "out" / "sequences" / "00" / "depth" / fmt::format("{:06}.npy", i));
+    ASSERT_EQ(depth.size(), 128U + 4U * 160U * 48U);
+    float z = 0.0F;
+    std::memcpy(&z, depth.data() + depth.size() - 4U * 80U, sizeof(z));
+    const double expected = 1.65 * 718.856 * 160 / 1241 / (47.0 - 185.2157 * 48 / 376);
+    EXPECT_NEAR(static_cast<double>(z), expected, 0.12 * expected) << "frame " << i;
+  }
+}
+
+/// Images of a drive of before there were rates, speeds and walks: means of their quarters.
+TEST_F(SyntheticDriveTest, DefaultDriveIsWhatItAlwaysWas) {
+  SyntheticDriveOptions options = small(20);
+  options.seed = 7;
+  options.width_px = 310;
+  options.height_px = 94;
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  const cv::Mat image = *sequence->read(19);
+  constexpr std::array<double, 4> kMeans = {124.3807, 128.3152, 97.2685, 90.0490};
+  for (int i = 0; i < 4; ++i) {
+    const cv::Scalar mean = cv::mean(image(cv::Rect(155 * (i % 2), 47 * (i / 2), 155, 47)));
+    EXPECT_NEAR((mean[0] + mean[1] + mean[2]) / 3.0, kMeans[static_cast<std::size_t>(i)], 0.01);
+  }
+  EXPECT_FALSE(fs::exists(root_ / "out" / "sequences" / "00" / "camera.yaml"));
+}
+
+TEST_F(SyntheticDriveTest, TimesFollowTheRate) {
+  SyntheticDriveOptions options = small(4);
+  options.rate_hz = 30.0;
+  options.speed_m_s = 6.0;
+  const auto expect_times = [&](const std::string& name, double rate_hz) {
+    const auto sequence = KittiSequence::open(root_ / name / "sequences" / "00");
+    ASSERT_TRUE(sequence) << sequence.error().message;
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(sequence->timestamps_s()[i], static_cast<double>(i) / rate_hz, 1e-9);
+    }
+    const double step_m = sequence->ground_truth()->at(3).translation.norm() / 3.0;
+    EXPECT_NEAR(step_m, 0.2, 0.05);
+  };
+  ASSERT_TRUE(render_synthetic_drive(root_ / "own", options));
+  expect_times("own", 30.0);
+  options.speed_m_s.reset();
+  options.rate_hz = 5.0;
+  options.trajectory = root_ / "own" / "poses" / "00.txt";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "along", options));
+  expect_times("along", 5.0);
+}
+
+TEST_F(SyntheticDriveTest, WalkIsASequenceWithACameraFile) {
+  SyntheticDriveOptions options = small(3);
+  options.walk = true;
+  options.width_px = 80;
+  options.height_px = 60;
+  const fs::path folder = root_ / "out" / "sequences" / "00";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
+  const auto sequence = KittiSequence::open(folder);
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 3U);
+  EXPECT_DOUBLE_EQ(sequence->camera().fx_px, 585.0 / 8);
+  EXPECT_DOUBLE_EQ(sequence->camera().cx_px, 40.0);
+  EXPECT_NEAR(sequence->timestamps_s()[2], 2.0 / 30.0, 1e-9);
+  EXPECT_EQ(bytes_of(folder / "camera.yaml"),
+            "image_width: 80\nimage_height: 60\ncamera_model: pinhole\n"
+            "intrinsics: [73.125, 73.125, 40, 30]\n"
+            "distortion_model: none\ndistortion_coefficients: []\nrate_hz: 30\n");
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  EXPECT_FALSE(fs::exists(folder / "camera.yaml")) << "of the walk that was there before";
+}
+
+TEST_F(SyntheticDriveTest, ContradictionsAreOneLine) {
+  const auto message = [&](const SyntheticDriveOptions& options) {
+    const Status status = render_synthetic_drive(root_ / "out", options);
+    return status ? std::string("(done)") : status.error().message;
+  };
+  SyntheticDriveOptions options = small(1);
+  options.trajectory = root_ / "given.txt";
+  options.walk = true;
+  EXPECT_THAT(message(options), HasSubstr("a trajectory or a walk, found both"));
+  options.walk = false;
+  options.speed_m_s = 5.0;
+  EXPECT_THAT(message(options), HasSubstr("a trajectory or a speed, found both"));
+  options = small(1);
+  options.rate_hz = 0.0;
+  EXPECT_THAT(message(options), HasSubstr("rate from 1 to 1000, found 0"));
+  options.rate_hz = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(message(options), HasSubstr("rate from 1 to 1000, found nan"));
+  options = small(1);
+  options.speed_m_s = 61.0;
+  EXPECT_THAT(message(options), HasSubstr("speed from 0.1 to 60, found 61"));
+  options.walk = true;
+  options.speed_m_s = 2.0;
+  EXPECT_THAT(message(options), HasSubstr("speed from 0.1 to 1, found 2"));
+  options = small(1000000);
+  options.rate_hz = 1.0;
+  options.speed_m_s = 60.0;
+  EXPECT_THAT(message(options), HasSubstr("at most 2000 km"));
+  EXPECT_FALSE(fs::exists(root_ / "out"));
+}
+
+TEST_F(SyntheticDriveTest, BadInputIsOneLine) {
+  const auto message = [&](const SyntheticDriveOptions& options, const fs::path& out) {
+    const Status status = render_synthetic_drive(out, options);
+    return status ? std::string("(done)") : status.error().message;
+  };
+  SyntheticDriveOptions options = small(1);
+  options.width_px = 0;
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("width from 16 to 8192, found 0"));
+  options = small(1);
+  options.height_px = -4;
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("height"));
+  EXPECT_THAT(message(small(0), root_ / "out"), HasSubstr("frames from 1"));
+  options = small(1);
+  options.trajectory = root_ / "absent.txt";
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("absent.txt"));
+  std::ofstream(root_ / "broken.txt") << "1 0 0 0 0 1 0 0 0 0 1\n";
+  options.trajectory = root_ / "broken.txt";
+  EXPECT_THAT(message(options, root_ / "out"), HasSubstr("broken.txt:1"));
+  EXPECT_FALSE(fs::exists(root_ / "out")) << "nothing is written before the input is sound";
+  std::ofstream(root_ / "file") << "x";
+  EXPECT_THAT(message(small(1), root_ / "file"), HasSubstr((root_ / "file").string()));
+}
+
+}  // namespace
+}  // namespace stemvo

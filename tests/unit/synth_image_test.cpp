@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "geometry/median.hpp"
+#include "synth/basics.hpp"
+#include "synth/materials.hpp"
+#include "synth/renderer.hpp"
+
+namespace stemvo::synth {
+namespace {
+
+Camera kitti_camera(double scale) {
+  Camera camera;
+  camera.fx_px = camera.fy_px = 718.856 * scale;
+  camera.cx_px = 607.1928 * scale;
+  camera.cy_px = 185.2157 * scale;
+  camera.width_px = static_cast<int>(1241 * scale);
+  camera.height_px = static_cast<int>(376 * scale);
+  return camera;
+}
+
+cv::Mat gray_of(const RenderedFrame& frame) {
+  cv::Mat gray;
+  cv::cvtColor(frame.bgr, gray, cv::COLOR_BGR2GRAY);
+  return gray;
+}
+
+/// Where the pixels of frame a are in frame b, by depth and poses; outside where they are hidden.
+cv::Mat predict(const RenderedFrame& a,
+                const RenderedFrame& b,
+                const Rigid3& b_from_a,
+                const Camera& camera) {
+  cv::Mat map(a.depth_m.size(), CV_32FC2);
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const double z = std::min(static_cast<double>(a.depth_m.at<float>(y, x)), 1e7);
+      const Eigen::Vector2d ray = camera.normalize({x, y});
+      const Eigen::Vector3d in_b = b_from_a * Eigen::Vector3d(ray.x() * z, ray.y() * z, z);
+      const Eigen::Vector2d to = camera.project(in_b);
+      const cv::Point at(static_cast<int>(std::lround(to.x())),
+                         static_cast<int>(std::lround(to.y())));
+      const bool inside = in_b.z() > 0.2 && cv::Rect({0, 0}, map.size()).contains(at);
+      const double seen = inside ? static_cast<double>(b.depth_m.at<float>(at)) : 0.0;
+      const bool visible = inside && std::abs(std::min(seen, 1e7) / in_b.z() - 1.0) < 0.05;
+      map.at<cv::Vec2f>(y, x) =
+          visible ? cv::Vec2f(static_cast<float>(to.x()), static_cast<float>(to.y()))
+                  : cv::Vec2f(-100.0F, -100.0F);
+    }
+  }
+  return map;
+}
+
+/// What tracking finds between frames and their successors warped on to them, in pixels.
+struct Offsets {
+  std::vector<double> dx;
+  std::vector<double> dy;
+  std::vector<double> length;
+
+  void add(const Renderer& renderer, std::size_t i, const Camera& camera) {
+    const RenderedFrame a = renderer.render(i);
+    const RenderedFrame b = renderer.render(i + 1);
+    const auto& poses = renderer.world_from_camera();
+    const cv::Mat map = predict(a, b, poses[i + 1].inverse() * poses[i], camera);
+    cv::Mat warped;
+    cv::remap(gray_of(b), warped, map, {}, cv::INTER_CUBIC);
+    std::vector<cv::Mat> xy;
+    cv::split(map, xy);
+    cv::Mat usable = xy[0] > -50.0F;
+    cv::copyMakeBorder(usable, usable, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
+    cv::erode(usable, usable, cv::Mat::ones(17, 17, CV_8U));
+    usable = usable(cv::Rect({1, 1}, map.size())).clone();
+    std::vector<cv::Point2f> from;
+    std::vector<cv::Point2f> to;
+    std::vector<uchar> found;
+    std::vector<float> residual;
+    cv::goodFeaturesToTrack(gray_of(a), from, 800, 0.002, 5.0, usable);
+    cv::calcOpticalFlowPyrLK(gray_of(a), warped, from, to, found, residual, {15, 15}, 0);
+    for (std::size_t k = 0; k < from.size(); ++k) {
+      if (found[k] != 0U) {
+        dx.push_back(static_cast<double>(to[k].x - from[k].x));
+        dy.push_back(static_cast<double>(to[k].y - from[k].y));
+        length.push_back(std::hypot(dx.back(), dy.back()));
+      }
+    }
+  }
+
+  /// Depth and poses are exact: there is no motion left, not even a hundredth of a pixel.
+  void expect_none() const {
+    EXPECT_LE(median(length), 0.1);
+    EXPECT_LE(std::abs(median(dx)), 0.01);
+    EXPECT_LE(std::abs(median(dy)), 0.01);
+  }
+};
+
+TEST(SyntheticImage, DepthAndPosesPredictTheNextFrame) {
+  const Camera camera = kitti_camera(0.5);
+  const Renderer renderer(make_own_drive(30, 3), camera, 3);
+  Offsets offsets;
+  for (const std::size_t i : {0U, 14U, 28U}) {
+    offsets.add(renderer, i, camera);
+  }
+  ASSERT_GT(offsets.length.size(), 600U);
+  offsets.expect_none();
+}
+
+Camera hand_camera() {
+  Camera camera;
+  camera.fx_px = camera.fy_px = 585.0;
+  camera.cx_px = 320.0;
+  camera.cy_px = 240.0;
+  camera.width_px = 640;
+  camera.height_px = 480;
+  return camera;
+}
+
+/// Walking, looking aside, turning on the spot: surfaces are 0.6 to 6 m away.
+TEST(SyntheticImage, DepthAndPosesPredictTheNextFrameOfAWalk) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
+    Offsets offsets;
+    for (std::size_t i = 10; i < 600; i += 97) {
+      offsets.add(renderer, i, hand_camera());
+    }
+    ASSERT_GT(offsets.length.size(), 2000U);
+    offsets.expect_none();
+  }
+}
+
+TEST(SyntheticImage, CourtyardIsNearAndRichInTexture) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
+    std::vector<double> counts;
+    std::vector<double> depths_m;
+    for (std::size_t i = 5; i < 600; i += 45) {
+      const RenderedFrame frame = renderer.render(i);
+      const cv::Mat gray = gray_of(frame);
+      std::vector<cv::Point2f> corners;
+      cv::goodFeaturesToTrack(gray, corners, 3000, 0.005, 8.0);
+      counts.push_back(static_cast<double>(corners.size()));
+      for (const cv::Point2f& corner : corners) {
+        depths_m.push_back(static_cast<double>(frame.depth_m.at<float>(corner)));
+      }
+      EXPECT_GT(corners.size(), 250U) << "seed " << seed << ", frame " << i;
+      const double mean = cv::mean(gray)[0];
+      EXPECT_GT(mean, 45.0) << "seed " << seed << ", frame " << i;
+      EXPECT_LT(mean, 170.0) << "seed " << seed << ", frame " << i;
+    }
+    EXPECT_GT(median(counts), 700.0);
+    std::sort(depths_m.begin(), depths_m.end());
+    EXPECT_LT(depths_m[depths_m.size() / 2], 4.0);
+    EXPECT_LT(depths_m[depths_m.size() / 10], 2.6);
+    EXPECT_LT(depths_m[depths_m.size() * 9 / 10], 7.0);
+  }
+}
+
+/// Deviation of the image between blurs of 1 and 8 px over part of the lane before the car.
+double road_contrast(const cv::Mat& gray, double from_row) {
+  cv::Mat image;
+  cv::Mat fine;
+  cv::Mat coarse;
+  gray.convertTo(image, CV_32F);
+  cv::GaussianBlur(image, fine, {}, 1.0);
+  cv::GaussianBlur(image, coarse, {}, 8.0);
+  const double w = gray.cols;
+  const double h = gray.rows;
+  const auto at = [](double x, double y) {
+    return cv::Point(static_cast<int>(std::lround(x)), static_cast<int>(std::lround(y)));
+  };
+  const std::vector<cv::Point> trapezoid = {at(0.36 * w, h), at(0.64 * w, h),
+                                            at(0.55 * w, 0.62 * h), at(0.45 * w, 0.62 * h)};
+  cv::Mat mask = cv::Mat::zeros(gray.size(), CV_8U);
+  cv::fillConvexPoly(mask, trapezoid, 255);
+  mask.rowRange(0, static_cast<int>(from_row * h)).setTo(0);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(fine - coarse, mean, deviation, mask);
+  return deviation[0];
+}
+
+/// Gray levels, medians over clip 06 (straight, real), as docs/synthetic_drives.md says.
+constexpr double kRealContrast = 7.50;
+constexpr double kRealContrastNear = 5.69;  // below 80 % of the height
+
+TEST(SyntheticImage, RoadHasNoMoreContrastThanARealOne) {
+  Trajectory straight;
+  for (int i = 0; i < 40; ++i) {
+    straight.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0, 0.0, 1.1 * i));
+  }
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const Renderer renderer(make_drive_along(straight), kitti_camera(1.0), seed);
+    const cv::Mat gray = gray_of(renderer.render(5 * seed));
+    EXPECT_LE(road_contrast(gray, 0.0), kRealContrast);
+    EXPECT_LE(road_contrast(gray, 0.8), kRealContrastNear);
+    EXPECT_GE(road_contrast(gray, 0.0), 0.4 * kRealContrast) << "a road without texture";
+  }
+}
+
+TEST(SyntheticImage, HasAsManyCornersAndEdgesAsAStreet) {
+  const Renderer renderer(make_own_drive(60, 1), kitti_camera(1.0), 1);
+  for (const std::size_t index : {0U, 45U}) {
+    const cv::Mat gray = gray_of(renderer.render(index));
+    std::vector<cv::Point2f> corners;
+    cv::goodFeaturesToTrack(gray, corners, 3000, 0.005, 8.0);
+    EXPECT_GT(corners.size(), 700U);
+    EXPECT_LT(corners.size(), 3000U);
+    const double mean = cv::mean(gray)[0];
+    EXPECT_GT(mean, 55.0);
+    EXPECT_LT(mean, 130.0);
+  }
+}
+
+TEST(SyntheticImage, BarsAreAveragedOverAnyFootprint) {
+  EXPECT_FLOAT_EQ(bars_coverage(0.05F, 0.01F, 1.0F, 0.1F), 1.0F);
+  EXPECT_FLOAT_EQ(bars_coverage(0.5F, 0.01F, 1.0F, 0.1F), 0.0F);
+  EXPECT_NEAR(bars_coverage(0.1F, 0.1F, 1.0F, 0.1F), 0.5F, 1e-5F);
+  EXPECT_NEAR(bars_coverage(123.3F, 50.0F, 1.0F, 0.1F), 0.1F, 2e-3F);
+  EXPECT_NEAR(bars_coverage(-3.95F, 0.05F, 1.0F, 0.1F), 1.0F, 1e-3F);
+  EXPECT_NEAR(box_coverage(1.0F, 2.0F, 1.0F, 9.0F), 0.5F, 1e-6F);
+}
+
+/// A wide sample must be the mean of many narrow ones, and the tile must have no seam.
+TEST(SyntheticImage, RipmapIsTheMeanOverItsFootprint) {
+  const Ripmap tile(octave_noise(5, {1.0, 1.0, 1.0}));
+  double mean = 0.0;
+  for (int i = 0; i < 256; ++i) {
+    mean +=
+        static_cast<double>(tile.sample(512.0F + static_cast<float>(i) + 0.5F, 16.5F, 1.0F, 1.0F)) /
+        256.0;
+  }
+  EXPECT_NEAR(static_cast<double>(tile.sample(640.0F, 16.5F, 256.0F, 1.0F)), mean, 1e-4);
+  constexpr auto kSize = static_cast<float>(Ripmap::kSize);
+  EXPECT_NEAR(tile.sample(3.25F, 7.5F, 2.0F, 5.0F),
+              tile.sample(3.25F - kSize, 7.5F + kSize, 2.0F, 5.0F), 1e-5F);
+  EXPECT_NEAR(tile.sample(-0.01F, 9.0F, 1.0F, 1.0F), tile.sample(0.01F, 9.0F, 1.0F, 1.0F), 0.2F);
+  EXPECT_NEAR(tile.sample(77.0F, 9.0F, 1e6F, 1e6F), 0.0F, 1e-3F);
+}
+
+}  // namespace
+}  // namespace stemvo::synth
