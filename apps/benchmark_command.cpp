@@ -20,7 +20,8 @@ namespace {
 constexpr const char* kFooter =
     R"(KITTI_ROOT holds sequences/NN (as 'stemvo run' takes them) and poses/NN.txt. Each sequence runs with
 the default configuration and the paper's, each with metres from the camera's height (no ground
-truth, no alignment) and with true steps (the paper's protocol).
+truth, no alignment) and with per-step ground-truth scale (the paper's
+protocol).
 
 --out receives benchmark.md and benchmark.json, a figure NN.png per sequence, speed.json, and all files
 of every run under runs/. The paper's and other published numbers stand beside a sequence where all of

@@ -9,7 +9,7 @@ import subprocess
 
 from sequence import frame_range
 
-TRUE_STEPS, ROAD = "true steps", "metres from the road"
+PER_STEP, ROAD = "per-step ground-truth scale", "metres from the road"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,10 +47,10 @@ def error_percent(contest, row):
 def lengths(contest, row):
     """Where the lengths of the row's steps come from: of stemvo's, what the run itself says (`scale_source`)."""
     if row.is_peer:
-        return TRUE_STEPS if contest.truth.exists() else "every step 1"
+        return PER_STEP if contest.truth.exists() else "every step 1"
     metrics = contest.out(row) / "metrics.json"
     source = json.loads(metrics.read_text(encoding="utf-8")).get("scale_source") if metrics.exists() else None
-    return {"camera_height": ROAD, "ground_truth": TRUE_STEPS, None: "unknown"}.get(source, source)
+    return {"camera_height": ROAD, "ground_truth": PER_STEP, None: "unknown"}.get(source, source)
 
 
 def result(contest, row, reference):

@@ -20,7 +20,7 @@ def table(results):
 def page(facts, results):
     """Everything that is printed: the machine, the table, how to read it."""
     lines = [f"{key}: {value}" for key, value in facts.items()]
-    lines += ["", table(results), "", "median and range of the rounds; whole processes; t_rel: stemvo with metres from the road, opencv orb with true steps"]
+    lines += ["", table(results), "", "median and range of the rounds; whole processes; t_rel: stemvo with metres from the road, opencv orb with per-step ground-truth scale"]
     if facts["busy"]:
         lines.append(f"BUSY MACHINE: load average {facts['load_before']:.2f} before the start, more than {BUSY_LOAD_PER_CORE} per core used: "
                      "frames/s and times are of a busy machine; compare CPU ms/frame")

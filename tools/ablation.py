@@ -4,7 +4,7 @@
 
     tools/ablation.py KITTI_ROOT --out docs/accuracy.md [--sequences 03,00,06] [--seeds 1,2,3]
 
-KITTI_ROOT holds sequences/NN and poses/NN.txt. Two tables: with true steps (each step takes its true
+KITTI_ROOT holds sequences/NN and poses/NN.txt. Two tables: with per-step ground-truth scale (each step takes its true
 length, so that direction and rotation are judged) and with metres from the camera's height (no ground
 truth). Nothing is aligned. "Together" pools the segments of all sequences. With more than one seed of
 the random numbers the means are shown. Where FILE has the lines `<!-- ablation -->` and
@@ -24,7 +24,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BEGIN, END = "<!-- ablation -->", "<!-- end of ablation -->"
 PROTOCOLS = {
-    "ground_truth": "True steps (`scale.source=ground_truth`)",
+    "ground_truth": "Per-step ground-truth scale (`scale.source=ground_truth`)",
     "camera_height": "Metres from the camera's height (`scale.source=camera_height`), no ground truth",
 }
 
@@ -33,7 +33,7 @@ PROTOCOLS = {
 class Row:
     heading: str
     settings: tuple = ()  # of --set
-    protocols: tuple = tuple(PROTOCOLS)  # the road plays no part with true steps
+    protocols: tuple = tuple(PROTOCOLS)  # the road plays no part with per-step ground-truth scale
 
 
 ROAD = ("camera_height",)

@@ -18,7 +18,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 GRAY = ["--set", "stem.model=gray"]
-PROTOCOLS = {"ground_truth": "true steps", "camera_height": "camera height"}
+PROTOCOLS = {"ground_truth": "per-step ground-truth scale", "camera_height": "camera height"}
 
 
 def configurations(efficientnet):
@@ -71,7 +71,7 @@ def print_table(arguments, protocol, title):
             null[name] = results[-1]["null_offset_m"]
         speed = sum(m["frames"] for m in results) / sum(m["frames"] / m["fps"] for m in results)
         print(f"| {heading} | " + " | ".join(cell(m) for m in results) + f" | {speed:.0f} |", flush=True)
-    print("| never moving | " + " | ".join(f"- / - / {null[name]:.2f}" for name in sequences) + " | |\n", flush=True)
+    print("| zero motion | " + " | ".join(f"- / - / {null[name]:.2f}" for name in sequences) + " | |\n", flush=True)
 
 
 def main():

@@ -20,8 +20,8 @@ constexpr std::string_view kHead =
 
 stemvo {}. t_rel in %, r_rel in degrees per 100 m (KITTI devkit), offset in m (mean of |dx| + |dz|). Nothing is aligned, except in the
 column ATE (root mean square position error in m after Sim(3)) and where a published row says so. *Camera height*: metres from the road and the
-camera's height above it, no ground truth. *True steps*: each step takes its true length (the paper's protocol), so direction and rotation are
-judged, scale is not. *Never moving*: what a trajectory scores that stays at the start.
+camera's height above it, no ground truth. *Per-step ground-truth scale*: each step takes its true length (the paper's protocol), so direction and rotation are
+judged, scale is not. *Zero motion*: what a trajectory scores that stays at the start.
 )";
 
 /// Names come from folders: nothing in them may end a cell or a line.
@@ -70,7 +70,7 @@ std::string short_cell(const Json& run) {
 
 std::string overview(const Json& report) {
   std::vector<std::vector<std::string>> rows = {{""}, {"t_rel / r_rel / offset"}};
-  std::vector<std::string> baseline = {"never moving"};
+  std::vector<std::string> baseline = {"zero motion"};
   for (const Json& sequence : report["sequences"]) {
     if (!sequence["problem"].is_null()) {
       continue;
@@ -143,7 +143,7 @@ std::string section(const Json& sequence) {
   }
   if (any != runs.end()) {
     text +=
-        row({"never moving", "-", "none", "-", "-", number((*any)["null_offset_m"], 2), "-", ""});
+        row({"zero motion", "-", "none", "-", "-", number((*any)["null_offset_m"], 2), "-", ""});
   }
   for (const Json& numbers : sequence["published"]) {
     text += published_row(numbers);
@@ -157,7 +157,7 @@ std::string section(const Json& sequence) {
 }  // namespace
 
 std::string_view words_for(const Json& scale_source) {
-  return scale_source == "camera_height" ? "camera height" : "true steps";
+  return scale_source == "camera_height" ? "camera height" : "per-step ground-truth scale";
 }
 
 std::string describe_frames(const Json& sequence) {

@@ -8,7 +8,7 @@
 
 namespace stemvo::benchmark {
 
-/// For people: "camera height", "true steps".
+/// For people: "camera height", "per-step ground-truth scale".
 [[nodiscard]] std::string_view words_for(const nlohmann::ordered_json& scale_source);
 
 /// "all 4541 frames", "clip 0:200 of 4541", "frames 0:60".

@@ -8,7 +8,7 @@
 
 #include "evaluation/metrics.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/timing/timing_report.hpp"
+#include "timing/timing_report.hpp"
 
 namespace stemvo {
 

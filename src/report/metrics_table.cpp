@@ -56,7 +56,7 @@ std::string error_table(const MetricsReport& report) {
              "the same segments"});
   table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
              "mean of |dx| + |dz|"});
-  table.add({"  if it never moved", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
+  table.add({"  of zero motion", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
              "the same for a camera that stays at the start"});
   for (const auto& [alignment, note] :
        {std::pair(Alignment::kNone, "root mean square position error"),

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stemvo/timing/timing_report.hpp"
+#include "timing/timing_report.hpp"
 
 namespace stemvo {
 

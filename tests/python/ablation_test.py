@@ -63,7 +63,7 @@ class Command(unittest.TestCase):
             for line in found:
                 told = any(problem.startswith(f"Not possible: {row.heading}") for problem in lines)
                 self.assertTrue(told or " / " in line, line)
-        # What every build can do: the defaults with true steps.
+        # What every build can do: the defaults with per-step ground-truth scale.
         self.assertIn(" / ", next(line for line in lines if line.startswith("| the defaults")))
 
     def test_a_sequence_that_is_not_there_is_wrong_usage(self):

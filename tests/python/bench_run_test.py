@@ -232,7 +232,7 @@ class TinyDrive(unittest.TestCase):
         peer = json.loads((self.folder / "a.json").read_text())["rows"][1]
         self.assertLess(peer["t_rel_percent"], 25, "a wrong direction or composition is far above")
         self.assertGreater(peer["t_rel_percent"], 0)
-        self.assertEqual(peer["t_rel_lengths"], "true steps")
+        self.assertEqual(peer["t_rel_lengths"], "per-step ground-truth scale")
         with self.subTest("without ground truth every step is 1 long"):
             out = self.folder / "unit.txt"
             subprocess.run([places.PEER_PYTHON, places.PEER, self.sequence, "--out", out, "--frames", "0:4"], check=True)

@@ -101,7 +101,7 @@ TEST_F(BadInput, Poses) {
   replace_line(poses, 4, "1 0 0 x 0 1 0 0 0 0 1 0");
   expect_error(run(), 1, {"00.txt:4:", "x"});
   write_file(poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
-  expect_error(run(), 1, {"00.txt", "9", "2"});
+  expect_error(run(), 1, {"00.txt", "each of 10 images", "found 2"});
   expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
   fs::remove(poses);
   expect_error(run({"--set", "scale.source=ground_truth"}), 1,
@@ -131,8 +131,11 @@ TEST_F(BadInput, ModelOtherThanTheManifestSays) {
   fs::copy(models / "manifest.yaml", folder_.path() / "manifest.yaml");
   fs::copy(models / "default.onnx", folder_.path() / "default.onnx");
   fs::resize_file(folder_.path() / "default.onnx", 1000);
-  expect_error(run({"--set", "stem.model=" + (folder_ / "default.onnx")}), 1,
-               {"default.onnx", "expected", "found"});
+  const std::string model = "stem.model=" + (folder_ / "default.onnx");
+  expect_error(run({"--set", model, "--set", "stem.filter=3"}), 1,
+               {"default.onnx", "expected sha256", "found"});
+  // Filter 2 has a file of its own, which alone is loaded.
+  expect_error(run({"--set", model}), 1, {"default_filter_2.onnx", "cannot read"});
 }
 
 TEST_F(BadInput, Configuration) {

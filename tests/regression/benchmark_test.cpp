@@ -68,8 +68,8 @@ TEST_F(Benchmark, DefaultsBeatThePaperAndThePublishedStayAway) {
   ASSERT_EQ(runs.size(), 4U);
   const auto offset = [&](std::size_t i) { return runs[i]["average_offset_m"].get<double>(); };
   const double null_offset = json["sequences"][0]["never_moving"]["average_offset_m"].get<double>();
-  EXPECT_LT(offset(1), 0.1 * null_offset);  // the defaults, true steps
-  EXPECT_LT(offset(1), offset(3));          // the paper's recipe, true steps
+  EXPECT_LT(offset(1), 0.1 * null_offset);  // the defaults, per-step ground-truth scale
+  EXPECT_LT(offset(1), offset(3));          // the paper's recipe, per-step ground-truth scale
   // A drive of that name is not KITTI's sequence.
   EXPECT_THAT(reports("out"), AllOf(HasSubstr("clip 0:30 of 4541"), Not(HasSubstr("476.4"))));
 }

@@ -63,10 +63,10 @@ TEST(BenchmarkReport, RowsHoldTheirNumbersAndTheBaseline) {
   EXPECT_THAT(text, HasSubstr("stemvo 0.1.0+abc. "));
   EXPECT_THAT(text, HasSubstr("clip 0:200 of 4541, 3724 m; 12 segments of 100..800 m.\n"));
   EXPECT_THAT(text, HasSubstr("| default, camera height | 1.17 / 0.25 / 7.25 |\n"));
-  EXPECT_THAT(text, HasSubstr("| paper, true steps | 94.04 / 0.25 / 7.25 |\n"));
-  EXPECT_THAT(text, HasSubstr("| never moving | - / - / 345.50 |\n"));
+  EXPECT_THAT(text, HasSubstr("| paper, per-step ground-truth scale | 94.04 / 0.25 / 7.25 |\n"));
+  EXPECT_THAT(text, HasSubstr("| zero motion | - / - / 345.50 |\n"));
   EXPECT_THAT(text, HasSubstr("| default | camera height | none | 1.17 | 0.254 | 7.25 |"));
-  EXPECT_THAT(text, HasSubstr("| never moving | - | none | - | - | 345.50 | - |  |\n"));
+  EXPECT_THAT(text, HasSubstr("| zero motion | - | none | - | - | 345.50 | - |  |\n"));
   EXPECT_THAT(text, HasSubstr("Published numbers are of all official frames"));
 }
 
