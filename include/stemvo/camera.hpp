@@ -5,6 +5,9 @@
 
 namespace stemvo {
 
+/// What OpenCV's maps of pixels hold.
+inline constexpr int kMaxImageSide_px = 32767;
+
 /// Pinhole camera without distortion (KITTI is rectified). Pixels: the centre of the top-left pixel
 /// is (0, 0). Camera axes: x right, y down, z forward.
 struct Camera {

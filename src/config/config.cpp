@@ -2,15 +2,11 @@
 #include "config/config.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -19,8 +15,6 @@ using options::Field;
 
 /// Those of the library, and the program's own before and after them.
 std::vector<Field> fields_of(Config& config) {
-  options::Rule cameras;
-  cameras.choices = {"auto", "image_0", "image_1", "image_2", "image_3"};
   options::Rule positive;
   positive.min = 0.0;
   positive.exclusive_min = true;
@@ -41,21 +35,8 @@ std::vector<Field> fields_of(Config& config) {
   return fields;
 }
 
-Expected<std::string> read_text(const std::filesystem::path& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error)) {
-    return fail(fmt::format("{}: expected a configuration file, found a folder", file.string()));
-  }
-  std::ifstream in(file, std::ios::binary);
-  if (!in) {
-    return fail(fmt::format("{}: expected a configuration file, found none that can be read ({})",
-                            file.string(), std::strerror(errno)));
-  }
-  return std::string(std::istreambuf_iterator<char>(in), {});
-}
-
 Expected<YAML::Node> read_yaml(const std::filesystem::path& file) {
-  return read_text(file).and_then(
+  return read_text_file(file).and_then(
       [&](const std::string& text) { return config::parse_document(text, file.string()); });
 }
 
@@ -129,12 +110,8 @@ Status apply_override(Config& config, const std::string& assignment) {
 
 Status validate(const Config& config) {
   Config copy = config;
-  for (const Field& field : fields_of(copy)) {
-    if (const std::string problem = options::violation_of(field); !problem.empty()) {
-      return fail(field.name() + ": " + problem);
-    }
-  }
-  return validate(static_cast<const Options&>(config));
+  const Status status = options::check(fields_of(copy));
+  return status ? validate(static_cast<const Options&>(config)) : status;
 }
 
 std::string dump_config(const Config& config) {

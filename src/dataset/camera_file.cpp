@@ -41,7 +41,7 @@ struct Values {
     model.choices = {"pinhole"};
     options::Rule distortion;
     distortion.choices = {"none", "radial-tangential", "radtan", "equidistant"};
-    const options::Rule side = between(1.0, 32767.0);  // what OpenCV's maps hold
+    const options::Rule side = between(1.0, kMaxImageSide_px);
     return {{"", "image_width", &width_px, side, ""},
             {"", "image_height", &height_px, side, ""},
             {"", "resolution", &resolution, side, ""},

@@ -11,7 +11,7 @@
 #include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
-#include "stem/model_file.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -288,7 +288,7 @@ Expected<YAML::Node> models_of(const std::filesystem::path& file, const std::str
 }  // namespace
 
 Expected<std::vector<ModelEntry>> load_manifest(const std::filesystem::path& file) {
-  const auto text = internal::read_bytes(file);
+  const auto text = read_text_file(file);
   if (!text) {
     return text.error();
   }

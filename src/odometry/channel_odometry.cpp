@@ -33,14 +33,8 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera)
   }
 }
 
-FrameResult ChannelOdometry::process(const Channel& channel, const cv::Mat& frame) {
-  track(prepare(channel, frame));
-  localize();
-  return optimize();
-}
-
-FrameResult ChannelOdometry::process_missing() {
-  track({});
+FrameResult ChannelOdometry::process(PreparedFrame frame) {
+  track(std::move(frame));
   localize();
   return optimize();
 }

@@ -35,17 +35,16 @@ class ChannelOdometry {
   /// For valid options; `options.stem` gives the stretch only.
   ChannelOdometry(const Options& options, const Camera& camera);
 
-  /// The next frame's channel; `frame`, of the camera's size, is where landmarks get their colour.
-  /// `times.stem_ms` of the result is the stretch's alone.
-  FrameResult process(const Channel& channel, const cv::Mat& frame);
-  /// A frame without a channel: the last motion goes on.
-  FrameResult process_missing();
-
-  /// The phases of process(), as in PhasedOdometry.
+  /// The phases, as in PhasedOdometry. `frame`, of the camera's size, is where landmarks get their
+  /// colour; `stem_ms` is the stretch's alone.
   [[nodiscard]] PreparedFrame prepare(const Channel& channel, const cv::Mat& frame);
   void track(PreparedFrame frame);
   void localize();
   FrameResult optimize();
+
+  /// The last three for one frame; one without an image stands for a frame that could not be read:
+  /// the last motion goes on.
+  FrameResult process(PreparedFrame frame);
 
   /// Of all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }

@@ -12,14 +12,12 @@
 namespace stemvo {
 namespace {
 
-constexpr int kMaxSide_px = 32768;
-
 /// Written so that NaN fails.
 Status check_camera(const Camera& camera) {
-  const auto is_side = [](int pixels) { return pixels > 0 && pixels <= kMaxSide_px; };
+  const auto is_side = [](int pixels) { return pixels > 0 && pixels <= kMaxImageSide_px; };
   if (!is_side(camera.width_px) || !is_side(camera.height_px)) {
     return fail(fmt::format("camera: expected a size of 1 to {} pixels a side, found {}x{}",
-                            kMaxSide_px, camera.width_px, camera.height_px));
+                            kMaxImageSide_px, camera.width_px, camera.height_px));
   }
   if (!(camera.fx_px > 0.0 && camera.fy_px > 0.0 && std::isfinite(camera.fx_px) &&
         std::isfinite(camera.fy_px))) {

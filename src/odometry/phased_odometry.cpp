@@ -41,10 +41,4 @@ PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
   return prepared;
 }
 
-FrameResult PhasedOdometry::process(PreparedFrame frame) {
-  track(std::move(frame));
-  localize();
-  return optimize();
-}
-
 }  // namespace stemvo

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <utility>
+
 #include <opencv2/core.hpp>
 
 #include "odometry/channel_odometry.hpp"
@@ -31,8 +33,10 @@ class PhasedOdometry {
   /// frame, in another thread.
   [[nodiscard]] FrameResult optimize() { return channel_odometry_.optimize(); }
 
-  /// All four for one frame; one without an image stands for a frame that could not be read.
-  [[nodiscard]] FrameResult process(PreparedFrame frame);
+  /// The last three for one frame, as ChannelOdometry::process.
+  [[nodiscard]] FrameResult process(PreparedFrame frame) {
+    return channel_odometry_.process(std::move(frame));
+  }
 
   /// Of the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }

@@ -257,16 +257,23 @@ std::string violation_of(const Field& field) {
       field.value);
 }
 
+Status check(const std::vector<Field>& fields) {
+  for (const Field& field : fields) {
+    if (const std::string problem = violation_of(field); !problem.empty()) {
+      return fail(field.name() + ": " + problem);
+    }
+  }
+  return {};
+}
+
 }  // namespace stemvo::options
 
 namespace stemvo {
 
 Status validate(const Options& options) {
   Options copy = options;
-  for (const options::Field& field : options::fields_of(copy)) {
-    if (const std::string problem = options::violation_of(field); !problem.empty()) {
-      return fail(field.name() + ": " + problem);
-    }
+  if (Status status = options::check(options::fields_of(copy)); !status) {
+    return status;
   }
   if (!(options.stem.stretch_low_percent < options.stem.stretch_high_percent)) {
     return fail(fmt::format(

@@ -79,5 +79,7 @@ inline constexpr std::array<std::string_view, 3> kFeatureMethods{"klt", "orb", "
 [[nodiscard]] std::string not_a_choice(const Rule& rule, std::string_view text);
 /// Nothing, or what the rule expected and what the value is: "expected ..., found ...".
 [[nodiscard]] std::string violation_of(const Field& field);
+/// The first violation, with its key in front.
+[[nodiscard]] Status check(const std::vector<Field>& fields);
 
 }  // namespace stemvo::options

@@ -10,12 +10,12 @@
 #include "models/manifest.hpp"
 #include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using internal::read_bytes;
 using internal::sha256_hex;
 
 std::string sha256_of(const std::string& text) { return sha256_hex(text); }
@@ -26,7 +26,7 @@ Expected<std::string> program_identity() {
   if (text.find('+') != std::string::npos && !text.ends_with(".dirty")) {
     return text;
   }
-  return read_bytes("/proc/self/exe").map([&](const std::string& bytes) {
+  return read_text_file("/proc/self/exe").map([&](const std::string& bytes) {
     return text + " " + sha256_hex(bytes);
   });
 }
@@ -50,7 +50,7 @@ std::string size_of(const fs::path& file) {
 }
 
 std::string hash_of(const fs::path& file) {
-  const auto bytes = read_bytes(file);
+  const auto bytes = read_text_file(file);
   return bytes ? sha256_hex(*bytes) : std::string("unreadable");
 }
 
@@ -67,7 +67,7 @@ std::string frames_identity(const KittiSequence& sequence, FrameIdentity identit
 Expected<std::string> files_identity(const std::vector<fs::path>& files) {
   std::string text;
   for (const fs::path& file : files) {
-    const auto bytes = read_bytes(file);
+    const auto bytes = read_text_file(file);
     if (!bytes) {
       return bytes.error();
     }

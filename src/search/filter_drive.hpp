@@ -21,10 +21,10 @@ class FilterDrive {
       : odometry_(config, camera), min_inliers_(config.odometry.min_inliers) {}
 
   void process(const Channel& channel, const cv::Mat& frame) {
-    count(odometry_.process(channel, frame));
+    count(odometry_.process(odometry_.prepare(channel, frame)));
   }
   /// No image, or a stem that refused it.
-  void process_missing() { count(odometry_.process_missing()); }
+  void process_missing() { count(odometry_.process({})); }
 
   [[nodiscard]] std::size_t num_frames() const { return odometry_.estimator().trajectory().size(); }
   /// Of the frames so far. The truth has at least as many poses (checked), the first the identity.

@@ -1,37 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "stem/model_file.hpp"
 
-#include <array>
-#include <cerrno>
-#include <fstream>
-#include <system_error>
-
 #include <fmt/format.h>
 
 #include "default_stem.hpp"
 #include "stem/sampling.hpp"
 #include "stem/window_check.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::internal {
-
-Expected<std::string> read_bytes(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return fail(fmt::format("{}: expected a file, found a folder", file.string()));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes;
-  std::array<char, 1 << 16> buffer;
-  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
-         stream.gcount() > 0) {
-    bytes.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  if (!stream.eof()) {  // not opened, or broken in the middle
-    return fail(
-        fmt::format("{}: cannot read: {}", file.string(), std::generic_category().message(errno)));
-  }
-  return bytes;
-}
 
 namespace {
 
@@ -40,7 +17,7 @@ constexpr const char* kBuiltIn = "built in";
 /// Of a file, or one that is part of the library.
 Expected<std::string> read_graph(const std::filesystem::path& file) {
   if (file.parent_path() != kBuiltIn) {
-    return read_bytes(file);
+    return read_text_file(file);
   }
   const auto bytes = [](const auto& data) { return std::string(data.begin(), data.end()); };
   return file.filename() == "default.onnx" ? bytes(kDefaultOnnx) : bytes(kDefaultFilterOnnx);
@@ -83,9 +60,10 @@ Expected<OnnxSession> open_model(const StemNetwork& network) {
   if (!bytes) {
     return bytes.error();
   }
-  if (const std::string hash = sha256_hex(*bytes);
-      !network.sha256.empty() && hash != network.sha256) {
-    return fail(fmt::format("{}: expected sha256 {}, found {}", file, network.sha256, hash));
+  if (!network.sha256.empty()) {
+    if (const std::string hash = sha256_hex(*bytes); hash != network.sha256) {
+      return fail(fmt::format("{}: expected sha256 {}, found {}", file, network.sha256, hash));
+    }
   }
   auto session = OnnxSession::create(file, *bytes, network.layer);
   if (!session) {

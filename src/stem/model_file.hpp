@@ -12,9 +12,6 @@
 
 namespace stemvo::internal {
 
-/// The whole of a file. Error: it cannot be read.
-[[nodiscard]] Expected<std::string> read_bytes(const std::filesystem::path& file);
-
 /// SHA-256 as 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 

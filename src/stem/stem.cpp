@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "stem/stem.hpp"
 
+#include <algorithm>
+#include <initializer_list>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -24,15 +27,13 @@ struct LoadedLayer {
 };
 
 /// -1 stands for the default. Error: outside the layer.
-Expected<int> choose_filter(const StemOptions& options, int num_filters, int default_filter) {
-  const int filter = options.filter == -1 ? default_filter : options.filter;
+Expected<int> choose_filter(int asked, const std::string& of, int num_filters, int default_filter) {
+  const int filter = asked == -1 ? default_filter : asked;
   if (filter >= 0 && filter < num_filters) {
     return filter;
   }
-  return fail(fmt::format(
-      "stem.filter: expected 0 to {} for {}, found {}", num_filters - 1,
-      options.layer == "first" ? options.model : options.model + " layer " + options.layer,
-      filter));
+  return fail(
+      fmt::format("stem.filter: expected 0 to {} for {}, found {}", num_filters - 1, of, filter));
 }
 
 /// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
@@ -99,10 +100,34 @@ Expected<std::unique_ptr<FilterLayer>> load_all(const StemNetwork& network, int 
   return internal::make_network_layer(network.file.string(), *std::move(session), plan);
 }
 
-/// Error: a name of no layer of our own, without a network.
+/// What a manifest would refuse: numbers that no convolution has.
+Status check_network(const StemNetwork& network) {
+  constexpr int kMax = 4096;  // no product of sizes overflows
+  const auto refuse = [&](const char* what, int min, int found) {
+    return fail(
+        fmt::format("{}: {}: expected {} to {}, found {}", network.name, what, min, kMax, found));
+  };
+  for (const auto& [what, min, found] : std::initializer_list<std::tuple<const char*, int, int>>{
+           {"filters", 1, network.num_filters},
+           {"kernel", 1, network.kernel_px[0]},
+           {"kernel", 1, network.kernel_px[1]},
+           {"stride", 1, network.stride_px},
+           {"padding", 0, *std::ranges::min_element(network.padding_px)},
+           {"padding", 0, *std::ranges::max_element(network.padding_px)},
+           {"default_filter", 0, network.default_filter},
+           {"folded sampling", 1, network.folded ? network.folded->sampling_px : 1}}) {
+    if (found < min || found > kMax) {
+      return refuse(what, min, found);
+    }
+  }
+  return {};
+}
+
+/// Error: a name of no layer of our own, without a network, or a network that is none.
 Expected<StemNetwork> network_of(const StemOptions& options) {
   if (options.network) {
-    return *options.network;
+    const Status status = check_network(*options.network);
+    return status ? Expected<StemNetwork>(*options.network) : status.error();
   }
   if (options.model == "default") {
     return internal::built_in_network();
@@ -121,12 +146,15 @@ Expected<LoadedLayer> load_network(const StemOptions& options, bool all_filters)
   if (!sampling) {
     return sampling.error();
   }
-  const auto filter = choose_filter(options, network->num_filters, network->default_filter);
+  const std::string label =
+      options.layer == "first" ? network->name : network->name + " layer " + options.layer;
+  const auto filter =
+      choose_filter(options.filter, label, network->num_filters, network->default_filter);
   if (!filter) {
     return filter.error();
   }
   LoadedLayer loaded;
-  loaded.info = {.model = options.model,
+  loaded.info = {.model = network->name,
                  .layer = network->layer,
                  .sha256 = network->sha256,
                  .filter = *filter,
@@ -163,7 +191,7 @@ Expected<LoadedLayer> load_layer(const StemOptions& options, bool all_filters) {
   LoadedLayer loaded;
   loaded.info.model = options.model;
   loaded.info.num_filters = is_gray ? 1 : 3;
-  const auto filter = choose_filter(options, loaded.info.num_filters, 0);
+  const auto filter = choose_filter(options.filter, options.model, loaded.info.num_filters, 0);
   if (!filter) {
     return filter.error();
   }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "text/text_file.hpp"
 
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include <fmt/core.h>
@@ -37,11 +37,13 @@ Expected<std::string> read_text_file(const fs::path& file) {
   }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) {
-    return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
+  std::string text;
+  std::array<char, 1 << 16> buffer;
+  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
+         stream.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) {
+  if (!stream.eof()) {  // not opened, or broken in the middle
     return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
   }
   return text;

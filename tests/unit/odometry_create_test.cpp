@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -85,6 +86,26 @@ TEST(OdometryCreate, AModelThatCannotTakeTheFramesIsAnErrorBeforeWork) {
               AllOf(HasSubstr("fixed_k4s4.onnx"), HasSubstr("found 1241x376")));
 }
 
+TEST(OdometryCreate, ANetworkThatIsNoConvolutionIsAnError) {
+  Options good;
+  good.stem = with_network({}, STEMVO_SOURCE_DIR "/models").value();
+  const auto message = [&](auto&& change) {
+    Options options = good;
+    change(*options.stem.network);
+    return error_of(options);
+  };
+  EXPECT_EQ(message([](StemNetwork&) {}), "no error");
+  EXPECT_EQ(message([](StemNetwork& n) { n.stride_px = 0; }),
+            "default: stride: expected 1 to 4096, found 0");
+  EXPECT_THAT(message([](StemNetwork& n) { n.kernel_px = {4, 0}; }), HasSubstr("kernel"));
+  EXPECT_THAT(message([](StemNetwork& n) { n.padding_px[2] = -1; }), HasSubstr("padding"));
+  EXPECT_THAT(message([](StemNetwork& n) { n.folded->sampling_px = 0; }), HasSubstr("folded"));
+  EXPECT_THAT(message([](StemNetwork& n) { n.default_filter = 16; }), HasSubstr("stem.filter"));
+  EXPECT_NE(message([](StemNetwork& n) { n.kernel_px = {4096, 4096}; }), "no error");
+  EXPECT_NE(message([](StemNetwork& n) { n.file = "/nowhere.onnx", n.folded.reset(); }),
+            "no error");
+}
+
 TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
   Camera camera = kCamera;
   camera.width_px = 3;
@@ -105,6 +126,25 @@ TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
   EXPECT_THAT(message(cv::Mat3b(96, 320), PixelOrder::kGray), HasSubstr("expected 1 channel of"));
   EXPECT_THAT(message(cv::Mat1w(96, 320), PixelOrder::kGray), HasSubstr("CV_16U"));
   EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb)->state, FrameState::kFirst);
+}
+
+TEST(OdometryProcess, TinyImagesAreTrackedOrNotButNothingThrows) {
+  for (const cv::Size size : {cv::Size(4, 4), {5, 9}, {12, 12}, {40, 6}, {7, 300}}) {
+    for (const FeatureMethod method :
+         {FeatureMethod::kKlt, FeatureMethod::kOrb, FeatureMethod::kSift}) {
+      Camera camera{50, 50, size.width / 2.0, size.height / 2.0, size.width, size.height};
+      Options options;
+      options.features.method = method;
+      auto odometry = Odometry::create(camera, options);
+      ASSERT_TRUE(odometry) << odometry.error().message;
+      for (int i = 0; i < 3; ++i) {
+        const cv::Mat image = image_at(i)(cv::Rect(0, 0, std::min(size.width, 320), 4));
+        cv::Mat tiny;
+        cv::resize(image, tiny, size);
+        EXPECT_TRUE(odometry->process(tiny, PixelOrder::kRgb)) << size;
+      }
+    }
+  }
 }
 
 TEST(OdometryProcess, BgrGivesTheChannelThatRgbGives) {
