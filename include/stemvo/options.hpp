@@ -39,8 +39,8 @@ struct StemNetwork {
   std::optional<FoldedFilter> folded;
 };
 
-/// Size of the image that points are tracked on. kAuto: kHalf for KLT on frames of 1000 columns and
-/// more, else kBicubic.
+/// Size of the image that points are tracked on. kAuto: kHalf for patches, and for KLT on frames of
+/// 1000 columns and more, else kBicubic.
 enum class Upsample {
   kAuto,
   kBicubic,  ///< the input's
@@ -64,21 +64,22 @@ struct StemOptions {
 };
 
 enum class FeatureMethod {
-  kKlt,   ///< corners, tracked by Lucas-Kanade
+  kPatch,  ///< corners, tracked by aligning the patch of their first frame
+  kKlt,   ///< corners, tracked by pyramidal Lucas-Kanade from frame to frame
   kOrb,   ///< described and matched (the paper's)
   kSift,  ///< described and matched
 };
 
 /// Keys `features.*`.
 struct FeatureOptions {
-  FeatureMethod method = FeatureMethod::kKlt;
+  FeatureMethod method = FeatureMethod::kPatch;
   int max_features = 500;  ///< keypoints aimed at per frame
   int grid_columns = 16;   ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
-  double corner_quality = 0.005;          ///< klt: least corner response over the strongest
-  double min_distance_px = 8.0;           ///< klt: between keypoints, in input pixels
+  double corner_quality = 0.005;          ///< patch, klt: least corner response over the strongest
+  double min_distance_px = 8.0;           ///< patch, klt: between keypoints, in input pixels
   int klt_window = 11;                    ///< klt: input pixels, odd; at least 7 of the image
-  int klt_levels = 4;                     ///< klt: of the pyramid over the input's size
+  int klt_levels = 4;                     ///< patch, klt: of the pyramid over the input's size
   double max_forward_backward_px = 0.25;  ///< klt: input pixels
   int fast_threshold = 10;                ///< orb
   double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
@@ -127,6 +128,15 @@ struct RefineOptions {
   double loss_px = 0.2;  ///< Cauchy scale on the reprojection error
 };
 
+/// What of the given camera is refined while driving (mode map): it is left only where the images
+/// insist.
+enum class CameraRefinement { kOff, kPrincipalPoint, kAll /* the focal length too */ };
+
+/// Keys `camera.*`.
+struct CameraOptions {
+  CameraRefinement refine = CameraRefinement::kPrincipalPoint;
+};
+
 enum class ScaleSource {
   kNone,          ///< up to scale
   kConstant,      ///< steps of the same length
@@ -151,6 +161,7 @@ struct Options {
   TwoViewOptions two_view;
   OdometryOptions odometry;
   RefineOptions refine;
+  CameraOptions camera;
   ScaleOptions scale;
   std::uint64_t seed = 1;  ///< of every random number
 };

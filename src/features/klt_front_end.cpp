@@ -2,14 +2,9 @@
 #include "features/klt_front_end.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <utility>
 
-#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "features/grid_quota.hpp"
-#include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -21,14 +16,8 @@ constexpr double kConverged_px = 0.015;  ///< an iteration's step, picture pixel
 /// Windows of 5x5 pixels lose the road: t_rel 0.85 for 0.31 on a rendered drive, whatever their
 /// size in the input.
 constexpr int kMinReach_px = 3;
-/// A smaller share of the points tracked: the image is of no use, or of another place.
-constexpr double kMinTracked = 0.1;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
-
-Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
-  return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
-}
 
 /// Distance in input pixels between two points of one picture.
 double input_distance_px(const PixelMap& map, const cv::Point2f& a, const cv::Point2f& b) {
@@ -43,8 +32,8 @@ bool is_inside(const cv::Point2f& uv, cv::Size size) {
 
 }  // namespace
 
-struct KltFrontEnd::Picture : PreparedPicture {
-  using PreparedPicture::PreparedPicture;
+struct KltFrontEnd::KltPicture : Picture {
+  using Picture::Picture;
   [[nodiscard]] int last_level() const { return static_cast<int>(pyramid.size() / kNextLevel) - 1; }
   std::vector<cv::Mat> pyramid;
   cv::Size window;
@@ -52,87 +41,25 @@ struct KltFrontEnd::Picture : PreparedPicture {
 
 std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& image) const {
   const StageTimer timer(Stage::kPyramid);
-  auto picture = std::make_shared<Picture>(image);
+  auto picture = std::make_shared<KltPicture>(image);
   const double scale = image.map.scale.minCoeff();
-  const int reach = std::max(kMinReach_px, static_cast<int>(options_.klt_window / 2 / scale));
+  const int reach = std::max(kMinReach_px, static_cast<int>(options().klt_window / 2 / scale));
   picture->window = cv::Size(2 * reach + 1, 2 * reach + 1);
-  // A picture of half the input's size is its pyramid's second level.
-  const int last_level = std::max(0, options_.klt_levels - 1 - std::ilogb(scale));
-  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, picture->window, last_level,
-                              /*withDerivatives=*/true);
+  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, picture->window,
+                              num_levels(scale) - 1, /*withDerivatives=*/true);
+  const bool is_halved = picture->last_level() > 0;
+  picture->corner_pixels = picture->pyramid[is_halved ? kNextLevel : 0];
+  picture->corner_scale = is_halved ? 2.0F : 1.0F;
   return picture;
 }
 
-Matches KltFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
-  auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
-  STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
-  if (last_.picture != nullptr &&
-      last_.picture->image.pixels.size() != picture->image.pixels.size()) {
-    last_ = {};
-    last_good_ = {};
-  }
-  Matches matches;
-  View now{std::move(picture), {}, frame};
-  if (last_.picture != nullptr) {
-    replenish(last_);
-    matches = track(last_, now);
-    if (is_lost(matches, last_)) {
-      track_from_last_good(now, matches);
-    } else {
-      last_good_ = {};
-    }
-  }
-  last_ = std::move(now);
-  return matches;
-}
-
-/// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
-/// tells more than the last one, its tracks go on.
-void KltFrontEnd::track_from_last_good(View& now, Matches& matches) {
-  if (last_good_.picture == nullptr && !last_.points.empty()) {
-    last_good_ = std::move(last_);
-    return;
-  }
-  if (last_good_.picture == nullptr) {
-    return;
-  }
-  View again{now.picture, {}, now.frame};
-  Matches found = track(last_good_, again);
-  if (!is_lost(found, last_good_)) {
-    now = std::move(again);
-    matches = std::move(found);
-    last_good_ = {};
-  }
-}
-
-bool KltFrontEnd::is_lost(const Matches& matches, const View& from) {
-  return static_cast<double>(matches.cur_uv.size()) <=
-         kMinTracked * static_cast<double>(from.points.size());
-}
-
-void KltFrontEnd::keep(const std::vector<char>& is_good) {
-  if (is_good.size() != last_.points.size()) {
-    return;
-  }
-  std::vector<Point> kept;
-  kept.reserve(is_good.size());
-  for (std::size_t i = 0; i < is_good.size(); ++i) {
-    if (is_good[i] != 0) {
-      kept.push_back(last_.points[i]);
-    }
-  }
-  last_.points = std::move(kept);
-}
-
-Matches KltFrontEnd::track(const View& from, View& to) const {
-  const StageTimer timer(Stage::kTracking);
-  const Picture& prev = *from.picture;
-  const Picture& cur = *to.picture;
-  Matches matches;
-  matches.prev_frame = from.frame;
-  matches.num_keypoints = static_cast<int>(from.points.size());
+std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& from,
+                                                                  const View& to) {
+  const auto& prev = static_cast<const KltPicture&>(*from.picture);
+  const auto& cur = static_cast<const KltPicture&>(*to.picture);
+  std::vector<std::optional<cv::Point2f>> result(from.points.size());
   if (from.points.empty()) {
-    return matches;
+    return result;
   }
   std::vector<cv::Point2f> prev_uv;
   prev_uv.reserve(from.points.size());
@@ -152,57 +79,16 @@ Matches KltFrontEnd::track(const View& from, View& to) const {
                            cur.window, std::min(cur.last_level(), kBackLevels - 1), criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW);
 
-  to.points.reserve(from.points.size());
-  for (std::size_t i = 0; i < from.points.size(); ++i) {
+  for (std::size_t i = 0; i < result.size(); ++i) {
     const bool is_good = found[i] != 0 && found_back[i] != 0 &&
                          is_inside(cur_uv[i], cur.image.pixels.size()) &&
                          input_distance_px(prev.image.map, prev_uv[i], back_uv[i]) <=
-                             options_.max_forward_backward_px;
-    if (!is_good) {
-      continue;
-    }
-    to.points.push_back({cur_uv[i], from.points[i].id});
-    matches.prev_uv.push_back(to_input(prev.image.map, prev_uv[i]));
-    matches.cur_uv.push_back(to_input(cur.image.map, cur_uv[i]));
-    matches.track_ids.push_back(from.points[i].id);
-  }
-  return matches;
-}
-
-/// Corners are looked for one level up, at half the size: the window that follows them is several
-/// pixels wide, and any pixel of a corner will do.
-void KltFrontEnd::replenish(View& view) {
-  const StageTimer timer(Stage::kDetection);
-  const Picture& picture = *view.picture;
-  const bool is_halved = picture.last_level() > 0;
-  const cv::Mat& pixels = picture.pyramid[is_halved ? kNextLevel : 0];
-  const float to_pixels = is_halved ? 2.0F : 1.0F;
-  const double min_distance =
-      options_.min_distance_px / (picture.image.map.scale.minCoeff() * to_pixels);
-  GridQuota quota(options_, picture.image.pixels.size());
-  cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
-  std::vector<Point> kept;
-  kept.reserve(view.points.size());
-  for (const Point& point : view.points) {
-    const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
-                           std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
-    if (mask.at<unsigned char>(center) == 0) {
-      continue;  // tracks that ran into each other: the older one stays
-    }
-    cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
-    quota.take(point.uv);
-    kept.push_back(point);
-  }
-  view.points = std::move(kept);
-
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(pixels, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
-                          mask, /*blockSize=*/3);
-  for (const cv::Point2f& corner : corners) {  // strongest first
-    if (quota.take(corner * to_pixels)) {
-      view.points.push_back({corner * to_pixels, next_id_++});
+                             options().max_forward_backward_px;
+    if (is_good) {
+      result[i] = cur_uv[i];
     }
   }
+  return result;
 }
 
 }  // namespace stemvo

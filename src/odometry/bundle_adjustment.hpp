@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <Eigen/Core>
-#include <ceres/sized_cost_function.h>
+#include <optional>
 
+#include <Eigen/Core>
+
+#include "geometry/bundle.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
 
@@ -27,27 +29,16 @@ struct BundleAdjustmentOptions {
 /// little to do, or not solved; the window is unchanged.
 bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentOptions& options);
 
-/// Reprojection error (px) of a landmark in a keyframe, with its derivatives. Parameters: a change
-/// of the keyframe's pose (rotation vector w, rad, and translation t) and the point in the world X;
-/// x = exp(w) R X + t in the camera, where R is the rotation the change starts from.
-class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
- public:
-  /// Points nearer than this (or behind) have no residual; map units.
-  static constexpr double kMinDepth = 1e-6;
-
-  /// The rotation must outlive the cost: the keyframe's observations share it.
-  ReprojectionCost(const Camera& camera, const Eigen::Matrix3d& rotation, const Eigen::Vector2d& uv)
-      : camera_(camera), rotation_(rotation), uv_(uv) {}
-
-  /// False for a point behind the camera: the solver takes a shorter step.
-  bool Evaluate(const double* const* parameters,
-                double* residuals,
-                double** jacobians) const override;
-
- private:
-  const Camera& camera_;
-  const Eigen::Matrix3d& rotation_;
-  Eigen::Vector2d uv_;
+/// What a window tells of the camera, all else left free.
+struct CameraMeasurement {
+  CameraChange change;            ///< of `camera`
+  CameraInformation information;  ///< of it alone, without the prior
+  double sigma_px = 0.0;
 };
+[[nodiscard]] std::optional<CameraMeasurement> measure_camera(
+    const Window& window,
+    const Camera& camera,
+    const CameraPrior& prior,
+    const BundleAdjustmentOptions& options);
 
 }  // namespace stemvo

@@ -35,6 +35,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config, camera),
       scale_(config),
+      calibration_(camera, config.camera.refine),
       step_(assumed_step(config.scale)) {
   window_options_.num_keyframes = config.refine.window;
   refinement_.loss_scale_px = config.refine.loss_px;
@@ -268,6 +269,8 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
     anchor_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera_, window_options_);
+  calibration_.observe(window_, refinement_);
+  camera_ = calibration_.camera();
   history_.observe(window_, frame.image);
 }
 
@@ -282,8 +285,9 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
     }
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
+    const RoadImage road = frame.road ? seen_by(*frame.road, camera_) : RoadImage{};
     const double factor =
-        scale_.measure(frame.road.get(), world_from_camera_.inverse() * road_pose_);
+        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
       for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {

@@ -11,6 +11,7 @@
 #include "odometry/initializer.hpp"
 #include "odometry/localization.hpp"
 #include "odometry/metric_scale.hpp"
+#include "odometry/self_calibration.hpp"
 #include "odometry/window.hpp"
 #include "odometry/window_history.hpp"
 #include "stemvo/camera.hpp"
@@ -75,6 +76,7 @@ class WindowEstimator final : public Estimator {
   Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;
   MetricScale scale_;
+  SelfCalibration calibration_;
   Rigid3 world_from_camera_;        ///< of the frame in work
   Rigid3 prev_from_cur_;            ///< the last motion of one frame
   double step_;                     ///< length of the last step measured, per frame

@@ -53,8 +53,8 @@ std::vector<Field> stem_fields(StemOptions& o) {
        "divides the stride, else 1"},
       {"stem", "upsample", enum_value(&o.upsample), one_of({"auto", "bicubic", "half", "native"}),
        "size of the image to track on: bicubic (the input's), half (of the input's where the "
-       "channel is coarser, else the channel's), native (the channel's), or auto: half for klt on "
-       "frames of 1000 columns and more, else bicubic"},
+       "channel is coarser, else the channel's), native (the channel's), or auto: half for "
+       "patch, and for klt on frames of 1000 columns and more, else bicubic"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),
        "percentile of the response that becomes black"},
       {"stem", "stretch_high_percent", &o.stretch_high_percent, between(0, 100),
@@ -68,20 +68,21 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
   return {
       {"features", "method", enum_value(&o.method),
        one_of({kFeatureMethods.begin(), kFeatureMethods.end()}),
-       "klt: corners tracked by optical flow; orb (the paper's), sift: described and matched"},
+       "patch: corners tracked by the patch of their first frame; klt: by optical flow from frame to "
+       "frame; orb (the paper's), sift: described and matched"},
       {"features", "max_features", &o.max_features, between(8, 100000),
        "keypoints aimed at per frame"},
       {"features", "grid_columns", &o.grid_columns, between(1, 1000),
        "cells across the image, each with its share of the keypoints"},
       {"features", "grid_rows", &o.grid_rows, between(1, 1000), "cells down the image"},
       {"features", "corner_quality", &o.corner_quality, between(0, 1),
-       "klt: least corner response, as a share of the strongest"},
+       "patch, klt: least corner response, as a share of the strongest"},
       {"features", "min_distance_px", &o.min_distance_px, at_least(0),
-       "klt: between keypoints, input pixels"},
+       "patch, klt: between keypoints, input pixels"},
       {"features", "klt_window", &o.klt_window, odd_between(3, 201),
        "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked image"},
       {"features", "klt_levels", &o.klt_levels, between(1, 10),
-       "klt: levels of the pyramid, from the input's size on"},
+       "patch, klt: levels of the pyramid, from the input's size on"},
       {"features", "max_forward_backward_px", &o.max_forward_backward_px, above(0),
        "klt: a point tracked there and back must return this close, input pixels"},
       {"features", "fast_threshold", &o.fast_threshold, between(1, 254),
@@ -139,6 +140,14 @@ std::vector<Field> refine_fields(RefineOptions& o) {
       {"refine", "max_iterations", &o.max_iterations, between(1, 1000), "of one refinement"},
       {"refine", "loss_px", &o.loss_px, above(0),
        "reprojection error from which an observation is mistrusted, input pixels"},
+  };
+}
+
+std::vector<Field> camera_fields(CameraOptions& o) {
+  return {
+      {"camera", "refine", enum_value(&o.refine), one_of({"off", "principal_point", "all"}),
+       "mode map: what of the given camera is refined while driving, where the images insist: off "
+       "(nothing), principal_point, or all (the focal length too)"},
   };
 }
 
@@ -214,6 +223,7 @@ std::vector<Field> fields_of(Options& options) {
   append(two_view_fields(options.two_view));
   append(odometry_fields(options.odometry));
   append(refine_fields(options.refine));
+  append(camera_fields(options.camera));
   append(scale_fields(options.scale));
   append({{"", "seed", &options.seed, any(), "of every random number"}});
   return fields;

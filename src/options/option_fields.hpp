@@ -59,7 +59,7 @@ inline constexpr std::array<std::string_view, 4> kScaleSources{"none", "constant
   return kScaleSources.at(static_cast<std::size_t>(source));
 }
 
-inline constexpr std::array<std::string_view, 3> kFeatureMethods{"klt", "orb", "sift"};
+inline constexpr std::array<std::string_view, 4> kFeatureMethods{"patch", "klt", "orb", "sift"};
 [[nodiscard]] inline std::string_view to_string(FeatureMethod method) {
   return kFeatureMethods.at(static_cast<std::size_t>(method));
 }

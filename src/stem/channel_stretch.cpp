@@ -99,8 +99,9 @@ Upsample choose_upsample(Upsample asked, FeatureMethod method, int width_px) {
   if (asked != Upsample::kAuto) {
     return asked;
   }
-  return method == FeatureMethod::kKlt && width_px >= kWideFrame_px ? Upsample::kHalf
-                                                                    : Upsample::kBicubic;
+  const bool is_half = method == FeatureMethod::kPatch ||
+                       (method == FeatureMethod::kKlt && width_px >= kWideFrame_px);
+  return is_half ? Upsample::kHalf : Upsample::kBicubic;
 }
 
 int enlargement(Upsample upsample, int sampling_px) {

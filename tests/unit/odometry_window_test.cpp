@@ -54,53 +54,6 @@ TEST(Landmarks, WrongPlacesAreCulled) {
   EXPECT_EQ(window.landmarks.size(), num_landmarks - 2);
 }
 
-/// At a change of the rotation that is nothing, tiny (the series) and large.
-TEST(ReprojectionCost, DerivativesAgreeWithNumericOnes) {
-  const Camera camera = testing::kitti_camera();
-  const Eigen::Matrix3d rotation = so3_exp({0.1, -0.2, 0.05}).toRotationMatrix();
-  const ReprojectionCost cost(camera, rotation, {600.0, 180.0});
-  Eigen::Vector3d x(2.0, -1.0, 12.0);
-  for (const double size : {0.0, 1e-5, 0.3}) {
-    Eigen::Matrix<double, 6, 1> pose;
-    pose << size * Eigen::Vector3d(0.5, -0.4, 0.7), 0.3, -0.1, 0.4;
-    const double* parameters[] = {pose.data(), x.data()};
-    Eigen::Vector2d residual;
-    Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
-    Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_x;
-    double* jacobians[] = {by_pose.data(), by_x.data()};
-    ASSERT_TRUE(cost.Evaluate(parameters, residual.data(), jacobians));
-    const auto check = [&](double* block, const auto& jacobian) {
-      for (int i = 0; i < jacobian.cols(); ++i) {
-        const double before = block[i];
-        const double step = 1e-6;
-        Eigen::Vector2d plus;
-        Eigen::Vector2d minus;
-        block[i] = before + step;
-        ASSERT_TRUE(cost.Evaluate(parameters, plus.data(), nullptr));
-        block[i] = before - step;
-        ASSERT_TRUE(cost.Evaluate(parameters, minus.data(), nullptr));
-        block[i] = before;
-        const Eigen::Vector2d numeric = (plus - minus) / (2.0 * step);
-        EXPECT_LE((numeric - jacobian.col(i)).norm(), 1e-5 * (1.0 + numeric.norm()))
-            << "rotation by " << size << ", parameter " << i;
-      }
-    };
-    check(pose.data(), by_pose);
-    check(x.data(), by_x);
-  }
-}
-
-TEST(ReprojectionCost, APointBehindTheCameraIsRefused) {
-  const Camera camera = testing::kitti_camera();
-  const Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  const ReprojectionCost cost(camera, rotation, {600.0, 180.0});
-  const Eigen::Matrix<double, 6, 1> pose = Eigen::Matrix<double, 6, 1>::Zero();
-  const Eigen::Vector3d x(0.0, 0.0, -1.0);
-  const double* parameters[] = {pose.data(), x.data()};
-  Eigen::Vector2d residual;
-  EXPECT_FALSE(cost.Evaluate(parameters, residual.data(), nullptr));
-}
-
 TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
   const WindowOptions options;
   const DriveTracks drive(8, 0.0, 3);

@@ -12,6 +12,8 @@ namespace {
 
 /// Reach of the local contrast, input pixels (level 1: its own, twice as wide).
 constexpr double kContrast_px = 8.0;
+/// The centre of a pixel of half size lies between two of full size.
+const PixelMap kHalf{{2.0, 2.0}, {0.5, 0.5}};
 
 /// The camera in the pixels of an image that is `map` away from the camera's own pixels.
 Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size) {
@@ -72,16 +74,23 @@ RoadImage::Level make_level(const cv::Mat& pixels, const Camera& camera, int con
 RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
   RoadImage road;
   road.pixels = image.pixels;
+  road.map = image.map;
   road.camera = camera_in(camera, image.map, image.pixels.size());
-  road.scale = image.map.scale.x();
-  const int contrast_px = std::max(4, cvRound(kContrast_px / road.scale));
+  const int contrast_px = std::max(4, cvRound(kContrast_px / road.map.scale.x()));
   cv::Mat half;
   cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  // The centre of a pixel of half size lies between two of full size.
-  const PixelMap map{{2.0, 2.0}, {0.5, 0.5}};
   road.levels = {make_level(image.pixels, road.camera, contrast_px),
-                 make_level(half, camera_in(road.camera, map, half.size()), contrast_px)};
+                 make_level(half, camera_in(road.camera, kHalf, half.size()), contrast_px)};
   return road;
+}
+
+RoadImage seen_by(const RoadImage& road, const Camera& camera) {
+  RoadImage result = road;
+  result.camera = camera_in(camera, road.map, road.pixels.size());
+  const Camera& half = road.levels[1].camera;
+  result.levels[0].camera = result.camera;
+  result.levels[1].camera = camera_in(result.camera, kHalf, {half.width_px, half.height_px});
+  return result;
 }
 
 }  // namespace stemvo

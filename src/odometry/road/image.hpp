@@ -19,11 +19,14 @@ struct RoadImage {
     cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, local contrast; row 0 is `first_row`
   };
   cv::Mat pixels;               ///< CV_8U, the image itself
+  PixelMap map;                 ///< to input pixels
   Camera camera;                ///< in its pixels
-  double scale = 1.0;           ///< input pixels per pixel of it
   std::array<Level, 2> levels;  ///< without values where too little is below the horizon
 };
 
 [[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
+
+/// The same image (pixels are shared), by a camera that is known better.
+[[nodiscard]] RoadImage seen_by(const RoadImage& road, const Camera& camera);
 
 }  // namespace stemvo

@@ -34,7 +34,7 @@ constexpr int kBorder_px = 24;  ///< room for the tracker's window around the st
 
 /// Input pixels -> the image's.
 cv::Size in_pixels_of(const RoadImage& image, cv::Size size) {
-  return {static_cast<int>(size.width / image.scale), static_cast<int>(size.height / image.scale)};
+  return {static_cast<int>(size.width / image.map.scale.x()), static_cast<int>(size.height / image.map.scale.x())};
 }
 
 /// Where the strip of road is in the current image, and the corners in it.
@@ -62,7 +62,7 @@ Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptio
     return {};
   }
   cv::goodFeaturesToTrack(cur.pixels(strip.box), strip.corners, options.max_points,
-                          options.corner_quality, options.corner_distance_px / cur.scale,
+                          options.corner_quality, options.corner_distance_px / cur.map.scale.x(),
                           mask(strip.box));
   return strip;
 }
@@ -147,7 +147,7 @@ std::vector<Track> track_corners(const RoadStep& step, const Strip& strip, const
     const cv::Point2f loop = back[i] - corner;
     const cv::Vec3d in_prev = map * cv::Vec3d(there[i].x, there[i].y, 1.0);
     if (found[i] == 0 || found_back[i] == 0 || !(in_prev[2] > 1e-6) ||
-        !(std::hypot(loop.x, loop.y) <= step.options.max_loop_px / cur.scale)) {
+        !(std::hypot(loop.x, loop.y) <= step.options.max_loop_px / cur.map.scale.x())) {
       continue;
     }
     const Track candidate{
@@ -157,7 +157,7 @@ std::vector<Track> track_corners(const RoadStep& step, const Strip& strip, const
             static_cast<int>(corner.x) / cell.width};
     const Residual residual = residual_of(candidate, warp, cur.camera);
     if (residual.is_valid &&
-        std::abs(residual.across_px) <= step.options.max_off_line_px / cur.scale) {
+        std::abs(residual.across_px) <= step.options.max_off_line_px / cur.map.scale.x()) {
       tracks.push_back(candidate);
     }
   }
@@ -181,7 +181,7 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
       residuals[i] = residual_of(tracks[i], warp, step.cur.camera);
       sizes[i] = residuals[i].is_valid ? std::abs(residuals[i].along_px) : 1e6;
     }
-    const double noise_px = std::max(kMinNoise_px / step.cur.scale, 1.4826 * median(sizes));
+    const double noise_px = std::max(kMinNoise_px / step.cur.map.scale.x(), 1.4826 * median(sizes));
     RoadNormal normal;
     std::map<int, Eigen::Vector3d> cells;
     fit.num_inliers = 0;

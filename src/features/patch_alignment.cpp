@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+#include "features/patch_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+namespace stemvo {
+namespace {
+
+constexpr int kCoarseIterations = 12;
+constexpr float kCoarseConverged_px = 0.1F;
+constexpr int kFineIterations = 8;
+constexpr float kFineConverged_px = 0.03F;
+/// A shorter step of the translation: scale and rotation are let go too.
+constexpr float kTranslated_px = 0.1F;
+/// Contrast less than this share of the patch's: it is something else.
+constexpr float kMinGain = 0.1F;
+/// The finest level may not leave what the coarser ones found by more.
+constexpr float kMaxFineMove_px = 4.0F;
+constexpr float kMaxScale = 1.7F;
+/// Of a patch about its mean, gray values squared.
+constexpr float kMinNormSq = 64.0F;
+/// Hessians worse conditioned than this have no inverse.
+constexpr float kMinDeterminant = 1e-3F;
+constexpr float kMinCondition = 1e-5F;
+
+/// A window of 16 pixels around it, and its neighbours, are inside the border.
+bool is_readable(const BorderedImage& image, float x, float y) {
+  constexpr float kOutside = 12.0F;
+  return x >= -kOutside && y >= -kOutside && x <= static_cast<float>(image.width - 1) + kOutside &&
+         y <= static_cast<float>(image.height - 1) + kOutside;
+}
+
+bool is_inside(const BorderedImage& image, float x, float y) {
+  return x >= 0.0F && y >= 0.0F && x <= static_cast<float>(image.width - 1) &&
+         y <= static_cast<float>(image.height - 1);
+}
+
+void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
+  const PatchKernels& kernels = patch_kernels();
+  const float left = x - 0.5F * (kCoarseSide - 1);
+  const float top = y - 0.5F * (kCoarseSide - 1);
+  kernels.sample_coarse(image, left, top, coarse.value);
+  CoarseValues before;
+  kernels.sample_coarse(image, left - 1.0F, top, before);
+  kernels.sample_coarse(image, left + 1.0F, top, coarse.gx);
+  float xx = 0.0F;
+  float xy = 0.0F;
+  float yy = 0.0F;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    coarse.gx[i] = 0.5F * (coarse.gx[i] - before[i]);
+  }
+  kernels.sample_coarse(image, left, top - 1.0F, before);
+  kernels.sample_coarse(image, left, top + 1.0F, coarse.gy);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    coarse.gy[i] = 0.5F * (coarse.gy[i] - before[i]);
+    xx += coarse.gx[i] * coarse.gx[i];
+    xy += coarse.gx[i] * coarse.gy[i];
+    yy += coarse.gy[i] * coarse.gy[i];
+  }
+  const float determinant = xx * yy - xy * xy;
+  const float inverse = determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;
+  coarse.inverse_hessian = {yy * inverse, -xy * inverse, xx * inverse};
+}
+
+using FineVector = Eigen::Map<Eigen::Matrix<float, kFineSide * kFineSide, 1>>;
+
+bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
+  const PatchKernels& kernels = patch_kernels();
+  FineValues before;
+  FineValues after;
+  kernels.sample_fine(image, {x, y}, patch.value);
+  FineVector value(patch.value.data());
+  value.array() -= value.mean();
+  patch.norm_sq = value.squaredNorm();
+  if (!(patch.norm_sq > kMinNormSq)) {
+    return false;
+  }
+  Eigen::Matrix<float, kFineSide * kFineSide, 4> columns;
+  kernels.sample_fine(image, {x - 1.0F, y}, before);
+  kernels.sample_fine(image, {x + 1.0F, y}, after);
+  columns.col(0) = 0.5F * (FineVector(after.data()) - FineVector(before.data()));
+  kernels.sample_fine(image, {x, y - 1.0F}, before);
+  kernels.sample_fine(image, {x, y + 1.0F}, after);
+  columns.col(1) = 0.5F * (FineVector(after.data()) - FineVector(before.data()));
+  for (int i = 0; i < kFineSide * kFineSide; ++i) {
+    const float dx = static_cast<float>(i % kFineSide) - 0.5F * (kFineSide - 1);
+    const float dy = static_cast<float>(i / kFineSide) - 0.5F * (kFineSide - 1);
+    columns(i, 2) = columns(i, 0) * dx + columns(i, 1) * dy;
+    columns(i, 3) = columns(i, 1) * dx - columns(i, 0) * dy;
+  }
+  columns.rowwise() -= columns.colwise().mean();
+  columns -= value * (value.transpose() * columns) / patch.norm_sq;
+  const Eigen::Matrix4f hessian = columns.transpose() * columns;
+  const Eigen::LDLT<Eigen::Matrix4f> solver(hessian);
+  if (solver.info() != Eigen::Success || !(solver.rcond() > kMinCondition)) {
+    return false;
+  }
+  const Eigen::Matrix<float, 4, kFineSide * kFineSide> step = solver.solve(columns.transpose());
+  for (std::size_t k = 0; k < 4; ++k) {
+    FineVector(patch.step[k].data()) = step.row(static_cast<Eigen::Index>(k)).transpose();
+  }
+  const Eigen::Matrix<float, 2, kFineSide * kFineSide> translation =
+      hessian.topLeftCorner<2, 2>().inverse() * columns.leftCols<2>().transpose();
+  for (std::size_t k = 0; k < 2; ++k) {
+    FineVector(patch.translation_step[k].data()) = translation.row(static_cast<Eigen::Index>(k)).transpose();
+    patch.translation_step[k + 2].fill(0.0F);
+  }
+  return true;
+}
+
+/// False: it left the image.
+bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float& x, float& y) {
+  const PatchKernels& kernels = patch_kernels();
+  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
+  const auto& inverse = patch.inverse_hessian;
+  for (int i = 0; i < kCoarseIterations; ++i) {
+    if (!is_readable(image, x, y)) {
+      return false;
+    }
+    float sums[2];
+    kernels.coarse_sums(image, x - kHalf, y - kHalf, patch.value, patch.gx, patch.gy, sums);
+    const float dx = inverse[0] * sums[0] + inverse[1] * sums[1];
+    const float dy = inverse[1] * sums[0] + inverse[2] * sums[1];
+    x -= dx;
+    y -= dy;
+    if (dx * dx + dy * dy < kCoarseConverged_px * kCoarseConverged_px) {
+      break;
+    }
+  }
+  return is_readable(image, x, y);
+}
+
+/// W <- W o dW^-1; similarities are complex numbers. Returns the length of the step.
+float compose(Similarity& warp, const float* step) {
+  const float c = 1.0F + step[2];
+  const float s = step[3];
+  const float inverse = 1.0F / (c * c + s * s);
+  const float a = (warp.a * c + warp.b * s) * inverse;
+  const float b = (warp.b * c - warp.a * s) * inverse;
+  const float dx = a * step[0] - b * step[1];
+  const float dy = b * step[0] + a * step[1];
+  warp = {warp.x - dx, warp.y - dy, a, b};
+  return std::hypot(dx, dy);
+}
+
+/// Inside the image, near the start and of a like size.
+bool is_plausible(const Similarity& warp, const BorderedImage& image, const Similarity& start) {
+  const float scale_sq = warp.a * warp.a + warp.b * warp.b;
+  return is_inside(image, warp.x, warp.y) &&
+         std::hypot(warp.x - start.x, warp.y - start.y) <= kMaxFineMove_px &&
+         scale_sq < kMaxScale * kMaxScale && scale_sq * kMaxScale * kMaxScale > 1.0F;
+}
+
+/// A translation first, until it has nearly converged; then the similarity.
+Alignment align_fine(const Patch& patch, const BorderedImage& image, const Similarity& start) {
+  const PatchKernels& kernels = patch_kernels();
+  constexpr float kNumPixels = kFineSide * kFineSide;
+  Alignment result{start, 0.0F};
+  bool only_translates = true;
+  for (int i = 0; i < kFineIterations; ++i) {
+    if (!is_plausible(result.warp, image, start)) {
+      return {result.warp, 0.0F};
+    }
+    FineValues values;
+    kernels.sample_fine(image, result.warp, values);
+    float sums[7];
+    kernels.fine_sums(values, only_translates ? patch.translation_step : patch.step, patch.value,
+                      sums);
+    const float variance = sums[5] - sums[4] * sums[4] / kNumPixels;
+    const float gain = sums[6] / patch.norm_sq;
+    if (!(variance > 0.0F && gain > kMinGain)) {
+      return {result.warp, 0.0F};
+    }
+    result.correlation = sums[6] / std::sqrt(variance * patch.norm_sq);
+    const float step[4] = {sums[0] / gain, sums[1] / gain, sums[2] / gain, sums[3] / gain};
+    const float length = compose(result.warp, step);
+    if (length < kFineConverged_px && !only_translates) {
+      break;
+    }
+    only_translates = only_translates && length > kTranslated_px;
+  }
+  return is_plausible(result.warp, image, start) ? result : Alignment{result.warp, 0.0F};
+}
+
+}  // namespace
+
+bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch) {
+  if (!is_inside(pyramid.front(), x, y) || !cut_fine(pyramid.front(), x, y, patch)) {
+    return false;
+  }
+  float scale = 1.0F;
+  for (std::size_t level = 1; level < pyramid.size() && level <= Patch::kNumCoarse; ++level) {
+    scale *= 0.5F;
+    cut_coarse(pyramid[level], scale * x, scale * y, patch.coarse[level - 1]);
+  }
+  return true;
+}
+
+Alignment align_patch(const Patch& patch,
+                      Pyramid pyramid,
+                      const Similarity& start,
+                      int first_level) {
+  Similarity warp = start;
+  for (int level = std::min({first_level, static_cast<int>(pyramid.size()) - 1, Patch::kNumCoarse});
+       level > 0; --level) {
+    const float scale = 1.0F / static_cast<float>(1 << level);
+    float x = scale * warp.x;
+    float y = scale * warp.y;
+    const auto index = static_cast<std::size_t>(level);
+    if (!align_coarse(patch.coarse[index - 1], pyramid[index], x, y)) {
+      return {warp, 0.0F};
+    }
+    warp.x = x / scale;
+    warp.y = y / scale;
+  }
+  return align_fine(patch, pyramid.front(), warp);
+}
+
+}  // namespace stemvo

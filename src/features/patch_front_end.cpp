@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#include "features/patch_front_end.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include <opencv2/imgproc.hpp>
+
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Of a patch with the image where it was found; less: it was not.
+constexpr float kMinCorrelation = 0.7F;
+/// Less, or a scale beyond this: it is cut out anew.
+constexpr float kGoodCorrelation = 0.85F;
+constexpr float kMaxScale = 1.4F;
+/// A point whose own motion is not known starts with the median of so many neighbours.
+constexpr std::size_t kNumNeighbours = 5;
+/// Where a motion is known, the level of half the size is coarse enough to begin.
+constexpr int kPredictedLevel = 1;
+
+/// Motions of points between two images.
+class Motions {
+ public:
+  [[nodiscard]] bool empty() const { return known_.empty(); }
+  void add(const cv::Point2f& from, const cv::Point2f& motion) { known_.push_back({from, motion}); }
+  /// Median of the nearest; none: 0.
+  [[nodiscard]] cv::Point2f near(const cv::Point2f& uv) const;
+
+ private:
+  struct Known {
+    cv::Point2f from;
+    cv::Point2f motion;
+  };
+  std::vector<Known> known_;
+};
+
+cv::Point2f Motions::near(const cv::Point2f& uv) const {
+  const std::size_t count = std::min(kNumNeighbours, known_.size());
+  if (count == 0) {
+    return {};
+  }
+  std::array<Known, kNumNeighbours> nearest;
+  const auto end = std::partial_sort_copy(
+      known_.begin(), known_.end(), nearest.begin(), nearest.end(),
+      [&](const Known& a, const Known& b) {
+        const cv::Point2f to_a = a.from - uv;
+        const cv::Point2f to_b = b.from - uv;
+        return to_a.dot(to_a) < to_b.dot(to_b);
+      });
+  const auto median = [&](float cv::Point2f::* axis) {
+    const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(nearest.begin(), middle, end, [&](const Known& a, const Known& b) {
+      return a.motion.*axis < b.motion.*axis;
+    });
+    return middle->motion.*axis;
+  };
+  return {median(&cv::Point2f::x), median(&cv::Point2f::y)};
+}
+
+}  // namespace
+
+struct PatchFrontEnd::PatchPicture : Picture {
+  using Picture::Picture;
+  std::vector<cv::Mat> bordered;  ///< what the pyramid's levels are part of
+  std::vector<BorderedImage> pyramid;
+};
+
+std::shared_ptr<const PreparedPicture> PatchFrontEnd::prepare(const ChannelImage& image) const {
+  const StageTimer timer(Stage::kPyramid);
+  auto picture = std::make_shared<PatchPicture>(image);
+  cv::Mat level = image.pixels;
+  for (int i = 0; i < num_levels(image.map.scale.minCoeff()); ++i) {
+    if (i > 0) {
+      cv::Mat half;
+      cv::pyrDown(level, half);
+      level = half;
+    }
+    constexpr int kBorder = kPatchBorder_px;
+    cv::Mat bordered;
+    cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
+    level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
+    if (i < 2) {
+      picture->corner_pixels = level;
+      picture->corner_scale = static_cast<float>(i + 1);
+    }
+    picture->pyramid.push_back(
+        {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
+    picture->bordered.push_back(std::move(bordered));
+  }
+  return picture;
+}
+
+bool PatchFrontEnd::begin_track(const Picture& picture, const Point& point) {
+  Track track;
+  track.warp = {point.uv.x, point.uv.y};
+  const Pyramid pyramid = static_cast<const PatchPicture&>(picture).pyramid;
+  return cut_patch(pyramid, point.uv.x, point.uv.y, track.patch) &&
+         tracks_.emplace(point.id, track).second;
+}
+
+std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
+                                                                    const View& to) {
+  const auto& picture = static_cast<const PatchPicture&>(*to.picture);
+  const Pyramid pyramid = picture.pyramid;
+  const int top = static_cast<int>(pyramid.size()) - 1;
+  Motions motions;
+  const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
+    const Track& track = tracks_.at(point.id);
+    const cv::Point2f start = point.uv + motion;
+    return align_patch(track.patch, pyramid, {start.x, start.y, track.warp.a, track.warp.b},
+                       first_level);
+  };
+  // First the points that were tracked to here: they tell the others where to look.
+  std::vector<Alignment> found(from.points.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Point& point = from.points[i];
+    const Track& track = tracks_.at(point.id);
+    if (track.frame == from.frame) {
+      found[i] = align(point, track.motion, kPredictedLevel);
+      if (found[i].correlation >= kMinCorrelation) {
+        motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
+      }
+    }
+  }
+  std::vector<std::optional<cv::Point2f>> result(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Point& point = from.points[i];
+    Track& track = tracks_.at(point.id);
+    if (found[i].correlation < kMinCorrelation) {
+      const cv::Point2f motion = motions.near(point.uv);
+      const bool is_predicted = track.frame != from.frame && !motions.empty();
+      found[i] = align(point, motion, is_predicted ? kPredictedLevel : top);
+      if (found[i].correlation < kMinCorrelation && is_predicted) {
+        found[i] = align(point, motion, top);
+      }
+    }
+    if (accept(found[i], picture, to.frame, point, track)) {
+      result[i] = cv::Point2f(track.warp.x, track.warp.y);
+    }
+  }
+  return result;
+}
+
+bool PatchFrontEnd::accept(const Alignment& found,
+                           const PatchPicture& picture,
+                           int frame,
+                           const Point& from,
+                           Track& track) {
+  if (found.correlation < kMinCorrelation) {
+    return false;
+  }
+  track.warp = found.warp;
+  track.motion = cv::Point2f(found.warp.x, found.warp.y) - from.uv;
+  track.frame = frame;
+  const float scale_sq = found.warp.a * found.warp.a + found.warp.b * found.warp.b;
+  constexpr float kMaxSq = kMaxScale * kMaxScale;
+  if (found.correlation >= kGoodCorrelation && scale_sq < kMaxSq && scale_sq * kMaxSq > 1.0F) {
+    return true;
+  }
+  track.warp = {found.warp.x, found.warp.y};
+  return cut_patch(picture.pyramid, found.warp.x, found.warp.y, track.patch);
+}
+
+void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
+                                     const std::vector<Point>& good) {
+  const auto has = [](const std::vector<Point>& points, int id) {
+    const auto found = std::lower_bound(points.begin(), points.end(), id,
+                                        [](const Point& point, int i) { return point.id < i; });
+    return found != points.end() && found->id == id;
+  };
+  std::erase_if(tracks_,
+                [&](const auto& track) { return !has(last, track.first) && !has(good, track.first); });
+}
+
+}  // namespace stemvo

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "features/patch_alignment.hpp"
+#include "features/point_front_end.hpp"
+
+namespace stemvo {
+
+/// Tracks by aligning the patch cut out when a point was new. A patch that has changed too much is
+/// cut out anew where the point is; the track keeps its id.
+class PatchFrontEnd final : public PointFrontEnd {
+ public:
+  explicit PatchFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
+
+  [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
+      const ChannelImage& image) const override;
+
+ private:
+  struct PatchPicture;
+  struct Track {
+    Patch patch;
+    Similarity warp;     ///< from the patch to the last image it was found in
+    cv::Point2f motion;  ///< to there, from the image before
+    int frame = -1;      ///< the number of that image; -1: it is new
+  };
+
+  [[nodiscard]] bool begin_track(const Picture& picture, const Point& point) override;
+  [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
+                                                                     const View& to) override;
+  void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) override;
+  [[nodiscard]] static bool accept(const Alignment& found,
+                                   const PatchPicture& picture,
+                                   int frame,
+                                   const Point& from,
+                                   Track& track);
+
+  std::map<int, Track> tracks_;  ///< by id
+};
+
+}  // namespace stemvo

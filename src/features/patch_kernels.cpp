@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: MIT
+#include "features/patch_kernels.hpp"
+
+#include <cmath>
+#include <cstddef>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace stemvo {
+namespace {
+
+#define STEMVO_INLINE inline __attribute__((always_inline))
+
+struct Bilinear {
+  const std::uint8_t* top_left;
+  float w00, w01, w10, w11;
+};
+
+STEMVO_INLINE Bilinear bilinear(const BorderedImage& image, float x, float y) {
+  const float column = std::floor(x);
+  const float row = std::floor(y);
+  const float u = x - column;
+  const float v = y - row;
+  return {image.origin + static_cast<std::ptrdiff_t>(row) * image.stride +
+              static_cast<std::ptrdiff_t>(column),
+          (1.0F - u) * (1.0F - v), u * (1.0F - v), (1.0F - u) * v, u * v};
+}
+
+STEMVO_INLINE float value_at(const Bilinear& at,
+                             const std::uint8_t* top,
+                             const std::uint8_t* bottom,
+                             int i) {
+  return at.w00 * static_cast<float>(top[i]) + at.w01 * static_cast<float>(top[i + 1]) +
+         at.w10 * static_cast<float>(bottom[i]) + at.w11 * static_cast<float>(bottom[i + 1]);
+}
+
+STEMVO_INLINE void sample_coarse(const BorderedImage& image, float x, float y, CoarseValues& values) {
+  const Bilinear at = bilinear(image, x, y);
+  for (int j = 0; j < kCoarseSide; ++j) {
+    const std::uint8_t* top = at.top_left + j * image.stride;
+    const std::uint8_t* bottom = top + image.stride;
+    for (int i = 0; i < kCoarseSide; ++i) {
+      values[static_cast<std::size_t>(j * kCoarseSide + i)] = value_at(at, top, bottom, i);
+    }
+  }
+}
+
+STEMVO_INLINE void coarse_sums(const BorderedImage& image,
+                               float x,
+                               float y,
+                               const CoarseValues& value,
+                               const CoarseValues& gx,
+                               const CoarseValues& gy,
+                               float* sums) {
+  const Bilinear at = bilinear(image, x, y);
+  std::array<float, kCoarseSide> sum_x{};
+  std::array<float, kCoarseSide> sum_y{};
+  for (int j = 0; j < kCoarseSide; ++j) {
+    const std::uint8_t* top = at.top_left + j * image.stride;
+    const std::uint8_t* bottom = top + image.stride;
+    const float* value_row = value.data() + j * kCoarseSide;
+    const float* gx_row = gx.data() + j * kCoarseSide;
+    const float* gy_row = gy.data() + j * kCoarseSide;
+    for (int i = 0; i < kCoarseSide; ++i) {
+      const float error = value_at(at, top, bottom, i) - value_row[i];
+      sum_x[static_cast<std::size_t>(i)] += gx_row[i] * error;
+      sum_y[static_cast<std::size_t>(i)] += gy_row[i] * error;
+    }
+  }
+  sums[0] = 0.0F;
+  sums[1] = 0.0F;
+  for (std::size_t i = 0; i < kCoarseSide; ++i) {
+    sums[0] += sum_x[i];
+    sums[1] += sum_y[i];
+  }
+}
+
+STEMVO_INLINE void catmull_rom(float t, float* w) {
+  w[0] = t * (-0.5F + t * (1.0F - 0.5F * t));
+  w[1] = 1.0F + t * t * (-2.5F + 1.5F * t);
+  w[2] = t * (0.5F + t * (2.0F - 1.5F * t));
+  w[3] = t * t * (-0.5F + 0.5F * t);
+}
+
+STEMVO_INLINE void fine_sums(const FineValues& values,
+                             const std::array<FineValues, 4>& columns,
+                             const FineValues& value,
+                             float* sums) {
+  constexpr std::size_t kSide = kFineSide;
+  std::array<std::array<float, kSide>, 7> lanes{};
+  for (std::size_t j = 0; j < kSide * kSide; j += kSide) {
+    for (std::size_t i = 0; i < kSide; ++i) {
+      const float sample = values[j + i];
+      lanes[0][i] += columns[0][j + i] * sample;
+      lanes[1][i] += columns[1][j + i] * sample;
+      lanes[2][i] += columns[2][j + i] * sample;
+      lanes[3][i] += columns[3][j + i] * sample;
+      lanes[4][i] += sample;
+      lanes[5][i] += sample * sample;
+      lanes[6][i] += value[j + i] * sample;
+    }
+  }
+  for (std::size_t k = 0; k < lanes.size(); ++k) {
+    sums[k] = 0.0F;
+    for (std::size_t i = 0; i < kSide; ++i) {
+      sums[k] += lanes[k][i];
+    }
+  }
+}
+
+void sample_fine_portable(const BorderedImage& image, const Similarity& warp, FineValues& values) {
+  constexpr float kCenter = 0.5F * (kFineSide - 1);
+  for (int j = 0; j < kFineSide; ++j) {
+    for (int i = 0; i < kFineSide; ++i) {
+      const float dx = static_cast<float>(i) - kCenter;
+      const float dy = static_cast<float>(j) - kCenter;
+      const float x = warp.x + warp.a * dx - warp.b * dy;
+      const float y = warp.y + warp.b * dx + warp.a * dy;
+      const float column = std::floor(x);
+      const float row = std::floor(y);
+      float wx[4];
+      float wy[4];
+      catmull_rom(x - column, wx);
+      catmull_rom(y - row, wy);
+      const std::uint8_t* pixel = image.origin + (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
+                                  static_cast<std::ptrdiff_t>(column) - 1;
+      float sum = 0.0F;
+      for (float w : wy) {
+        sum += w * (wx[0] * static_cast<float>(pixel[0]) + wx[1] * static_cast<float>(pixel[1]) +
+                    wx[2] * static_cast<float>(pixel[2]) + wx[3] * static_cast<float>(pixel[3]));
+        pixel += image.stride;
+      }
+      values[static_cast<std::size_t>(j * kFineSide + i)] = sum;
+    }
+  }
+}
+
+void sample_coarse_portable(const BorderedImage& image, float x, float y, CoarseValues& values) {
+  sample_coarse(image, x, y, values);
+}
+void coarse_sums_portable(const BorderedImage& image,
+                          float x,
+                          float y,
+                          const CoarseValues& value,
+                          const CoarseValues& gx,
+                          const CoarseValues& gy,
+                          float* sums) {
+  coarse_sums(image, x, y, value, gx, gy, sums);
+}
+void fine_sums_portable(const FineValues& values,
+                        const std::array<FineValues, 4>& columns,
+                        const FineValues& value,
+                        float* sums) {
+  fine_sums(values, columns, value, sums);
+}
+
+constexpr PatchKernels kPortable{sample_coarse_portable, coarse_sums_portable, sample_fine_portable,
+                                 fine_sums_portable};
+
+#if defined(__x86_64__)
+#define STEMVO_AVX2 __attribute__((target("avx2,fma")))
+
+STEMVO_AVX2 void sample_coarse_avx2(const BorderedImage& image,
+                                    float x,
+                                    float y,
+                                    CoarseValues& values) {
+  sample_coarse(image, x, y, values);
+}
+STEMVO_AVX2 void coarse_sums_avx2(const BorderedImage& image,
+                                  float x,
+                                  float y,
+                                  const CoarseValues& value,
+                                  const CoarseValues& gx,
+                                  const CoarseValues& gy,
+                                  float* sums) {
+  coarse_sums(image, x, y, value, gx, gy, sums);
+}
+STEMVO_AVX2 void fine_sums_avx2(const FineValues& values,
+                                const std::array<FineValues, 4>& columns,
+                                const FineValues& value,
+                                float* sums) {
+  fine_sums(values, columns, value, sums);
+}
+
+STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
+  const __m256 half = _mm256_set1_ps(0.5F);
+  const __m256 one = _mm256_set1_ps(1.0F);
+  const __m256 t_sq = _mm256_mul_ps(t, t);
+  const __m256 half_t = _mm256_mul_ps(half, t);
+  w[0] = _mm256_mul_ps(t, _mm256_fmsub_ps(t, _mm256_sub_ps(one, half_t), half));
+  w[1] = _mm256_fmadd_ps(
+      t_sq, _mm256_fmsub_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.5F)), one);
+  w[2] = _mm256_mul_ps(
+      t, _mm256_fmadd_ps(t, _mm256_fnmadd_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.0F)), half));
+  w[3] = _mm256_mul_ps(t_sq, _mm256_sub_ps(half_t, half));
+}
+
+/// Eight samples at once: a gather of four bytes holds the taps of one row.
+STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
+                                  const Similarity& warp,
+                                  FineValues& values) {
+  constexpr float kCenter = 0.5F * (kFineSide - 1);
+  const __m256 dx = _mm256_setr_ps(-3.5F, -2.5F, -1.5F, -0.5F, 0.5F, 1.5F, 2.5F, 3.5F);
+  const __m256 ax = _mm256_fmadd_ps(_mm256_set1_ps(warp.a), dx, _mm256_set1_ps(warp.x));
+  const __m256 bx = _mm256_fmadd_ps(_mm256_set1_ps(warp.b), dx, _mm256_set1_ps(warp.y));
+  const __m256i stride = _mm256_set1_epi32(static_cast<int>(image.stride));
+  const __m256i low = _mm256_set1_epi32(255);
+  for (int j = 0; j < kFineSide; ++j) {
+    const float dy = static_cast<float>(j) - kCenter;
+    const __m256 x = _mm256_sub_ps(ax, _mm256_set1_ps(warp.b * dy));
+    const __m256 y = _mm256_add_ps(bx, _mm256_set1_ps(warp.a * dy));
+    const __m256 column = _mm256_floor_ps(x);
+    const __m256 row = _mm256_floor_ps(y);
+    __m256 wx[4];
+    __m256 wy[4];
+    catmull_rom(_mm256_sub_ps(x, column), wx);
+    catmull_rom(_mm256_sub_ps(y, row), wy);
+    __m256i offset = _mm256_add_epi32(_mm256_mullo_epi32(_mm256_cvtps_epi32(row), stride),
+                                      _mm256_cvtps_epi32(column));
+    const auto* pixels = reinterpret_cast<const int*>(image.origin - image.stride - 1);
+    __m256 sum = _mm256_setzero_ps();
+    for (const __m256 w : wy) {
+      const __m256i taps = _mm256_i32gather_epi32(pixels, offset, 1);
+      const __m256 p0 = _mm256_cvtepi32_ps(_mm256_and_si256(taps, low));
+      const __m256 p1 = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(taps, 8), low));
+      const __m256 p2 = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(taps, 16), low));
+      const __m256 p3 = _mm256_cvtepi32_ps(_mm256_srli_epi32(taps, 24));
+      const __m256 in_row = _mm256_fmadd_ps(
+          wx[0], p0, _mm256_fmadd_ps(wx[1], p1, _mm256_fmadd_ps(wx[2], p2, _mm256_mul_ps(wx[3], p3))));
+      sum = _mm256_fmadd_ps(w, in_row, sum);
+      offset = _mm256_add_epi32(offset, stride);
+    }
+    _mm256_storeu_ps(values.data() + j * kFineSide, sum);
+  }
+}
+
+constexpr PatchKernels kAvx2{sample_coarse_avx2, coarse_sums_avx2, sample_fine_avx2, fine_sums_avx2};
+#endif
+
+}  // namespace
+
+const PatchKernels& portable_patch_kernels() { return kPortable; }
+
+const PatchKernels& patch_kernels() {
+#if defined(__x86_64__)
+  static const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  return has_avx2 ? kAvx2 : kPortable;
+#else
+  return kPortable;
+#endif
+}
+
+}  // namespace stemvo

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace stemvo {
+
+/// An 8-bit image whose pixels may be read outside of it, up to a border's width.
+struct BorderedImage {
+  const std::uint8_t* origin = nullptr;  ///< pixel (0, 0)
+  std::ptrdiff_t stride = 0;             ///< bytes from row to row
+  int width = 0;
+  int height = 0;
+};
+
+/// Similarity: q = t + [a -b; b a] x.
+struct Similarity {
+  float x = 0.0F;
+  float y = 0.0F;
+  float a = 1.0F;
+  float b = 0.0F;
+};
+
+inline constexpr int kCoarseSide = 8;
+inline constexpr int kFineSide = 8;
+using CoarseValues = std::array<float, kCoarseSide * kCoarseSide>;
+using FineValues = std::array<float, kFineSide * kFineSide>;
+
+/// What the inner loops of alignment are made of, for one instruction set. The values of two sets
+/// differ in their last digits.
+struct PatchKernels {
+  /// Bilinear samples at (x + i, y + j), i and j from 0 to 7.
+  void (*sample_coarse)(const BorderedImage& image, float x, float y, CoarseValues& values);
+  /// sums[0] = sum of gx e and sums[1] = of gy e, where e = sample - value, at (x + i, y + j).
+  void (*coarse_sums)(const BorderedImage& image,
+                      float x,
+                      float y,
+                      const CoarseValues& value,
+                      const CoarseValues& gx,
+                      const CoarseValues& gy,
+                      float* sums);
+  /// Catmull-Rom samples at the similarity's images of (i - 3.5, j - 3.5), i and j from 0 to 7.
+  void (*sample_fine)(const BorderedImage& image, const Similarity& warp, FineValues& values);
+  /// sums[k] = sum of columns[k] values; sums[4] of values; [5] of values^2; [6] of values value.
+  void (*fine_sums)(const FineValues& values,
+                    const std::array<FineValues, 4>& columns,
+                    const FineValues& value,
+                    float* sums);
+};
+
+/// The fastest that this processor runs.
+[[nodiscard]] const PatchKernels& patch_kernels();
+[[nodiscard]] const PatchKernels& portable_patch_kernels();
+
+}  // namespace stemvo

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include "features/point_front_end.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <opencv2/imgproc.hpp>
+
+#include "features/grid_quota.hpp"
+#include "internal_check.hpp"
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A smaller share of the points tracked: the image is of no use, or of another place.
+constexpr double kMinTracked = 0.1;
+
+Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
+  return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
+}
+
+}  // namespace
+
+int PointFrontEnd::num_levels(double scale) const {
+  return std::max(1, options_.klt_levels - std::ilogb(scale));
+}
+
+Matches PointFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
+  auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
+  STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
+  if (last_.picture != nullptr &&
+      last_.picture->image.pixels.size() != picture->image.pixels.size()) {
+    last_ = {};
+    last_good_ = {};
+  }
+  Matches matches;
+  View now{std::move(picture), {}, frame};
+  if (last_.picture != nullptr) {
+    replenish(last_);
+    matches = track(last_, now);
+    if (is_lost(matches, last_)) {
+      track_from_last_good(now, matches);
+    } else {
+      last_good_ = {};
+    }
+  }
+  last_ = std::move(now);
+  end_other_tracks(last_.points, last_good_.points);
+  return matches;
+}
+
+/// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
+/// tells more than the last one, its tracks go on.
+void PointFrontEnd::track_from_last_good(View& now, Matches& matches) {
+  if (last_good_.picture == nullptr && !last_.points.empty()) {
+    last_good_ = std::move(last_);
+    return;
+  }
+  if (last_good_.picture == nullptr) {
+    return;
+  }
+  View again{now.picture, {}, now.frame};
+  Matches found = track(last_good_, again);
+  if (!is_lost(found, last_good_)) {
+    now = std::move(again);
+    matches = std::move(found);
+    last_good_ = {};
+  }
+}
+
+bool PointFrontEnd::is_lost(const Matches& matches, const View& from) {
+  return static_cast<double>(matches.cur_uv.size()) <=
+         kMinTracked * static_cast<double>(from.points.size());
+}
+
+void PointFrontEnd::keep(const std::vector<char>& is_good) {
+  if (is_good.size() != last_.points.size()) {
+    return;
+  }
+  std::vector<Point> kept;
+  kept.reserve(is_good.size());
+  for (std::size_t i = 0; i < is_good.size(); ++i) {
+    if (is_good[i] != 0) {
+      kept.push_back(last_.points[i]);
+    }
+  }
+  last_.points = std::move(kept);
+}
+
+Matches PointFrontEnd::track(const View& from, View& to) {
+  const StageTimer timer(Stage::kTracking);
+  Matches matches;
+  matches.prev_frame = from.frame;
+  matches.num_keypoints = static_cast<int>(from.points.size());
+  const std::vector<std::optional<cv::Point2f>> found = track_points(from, to);
+  to.points.reserve(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!found[i].has_value()) {
+      continue;
+    }
+    const Point& point = from.points[i];
+    to.points.push_back({*found[i], point.id});
+    matches.prev_uv.push_back(to_input(from.picture->image.map, point.uv));
+    matches.cur_uv.push_back(to_input(to.picture->image.map, *found[i]));
+    matches.track_ids.push_back(point.id);
+  }
+  return matches;
+}
+
+/// Corners are looked for at half the size where that is at hand: the patch that is tracked is
+/// several pixels wide, and any pixel of a corner will do.
+void PointFrontEnd::replenish(View& view) {
+  const StageTimer timer(Stage::kDetection);
+  const Picture& picture = *view.picture;
+  const cv::Mat& pixels = picture.corner_pixels;
+  const float to_pixels = picture.corner_scale;
+  const double min_distance =
+      options_.min_distance_px / (picture.image.map.scale.minCoeff() * to_pixels);
+  GridQuota quota(options_, picture.image.pixels.size());
+  cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
+  std::vector<Point> kept;
+  kept.reserve(view.points.size());
+  for (const Point& point : view.points) {
+    const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
+                           std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
+    if (mask.at<unsigned char>(center) == 0) {
+      continue;  // tracks that ran into each other: the older one stays
+    }
+    cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
+    quota.take(point.uv);
+    kept.push_back(point);
+  }
+  view.points = std::move(kept);
+
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(pixels, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
+                          mask, /*blockSize=*/3);
+  for (const cv::Point2f& corner : corners) {  // strongest first
+    const Point point{corner * to_pixels, next_id_};
+    if (quota.take(point.uv) && begin_track(picture, point)) {
+      view.points.push_back(point);
+      ++next_id_;
+    }
+  }
+}
+
+}  // namespace stemvo

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "features/front_end.hpp"
+
+namespace stemvo {
+
+/// Corners tracked from image to image; cells that lost points are refilled with new corners. How
+/// they are tracked is the derived class's.
+class PointFrontEnd : public FrontEnd {
+ public:
+  using FrontEnd::process;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture, int frame) override;
+  void keep(const std::vector<char>& is_good) override;
+
+ protected:
+  /// With the pyramid that the derived class tracks on.
+  struct Picture : PreparedPicture {
+    using PreparedPicture::PreparedPicture;
+    cv::Mat corner_pixels;       ///< where corners are looked for
+    float corner_scale = 1.0F;  ///< pixels of the image per pixel of it
+  };
+  /// A point of an image, in that image's pixels.
+  struct Point {
+    cv::Point2f uv;
+    int id = -1;
+  };
+  struct View {
+    std::shared_ptr<const Picture> picture;
+    std::vector<Point> points;  ///< ordered by id
+    int frame = -1;
+  };
+
+  explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}
+
+  [[nodiscard]] const FeatureOptions& options() const { return options_; }
+  /// Levels of a pyramid over an image of the given scale (input pixels per pixel): an image of half
+  /// the input's size is its pyramid's second level.
+  [[nodiscard]] int num_levels(double scale) const;
+
+ private:
+  /// A new corner; false: it cannot be tracked.
+  [[nodiscard]] virtual bool begin_track(const Picture& picture, const Point& point) = 0;
+  /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
+  [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
+                                                                             const View& to) = 0;
+  /// No track but those of these two, each ordered by id, goes on.
+  virtual void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) = 0;
+
+  [[nodiscard]] Matches track(const View& from, View& to);
+  void track_from_last_good(View& now, Matches& matches);
+  [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
+  void replenish(View& view);
+
+  FeatureOptions options_;
+  View last_;
+  View last_good_;  ///< the one before nearly every track ended; none otherwise
+  int next_id_ = 0;
+};
+
+}  // namespace stemvo

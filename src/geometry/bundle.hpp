@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// Poses and points that see each other, in any one unit of length.
+struct Bundle {
+  struct Observation {
+    int pose = 0;
+    int point = 0;
+    Eigen::Vector2d uv;
+  };
+  std::vector<Rigid3> camera_from_world;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Observation> observations;  ///< ordered by point
+  Camera camera;
+  /// What the camera lacks: x' = x (1 + k1 r^2 + k2 r^4) of normalized coordinates.
+  Eigen::Vector2d radial = Eigen::Vector2d::Zero();
+};
+
+/// Changes of cx, cy (px), of the focal lengths (share), k1, k2.
+using CameraChange = Eigen::Matrix<double, 5, 1>;
+using CameraInformation = Eigen::Matrix<double, 5, 5>;
+
+/// What is known of a bundle's camera beforehand.
+struct CameraPrior {
+  CameraChange mean;              ///< less the bundle's camera
+  CameraInformation information;  ///< for observations of a noise of 1 px
+};
+
+struct BundleOptions {
+  int num_fixed_poses = 2;  ///< the first ones; with fewer than 2 lengths are free
+  int max_iterations = 10;
+  double loss_scale_px = 0.2;          ///< Cauchy
+  double min_relative_decrease = 5e-3; ///< of the cost; a smaller one ends the minimization
+  std::optional<CameraPrior> camera;   ///< the camera is an unknown too
+};
+
+struct BundleResult {
+  bool is_usable = false;  ///< the cost fell or stayed; else the bundle is unchanged
+  double cost = 0.0;       ///< sum of the robust loss, px^2
+  CameraChange camera_change = CameraChange::Zero();
+  /// Of the camera without its prior, all else left free: inverse of its covariance for observations
+  /// of a noise of 1 px.
+  CameraInformation information = CameraInformation::Zero();
+};
+
+/// Bundle adjustment (Triggs et al., 2000): reprojection error under Cauchy's loss,
+/// Levenberg-Marquardt, the points eliminated by the Schur complement. Every point must lie in front
+/// of every pose that sees it. One thread; the same bytes on every run.
+BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options);
+
+}  // namespace stemvo

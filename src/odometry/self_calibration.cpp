@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/self_calibration.hpp"
+
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+namespace stemvo {
+namespace {
+
+/// Of the given camera: principal point (px), focal length (share), k1, k2.
+constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
+/// Errors of a track's points are alike: a window tells less than as many independent ones would.
+constexpr double kSigmaFactor = 2.0;
+/// An unknown is believed under this sigma, px, ..
+constexpr double kMaxSigma_px = 1.5;
+constexpr double kMaxSigmaOfFocal = 0.0015;
+/// .. where it leaves the given value by more than so many sigmas.
+constexpr double kMinSigmas = 2.0;
+
+/// Finite, and nowhere less than nothing.
+bool is_plausible(const CameraMeasurement& found) {
+  const Eigen::Map<const CameraChange> scale(kPriorSigma);
+  const CameraInformation scaled = scale.asDiagonal() * found.information * scale.asDiagonal();
+  return scaled.allFinite() && found.change.allFinite() &&
+         Eigen::SelfAdjointEigenSolver<CameraInformation>(scaled).eigenvalues().minCoeff() > -1e-3;
+}
+
+}  // namespace
+
+SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinement)
+    : given_(given), camera_(given), refinement_(refinement) {
+  const Eigen::Map<const CameraChange> sigma(kPriorSigma);
+  information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+CameraChange SelfCalibration::sigma() const {
+  return information_.inverse().diagonal().cwiseSqrt();
+}
+
+CameraChange SelfCalibration::applied() const {
+  CameraChange change = CameraChange::Zero();
+  change[0] = camera_.cx_px - given_.cx_px;
+  change[1] = camera_.cy_px - given_.cy_px;
+  change[2] = camera_.fx_px / given_.fx_px - 1.0;
+  return change;
+}
+
+void SelfCalibration::observe(const Window& window, const BundleAdjustmentOptions& options) {
+  if (refinement_ == CameraRefinement::kOff ||
+      ++keyframes_since_ < static_cast<int>(window.keyframes.size())) {
+    return;
+  }
+  keyframes_since_ = 0;
+  constexpr double factor_sq = kSigmaFactor * kSigmaFactor;
+  const CameraChange before = applied();
+  const auto found = measure_camera(window, camera_,
+                                    {mean_ - before, factor_sq * information_}, options);
+  if (!found.has_value() || !is_plausible(*found)) {
+    return;
+  }
+  mean_ = before + found->change;
+  information_ += found->information / factor_sq;
+  const CameraChange sigma = this->sigma();
+  const auto insists = [&](int i, double max) {
+    return sigma[i] < max && std::abs(mean_[i]) > kMinSigmas * sigma[i];
+  };
+  camera_ = given_;
+  camera_.cx_px += insists(0, kMaxSigma_px) ? mean_[0] : 0.0;
+  camera_.cy_px += insists(1, kMaxSigma_px) ? mean_[1] : 0.0;
+  if (refinement_ == CameraRefinement::kAll && insists(2, kMaxSigmaOfFocal)) {
+    camera_.fx_px *= 1.0 + mean_[2];
+    camera_.fy_px *= 1.0 + mean_[2];
+  }
+}
+
+}  // namespace stemvo

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Core>
+
+#include "geometry/bundle.hpp"
+#include "odometry/bundle_adjustment.hpp"
+#include "odometry/window.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/options.hpp"
+
+namespace stemvo {
+
+/// Learns the camera from windows that share no keyframe, one after the other: principal point,
+/// focal length and the radial distortion that is left, each with a prior. The given camera is left
+/// only where the data insist.
+class SelfCalibration {
+ public:
+  SelfCalibration(const Camera& given, CameraRefinement refinement);
+
+  /// Once per keyframe, after its window was refined.
+  void observe(const Window& window, const BundleAdjustmentOptions& options);
+
+  /// The given one, less what the data insist on.
+  [[nodiscard]] const Camera& camera() const { return camera_; }
+  /// Of the estimate, in the order of CameraChange.
+  [[nodiscard]] CameraChange sigma() const;
+
+ private:
+  [[nodiscard]] CameraChange applied() const;
+
+  Camera given_;
+  Camera camera_;
+  CameraRefinement refinement_;
+  CameraChange mean_ = CameraChange::Zero();  ///< less the given camera
+  CameraInformation information_;
+  int keyframes_since_ = 0;
+};
+
+}  // namespace stemvo
