@@ -79,7 +79,11 @@ int run_program(int argc, char** argv) {
         "search (see 'stemvo --help')");
     return kExitUsage;
   }
-  return action();
+  const Expected<int> exit_code = action();
+  if (!exit_code) {
+    print_error(exit_code.error().message);
+  }
+  return exit_code.value_or(kExitFailed);
 }
 
 }  // namespace

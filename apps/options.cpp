@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <map>
-#include <string_view>
 #include <system_error>
 
 #include "install_paths.hpp"
@@ -86,6 +85,18 @@ NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key) {
   return result;
 }
 
+CLI::Option* add_file_option(CLI::App& command,
+                             const std::string& name,
+                             std::optional<std::filesystem::path>& file,
+                             const std::string& help) {
+  const auto take = [&file](const std::string& text) {
+    if (!text.empty()) {
+      file = text;
+    }
+  };
+  return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
+}
+
 CLI::Option* add_range_option(CLI::App& command,
                               const std::string& name,
                               std::optional<FrameRangeRequest>& range,
@@ -93,9 +104,7 @@ CLI::Option* add_range_option(CLI::App& command,
   const auto parse = [&range](const std::string& text) {
     const Expected<FrameRangeRequest> parsed = parse_frame_range(text);
     if (!parsed) {
-      const std::string& message = parsed.error().message;
-      constexpr std::string_view kPrefix = "frames: ";  // CLI11 names the option itself
-      return message.starts_with(kPrefix) ? message.substr(kPrefix.size()) : message;
+      return parsed.error().message;
     }
     range = *parsed;
     return std::string();

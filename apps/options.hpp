@@ -34,6 +34,12 @@ struct NamedKeys {
 };
 [[nodiscard]] NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key);
 
+/// An option FILE; without text it counts as not given.
+CLI::Option* add_file_option(CLI::App& command,
+                             const std::string& name,
+                             std::optional<std::filesystem::path>& file,
+                             const std::string& help);
+
 /// Whole numbers from min to max; leaves the help's line short.
 [[nodiscard]] CLI::Validator in_range(int min, int max);
 

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_yaml.hpp"
-#include "report/text_table.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 

@@ -47,7 +47,7 @@ bool has_contrast(double low, double high) {
   return high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20});
 }
 
-/// Picture pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
+/// Image pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
 PixelMap upsampled(const PixelMap& map, int factor) {
   PixelMap up;
   up.scale = map.scale / factor;

@@ -38,6 +38,9 @@ Expected<std::string> read_text_file(const fs::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   std::string text;
+  if (const auto size = fs::file_size(file, ignored); !ignored) {
+    text.reserve(size);
+  }
   std::array<char, 1 << 16> buffer;
   while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          stream.gcount() > 0) {

@@ -13,24 +13,21 @@
 namespace stemvo {
 
 /// Everything `stemvo channel` was asked for.
-struct ChannelPicturesRequest {
-  std::filesystem::path sequence_dir;  ///< with camera_file: pictures, FrameSourceRequest::path
+struct ChannelImagesRequest : FrameSourceRequest {
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;                             ///< `input` and `stem` are used
-  std::optional<FrameRangeRequest> frames;   ///< else all
   std::optional<FrameRangeRequest> filters;  ///< half open, as frames; else all of the layer
-  std::optional<std::filesystem::path> camera_file;  ///< of a folder of pictures
 };
 
 /// Called after each frame: frames done, frames in all; false stops.
 using ChannelProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// The paper's Figure 1. For each frame: %06d_input.png, %06d_filter_%03d.png (8 bit, as the front
-/// end sees it) and %06d_sheet.png with all of them. Returns the number of pictures written.
-/// Errors: those of the sequence and the model, filters outside the layer, a broken frame, out_dir
-/// that cannot be written.
-[[nodiscard]] Expected<std::size_t> write_channel_pictures(const ChannelPicturesRequest& request,
-                                                           const ChannelProgress& progress = {});
+/// end sees it) and %06d_sheet.png with all of them. Returns the number of images written.
+/// Errors: those of the sequence and the model, filters outside the layer, an unreadable frame,
+/// out_dir that cannot be written.
+[[nodiscard]] Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
+                                                         const ChannelProgress& progress = {});
 
 }  // namespace stemvo
