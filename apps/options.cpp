@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
-#include <algorithm>
 #include <map>
 #include <system_error>
 
@@ -71,18 +70,6 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
     return status.error();
   }
   return config;
-}
-
-NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key) {
-  NamedKeys result;
-  result.by_set = std::any_of(
-      arguments.overrides.begin(), arguments.overrides.end(),
-      [&key](const std::string& assignment) { return assignment.starts_with(key + "="); });
-  if (!arguments.file.empty()) {
-    const auto keys = keys_in_config(find_config(arguments.file));
-    result.by_file = keys && std::find(keys->begin(), keys->end(), key) != keys->end();
-  }
-  return result;
 }
 
 CLI::Option* add_file_option(CLI::App& command,

@@ -27,13 +27,6 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments);
 [[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments,
                                            const Config& base = {});
 
-/// Whether --set or the --config file names the key. Call after read_config, which checks both.
-struct NamedKeys {
-  bool by_set = false;
-  bool by_file = false;
-};
-[[nodiscard]] NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key);
-
 /// An option FILE; without text it counts as not given.
 CLI::Option* add_file_option(CLI::App& command,
                              const std::string& name,

@@ -74,10 +74,6 @@ Expected<int> run(Arguments& arguments) {
   request.config = *config;
   request.models_dir = data_folder("models");
   request.started = process_start();
-  const NamedKeys source = named_keys(arguments.config, "scale.source");
-  request.chosen.source = source.by_set || source.by_file;
-  // A file's height is some camera's, often the default; that of the camera file is this one's.
-  request.chosen.camera_height = named_keys(arguments.config, "scale.camera_height_m").by_set;
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
       request,

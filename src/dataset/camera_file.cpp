@@ -18,6 +18,9 @@
 namespace stemvo::dataset {
 namespace {
 
+using options::Field;
+using options::Rule;
+
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file) {}
@@ -58,7 +61,7 @@ class Reader {
         root_.remove(key);
       }
     }
-    std::vector<options::Field> fields = this->fields();
+    std::vector<Field> fields = this->fields();
     return config::read_document(root_, file_.string(), fields);
   }
 
@@ -154,27 +157,18 @@ class Reader {
     return status;
   }
 
-  std::vector<options::Field> fields() {
-    const auto between = [](double min, double max) {
-      options::Rule rule;
-      rule.min = min;
-      rule.max = max;
-      return rule;
-    };
-    options::Rule model;
-    model.choices = {"pinhole"};
-    options::Rule distortion;
-    distortion.choices = {"none", "radial-tangential", "radtan", "equidistant"};
-    const options::Rule side = between(1.0, kMaxImageSide_px);
+  std::vector<Field> fields() {
+    const Rule side = Rule::between(1.0, kMaxImageSide_px);
+    const Rule distortion = Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
     return {{"", "image_width", &width_px_, side, ""},
             {"", "image_height", &height_px_, side, ""},
             {"", "resolution", &resolution_, side, ""},
-            {"", "camera_model", &camera_model_, model, ""},
+            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
             {"", "intrinsics", &intrinsics_, {}, ""},
             {"", "distortion_model", &distortion_model_, distortion, ""},
             {"", "distortion_coefficients", &distortion_coefficients_, {}, ""},
-            {"", "rate_hz", &rate_hz_, between(1e-9, 1e5), ""},
-            {"", "camera_height", &camera_height_m_, between(1e-9, 1000.0), ""}};
+            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
+            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;

@@ -40,29 +40,23 @@ class EntryReader {
 
  private:
   std::vector<Field> fields() {
-    const auto at_least = [](double min) {
-      Rule rule;
-      rule.min = min;
-      rule.max = kLargestNumber;
-      return rule;
-    };
-    Rule sampling;
-    sampling.choices = {"any", "native"};
+    const Rule positive = Rule::between(1, kLargestNumber);
+    const Rule not_negative = Rule::between(0, kLargestNumber);
     return {{"", "name", &entry_.name, {}, ""},
             {"", "file", &file_, {}, ""},
             {"", "sha256", &entry_.sha256, {}, ""},
             {"", "network", &entry_.network, {}, ""},
             {"", "layer", &entry_.layer, {}, ""},
-            {"", "filters", &entry_.num_filters, at_least(1), ""},
-            {"", "kernel", &kernel_, at_least(1), ""},
-            {"", "stride", &entry_.stride_px, at_least(1), ""},
-            {"", "padding", &padding_, at_least(0), ""},
-            {"", "default_filter", &entry_.default_filter, at_least(0), ""},
+            {"", "filters", &entry_.num_filters, positive, ""},
+            {"", "kernel", &kernel_, positive, ""},
+            {"", "stride", &entry_.stride_px, positive, ""},
+            {"", "padding", &padding_, not_negative, ""},
+            {"", "default_filter", &entry_.default_filter, not_negative, ""},
             {"", "licence", &entry_.licence, {}, ""},
             {"", "command", &entry_.command, {}, ""},
-            {"", "sampling", &sampling_, sampling, ""},
-            {"folded", "filter", &folded_.filter, at_least(0), ""},
-            {"folded", "sampling", &folded_.sampling_px, at_least(1), ""},
+            {"", "sampling", &sampling_, Rule::one_of({"any", "native"}), ""},
+            {"folded", "filter", &folded_.filter, not_negative, ""},
+            {"folded", "sampling", &folded_.sampling_px, positive, ""},
             {"folded", "file", &folded_file_, {}, ""},
             {"folded", "sha256", &folded_.sha256, {}, ""}};
   }
@@ -83,7 +77,7 @@ class EntryReader {
     has_folded_ = node_.IsMap() && node_["folded"].IsDefined();
     for (const Field& field : keys) {
       const bool is_optional = field.section.empty() ? field.key == "sampling" : !has_folded_;
-      if (!is_optional && !config::is_set(node_, field)) {
+      if (!is_optional && !field.is_given) {
         const YAML::Node group = field.section.empty() ? node_ : node_["folded"];
         return fail(
             fmt::format("{}:{}: missing key '{}'", source_.string(), line_of(group), field.name()));

@@ -67,8 +67,24 @@ class FrameScheduler {
 
   void run();
   [[nodiscard]] int num_threads() const { return num_threads_; }
+
   /// Called by a thread of its own; returns when all of the loop is done.
-  void run_loop(int num_stripes, const SharedLoop::Body& body);
+  void run_loop(int num_stripes, const SharedLoop::Body& body) {
+    SharedLoop loop(num_stripes, num_threads_, body);
+    std::unique_lock lock(mutex_);
+    if (loop_ != nullptr) {
+      lock.unlock();
+      body(0, num_stripes);
+      return;
+    }
+    loop_ = &loop;
+    wake_one();
+    lock.unlock();
+    loop.work();
+    lock.lock();
+    loop_ = nullptr;
+    helped_.wait(lock, [&loop] { return loop.num_helpers == 0; });
+  }
 
  private:
   struct Progress {
@@ -76,23 +92,107 @@ class FrameScheduler {
     std::size_t num_done = 0;
   };
 
-  void run_on_threads();
   void work(int thread);
-  bool run_stage(const Job& job) const;
+
+  void run_on_threads() {
+    std::vector<std::jthread> threads;
+    try {
+      for (int i = 1; i < num_threads_; ++i) {
+        threads.emplace_back([this, i] { work(i); });
+      }
+    } catch (...) {  // no more threads to be had
+      const std::lock_guard lock(mutex_);
+      thrown_ = thrown_ == nullptr ? std::current_exception() : thrown_;
+      is_ended_ = true;
+      changed_.notify_all();
+    }
+    work(0);
+  }
+
+  [[nodiscard]] bool run_stage(const Job& job) const {
+    if (job.stage == kOptimize) {
+      return stages_.optimize(job.frame);
+    }
+    const std::array stages = {&stages_.read, &stages_.prepare, &stages_.track, &stages_.localize};
+    (*stages.at(job.stage))(job.frame);
+    return true;
+  }
 
   // With the mutex held.
+
   [[nodiscard]] bool is_over() const {
     return is_ended_ || progress_[kOptimize].num_done == num_frames_;
   }
-  [[nodiscard]] bool can_run(StageId stage) const;
-  [[nodiscard]] std::optional<Job> next_job() const;
   [[nodiscard]] bool is_help_wanted() const {
     return loop_ != nullptr && loop_->has_stripes_left();
   }
-  void begin(const Job& job);
-  void end(const Job& job, bool goes_on);
-  void wake_one();
-  void help(std::unique_lock<std::mutex>& lock);
+
+  [[nodiscard]] bool can_run(StageId stage) const {
+    const Progress& own = progress_[stage];
+    const std::size_t frame = own.num_begun;
+    const bool is_busy = stage != kRead && own.num_begun > own.num_done;
+    if (is_over() || is_busy || frame == num_frames_) {
+      return false;
+    }
+    switch (stage) {
+      case kRead:
+        return frame < progress_[kOptimize].num_done + kMaxInFlight;
+      case kPrepare:
+        return is_read_[frame % kMaxInFlight];
+      case kTrack:
+        return progress_[kPrepare].num_done > frame && progress_[kLocalize].num_done == frame;
+      case kLocalize:
+        return progress_[kTrack].num_done > frame && progress_[kOptimize].num_done == frame;
+      default:
+        return progress_[kLocalize].num_done > frame;
+    }
+  }
+
+  [[nodiscard]] std::optional<Job> next_job() const {
+    for (const StageId stage : kMostUrgentFirst) {
+      if (can_run(stage)) {
+        return Job{stage, progress_[stage].num_begun};
+      }
+    }
+    return std::nullopt;
+  }
+
+  void begin(const Job& job) {
+    ++progress_[job.stage].num_begun;
+    if (job.stage == kPrepare) {
+      is_read_[job.frame % kMaxInFlight] = false;
+    }
+  }
+
+  void end(const Job& job, bool goes_on) {
+    ++progress_[job.stage].num_done;
+    if (job.stage == kRead) {
+      is_read_[job.frame % kMaxInFlight] = true;
+    }
+    is_ended_ = is_ended_ || !goes_on;
+    if (is_over()) {
+      changed_.notify_all();
+    }
+  }
+
+  /// Whoever finds something to do wakes the next one, if there is more.
+  void wake_one() {
+    if (num_idle_ > 0 && (is_help_wanted() || next_job())) {
+      changed_.notify_one();
+    }
+  }
+
+  void help(std::unique_lock<std::mutex>& lock) {
+    SharedLoop& loop = *loop_;
+    ++loop.num_helpers;
+    wake_one();
+    lock.unlock();
+    loop.work();
+    lock.lock();
+    if (--loop.num_helpers == 0) {
+      helped_.notify_all();
+    }
+  }
 
   const FrameStages& stages_;
   const std::size_t num_frames_;
@@ -170,70 +270,6 @@ void FrameScheduler::run() {
   }
 }
 
-bool FrameScheduler::can_run(StageId stage) const {
-  const Progress& own = progress_[stage];
-  const std::size_t frame = own.num_begun;
-  const bool is_busy = stage != kRead && own.num_begun > own.num_done;
-  if (is_over() || is_busy || frame == num_frames_) {
-    return false;
-  }
-  switch (stage) {
-    case kRead:
-      return frame < progress_[kOptimize].num_done + kMaxInFlight;
-    case kPrepare:
-      return is_read_[frame % kMaxInFlight];
-    case kTrack:
-      return progress_[kPrepare].num_done > frame && progress_[kLocalize].num_done == frame;
-    case kLocalize:
-      return progress_[kTrack].num_done > frame && progress_[kOptimize].num_done == frame;
-    default:
-      return progress_[kLocalize].num_done > frame;
-  }
-}
-
-std::optional<Job> FrameScheduler::next_job() const {
-  for (const StageId stage : kMostUrgentFirst) {
-    if (can_run(stage)) {
-      return Job{stage, progress_[stage].num_begun};
-    }
-  }
-  return std::nullopt;
-}
-
-void FrameScheduler::begin(const Job& job) {
-  ++progress_[job.stage].num_begun;
-  if (job.stage == kPrepare) {
-    is_read_[job.frame % kMaxInFlight] = false;
-  }
-}
-
-void FrameScheduler::end(const Job& job, bool goes_on) {
-  ++progress_[job.stage].num_done;
-  if (job.stage == kRead) {
-    is_read_[job.frame % kMaxInFlight] = true;
-  }
-  is_ended_ = is_ended_ || !goes_on;
-  if (is_over()) {
-    changed_.notify_all();
-  }
-}
-
-/// Whoever finds something to do wakes the next one, if there is more.
-void FrameScheduler::wake_one() {
-  if (num_idle_ > 0 && (is_help_wanted() || next_job())) {
-    changed_.notify_one();
-  }
-}
-
-bool FrameScheduler::run_stage(const Job& job) const {
-  if (job.stage == kOptimize) {
-    return stages_.optimize(job.frame);
-  }
-  const std::array stages = {&stages_.read, &stages_.prepare, &stages_.track, &stages_.localize};
-  (*stages.at(job.stage))(job.frame);
-  return true;
-}
-
 void FrameScheduler::work(int thread) {
   FrameScheduler* const scheduler_before = std::exchange(scheduler_of_thread, this);
   const int index_before = std::exchange(index_of_thread, thread);
@@ -263,50 +299,6 @@ void FrameScheduler::work(int thread) {
   }
   scheduler_of_thread = scheduler_before;
   index_of_thread = index_before;
-}
-
-void FrameScheduler::run_on_threads() {
-  std::vector<std::jthread> threads;
-  try {
-    for (int i = 1; i < num_threads_; ++i) {
-      threads.emplace_back([this, i] { work(i); });
-    }
-  } catch (...) {  // no more threads to be had
-    const std::lock_guard lock(mutex_);
-    thrown_ = thrown_ == nullptr ? std::current_exception() : thrown_;
-    is_ended_ = true;
-    changed_.notify_all();
-  }
-  work(0);
-}
-
-void FrameScheduler::run_loop(int num_stripes, const SharedLoop::Body& body) {
-  SharedLoop loop(num_stripes, num_threads_, body);
-  std::unique_lock lock(mutex_);
-  if (loop_ != nullptr) {
-    lock.unlock();
-    body(0, num_stripes);
-    return;
-  }
-  loop_ = &loop;
-  wake_one();
-  lock.unlock();
-  loop.work();
-  lock.lock();
-  loop_ = nullptr;
-  helped_.wait(lock, [&loop] { return loop.num_helpers == 0; });
-}
-
-void FrameScheduler::help(std::unique_lock<std::mutex>& lock) {
-  SharedLoop& loop = *loop_;
-  ++loop.num_helpers;
-  wake_one();
-  lock.unlock();
-  loop.work();
-  lock.lock();
-  if (--loop.num_helpers == 0) {
-    helped_.notify_all();
-  }
 }
 
 }  // namespace

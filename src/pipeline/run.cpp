@@ -20,12 +20,15 @@ namespace {
 
 /// A folder of images is no car of KITTI's: what its camera file does not say is not known.
 Config with_camera_height(Config config, const RunRequest& request, const FrameSource& source) {
-  const bool is_default =
-      config.scale.source == ScaleSource::kCameraHeight && !request.chosen.source;
-  if (request.camera_file && !source.camera_height_m() && is_default) {
+  constexpr const char* kSource = "scale.source";
+  const bool is_chosen = config.scale.source != ScaleSource::kCameraHeight ||
+                         config.keys_in_file.contains(kSource) ||
+                         config.keys_overridden.contains(kSource);
+  if (request.camera_file && !source.camera_height_m() && !is_chosen) {
     config.scale.source = ScaleSource::kNone;
   }
-  if (source.camera_height_m() && !request.chosen.camera_height) {
+  // A file's height is some camera's, often the default; that of the camera file is this one's.
+  if (source.camera_height_m() && !config.keys_overridden.contains("scale.camera_height_m")) {
     config.scale.camera_height_m = *source.camera_height_m();
   }
   return config;

@@ -18,20 +18,13 @@
 
 namespace stemvo {
 
-/// Keys that were chosen for this run, whatever a camera file says.
-struct ChosenScale {
-  bool source = false;         ///< scale.source; always, where it is not the default
-  bool camera_height = false;  ///< scale.camera_height_m
-};
-
 /// Everything `stemvo run` was asked for. The camera is that of `config`. A camera file's
-/// camera_height sets scale.camera_height_m; without one scale.source becomes none; neither where
-/// the key was chosen.
+/// camera_height sets scale.camera_height_m where --set did not; without one scale.source becomes
+/// none where neither --set nor a configuration file named it.
 struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;
-  ChosenScale chosen;
   int num_threads = 0;         ///< 0: all cores
   int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
