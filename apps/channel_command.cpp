@@ -58,9 +58,7 @@ CLI::App* add_channel(CLI::App& app, Action& action) {
                    "Sequence in KITTI's layout; with --camera, images")
       ->required()
       ->type_name("");
-  command->add_option("--out", arguments->request.out_dir, "Folder for the images; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, arguments->request.out_dir, "Folder for the images; created");
   add_range_option(*command, "--frames", arguments->request.frames,
                    "Frames A to B-1; default: the first one");
   add_range_option(*command, "--filters", arguments->request.filters,

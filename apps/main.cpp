@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
   stemvo::apps::catch_interrupts();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell
   try {
-    return stemvo::apps::finish_console(stemvo::apps::run_program(argc, argv));
+    return stemvo::apps::flush_console(stemvo::apps::run_program(argc, argv));
   } catch (const std::exception& error) {
     stemvo::apps::print_error(std::string("internal: ") + error.what());
   } catch (...) {

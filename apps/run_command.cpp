@@ -106,9 +106,7 @@ CLI::App* add_run(CLI::App& app, Action& action) {
                    "Sequence in KITTI's layout; with --camera, images")
       ->required()
       ->type_name("");
-  command->add_option("--out", request.out_dir, "Folder for the results; created, files replaced")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
   add_file_option(*command, "--gt", request.ground_truth, "Ground truth: a pose file of KITTI");
@@ -118,9 +116,7 @@ CLI::App* add_run(CLI::App& app, Action& action) {
                   "With --camera: a time in seconds per image; default: its rate_hz");
   add_file_option(*command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
-  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(*command, request.num_threads);
   command->add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));

@@ -38,9 +38,9 @@ std::vector<float> sample(const cv::Mat& values) {
 double percentile(std::vector<float>& samples, double percent) {
   const double last = static_cast<double>(samples.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(std::lround(last * percent / 100.0));
-  const auto place = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
-  std::nth_element(samples.begin(), place, samples.end());
-  return *place;
+  const auto at = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
+  std::nth_element(samples.begin(), at, samples.end());
+  return *at;
 }
 
 bool has_contrast(double low, double high) {

@@ -17,8 +17,9 @@ namespace stemvo::internal {
 /// at the k pixels from s' J - before on.
 ///
 /// The passes read one buffer, each from its own start. Where the graph pads, a pass would see
-/// padding where the frame goes on, at another place in each pass; then the buffer holds a margin
-/// of repeated border pixels instead, and outputs that touch the graph's padding are left out.
+/// padding where the frame goes on, at another position in each pass; then the buffer holds a
+/// margin of repeated border pixels instead, and outputs that touch the graph's padding are left
+/// out.
 struct SamplingAxis {
   int kernel = 1;
   int stride = 1;

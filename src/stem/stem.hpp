@@ -81,8 +81,8 @@ class Stem {
 /// channel.
 [[nodiscard]] int enlargement(Upsample upsample, int sampling_px);
 
-/// Float channel -> 8-bit image: percentile limits that follow the drive slowly, so that a patch
-/// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
+/// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
+/// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
 /// brings it to the input's size, or half of it (PixelMap is adjusted; no resampling between
 /// pixels). A channel without contrast becomes one gray and leaves the limits as they were; NaN
 /// becomes 0 (upsampled: its surroundings too).

@@ -46,7 +46,7 @@ Expected<std::string> read_text_file(const fs::path& file) {
          stream.gcount() > 0) {
     text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
-  if (!stream.eof()) {  // not opened, or broken in the middle
+  if (!stream.eof()) {  // not opened, or failed in the middle
     return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
   }
   return text;
