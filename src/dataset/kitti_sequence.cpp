@@ -19,25 +19,24 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 
 /// 0..3; colour cameras are 2 and 3.
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
-  if (option == "auto") {
-    for (const int index : {2, 0}) {
-      if (dataset::is_folder(directory / fmt::format("image_{}", index))) {
-        return index;
-      }
-    }
-    return fail(
-        fmt::format("{}: expected a folder image_2 or image_0, found neither", directory.string()));
-  }
-  for (int index = 0; index < 4; ++index) {
-    if (option == fmt::format("image_{}", index)) {
-      if (!dataset::is_folder(directory / option)) {
-        return fail(fmt::format("{}: expected a folder (input.camera is {}), found none",
-                                (directory / option).string(), option));
-      }
+  bool is_known = option == "auto";
+  for (const int index : {2, 0, 1, 3}) {
+    const std::string name = fmt::format("image_{}", index);
+    const bool is_wanted = option == "auto" ? index % 2 == 0 : option == name;
+    if (is_wanted && dataset::is_folder(directory / name)) {
       return index;
     }
+    is_known = is_known || is_wanted;
   }
-  return fail(fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  if (!is_known) {
+    return fail(
+        fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  }
+  return fail(option == "auto"
+                  ? fmt::format("{}: expected a folder image_2 or image_0, found neither",
+                                directory.string())
+                  : fmt::format("{}: expected a folder (input.camera is {}), found none",
+                                (directory / option).string(), option));
 }
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.

@@ -13,7 +13,7 @@
 
 namespace stemvo {
 Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
-                                           const ChannelProgress& progress) {
+                                           const RunProgress& progress) {
   if (const Status status = validate(request.config); !status) {
     return status.error();
   }

@@ -137,8 +137,7 @@ Expected<RunSummary> run_source(const RunRequest& request,
     report.timing->num_threads = cv::getNumThreads();
   }
   pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
-  return RunSummary{report, odometry->stem_info(), std::move(done.warnings), done.interrupted,
-                    std::move(written)};
+  return RunSummary{report, std::move(done.warnings), done.interrupted, std::move(written)};
 }
 
 }  // namespace

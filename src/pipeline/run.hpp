@@ -12,7 +12,6 @@
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
 #include "report/metrics_json.hpp"
-#include "stem/stem.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/odometry.hpp"
 
@@ -35,14 +34,13 @@ struct RunRequest : FrameSourceRequest {
 
 /// What became of a run. Every file is written, also after an interrupt.
 struct RunSummary {
-  MetricsReport report;  ///< what metrics.json holds
-  StemInfo stem;
+  MetricsReport report;               ///< what metrics.json holds
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
   bool interrupted = false;           ///< stopped early; results hold what was computed
   Status written;                     ///< the first result that could not be written, if any
 };
 
-/// Called after each frame: frames done, frames in all; false stops the run (results are written).
+/// Called after each frame: frames done, frames in all; false stops (results are written).
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir

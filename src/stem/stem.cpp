@@ -177,7 +177,6 @@ Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
                          .sha256 = network->sha256,
                          .filter = *filter,
                          .num_filters = network->num_filters,
-                         .native_stride_px = network->stride_px,
                          .sampling_px = *sampling};
   if (is_identity(options.model)) {
     return Stem(info, options.model == "gray" ? gray_channel : input_channels, true);

@@ -21,7 +21,6 @@ struct StemInfo {
   std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
   int filter = 0;      ///< the one chosen, never -1
   int num_filters = 1;
-  int native_stride_px = 1;
   int sampling_px = 1;
 };
 
