@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
-#include <string>
 
 #include <fmt/format.h>
 
@@ -9,7 +8,7 @@
 #include "install_paths.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
-#include "pipeline/channel_pictures.hpp"
+#include "pipeline/channel_images.hpp"
 #include "progress.hpp"
 
 namespace stemvo::apps {
@@ -20,36 +19,30 @@ constexpr const char* kFooter =
 shows them side by side.
 
 Examples:
-  stemvo channel kitti/sequences/03 --out pictures
-  stemvo channel kitti/sequences/03 --out pictures --frames 100:110 --filters 0:4
+  stemvo channel kitti/sequences/03 --out images
+  stemvo channel kitti/sequences/03 --out images --frames 100:110 --filters 0:4
   stemvo channel kitti/sequences/02 --out rgb --set stem.model=input_layer)";
 
 struct Arguments {
-  ChannelPicturesRequest request;
+  ChannelImagesRequest request;
   ConfigArguments config;
-  std::string camera_file;
 };
 
-int draw(Arguments& arguments) {
+Expected<int> draw(Arguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
-    print_error(config.error().message);
-    return kExitFailed;
+    return config.error();
   }
   arguments.request.config = *config;
   arguments.request.models_dir = data_folder("models");
-  if (!arguments.camera_file.empty()) {
-    arguments.request.camera_file = arguments.camera_file;
-  }
   Progress progress("frames", /*is_quiet=*/false);
-  const Expected<std::size_t> written = write_channel_pictures(
+  const Expected<std::size_t> written = write_channel_images(
       arguments.request,
       [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
   if (!written) {
-    print_error(written.error().message);
-    return kExitFailed;
+    return written.error();
   }
-  print(fmt::format("{} pictures in {}\n", *written, arguments.request.out_dir.string()));
+  print(fmt::format("{} images in {}\n", *written, arguments.request.out_dir.string()));
   return is_interrupted() ? kExitInterrupted : kExitDone;
 }
 
@@ -62,20 +55,16 @@ CLI::App* add_channel(CLI::App& app, Action& action) {
   arguments->request.frames = FrameRangeRequest{0, 1};
   command
       ->add_option("SEQUENCE_DIR", arguments->request.sequence_dir,
-                   "Sequence in KITTI's layout; with --camera, pictures")
+                   "Sequence in KITTI's layout; with --camera, images")
       ->required()
       ->type_name("");
-  command->add_option("--out", arguments->request.out_dir, "Folder for the pictures; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, arguments->request.out_dir, "Folder for the images; created");
   add_range_option(*command, "--frames", arguments->request.frames,
                    "Frames A to B-1; default: the first one");
   add_range_option(*command, "--filters", arguments->request.filters,
                    "Filters A to B-1; default: all");
-  command
-      ->add_option("--camera", arguments->camera_file,
-                   "SEQUENCE_DIR is a folder of pictures or a pattern (see 'stemvo run --help')")
-      ->type_name("FILE");
+  add_file_option(*command, "--camera", arguments->request.camera_file,
+                  "SEQUENCE_DIR is a folder of images or a pattern (see 'stemvo run --help')");
   add_config_options(*command, arguments->config);
   command->footer(kFooter);
   command->callback([arguments, &action] { action = [arguments] { return draw(*arguments); }; });

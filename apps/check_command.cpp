@@ -24,12 +24,11 @@ struct Arguments {
   std::filesystem::path thresholds;
 };
 
-int check(const Arguments& arguments) {
+Expected<int> check(const Arguments& arguments) {
   const Expected<std::vector<ThresholdResult>> results =
       check_metrics(arguments.metrics, arguments.thresholds);
   if (!results) {
-    print_error(results.error().message);
-    return kExitFailed;
+    return results.error();
   }
   print(format_check_table(*results));
   return all_passed(*results) ? kExitDone : kExitFailed;

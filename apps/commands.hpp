@@ -5,6 +5,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "stemvo/error.hpp"
+
 namespace stemvo::apps {
 
 inline constexpr int kExitDone = 0;
@@ -12,8 +14,9 @@ inline constexpr int kExitFailed = 1;  ///< the world disagreed
 inline constexpr int kExitUsage = 2;
 inline constexpr int kExitInterrupted = 130;
 
-/// What the command line asks for; set while parsing, called afterwards. Returns the exit code.
-using Action = std::function<int()>;
+/// What the command line asks for; set while parsing, called afterwards. Returns the exit code; an
+/// error is printed, and means kExitFailed.
+using Action = std::function<Expected<int>()>;
 
 /// Each adds its command, whose parsing sets `action`.
 CLI::App* add_run(CLI::App& app, Action& action);

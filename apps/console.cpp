@@ -51,7 +51,7 @@ void print_error(std::string_view message) { print_line("error", message); }
 
 void print_warning(std::string_view message) { print_line("warning", message); }
 
-int finish_console(int exit_code) {
+int flush_console(int exit_code) {
   if (std::fflush(stdout) != 0 && first_failure == 0) {
     first_failure = errno;
   }

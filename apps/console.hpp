@@ -9,7 +9,7 @@ namespace stemvo::apps {
 /// Keeps files away from a closed standard output, and a closed pipe from ending the program.
 void prepare_console();
 
-/// Results, to standard output. A failure is told by finish_console.
+/// Results, to standard output. A failure is told by flush_console.
 void print(std::string_view text);
 /// "error: ..." on one line of standard error.
 void print_error(std::string_view message);
@@ -18,7 +18,7 @@ void print_warning(std::string_view message);
 
 /// Flushes standard output; the exit code, or 1 with a message when the results could not be
 /// written there (a reader that went away is no failure).
-int finish_console(int exit_code);
+int flush_console(int exit_code);
 
 /// When the process started; the first call sets it.
 std::chrono::steady_clock::time_point process_start();

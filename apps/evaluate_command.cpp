@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "options.hpp"
 #include "report/evaluate_report.hpp"
 
 namespace stemvo::apps {
@@ -20,28 +23,19 @@ Examples:
 struct Arguments {
   EvaluationRequest request;
   std::string alignment = "none";
-  std::string json;
+  std::optional<std::filesystem::path> json;
 };
 
-int fail_with(const Error& error) {
-  print_error(error.message);
-  return kExitFailed;
-}
-
-int evaluate(Arguments& arguments) {
-  const Expected<Alignment> alignment = parse_alignment(arguments.alignment);
-  if (!alignment) {
-    return fail_with(alignment.error());
-  }
-  arguments.request.alignment = *alignment;
+Expected<int> evaluate(Arguments& arguments) {
+  arguments.request.alignment = parse_alignment(arguments.alignment).value();
   const Expected<EvaluationReport> report = evaluate_files(arguments.request);
   if (!report) {
-    return fail_with(report.error());
+    return report.error();
   }
   print(format_evaluation_table(*report));
-  if (!arguments.json.empty()) {
-    if (const Status status = write_evaluation_json(arguments.json, *report); !status) {
-      return fail_with(status.error());
+  if (arguments.json) {
+    if (const Status status = write_evaluation_json(*arguments.json, *report); !status) {
+      return status.error();
     }
   }
   return kExitDone;
@@ -61,8 +55,7 @@ CLI::App* add_evaluate(CLI::App& app, Action& action) {
   command->add_option("--align", arguments->alignment, "none (default), scale, se3 or sim3")
       ->type_name("KIND")
       ->check(CLI::IsMember({"none", "scale", "se3", "sim3"}));
-  command->add_option("--json", arguments->json, "Write the numbers to this file as well")
-      ->type_name("FILE");
+  add_file_option(*command, "--json", arguments->json, "Write the numbers to this file as well");
   command->footer(kFooter);
   command->callback(
       [arguments, &action] { action = [arguments] { return evaluate(*arguments); }; });

@@ -79,7 +79,11 @@ int run_program(int argc, char** argv) {
         "search (see 'stemvo --help')");
     return kExitUsage;
   }
-  return action();
+  const Expected<int> exit_code = action();
+  if (!exit_code) {
+    print_error(exit_code.error().message);
+  }
+  return exit_code.value_or(kExitFailed);
 }
 
 }  // namespace
@@ -91,7 +95,7 @@ int main(int argc, char** argv) {
   stemvo::apps::catch_interrupts();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell
   try {
-    return stemvo::apps::finish_console(stemvo::apps::run_program(argc, argv));
+    return stemvo::apps::flush_console(stemvo::apps::run_program(argc, argv));
   } catch (const std::exception& error) {
     stemvo::apps::print_error(std::string("internal: ") + error.what());
   } catch (...) {

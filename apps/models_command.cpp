@@ -29,13 +29,12 @@ std::string describe(const ModelEntry& entry, const Status& status) {
 }
 
 /// `model` empty: all.
-int list_models(const std::string& model) {
+Expected<int> list_models(const std::string& model) {
   const auto folder = data_folder("models");
   const Expected<std::vector<ModelEntry>> entries =
       model.empty() ? load_manifest(folder / "manifest.yaml") : find_layers(model, folder);
   if (!entries) {
-    print_error(entries.error().message);
-    return kExitFailed;
+    return entries.error();
   }
   int exit_code = kExitDone;
   for (const ModelEntry& entry : *entries) {

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "options.hpp"
 
-#include <algorithm>
 #include <map>
-#include <string_view>
 #include <system_error>
 
 #include "install_paths.hpp"
@@ -74,16 +72,26 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
   return config;
 }
 
-NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key) {
-  NamedKeys result;
-  result.by_set = std::any_of(
-      arguments.overrides.begin(), arguments.overrides.end(),
-      [&key](const std::string& assignment) { return assignment.starts_with(key + "="); });
-  if (!arguments.file.empty()) {
-    const auto keys = keys_in_config(find_config(arguments.file));
-    result.by_file = keys && std::find(keys->begin(), keys->end(), key) != keys->end();
-  }
-  return result;
+CLI::Option* add_file_option(CLI::App& command,
+                             const std::string& name,
+                             std::optional<std::filesystem::path>& file,
+                             const std::string& help) {
+  const auto take = [&file](const std::string& text) {
+    if (!text.empty()) {
+      file = text;
+    }
+  };
+  return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
+}
+
+void add_out_folder(CLI::App& command, std::filesystem::path& folder, const std::string& help) {
+  command.add_option("--out", folder, help)->required()->type_name("DIR");
+}
+
+void add_threads_option(CLI::App& command, int& num_threads) {
+  command.add_option("--threads", num_threads, "Threads; 0 (default): all cores")
+      ->type_name("N")
+      ->check(in_range(0, 1024));
 }
 
 CLI::Option* add_range_option(CLI::App& command,
@@ -93,9 +101,7 @@ CLI::Option* add_range_option(CLI::App& command,
   const auto parse = [&range](const std::string& text) {
     const Expected<FrameRangeRequest> parsed = parse_frame_range(text);
     if (!parsed) {
-      const std::string& message = parsed.error().message;
-      constexpr std::string_view kPrefix = "frames: ";  // CLI11 names the option itself
-      return message.starts_with(kPrefix) ? message.substr(kPrefix.size()) : message;
+      return parsed.error().message;
     }
     range = *parsed;
     return std::string();

@@ -27,15 +27,22 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments);
 [[nodiscard]] Expected<Config> read_config(const ConfigArguments& arguments,
                                            const Config& base = {});
 
-/// Whether --set or the --config file names the key. Call after read_config, which checks both.
-struct NamedKeys {
-  bool by_set = false;
-  bool by_file = false;
-};
-[[nodiscard]] NamedKeys named_keys(const ConfigArguments& arguments, const std::string& key);
+/// An option FILE; without text it counts as not given.
+CLI::Option* add_file_option(CLI::App& command,
+                             const std::string& name,
+                             std::optional<std::filesystem::path>& file,
+                             const std::string& help);
 
 /// Whole numbers from min to max; leaves the help's line short.
 [[nodiscard]] CLI::Validator in_range(int min, int max);
+
+/// --out DIR, which must be given.
+void add_out_folder(CLI::App& command,
+                    std::filesystem::path& folder,
+                    const std::string& help = "Folder for the results; created");
+
+/// --threads N.
+void add_threads_option(CLI::App& command, int& num_threads);
 
 /// An option "A:B"; text of another form is wrong usage.
 CLI::Option* add_range_option(CLI::App& command,

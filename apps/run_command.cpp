@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -20,7 +18,7 @@ constexpr const char* kFooter =
     R"(SEQUENCE_DIR holds image_2/000000.png, .. (colour) or image_0 (gray), calib.txt and times.txt, as in
 KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
 
-With --camera it is a folder of PNG or JPEG pictures in the order of their names (frame2 before
+With --camera it is a folder of PNG or JPEG images in the order of their names (frame2 before
 frame10), or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
 
   image_width: 640
@@ -50,10 +48,6 @@ Examples:
 struct Arguments {
   RunRequest request;
   ConfigArguments config;
-  std::string ground_truth;
-  std::string calibration;
-  std::string camera_file;
-  std::string times;
   bool is_quiet = false;
 };
 
@@ -65,47 +59,27 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   if (summary.report.timing) {
     print('\n' + format_timing_table(*summary.report.timing) + '\n');
   }
-  print(fmt::format("picture: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+  print(fmt::format("plot: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
   if (arguments.request.write_map) {
     print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
   }
 }
 
-/// What was typed, for the library; an empty path: not given.
-void fill_request(const Arguments& arguments, RunRequest& request) {
-  const auto take = [](const std::string& typed, std::optional<std::filesystem::path>& path) {
-    if (!typed.empty()) {
-      path = typed;
-    }
-  };
-  take(arguments.ground_truth, request.ground_truth);
-  take(arguments.calibration, request.calibration);
-  take(arguments.camera_file, request.camera_file);
-  take(arguments.times, request.times);
-  const NamedKeys source = named_keys(arguments.config, "scale.source");
-  request.chosen.source = source.by_set || source.by_file;
-  // A file's height is some camera's, often the default; that of the camera file is this one's.
-  request.chosen.camera_height = named_keys(arguments.config, "scale.camera_height_m").by_set;
-}
-
-int run(Arguments& arguments) {
+Expected<int> run(Arguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
-    print_error(config.error().message);
-    return kExitFailed;
+    return config.error();
   }
   RunRequest& request = arguments.request;
   request.config = *config;
   request.models_dir = data_folder("models");
   request.started = process_start();
-  fill_request(arguments, request);
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
       request,
       [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
   if (!summary) {
-    print_error(summary.error().message);
-    return kExitFailed;
+    return summary.error();
   }
   for (const std::string& warning : summary->warnings) {
     print_warning(warning);
@@ -115,8 +89,7 @@ int run(Arguments& arguments) {
                               summary->report.num_frames));
   }
   if (!summary->written) {
-    print_error(summary->written.error().message);
-    return kExitFailed;
+    return summary->written.error();
   }
   print_summary(arguments, *summary);
   return summary->interrupted ? kExitInterrupted : kExitDone;
@@ -130,32 +103,21 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   RunRequest& request = arguments->request;
   command
       ->add_option("SEQUENCE_DIR", request.sequence_dir,
-                   "Sequence in KITTI's layout; with --camera, pictures")
+                   "Sequence in KITTI's layout; with --camera, images")
       ->required()
       ->type_name("");
-  command->add_option("--out", request.out_dir, "Folder for the results; created, files replaced")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
-  command->add_option("--gt", arguments->ground_truth, "Ground truth: a pose file of KITTI")
-      ->type_name("FILE");
-  command
-      ->add_option("--camera", arguments->camera_file,
-                   "SEQUENCE_DIR is a folder of pictures or a pattern, of this camera (see below)")
-      ->type_name("FILE");
-  command
-      ->add_option("--times", arguments->times,
-                   "With --camera: a time in seconds per picture; default: its rate_hz")
-      ->type_name("FILE");
-  command
-      ->add_option("--calib", arguments->calibration,
-                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'")
-      ->type_name("FILE");
-  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
-  command->add_option("--pictures", request.picture_every, "Draw the tracks of every Nth frame")
+  add_file_option(*command, "--gt", request.ground_truth, "Ground truth: a pose file of KITTI");
+  add_file_option(*command, "--camera", request.camera_file,
+                  "SEQUENCE_DIR is a folder of images or a pattern, of this camera (see below)");
+  add_file_option(*command, "--times", request.times,
+                  "With --camera: a time in seconds per image; default: its rate_hz");
+  add_file_option(*command, "--calib", request.calibration,
+                  "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
+  add_threads_option(*command, request.num_threads);
+  command->add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
   command->add_flag("--map", request.write_map,

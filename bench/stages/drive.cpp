@@ -104,7 +104,7 @@ Chain run_chain() {
 }  // namespace
 
 Stem load_stem(const StemOptions& options) {
-  return value_of(create_stem(options, STEMVO_MODELS_DIR));
+  return value_of(Stem::create(value_of(with_network(options, STEMVO_MODELS_DIR))));
 }
 
 const Frames& frames() {

@@ -10,7 +10,7 @@
 
 #include "pipeline/thread_scope.hpp"
 #include "stages/drive.hpp"
-#include "stages/pictures.hpp"
+#include "stages/images.hpp"
 #include "stemvo/version.hpp"
 
 int main(int argc, char** argv) {

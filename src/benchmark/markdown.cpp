@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "report/text_table.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo::benchmark {
 namespace {

@@ -16,8 +16,8 @@
 #include "odometry/phased_odometry.hpp"
 #include "options/option_fields.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "report/text_table.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 namespace {

@@ -15,29 +15,20 @@ using options::Field;
 
 /// Those of the library, and the program's own before and after them.
 std::vector<Field> fields_of(Config& config) {
-  options::Rule positive;
-  positive.min = 0.0;
-  positive.exclusive_min = true;
   std::vector<Field> fields = options::fields_of(config);
   fields.insert(
       fields.begin(),
-      {"input",
-       "camera",
-       &config.input.camera,
-       {.choices = {"auto", "image_0", "image_1", "image_2", "image_3"}},
+      {"input", "camera", &config.input.camera,
+       options::Rule::one_of({"auto", "image_0", "image_1", "image_2", "image_3"}),
        "folder of the sequence to read; auto: image_2 (colour) where present, else image_0 "
        "(gray)"});
   fields.insert(
       fields.end() - 1,  // the seed is last
-      {"evaluation", "segment_lengths_m", &config.evaluation.segment_lengths_m, positive,
+      {"evaluation", "segment_lengths_m", &config.evaluation.segment_lengths_m,
+       options::Rule::above(0.0),
        "of t_rel and r_rel; []: 100, 200, .. 800, or 10, 20, .. 50 where the path is under "
        "100 m"});
   return fields;
-}
-
-Expected<YAML::Node> read_yaml(const std::filesystem::path& file) {
-  return read_text_file(file).and_then(
-      [&](const std::string& text) { return config::parse_document(text, file.string()); });
 }
 
 /// A list is written as in the file; anything else is taken as it stands, so that a path may hold
@@ -54,7 +45,8 @@ std::string read_assigned(const std::string& text, const Field& field) {
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
-  const Expected<YAML::Node> root = read_yaml(file);
+  const auto root = read_text_file(file).and_then(
+      [&](const std::string& text) { return config::parse_document(text, file.string()); });
   if (!root) {
     return root.error();
   }
@@ -63,22 +55,12 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
   if (Status status = config::read_document(*root, file.string(), fields); !status) {
     return status.error();
   }
-  return result;
-}
-
-Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& file) {
-  const Expected<YAML::Node> root = read_yaml(file);
-  if (!root) {
-    return root.error();
-  }
-  Config config;
-  std::vector<std::string> keys;
-  for (const Field& field : fields_of(config)) {
-    if (config::is_set(*root, field)) {
-      keys.push_back(field.name());
+  for (const Field& field : fields) {
+    if (field.is_given) {
+      result.keys_in_file.insert(field.name());
     }
   }
-  return keys;
+  return result;
 }
 
 Status apply_override(Config& config, const std::string& assignment) {
@@ -105,6 +87,7 @@ Status apply_override(Config& config, const std::string& assignment) {
     return fail(source + ": " + problem);
   }
   config = changed;
+  config.keys_overridden.insert(name);
   return {};
 }
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <set>
 #include <string>
-#include <vector>
 
 #include "evaluation/metrics.hpp"
 #include "stemvo/error.hpp"
@@ -20,14 +20,16 @@ struct InputOptions {
 struct Config : Options {
   InputOptions input;
   EvaluationOptions evaluation;
+
+  // Who chose a key, e.g. "scale.source".
+  std::set<std::string> keys_in_file;     ///< of load_config
+  std::set<std::string> keys_overridden;  ///< of apply_override
 };
 
 /// Reads a YAML file over `base`. Errors with file and line: not YAML, unknown or duplicated key,
 /// wrong type, value out of range.
 [[nodiscard]] Expected<Config> load_config(const std::filesystem::path& file,
                                            const Config& base = {});
-/// The keys a YAML file sets, e.g. "scale.source". Errors: it cannot be read, it is not YAML.
-[[nodiscard]] Expected<std::vector<std::string>> keys_in_config(const std::filesystem::path& file);
 /// `key=value` of --set, e.g. "stem.filter=10".
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 /// Ranges and choices of every key; written so that NaN fails.

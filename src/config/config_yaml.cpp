@@ -90,15 +90,6 @@ bool is_section(std::string_view name, const std::vector<Field>& fields) {
                                       [name](const Field& f) { return f.section == name; });
 }
 
-const Field* find_field(std::string_view section,
-                        std::string_view key,
-                        const std::vector<Field>& fields) {
-  const auto found = std::find_if(fields.begin(), fields.end(), [&](const Field& f) {
-    return f.section == section && f.key == key;
-  });
-  return found == fields.end() ? nullptr : &*found;
-}
-
 std::string read_list(const YAML::Node& node, std::vector<double>& values) {
   values.clear();
   for (const YAML::Node& element : node) {
@@ -153,12 +144,16 @@ class MapReader {
     if (section.empty() && is_section(key, fields_)) {
       return read(value, key);
     }
-    const Field* field = find_field(section, key, fields_);
+    const auto field = std::find_if(fields_.begin(), fields_.end(), [&](const Field& f) {
+      return f.section == section && f.key == key;
+    });
+    const bool is_known = field != fields_.end();
     const std::string problem =
-        field == nullptr ? unknown_key(section, key, fields_) : read_value(value, *field);
+        is_known ? read_value(value, *field) : unknown_key(section, key, fields_);
     if (!problem.empty()) {
       return error(key_node, fmt::format("{}: {}", full_name(section, quoted_key(key)), problem));
     }
+    field->is_given = true;
     return {};
   }
 
@@ -262,14 +257,6 @@ std::string read_value(const YAML::Node& node, const Field& field) {
                           list != nullptr ? "a list of numbers" : "one value", kind_of(node));
   }
   return problem.empty() ? violation_of(field) : problem;
-}
-
-bool is_set(const YAML::Node& root, const Field& field) {
-  if (!root.IsMap()) {
-    return false;
-  }
-  const YAML::Node map = field.section.empty() ? root : root[std::string(field.section)];
-  return map && map.IsMap() && map[std::string(field.key)].IsDefined();
 }
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {

@@ -17,17 +17,14 @@ using namespace options;  // NOLINT: the fields are read and written here
 /// The one document of a YAML text. Errors "<source>:<line>: ...": not YAML, several documents.
 [[nodiscard]] Expected<YAML::Node> parse_document(const std::string& text, std::string_view source);
 
-/// Reads a document into the fields it names. Errors "<source>:<line>: <key>: ...": unknown or
-/// duplicated key, wrong type, value the rule refuses.
+/// Reads a document into the fields it names, and marks them. Errors "<source>:<line>: <key>: ...":
+/// unknown or duplicated key, wrong type, value the rule refuses.
 [[nodiscard]] Status read_document(const YAML::Node& root,
                                    std::string_view source,
                                    std::vector<Field>& fields);
 
 /// Reads one value, a scalar or a list. Nothing, or "expected ..., found ...".
 [[nodiscard]] std::string read_value(const YAML::Node& node, const Field& field);
-
-/// Whether a document names the field.
-[[nodiscard]] bool is_set(const YAML::Node& root, const Field& field);
 
 /// "unknown key; known keys of stem: model, filter, ..."
 [[nodiscard]] std::string unknown_key(std::string_view section,

@@ -18,41 +18,8 @@
 namespace stemvo::dataset {
 namespace {
 
-/// What the keys say; as here where they are absent.
-struct Values {
-  int width_px = 0;
-  int height_px = 0;
-  std::vector<double> resolution;
-  std::string camera_model;
-  std::vector<double> intrinsics;
-  std::string distortion_model;
-  std::vector<double> distortion_coefficients;
-  double rate_hz = 0.0;
-  double camera_height_m = 0.0;
-
-  std::vector<options::Field> fields() {
-    const auto between = [](double min, double max) {
-      options::Rule rule;
-      rule.min = min;
-      rule.max = max;
-      return rule;
-    };
-    options::Rule model;
-    model.choices = {"pinhole"};
-    options::Rule distortion;
-    distortion.choices = {"none", "radial-tangential", "radtan", "equidistant"};
-    const options::Rule side = between(1.0, kMaxImageSide_px);
-    return {{"", "image_width", &width_px, side, ""},
-            {"", "image_height", &height_px, side, ""},
-            {"", "resolution", &resolution, side, ""},
-            {"", "camera_model", &camera_model, model, ""},
-            {"", "intrinsics", &intrinsics, {}, ""},
-            {"", "distortion_model", &distortion_model, distortion, ""},
-            {"", "distortion_coefficients", &distortion_coefficients, {}, ""},
-            {"", "rate_hz", &rate_hz, between(1e-9, 1e5), ""},
-            {"", "camera_height", &camera_height_m, between(1e-9, 1000.0), ""}};
-  }
-};
+using options::Field;
+using options::Rule;
 
 class Reader {
  public:
@@ -70,8 +37,8 @@ class Reader {
     const auto if_given = [](double value) {
       return value > 0.0 ? std::optional(value) : std::nullopt;
     };
-    result.rate_hz = if_given(values_.rate_hz);
-    result.camera_height_m = if_given(values_.camera_height_m);
+    result.rate_hz = if_given(rate_hz_);
+    result.camera_height_m = if_given(camera_height_m_);
     return result;
   }
 
@@ -94,7 +61,7 @@ class Reader {
         root_.remove(key);
       }
     }
-    std::vector<options::Field> fields = values_.fields();
+    std::vector<Field> fields = this->fields();
     return config::read_document(root_, file_.string(), fields);
   }
 
@@ -123,34 +90,33 @@ class Reader {
   }
 
   Status set_size(Camera& camera) const {
-    camera.width_px = values_.width_px;
-    camera.height_px = values_.height_px;
-    if ((values_.width_px == 0) != (values_.height_px == 0)) {
+    camera.width_px = width_px_;
+    camera.height_px = height_px_;
+    if ((width_px_ == 0) != (height_px_ == 0)) {
       return fail(fmt::format("{}: expected image_width and image_height, found {} alone",
-                              file_.string(),
-                              values_.width_px == 0 ? "image_height" : "image_width"));
+                              file_.string(), width_px_ == 0 ? "image_height" : "image_width"));
     }
-    if (values_.width_px > 0) {
+    if (width_px_ > 0) {
       return {};
     }
-    if (values_.resolution.empty()) {
+    if (resolution_.empty()) {
       return missing("image_width and image_height, or resolution: [width, height]");
     }
-    for (const double side : values_.resolution) {
+    for (const double side : resolution_) {
       if (side != std::floor(side)) {
         return refuse("resolution", fmt::format("expected whole pixels, found {}", side));
       }
     }
-    const Status status = check_length("resolution", values_.resolution, {2}, "[width, height]");
+    const Status status = check_length("resolution", resolution_, {2}, "[width, height]");
     if (status) {
-      camera.width_px = static_cast<int>(values_.resolution[0]);
-      camera.height_px = static_cast<int>(values_.resolution[1]);
+      camera.width_px = static_cast<int>(resolution_[0]);
+      camera.height_px = static_cast<int>(resolution_[1]);
     }
     return status;
   }
 
   Status set_intrinsics(Camera& camera) const {
-    const std::vector<double>& numbers = values_.intrinsics;
+    const std::vector<double>& numbers = intrinsics_;
     if (const Status status = check_length("intrinsics", numbers, {4}, "[fx, fy, cx, cy]");
         !status) {
       return status;
@@ -168,8 +134,8 @@ class Reader {
   }
 
   Status set_distortion(Lens& lens) const {
-    const std::string& model = values_.distortion_model;
-    const std::vector<double>& numbers = values_.distortion_coefficients;
+    const std::string& model = distortion_model_;
+    const std::vector<double>& numbers = distortion_coefficients_;
     if (model.empty()) {
       return missing("distortion_model: none, radial-tangential or equidistant");
     }
@@ -191,9 +157,32 @@ class Reader {
     return status;
   }
 
+  std::vector<Field> fields() {
+    const Rule side = Rule::between(1.0, kMaxImageSide_px);
+    const Rule distortion = Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
+    return {{"", "image_width", &width_px_, side, ""},
+            {"", "image_height", &height_px_, side, ""},
+            {"", "resolution", &resolution_, side, ""},
+            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
+            {"", "intrinsics", &intrinsics_, {}, ""},
+            {"", "distortion_model", &distortion_model_, distortion, ""},
+            {"", "distortion_coefficients", &distortion_coefficients_, {}, ""},
+            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
+            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
+  }
+
   std::filesystem::path file_;
   YAML::Node root_;
-  Values values_;
+  // What the keys say; as here where they are absent.
+  int width_px_ = 0;
+  int height_px_ = 0;
+  std::vector<double> resolution_;
+  std::string camera_model_;
+  std::vector<double> intrinsics_;
+  std::string distortion_model_;
+  std::vector<double> distortion_coefficients_;
+  double rate_hz_ = 0.0;
+  double camera_height_m_ = 0.0;
 };
 
 }  // namespace

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_files.hpp"
 
+#include <algorithm>
 #include <span>
+#include <string>
 #include <system_error>
+
+#include <fmt/format.h>
 
 namespace stemvo::dataset {
 
@@ -32,16 +36,17 @@ Expected<std::vector<fs::path>> list_folder(const fs::path& folder) {
 }
 
 Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& request,
-                                   std::size_t num_frames,
-                                   const fs::path& folder) {
+                                   std::size_t count,
+                                   const std::string& owner,
+                                   std::string_view things) {
   if (!request) {
-    return FrameRange{0, num_frames};
+    return FrameRange{0, count};
   }
-  const FrameRange range{request->begin, request->end.value_or(num_frames)};
-  if (range.begin >= range.end || range.end > num_frames) {
+  const FrameRange range{request->begin, request->end.value_or(count)};
+  if (range.begin >= range.end || range.end > count) {
     const std::string end = request->end ? std::to_string(*request->end) : "";
-    return fail(fmt::format("{}: expected frames inside 0:{}, found --frames {}:{}",
-                            folder.string(), num_frames, request->begin, end));
+    return fail(fmt::format("{}: expected {} inside 0:{}, found --{} {}:{}", owner, things, count,
+                            things, request->begin, end));
   }
   return range;
 }
@@ -91,6 +96,29 @@ Expected<cv::Mat> check_size(const fs::path& file, Expected<cv::Mat> image, cons
                             camera.width_px, camera.height_px, image->cols, image->rows));
   }
   return image;
+}
+
+Expected<io::ImageKind> vote_on_images(
+    const std::vector<fs::path>& files,
+    const std::function<Expected<io::ImageKind>(const fs::path&)>& kind_of) {
+  constexpr std::size_t kNumVotes = 5;
+  std::string first_message;
+  std::vector<io::ImageKind> votes;
+  for (auto file = files.begin(); file != files.end() && votes.size() < kNumVotes; ++file) {
+    const auto kind = kind_of(*file);
+    if (kind) {
+      votes.push_back(*kind);
+    } else if (first_message.empty()) {
+      first_message = kind.error().message;
+    }
+  }
+  if (votes.empty()) {
+    return fail(
+        fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
+  }
+  return *std::max_element(votes.begin(), votes.end(), [&](const auto& a, const auto& b) {
+    return std::count(votes.begin(), votes.end(), a) < std::count(votes.begin(), votes.end(), b);
+  });
 }
 
 }  // namespace stemvo::dataset

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include <fmt/format.h>
 #include <opencv2/core.hpp>
 
 #include "dataset/frame_source.hpp"
+#include "io/image_file.hpp"
 #include "stemvo/error.hpp"
 
 /// What all frame sources that read files share.
@@ -24,10 +25,12 @@ namespace stemvo::dataset {
 [[nodiscard]] Expected<std::vector<std::filesystem::path>> list_folder(
     const std::filesystem::path& folder);
 
-/// Error (folder named): empty or outside the frames there are.
+/// All where nothing is asked for. Error: empty or outside the `count` frames (or what `things`
+/// are) of `owner`.
 [[nodiscard]] Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& request,
-                                                 std::size_t num_frames,
-                                                 const std::filesystem::path& folder);
+                                                 std::size_t count,
+                                                 const std::string& owner,
+                                                 std::string_view things = "frames");
 
 /// Files, times and, where there is a file of them, poses (KITTI's format) of the range; the rest
 /// of the list is left as it is made. The file has at least the poses up to the range's end;
@@ -51,28 +54,9 @@ namespace stemvo::dataset {
 [[nodiscard]] Expected<FrameSource> open_image_folder(const FrameSourceRequest& request);
 
 /// What most of the first readable images are; of equals the one seen first. One odd frame must
-/// not throw the rest away. `kind_of`: path -> Expected<Kind>. Error: none can be read.
-template <typename Kind, typename KindOf>
-[[nodiscard]] Expected<Kind> vote_on_images(const std::vector<std::filesystem::path>& files,
-                                            const KindOf& kind_of) {
-  constexpr std::size_t kNumVotes = 5;
-  std::string first_message;
-  std::vector<Kind> votes;
-  for (auto file = files.begin(); file != files.end() && votes.size() < kNumVotes; ++file) {
-    const Expected<Kind> kind = kind_of(*file);
-    if (kind) {
-      votes.push_back(*kind);
-    } else if (first_message.empty()) {
-      first_message = kind.error().message;
-    }
-  }
-  if (votes.empty()) {
-    return fail(
-        fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
-  }
-  return *std::max_element(votes.begin(), votes.end(), [&](const Kind& a, const Kind& b) {
-    return std::count(votes.begin(), votes.end(), a) < std::count(votes.begin(), votes.end(), b);
-  });
-}
+/// not throw the rest away. `kind_of`: of a file. Error: none can be read.
+[[nodiscard]] Expected<io::ImageKind> vote_on_images(
+    const std::vector<std::filesystem::path>& files,
+    const std::function<Expected<io::ImageKind>(const std::filesystem::path&)>& kind_of);
 
 }  // namespace stemvo::dataset

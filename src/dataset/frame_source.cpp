@@ -40,10 +40,6 @@ Error refuse(const fs::path& path) {
   return fail(fmt::format("{}: {}", path.string(), problem));
 }
 
-std::unique_ptr<const FrameSource> to_pointer(const FrameSource& source) {
-  return std::make_unique<const FrameSource>(source);
-}
-
 }  // namespace
 
 Expected<cv::Mat> FrameSource::read(std::size_t index) const {
@@ -58,21 +54,21 @@ Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
   const std::optional<std::size_t> begin = parse_index(first.empty() ? "0" : first);
   const std::optional<std::size_t> end = parse_index(last);
   if (colon == std::string::npos || text.size() == 1 || !begin || (!last.empty() && !end)) {
-    return fail(fmt::format("frames: expected A:B, A: or :B with whole numbers, found '{}'", text));
+    return fail(fmt::format("expected A:B, A: or :B with whole numbers, found '{}'", text));
   }
   if (end && *end <= *begin) {
-    return fail(fmt::format("frames: expected A < B in the half-open A:B, found '{}'", text));
+    return fail(fmt::format("expected A < B in the half-open A:B, found '{}'", text));
   }
   return FrameRangeRequest{*begin, end};
 }
 
-Expected<std::unique_ptr<const FrameSource>> open_source(const FrameSourceRequest& request) {
+Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   if (request.camera_file) {
     if (request.calibration) {
       return fail(fmt::format("{}: expected --camera or --calib (KITTI's layout only), found both",
                               request.calibration->string()));
     }
-    return dataset::open_image_folder(request).map(to_pointer);
+    return dataset::open_image_folder(request);
   }
   if (request.times) {
     return fail(
@@ -80,12 +76,12 @@ Expected<std::unique_ptr<const FrameSource>> open_source(const FrameSourceReques
                     "times.txt), found no --camera",
                     request.times->string()));
   }
-  if (!dataset::is_folder(request.path) || !looks_like_kitti(request.path)) {
-    return refuse(request.path);
+  if (!dataset::is_folder(request.sequence_dir) || !looks_like_kitti(request.sequence_dir)) {
+    return refuse(request.sequence_dir);
   }
-  return KittiSequence::open(request.path, {request.kitti_camera, request.frames,
-                                            request.ground_truth, request.calibration})
-      .map(to_pointer);
+  return KittiSequence::open(request.sequence_dir, request).map([](const FrameSource& source) {
+    return source;
+  });
 }
 
 }  // namespace stemvo

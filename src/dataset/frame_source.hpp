@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -35,41 +34,37 @@ struct FrameRangeRequest {
 struct FrameList {
   std::string name;  ///< of the folder, e.g. "03"
   FrameRange range;  ///< in the folder's numbering
-  Camera camera;     ///< of the frames as they are read: without distortion
+  Camera camera;     ///< pinhole without distortion, of the frames as they are read
   std::vector<std::filesystem::path> files;
   std::vector<double> timestamps_s;
-  std::optional<Trajectory> ground_truth = std::nullopt;  ///< first pose is the identity
-  std::optional<std::filesystem::path> ground_truth_file = std::nullopt;
-  std::optional<std::filesystem::path> given_calibration = std::nullopt;
-  std::optional<double> camera_height_m = std::nullopt;  ///< above the road, of a camera file
+  std::optional<Trajectory> ground_truth;  ///< first pose is the identity
+  std::optional<std::filesystem::path> ground_truth_file;
+  /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
+  std::optional<std::filesystem::path> given_calibration;
+  std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
   /// File -> frame; several threads may call it.
-  std::function<Expected<cv::Mat>(const std::filesystem::path&)> read = {};
+  std::function<Expected<cv::Mat>(const std::filesystem::path&)> read;
 };
 
-/// Frames of one camera, in order.
+/// Frames of one camera, in order; what is known of them as in FrameList.
 class FrameSource {
  public:
   explicit FrameSource(FrameList frames) : frames_(std::move(frames)) {}
 
   [[nodiscard]] std::size_t size() const { return frames_.files.size(); }
-  /// Pinhole without distortion, of the frames as `read` gives them.
   [[nodiscard]] const Camera& camera() const { return frames_.camera; }
   [[nodiscard]] const std::string& name() const { return frames_.name; }
   [[nodiscard]] FrameRange range() const { return frames_.range; }
   [[nodiscard]] const std::vector<double>& timestamps_s() const { return frames_.timestamps_s; }
-  /// First pose is the identity; absent when there is no file.
   [[nodiscard]] const std::optional<Trajectory>& ground_truth() const {
     return frames_.ground_truth;
   }
-  /// The pose file the ground truth was read from.
   [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
     return frames_.ground_truth_file;
   }
-  /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
   [[nodiscard]] const std::optional<std::filesystem::path>& given_calibration() const {
     return frames_.given_calibration;
   }
-  /// Above the road; absent where no camera file says it.
   [[nodiscard]] const std::optional<double>& camera_height_m() const {
     return frames_.camera_height_m;
   }
@@ -86,17 +81,23 @@ class FrameSource {
   FrameList frames_;
 };
 
+/// Keys `input.*` of the configuration, and the program's --frames, --gt and --calib.
+struct SequenceOptions {
+  std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
+  std::optional<FrameRangeRequest> frames = std::nullopt;
+  /// Else ../../poses/NN.txt if it exists; of images none.
+  std::optional<std::filesystem::path> ground_truth = std::nullopt;
+  /// Else calib.txt in the folder. KITTI's layout only.
+  std::optional<std::filesystem::path> calibration = std::nullopt;
+};
+
 /// What was asked for, and the files given beside it.
-struct FrameSourceRequest {
+struct FrameSourceRequest : SequenceOptions {
   /// A folder in KITTI's layout or, with `camera_file`, a folder of images or a pattern such as
   /// `drive/left_*.png` (* and ? in the last part).
-  std::filesystem::path path;
-  std::string kitti_camera = "auto";  ///< key input.camera
-  std::optional<FrameRangeRequest> frames = std::nullopt;
-  std::optional<std::filesystem::path> ground_truth = std::nullopt;
-  std::optional<std::filesystem::path> calibration = std::nullopt;  ///< KITTI's layout only
-  std::optional<std::filesystem::path> camera_file = std::nullopt;
-  std::optional<std::filesystem::path> times = std::nullopt;  ///< with camera_file only
+  std::filesystem::path sequence_dir;
+  std::optional<std::filesystem::path> camera_file;  ///< of images
+  std::optional<std::filesystem::path> times;        ///< of images; else the camera's rate_hz
 };
 
 /// KITTI's layout without a camera file: KittiSequence::open. With one: PNG and JPEG images in
@@ -105,7 +106,6 @@ struct FrameSourceRequest {
 /// `times` the camera file's rate_hz counts. Errors: those of KittiSequence::open; neither layout
 /// nor camera file; a camera file that is wrong; no images; images of another size; more or
 /// fewer times or poses than images; a range outside.
-[[nodiscard]] Expected<std::unique_ptr<const FrameSource>> open_source(
-    const FrameSourceRequest& request);
+[[nodiscard]] Expected<FrameSource> open_source(const FrameSourceRequest& request);
 
 }  // namespace stemvo

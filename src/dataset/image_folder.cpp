@@ -43,7 +43,7 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
                             const fs::path& folder,
                             const fs::path& camera_file,
                             const Camera& camera) {
-  const auto kind = vote_on_images<io::ImageKind>(files, io::read_image_kind);
+  const auto kind = vote_on_images(files, io::read_image_kind);
   if (!kind) {
     return kind.error();
   }
@@ -62,11 +62,12 @@ Expected<FrameSource> open_image_folder(const FrameSourceRequest& request) {
   if (!camera_file) {
     return camera_file.error();
   }
-  const auto images = list_images(request.path);
+  const auto images = list_images(request.sequence_dir);
   if (!images) {
     return images.error();
   }
-  const auto range = resolve_range(request.frames, images->files.size(), request.path);
+  const auto range =
+      resolve_range(request.frames, images->files.size(), request.sequence_dir.string());
   if (!range) {
     return range.error();
   }

@@ -19,25 +19,24 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 
 /// 0..3; colour cameras are 2 and 3.
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
-  if (option == "auto") {
-    for (const int index : {2, 0}) {
-      if (dataset::is_folder(directory / fmt::format("image_{}", index))) {
-        return index;
-      }
-    }
-    return fail(
-        fmt::format("{}: expected a folder image_2 or image_0, found neither", directory.string()));
-  }
-  for (int index = 0; index < 4; ++index) {
-    if (option == fmt::format("image_{}", index)) {
-      if (!dataset::is_folder(directory / option)) {
-        return fail(fmt::format("{}: expected a folder (input.camera is {}), found none",
-                                (directory / option).string(), option));
-      }
+  bool is_known = option == "auto";
+  for (const int index : {2, 0, 1, 3}) {
+    const std::string name = fmt::format("image_{}", index);
+    const bool is_wanted = option == "auto" ? index % 2 == 0 : option == name;
+    if (is_wanted && dataset::is_folder(directory / name)) {
       return index;
     }
+    is_known = is_known || is_wanted;
   }
-  return fail(fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  if (!is_known) {
+    return fail(
+        fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
+  }
+  return fail(option == "auto"
+                  ? fmt::format("{}: expected a folder image_2 or image_0, found neither",
+                                directory.string())
+                  : fmt::format("{}: expected a folder (input.camera is {}), found none",
+                                (directory / option).string(), option));
 }
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.
@@ -70,14 +69,6 @@ Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
   return files;
 }
 
-/// The size most of the first readable frames have.
-Expected<cv::Size> find_image_size(const std::vector<fs::path>& files, bool is_color) {
-  return dataset::vote_on_images<cv::Size>(
-      files, [is_color](const fs::path& file) -> Expected<cv::Size> {
-        return io::read_png(file, is_color).map([](const cv::Mat& m) { return m.size(); });
-      });
-}
-
 /// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.
 std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::string& name) {
   std::error_code code;
@@ -106,7 +97,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   if (!images) {
     return images.error();
   }
-  const auto range = dataset::resolve_range(options.frames, images->size(), image_folder);
+  const auto range = dataset::resolve_range(options.frames, images->size(), image_folder.string());
   if (!range) {
     return range.error();
   }
@@ -132,12 +123,16 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   frames.camera = *camera;
   frames.given_calibration = options.calibration;
   const bool is_color = *camera_index >= 2;
-  const auto size = find_image_size(frames.files, is_color);
-  if (!size) {
-    return size.error();
+  const auto kind = dataset::vote_on_images(frames.files, [is_color](const fs::path& file) {
+    return io::read_png(file, is_color).map([is_color](const cv::Mat& image) {
+      return io::ImageKind{image.size(), is_color};
+    });
+  });
+  if (!kind) {
+    return kind.error();
   }
-  frames.camera.width_px = size->width;
-  frames.camera.height_px = size->height;
+  frames.camera.width_px = kind->size.width;
+  frames.camera.height_px = kind->size.height;
   if (options.calibration) {
     if (const Status status = dataset::check_center(frames.camera); !status) {
       return fail(fmt::format("{}: {}: a calibration of another image size", calibration.string(),

@@ -2,23 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <string>
 
 #include "dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {
-
-/// Keys `input.*` of the configuration, and the program's --frames, --gt and --calib.
-struct SequenceOptions {
-  std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
-  std::optional<FrameRangeRequest> frames = std::nullopt;
-  /// Else ../../poses/NN.txt if it exists.
-  std::optional<std::filesystem::path> ground_truth = std::nullopt;
-  /// Else calib.txt in the folder.
-  std::optional<std::filesystem::path> calibration = std::nullopt;
-};
 
 /// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt. Frames are CV_8UC1 for
 /// the gray cameras, CV_8UC3 in RGB order for colour.

@@ -33,23 +33,19 @@ std::vector<double> distances_m(std::span<const Rigid3> poses) {
   return result;
 }
 
-Trajectory transform(std::span<const Rigid3> poses, const Similarity3& similarity) {
-  const Eigen::Quaterniond rotation(similarity.rotation);
-  Trajectory result;
-  result.reserve(poses.size());
-  for (const Rigid3& pose : poses) {
-    result.emplace_back(rotation * pose.rotation,
-                        similarity.scale * (rotation * pose.translation) + similarity.translation);
-  }
-  return result;
-}
-
 /// Both start at the identity. Umeyama's fit on positions.
 Trajectory align(std::span<const Rigid3> estimate,
                  std::span<const Rigid3> ground_truth,
                  Alignment alignment) {
-  return transform(estimate,
-                   align_positions(positions(estimate), positions(ground_truth), alignment));
+  const Similarity3 fit = align_positions(positions(estimate), positions(ground_truth), alignment);
+  const Eigen::Quaterniond rotation(fit.rotation);
+  Trajectory result;
+  result.reserve(estimate.size());
+  for (const Rigid3& pose : estimate) {
+    result.emplace_back(rotation * pose.rotation,
+                        fit.scale * (rotation * pose.translation) + fit.translation);
+  }
+  return result;
 }
 
 double position_rmse_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {

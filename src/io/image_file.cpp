@@ -1,34 +1,26 @@
 // SPDX-License-Identifier: MIT
 #include "io/image_file.hpp"
 
-#include <fstream>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <system_error>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "io/png.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::io {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The whole file; `expected` is what it should be.
-Expected<Bytes> read_bytes(const fs::path& file, std::string_view expected) {
-  std::error_code code;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || fs::is_directory(file, code)) {
-    return fail(fmt::format("{}: expected a readable {}, cannot open it", file.string(), expected));
-  }
-  const std::uintmax_t size = fs::file_size(file, code);
-  Bytes bytes(code ? 0 : size);
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
+/// What `use` makes of the file's bytes.
+template <typename Use>
+auto with_bytes(const fs::path& file, const Use& use) {
+  return read_text_file(file).and_then([&](const std::string& text) {
+    return use(Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+  });
 }
 
 // JPEG's markers: this byte and a code.
@@ -36,14 +28,14 @@ constexpr std::uint8_t kMark = 0xff;
 constexpr std::uint8_t kStartOfImage = 0xd8;
 constexpr std::uint8_t kEndOfImage = 0xd9;
 
-bool is_jpeg(const Bytes& bytes) {
+bool is_jpeg(Bytes bytes) {
   return bytes.size() >= 2 && bytes[0] == kMark && bytes[1] == kStartOfImage;
 }
 
 /// The segment behind the first marker of a JPEG that `is_wanted`. The bytes of other segments
 /// (thumbnails among them) are skipped.
 template <typename Predicate>
-std::optional<std::size_t> find_segment(const Bytes& bytes, const Predicate& is_wanted) {
+std::optional<std::size_t> find_segment(Bytes bytes, const Predicate& is_wanted) {
   const auto byte = [&](std::size_t i) { return i < bytes.size() ? bytes[i] : std::uint8_t{0}; };
   // What the mark stands before within an image's data: itself, stuffing and restarts.
   const auto is_data = [](int code) {
@@ -63,7 +55,7 @@ std::optional<std::size_t> find_segment(const Bytes& bytes, const Predicate& is_
 }
 
 /// More than one component.
-bool is_color_jpeg(const Bytes& bytes) {
+bool is_color_jpeg(Bytes bytes) {
   constexpr std::size_t kNumComponents = 7;  // behind length, precision, height and width
   const auto frame = find_segment(bytes, [](int code) {  // all but three, which define tables
     return code >= 0xc0 && code <= 0xcf && code != 0xc4 && code != 0xc8 && code != 0xcc;
@@ -72,7 +64,7 @@ bool is_color_jpeg(const Bytes& bytes) {
 }
 
 /// The markers are walked to the end first, because the decoder fills what is missing with gray.
-Expected<cv::Mat> decode_jpeg(const Bytes& bytes, const std::string& name, bool as_color) {
+Expected<cv::Mat> decode_jpeg(Bytes bytes, const std::string& name, bool as_color) {
   if (!find_segment(bytes, [](int code) { return code == kEndOfImage; })) {
     return fail(fmt::format("{}: expected a complete JPEG image, found one cut off after {} bytes",
                             name, bytes.size()));
@@ -84,7 +76,7 @@ Expected<cv::Mat> decode_jpeg(const Bytes& bytes, const std::string& name, bool 
   return image;
 }
 
-Expected<cv::Mat> decode(const Bytes& bytes, const std::string& name, bool as_color) {
+Expected<cv::Mat> decode(Bytes bytes, const std::string& name, bool as_color) {
   if (is_png(bytes)) {
     return decode_png(bytes, name, as_color);
   }
@@ -98,26 +90,20 @@ Expected<cv::Mat> decode(const Bytes& bytes, const std::string& name, bool as_co
 }  // namespace
 
 Expected<ImageKind> read_image_kind(const fs::path& file) {
-  const auto bytes = read_bytes(file, "PNG or JPEG image");
-  if (!bytes) {
-    return bytes.error();
-  }
-  const bool is_color = is_png(*bytes) ? is_color_png(*bytes) : is_color_jpeg(*bytes);
-  return decode(*bytes, file.string(), is_color).map([&](const cv::Mat& image) {
-    return ImageKind{image.size(), is_color};
+  return with_bytes(file, [&](Bytes bytes) {
+    const bool is_color = is_png(bytes) ? is_color_png(bytes) : is_color_jpeg(bytes);
+    return decode(bytes, file.string(), is_color).map([&](const cv::Mat& image) {
+      return ImageKind{image.size(), is_color};
+    });
   });
 }
 
 Expected<cv::Mat> read_image(const fs::path& file, bool as_color) {
-  return read_bytes(file, "PNG or JPEG image").and_then([&](const Bytes& bytes) {
-    return decode(bytes, file.string(), as_color);
-  });
+  return with_bytes(file, [&](Bytes bytes) { return decode(bytes, file.string(), as_color); });
 }
 
 Expected<cv::Mat> read_png(const fs::path& file, bool as_color) {
-  return read_bytes(file, "PNG image").and_then([&](const Bytes& bytes) {
-    return decode_png(bytes, file.string(), as_color);
-  });
+  return with_bytes(file, [&](Bytes bytes) { return decode_png(bytes, file.string(), as_color); });
 }
 
 }  // namespace stemvo::io

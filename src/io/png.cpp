@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 #include <libdeflate.h>
@@ -15,12 +16,10 @@
 namespace stemvo::io {
 namespace {
 
-using View = std::span<const std::uint8_t>;
-
 constexpr std::array<std::uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 
 /// The first four bytes.
-std::uint32_t big_endian_32(View bytes) {
+std::uint32_t big_endian_32(Bytes bytes) {
   return (std::uint32_t{bytes[0]} << 24U) | (std::uint32_t{bytes[1]} << 16U) |
          (std::uint32_t{bytes[2]} << 8U) | std::uint32_t{bytes[3]};
 }
@@ -28,8 +27,8 @@ std::uint32_t big_endian_32(View bytes) {
 /// PNG specification, section 5.3.
 struct Chunk {
   std::string_view type;  ///< empty: there is no such chunk inside the file
-  View data;
-  View checked;                ///< type and data: what the checksum is of
+  Bytes data;
+  Bytes checked;               ///< type and data: what the checksum is of
   std::uint32_t checksum = 0;  ///< CRC-32, as it stands in the file
 
   [[nodiscard]] bool is_sound() const {
@@ -38,13 +37,13 @@ struct Chunk {
 };
 
 /// Takes the next chunk off the `rest` of a file.
-Chunk next_chunk(View& rest) {
+Chunk next_chunk(Bytes& rest) {
   constexpr std::size_t kFrame = 12;  // length, type and CRC, 4 bytes each
   if (rest.size() < kFrame || big_endian_32(rest) > rest.size() - kFrame) {
     return {};
   }
   const std::size_t length = big_endian_32(rest);
-  const View checked = rest.subspan(4, 4 + length);
+  const Bytes checked = rest.subspan(4, 4 + length);
   const Chunk chunk{{reinterpret_cast<const char*>(checked.data()), 4},
                     checked.subspan(4),
                     checked,
@@ -54,8 +53,8 @@ Chunk next_chunk(View& rest) {
 }
 
 /// Each chunk must lie inside the file, the last is IEND.
-bool is_complete(View bytes) {
-  View rest = bytes.subspan(kSignature.size());
+bool is_complete(Bytes bytes) {
+  Bytes rest = bytes.subspan(kSignature.size());
   for (Chunk chunk = next_chunk(rest); !chunk.type.empty(); chunk = next_chunk(rest)) {
     if (chunk.type == "IEND") {
       return true;
@@ -75,7 +74,7 @@ bool is_plain_header(const Chunk& chunk, bool as_color) {
 
 /// The parts of the zlib stream, one behind the other. False: a chunk that is damaged or may change
 /// pixels.
-bool collect_pixel_data(View rest, Bytes& packed) {
+bool collect_pixel_data(Bytes rest, std::vector<std::uint8_t>& packed) {
   /// Chunks that say something about the image and change no pixel of it.
   static constexpr std::array<std::string_view, 7> kHarmless = {"tEXt", "tIME", "pHYs", "gAMA",
                                                                 "cHRM", "sRGB", "bKGD"};
@@ -151,10 +150,10 @@ bool undo_filter(int filter, const Row& row) {
 
 /// `filtered`: per row of the image one byte that names the filter, then the row.
 template <int kChannels>
-cv::Mat undo_filters(const Bytes& filtered, int rows, int cols) {
+cv::Mat undo_filters(const std::vector<std::uint8_t>& filtered, int rows, int cols) {
   cv::Mat image(rows, cols, CV_8UC(kChannels));
   const std::size_t row_size = filtered.size() / static_cast<std::size_t>(rows) - 1;
-  const Bytes zeros(row_size, 0);
+  const std::vector<std::uint8_t> zeros(row_size, 0);
   const std::uint8_t* above = zeros.data();
   const std::uint8_t* in = filtered.data();
   for (int v = 0; v < rows; ++v) {
@@ -172,28 +171,28 @@ cv::Mat undo_filters(const Bytes& filtered, int rows, int cols) {
 struct Workspace {
   std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> decompressor{
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor};
-  Bytes packed;
-  Bytes unpacked;
+  std::vector<std::uint8_t> packed;
+  std::vector<std::uint8_t> unpacked;
 };
 
 }  // namespace
 
-bool is_png(View bytes) {
+bool is_png(Bytes bytes) {
   return bytes.size() >= kSignature.size() &&
          std::equal(kSignature.begin(), kSignature.end(), bytes.begin());
 }
 
-bool is_color_png(const Bytes& bytes) {
+bool is_color_png(Bytes bytes) {
   constexpr std::size_t kColorType = 25;  // of IHDR, which comes first
   constexpr std::uint8_t kColorBit = 2;
   return bytes.size() > kColorType && (bytes[kColorType] & kColorBit) != 0;
 }
 
-cv::Mat decode_plain_png(View bytes, bool as_color) {
+cv::Mat decode_plain_png(Bytes bytes, bool as_color) {
   constexpr std::uint64_t kMaxSide = 1U << 16U;
   constexpr std::uint64_t kMaxExpansion = 1032;  // deflate makes at most that many bytes of one
   thread_local Workspace work;
-  View rest = bytes.subspan(kSignature.size());
+  Bytes rest = bytes.subspan(kSignature.size());
   const Chunk header = next_chunk(rest);
   if (work.decompressor == nullptr || !is_plain_header(header, as_color) ||
       !collect_pixel_data(rest, work.packed)) {
@@ -217,10 +216,12 @@ cv::Mat decode_plain_png(View bytes, bool as_color) {
                                                         static_cast<int>(cols));
 }
 
-cv::Mat decode_by_opencv(const Bytes& bytes, bool as_color, int flags) {
+cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags) {
+  const cv::Mat packed(1, static_cast<int>(bytes.size()), CV_8UC1,
+                       const_cast<std::uint8_t*>(bytes.data()));  // it is only read
   cv::Mat image;
   try {
-    image = cv::imdecode(bytes, (as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE) | flags);
+    image = cv::imdecode(packed, (as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE) | flags);
   } catch (const cv::Exception&) {
     return {};
   }
@@ -230,7 +231,7 @@ cv::Mat decode_by_opencv(const Bytes& bytes, bool as_color, int flags) {
   return image;
 }
 
-Expected<cv::Mat> decode_png(const Bytes& bytes, const std::string& name, bool as_color) {
+Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color) {
   if (!is_png(bytes)) {
     return fail(fmt::format("{}: expected a PNG image, found {}", name,
                             bytes.empty() ? "an empty file" : "another kind of file"));

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -12,27 +11,25 @@
 
 namespace stemvo::io {
 
-using Bytes = std::vector<std::uint8_t>;
+using Bytes = std::span<const std::uint8_t>;
 
 /// A complete PNG as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors, starting
 /// with `name`: not a PNG; cut off; damaged. An image is never partly decoded: the chunks are
 /// walked to the end first, because some decoders fill what is missing with gray.
-[[nodiscard]] Expected<cv::Mat> decode_png(const Bytes& bytes,
-                                           const std::string& name,
-                                           bool as_color);
+[[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color);
 
 /// The common kind of PNG, which is what KITTI has, by libdeflate: in a third of the time that
 /// libpng and zlib take. Empty: the file is of another kind (other than 8-bit gray, or RGB with
 /// `as_color`; interlaced; with chunks that may change pixels), or something in it is wrong
 /// (checksums are compared). RGB order.
-[[nodiscard]] cv::Mat decode_plain_png(std::span<const std::uint8_t> bytes, bool as_color);
+[[nodiscard]] cv::Mat decode_plain_png(Bytes bytes, bool as_color);
 
 /// Every format and kind that OpenCV knows; empty: damaged. `flags` beside gray or colour.
-[[nodiscard]] cv::Mat decode_by_opencv(const Bytes& bytes, bool as_color, int flags = 0);
+[[nodiscard]] cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags = 0);
 
 /// By the first bytes.
-[[nodiscard]] bool is_png(std::span<const std::uint8_t> bytes);
+[[nodiscard]] bool is_png(Bytes bytes);
 /// Of a PNG: palettes are colour.
-[[nodiscard]] bool is_color_png(const Bytes& bytes);
+[[nodiscard]] bool is_color_png(Bytes bytes);
 
 }  // namespace stemvo::io

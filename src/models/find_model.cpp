@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <filesystem>
-#include <iterator>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -13,62 +11,62 @@
 namespace stemvo {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr const char* kManifest = "manifest.yaml";
 
-Expected<std::vector<ModelEntry>> find_by_path(const std::filesystem::path& file) {
+/// The manifest that lists a model given by its path. Error: no such file, or none beside it.
+Expected<fs::path> manifest_beside(const fs::path& file) {
   std::error_code ignored;
-  if (!std::filesystem::exists(file, ignored)) {
+  if (!fs::exists(file, ignored)) {
     return fail(fmt::format("{}: no such file", file.string()));
   }
-  const std::filesystem::path manifest = std::filesystem::absolute(file).parent_path() / kManifest;
-  if (!std::filesystem::exists(manifest, ignored)) {
+  const fs::path manifest = fs::absolute(file).parent_path() / kManifest;
+  if (!fs::exists(manifest, ignored)) {
     return fail(fmt::format(
         "{}: expected a {} beside it, which says kernel, stride and padding, found none",
         file.string(), kManifest));
   }
-  const auto entries = load_manifest(manifest);
+  return manifest;
+}
+
+}  // namespace
+
+Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
+                                              const fs::path& models_dir) {
+  const bool is_path = model.ends_with(".onnx");
+  const auto manifest =
+      is_path ? manifest_beside(model) : Expected<fs::path>(models_dir / kManifest);
+  const auto entries = manifest.and_then(load_manifest);
   if (!entries) {
     return entries.error();
   }
-  std::vector<ModelEntry> found;
-  std::copy_if(entries->begin(), entries->end(), std::back_inserter(found),
-               [&](const ModelEntry& entry) { return entry.file.filename() == file.filename(); });
-  if (found.empty()) {
-    return fail(fmt::format("{}: expected an entry with 'file: {}', found none", manifest.string(),
-                            file.filename().string()));
-  }
-  return found;
-}
-
-Expected<std::vector<ModelEntry>> find_by_name(const std::string& model,
-                                               const std::filesystem::path& manifest) {
-  auto entries = load_manifest(manifest);
-  if (!entries) {
-    return entries;
-  }
+  const fs::path file_name = fs::path(model).filename();
   std::vector<ModelEntry> found;
   std::vector<std::string> known;
-  for (ModelEntry& entry : *entries) {
+  for (const ModelEntry& entry : *entries) {
     if (known.empty() || known.back() != entry.name) {
       known.push_back(entry.name);
     }
-    if (entry.name == model) {
-      found.push_back(std::move(entry));
+    if (is_path ? entry.file.filename() == file_name : entry.name == model) {
+      found.push_back(entry);
     }
   }
   if (!found.empty()) {
     return found;
   }
+  if (is_path) {
+    return fail(fmt::format("{}: expected an entry with 'file: {}', found none", manifest->string(),
+                            file_name.string()));
+  }
   known.insert(known.end(), {"gray", "input_layer", "the path of an .onnx"});
-  return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest.string(),
+  return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest->string(),
                           fmt::join(known, ", "), model));
 }
 
-}  // namespace
-
 Expected<ModelEntry> find_model(const std::string& model,
                                 const std::string& layer,
-                                const std::filesystem::path& models_dir) {
+                                const fs::path& models_dir) {
   auto layers = find_layers(model, models_dir);
   if (!layers) {
     return layers.error();
@@ -84,7 +82,7 @@ Expected<ModelEntry> find_model(const std::string& model,
                           fmt::join(known, ", "), layer));
 }
 
-Expected<StemOptions> with_network(StemOptions options, const std::filesystem::path& models_dir) {
+Expected<StemOptions> with_network(StemOptions options, const fs::path& models_dir) {
   if (options.model == "gray" || options.model == "input_layer") {
     return options;
   }
@@ -97,21 +95,15 @@ Expected<StemOptions> with_network(StemOptions options, const std::filesystem::p
   return options;
 }
 
-Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
-                                              const std::filesystem::path& models_dir) {
-  return model.ends_with(".onnx") ? find_by_path(model)
-                                  : find_by_name(model, models_dir / kManifest);
-}
-
 Status check_model(const ModelEntry& entry) {
   auto session = internal::open_model(entry);
-  if (const auto folded = internal::folded_network(entry); session && folded) {
-    session = internal::open_model(*folded);
+  if (session && entry.folded) {
+    session = internal::open_model(internal::folded_network(entry));
   }
   return session ? Status() : session.error();
 }
 
-Expected<Stem> create_stem(const StemOptions& options, const std::filesystem::path& models_dir) {
+Expected<Stem> create_stem(const StemOptions& options, const fs::path& models_dir) {
   const auto found = with_network(options, models_dir);
   if (!found) {
     return found.error();

@@ -47,7 +47,7 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   prepared.stem_ms = watch.lap_ms();
   prepared.picture = front_end_->prepare(image);
   if (asks_road_) {
-    const StageTimer timer(Stage::kRoadPicture);
+    const StageTimer timer(Stage::kRoadImage);
     prepared.road = std::make_shared<RoadImage>(make_road_image(image, camera_));
   }
   return prepared;

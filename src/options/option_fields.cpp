@@ -12,54 +12,34 @@
 namespace stemvo::options {
 namespace {
 
-Rule any() { return {}; }
-Rule one_of(std::vector<std::string_view> choices) {
-  Rule rule;
-  rule.choices = std::move(choices);
-  return rule;
-}
-Rule at_least(double min) {
-  Rule rule;
-  rule.min = min;
-  return rule;
-}
-Rule above(double min) {
-  Rule rule = at_least(min);
-  rule.exclusive_min = true;
-  return rule;
-}
-Rule between(double min, double max) {
-  Rule rule = at_least(min);
-  rule.max = max;
-  return rule;
-}
-Rule odd_between(double min, double max) {
-  Rule rule = between(min, max);
-  rule.odd = true;
-  return rule;
-}
-
 std::vector<Field> stem_fields(StemOptions& o) {
   return {
-      {"stem", "model", &o.model, any(),
+      {"stem",
+       "model",
+       &o.model,
+       {},
        "name in models/manifest.yaml, path of an .onnx, gray, or input_layer (filters 0-2 = R, G, "
        "B)"},
-      {"stem", "layer", &o.layer, any(),
+      {"stem",
+       "layer",
+       &o.layer,
+       {},
        "of a model that has several layers (stemvo models MODEL lists them), or first"},
-      {"stem", "filter", &o.filter, at_least(-1),
+      {"stem", "filter", &o.filter, Rule::at_least(-1),
        "the one filter whose response is the image; -1: the default_filter of the manifest"},
-      {"stem", "sampling_px", &o.sampling_px, at_least(0),
+      {"stem", "sampling_px", &o.sampling_px, Rule::at_least(0),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
-      {"stem", "upsample", enum_value(&o.upsample), one_of({"auto", "bicubic", "half", "native"}),
+      {"stem", "upsample", enum_value(&o.upsample),
+       Rule::one_of({"auto", "bicubic", "half", "native"}),
        "size of the image to track on: bicubic (the input's), half (of the input's where the "
        "channel is coarser, else the channel's), native (the channel's), or auto: half for "
        "patch, and for klt on frames of 1000 columns and more, else bicubic"},
-      {"stem", "stretch_low_percent", &o.stretch_low_percent, between(0, 100),
+      {"stem", "stretch_low_percent", &o.stretch_low_percent, Rule::between(0, 100),
        "percentile of the response that becomes black"},
-      {"stem", "stretch_high_percent", &o.stretch_high_percent, between(0, 100),
+      {"stem", "stretch_high_percent", &o.stretch_high_percent, Rule::between(0, 100),
        "percentile of the response that becomes white"},
-      {"stem", "stretch_memory", &o.stretch_memory, between(0, 1),
+      {"stem", "stretch_memory", &o.stretch_memory, Rule::between(0, 1),
        "share of the last frame's black and white kept, so that gray values stay put"},
   };
 }
@@ -67,66 +47,66 @@ std::vector<Field> stem_fields(StemOptions& o) {
 std::vector<Field> feature_fields(FeatureOptions& o) {
   return {
       {"features", "method", enum_value(&o.method),
-       one_of({kFeatureMethods.begin(), kFeatureMethods.end()}),
+       Rule::one_of({kFeatureMethods.begin(), kFeatureMethods.end()}),
        "patch: corners tracked by the patch of their first frame; klt: by optical flow from frame to "
        "frame; orb (the paper's), sift: described and matched"},
-      {"features", "max_features", &o.max_features, between(8, 100000),
+      {"features", "max_features", &o.max_features, Rule::between(8, 100000),
        "keypoints aimed at per frame"},
-      {"features", "grid_columns", &o.grid_columns, between(1, 1000),
+      {"features", "grid_columns", &o.grid_columns, Rule::between(1, 1000),
        "cells across the image, each with its share of the keypoints"},
-      {"features", "grid_rows", &o.grid_rows, between(1, 1000), "cells down the image"},
-      {"features", "corner_quality", &o.corner_quality, between(0, 1),
+      {"features", "grid_rows", &o.grid_rows, Rule::between(1, 1000), "cells down the image"},
+      {"features", "corner_quality", &o.corner_quality, Rule::between(0, 1),
        "patch, klt: least corner response, as a share of the strongest"},
-      {"features", "min_distance_px", &o.min_distance_px, at_least(0),
+      {"features", "min_distance_px", &o.min_distance_px, Rule::at_least(0),
        "patch, klt: between keypoints, input pixels"},
-      {"features", "klt_window", &o.klt_window, odd_between(3, 201),
+      {"features", "klt_window", &o.klt_window, Rule::odd_between(3, 201),
        "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked image"},
-      {"features", "klt_levels", &o.klt_levels, between(1, 10),
+      {"features", "klt_levels", &o.klt_levels, Rule::between(1, 10),
        "patch, klt: levels of the pyramid, from the input's size on"},
-      {"features", "max_forward_backward_px", &o.max_forward_backward_px, above(0),
+      {"features", "max_forward_backward_px", &o.max_forward_backward_px, Rule::above(0),
        "klt: a point tracked there and back must return this close, input pixels"},
-      {"features", "fast_threshold", &o.fast_threshold, between(1, 254),
+      {"features", "fast_threshold", &o.fast_threshold, Rule::between(1, 254),
        "orb: least step of gray value of a corner"},
-      {"features", "ratio", &o.ratio, between(0, 1),
+      {"features", "ratio", &o.ratio, Rule::between(0, 1),
        "sift: distance of the best match over that of the second best"},
   };
 }
 
 std::vector<Field> two_view_fields(TwoViewOptions& o) {
   return {
-      {"two_view", "sigma_px", &o.sigma_px, above(0),
+      {"two_view", "sigma_px", &o.sigma_px, Rule::above(0),
        "noise in the scores S_H and S_F of eq. (5), input pixels"},
-      {"two_view", "homography_ratio", &o.homography_ratio, between(0, 1),
+      {"two_view", "homography_ratio", &o.homography_ratio, Rule::between(0, 1),
        "R_H of eq. (7) above it: the initial pose comes from the homography"},
-      {"two_view", "estimator", enum_value(&o.estimator), one_of({"magsac", "ransac"}),
+      {"two_view", "estimator", enum_value(&o.estimator), Rule::one_of({"magsac", "ransac"}),
        "robust estimator"},
-      {"two_view", "inlier_threshold_px", &o.inlier_threshold_px, above(0),
+      {"two_view", "inlier_threshold_px", &o.inlier_threshold_px, Rule::above(0),
        "of the robust estimator, input pixels"},
-      {"two_view", "confidence", &o.confidence, between(0.5, 0.999999999),
+      {"two_view", "confidence", &o.confidence, Rule::between(0.5, 0.999999999),
        "of the robust estimator: probability that a good sample was drawn"},
-      {"two_view", "max_iterations", &o.max_iterations, between(1, 10000000),
+      {"two_view", "max_iterations", &o.max_iterations, Rule::between(1, 10000000),
        "of the robust estimator"},
-      {"two_view", "refine", &o.refine, any(), "nonlinear refinement of the motion on the inliers"},
-      {"two_view", "refine_loss_px", &o.refine_loss_px, above(0),
+      {"two_view", "refine", &o.refine, {}, "nonlinear refinement of the motion on the inliers"},
+      {"two_view", "refine_loss_px", &o.refine_loss_px, Rule::above(0),
        "epipolar distance from which the refinement mistrusts a match, input pixels"},
   };
 }
 
 std::vector<Field> odometry_fields(OdometryOptions& o) {
   return {
-      {"odometry", "mode", enum_value(&o.mode), one_of({"two_frame", "map"}),
+      {"odometry", "mode", enum_value(&o.mode), Rule::one_of({"two_frame", "map"}),
        "two_frame: motions of pairs of frames are chained; map: each frame is localized "
        "against landmarks of the last keyframes, which are refined together"},
-      {"odometry", "composition", enum_value(&o.composition), one_of({"right", "paper"}),
+      {"odometry", "composition", enum_value(&o.composition), Rule::one_of({"right", "paper"}),
        "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)"},
-      {"odometry", "gate", enum_value(&o.gate), one_of({"translation", "paper", "off"}),
+      {"odometry", "gate", enum_value(&o.gate), Rule::one_of({"translation", "paper", "off"}),
        "two_frame: what a step that does not go forward loses: its translation, paper: its "
        "rotation "
        "too; off: nothing"},
-      {"odometry", "min_inliers", &o.min_inliers, at_least(5), "fewer: the frame is lost"},
-      {"odometry", "stationary_flow_px", &o.stationary_flow_px, at_least(0),
+      {"odometry", "min_inliers", &o.min_inliers, Rule::at_least(5), "fewer: the frame is lost"},
+      {"odometry", "stationary_flow_px", &o.stationary_flow_px, Rule::at_least(0),
        "median flow below it: stationary, input pixels"},
-      {"odometry", "min_parallax_px", &o.min_parallax_px, at_least(0),
+      {"odometry", "min_parallax_px", &o.min_parallax_px, Rule::at_least(0),
        "median flow without the rotation's below it: low parallax, too little to see a direction, "
        "input pixels"},
   };
@@ -134,18 +114,18 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
 
 std::vector<Field> refine_fields(RefineOptions& o) {
   return {
-      {"refine", "every", &o.every, at_least(0),
+      {"refine", "every", &o.every, Rule::at_least(0),
        "keyframes between refinements of the map, the paper's m; 0: never"},
-      {"refine", "window", &o.window, between(3, 100), "keyframes refined together"},
-      {"refine", "max_iterations", &o.max_iterations, between(1, 1000), "of one refinement"},
-      {"refine", "loss_px", &o.loss_px, above(0),
+      {"refine", "window", &o.window, Rule::between(3, 100), "keyframes refined together"},
+      {"refine", "max_iterations", &o.max_iterations, Rule::between(1, 1000), "of one refinement"},
+      {"refine", "loss_px", &o.loss_px, Rule::above(0),
        "reprojection error from which an observation is mistrusted, input pixels"},
   };
 }
 
 std::vector<Field> camera_fields(CameraOptions& o) {
   return {
-      {"camera", "refine", enum_value(&o.refine), one_of({"off", "principal_point", "all"}),
+      {"camera", "refine", enum_value(&o.refine), Rule::one_of({"off", "principal_point", "all"}),
        "mode map: what of the given camera is refined while driving, where the images insist: off "
        "(nothing), principal_point, or all (the focal length too)"},
   };
@@ -154,17 +134,20 @@ std::vector<Field> camera_fields(CameraOptions& o) {
 std::vector<Field> scale_fields(ScaleOptions& o) {
   return {
       {"scale", "source", enum_value(&o.source),
-       one_of({kScaleSources.begin(), kScaleSources.end()}),
+       Rule::one_of({kScaleSources.begin(), kScaleSources.end()}),
        "length of a step: none, up to scale (1 unit; mode map: the first one); constant, the same "
        "in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
        "paper's protocol; needs the pose file)"},
-      {"scale", "constant_m", &o.constant_m, above(0), "metres per frame when constant"},
-      {"scale", "camera_height_m", &o.camera_height_m, above(0),
+      {"scale", "constant_m", &o.constant_m, Rule::above(0), "metres per frame when constant"},
+      {"scale", "camera_height_m", &o.camera_height_m, Rule::above(0),
        "above the road, for camera_height"},
-      {"scale", "estimators", enum_value(&o.estimators), one_of({"both", "dense", "points"}),
+      {"scale", "estimators", enum_value(&o.estimators), Rule::one_of({"both", "dense", "points"}),
        "camera_height: what measures the road: dense (its image aligned), points (tracked "
        "corners; the first frames are dense all the same), or both"},
-      {"scale", "temporal_filter", &o.temporal_filter, any(),
+      {"scale",
+       "temporal_filter",
+       &o.temporal_filter,
+       {},
        "camera_height: measurements are filtered over time; false: each frame's stands alone"},
   };
 }
@@ -225,7 +208,7 @@ std::vector<Field> fields_of(Options& options) {
   append(refine_fields(options.refine));
   append(camera_fields(options.camera));
   append(scale_fields(options.scale));
-  append({{"", "seed", &options.seed, any(), "of every random number"}});
+  append({{"", "seed", &options.seed, {}, "of every random number"}});
   return fields;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -17,11 +18,20 @@ namespace stemvo::options {
 /// Which values a key may have. Bounds hold for every element of a list; infinite and NaN never
 /// pass.
 struct Rule {
-  double min = -std::numeric_limits<double>::infinity();
-  double max = std::numeric_limits<double>::infinity();
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  double min = -kInfinity;
+  double max = kInfinity;
   bool exclusive_min = false;
   bool odd = false;
   std::vector<std::string_view> choices;  ///< of a text (empty: any but none) or enumerators
+
+  static Rule at_least(double min) { return between(min, kInfinity); }
+  static Rule above(double min) { return {min, kInfinity, true, false, {}}; }
+  static Rule between(double min, double max) { return {min, max, false, false, {}}; }
+  static Rule odd_between(double min, double max) { return {min, max, false, true, {}}; }
+  static Rule one_of(std::vector<std::string_view> choices) {
+    return {-kInfinity, kInfinity, false, false, std::move(choices)};
+  }
 };
 
 /// An enumerator by its number, which is also that of its name among Rule::choices.
@@ -47,6 +57,7 @@ struct Field {
   FieldValue value;  ///< points into the options given to fields_of()
   Rule rule;
   std::string_view help;
+  bool is_given = false;  ///< a document that was read names it
 
   [[nodiscard]] std::string name() const {
     return section.empty() ? std::string(key) : std::string(section) + "." + std::string(key);

@@ -10,46 +10,43 @@
 
 #include <fmt/format.h>
 
+#include "dataset/frame_files.hpp"
+
 namespace stemvo::pipeline {
 
-Status create_out_folder(const std::filesystem::path& folder) {
+namespace fs = std::filesystem;
+
+Status create_out_folder(const fs::path& folder) {
   const auto refuse = [&folder](const std::string& found) {
     return fail(fmt::format("{}: expected an output folder that can be written, found: {}",
                             folder.string(), found));
   };
   std::error_code code;
-  std::filesystem::create_directories(folder, code);
+  fs::create_directories(folder, code);
   if (code) {
     return refuse(code.message());
   }
-  if (!std::filesystem::is_directory(folder, code)) {
+  if (!fs::is_directory(folder, code)) {
     return refuse("a file of that name");
   }
-  const std::filesystem::path probe = folder / ".stemvo_probe";
+  const fs::path probe = folder / ".stemvo_probe";
   std::ofstream out(probe);
   if (!(out << "can be written\n") || !out.flush()) {
     return refuse(std::strerror(errno));
   }
   out.close();
-  std::filesystem::remove(probe, code);
+  fs::remove(probe, code);
   return {};
 }
 
-Status remove_old_pictures(const std::filesystem::path& folder) {
-  std::error_code code;
-  std::vector<std::filesystem::path> old;
-  std::filesystem::directory_iterator entry(folder, code);
-  for (; !code && entry != std::filesystem::directory_iterator(); entry.increment(code)) {
-    const std::string stem = entry->path().stem().string();
+Status remove_old_images(const fs::path& folder) {
+  for (const fs::path& file : dataset::list_folder(folder).value_or(std::vector<fs::path>())) {
+    const std::string stem = file.stem().string();
     const bool is_number = stem.size() == 6 && stem.find_first_not_of("0123456789") == stem.npos;
-    std::error_code ignored;
-    if (is_number && entry->path().extension() == ".png" && entry->is_regular_file(ignored)) {
-      old.push_back(entry->path());
-    }
-  }
-  for (const std::filesystem::path& file : old) {
-    if (!code && !std::filesystem::remove(file, code) && code) {
-      return fail(fmt::format("{}: an earlier run's picture cannot be removed ({})", file.string(),
+    std::error_code code;
+    if (is_number && file.extension() == ".png" && fs::is_regular_file(file, code) &&
+        !fs::remove(file, code) && code) {
+      return fail(fmt::format("{}: an earlier run's image cannot be removed ({})", file.string(),
                               code.message()));
     }
   }

@@ -11,8 +11,8 @@ namespace stemvo::pipeline {
 /// folder, what was expected, what the system says.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
 
-/// Removes the pictures an earlier run left in its folder, so that those of one run are not taken
+/// Removes the images an earlier run left in its folder, so that those of one run are not taken
 /// for another's: files of six digits and `.png`, nothing else. Error: one that cannot be removed.
-[[nodiscard]] Status remove_old_pictures(const std::filesystem::path& folder);
+[[nodiscard]] Status remove_old_images(const std::filesystem::path& folder);
 
 }  // namespace stemvo::pipeline

@@ -2,17 +2,21 @@
 #include "pipeline/result_files.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-#include <string>
+#include <chrono>
+#include <optional>
+#include <span>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "internal_check.hpp"
+#include "options/option_fields.hpp"
 #include "report/evaluate_report.hpp"
+#include "report/map_ply.hpp"
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::pipeline {
 namespace {
@@ -21,12 +25,6 @@ namespace {
 std::string one_line(std::string text) {
   std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
   return text;
-}
-
-/// "frames 10:20 of 03", in the folder's numbering.
-std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
-  const std::size_t begin = sequence.range().begin;
-  return fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence.name());
 }
 
 std::string describe_numbers(const MetricsReport& report) {
@@ -44,81 +42,196 @@ std::string describe_numbers(const MetricsReport& report) {
   return text;
 }
 
+/// Steps to both sides of a frame that tell how much its surroundings were stretched.
+constexpr std::size_t kStepsAround = 5;
+
+double path_length(std::span<const Rigid3> poses, std::size_t begin, std::size_t end) {
+  double length = 0.0;
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    length += (poses[i].translation - poses[i - 1].translation).norm();
+  }
+  return length;
+}
+
+/// Written units per unit of the landmarks, around a frame.
+double stretch_at(std::span<const Rigid3> refined,
+                  std::span<const Rigid3> written,
+                  std::size_t frame) {
+  const std::size_t begin = frame - std::min(frame, kStepsAround);
+  const std::size_t end = std::min(frame + kStepsAround + 1, refined.size());
+  const double before = path_length(refined, begin, end);
+  return before > 0.0 ? path_length(written, begin, end) / before : 1.0;
+}
+
+class ResultWriter {
+ public:
+  ResultWriter(const RunRequest& request,
+               const FrameSource& sequence,
+               const PhasedOdometry& odometry,
+               const Drive& drive)
+      : request_(request),
+        sequence_(sequence),
+        odometry_(odometry),
+        drive_(drive),
+        trajectory_(drive.trajectory) {
+    if (sequence.ground_truth()) {  // an interrupted run has fewer poses
+      truth_ = std::span(*sequence.ground_truth()).first(trajectory_.size());
+    }
+    trajectory_ = rescaled(std::move(trajectory_));
+    if (request.config.odometry.mode == OdometryMode::kMap) {
+      refined_ = rescaled(odometry.frames().estimator().refined_trajectory());
+    }
+  }
+
+  Status write(MetricsReport& report) {
+    const std::filesystem::path& folder = request_.out_dir;
+    const std::span<const double> times_s(sequence_.timestamps_s().data(), trajectory_.size());
+    Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
+    keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
+    keep_first(written, write_refined(folder / "trajectory_refined_kitti.txt"));
+    report = make_report();
+    keep_first(written, drive_.written);
+    keep_first(written, write_text_file(folder / "config.yaml", config_text()));
+    if (request_.write_map) {
+      keep_first(written, write_map_ply(folder / "map.ply", map_points(), *refined_));
+    }
+    const TrajectoryPlot plot = make_plot(report);
+    keep_first(written, write_trajectory_png(folder / "trajectory.png", plot));
+    keep_first(written, write_trajectory_svg(folder / "trajectory.svg", plot));
+    return written;
+  }
+
+ private:
+  [[nodiscard]] Trajectory rescaled(Trajectory trajectory) const {
+    return request_.config.scale.source == ScaleSource::kGroundTruth
+               ? rescale_steps(trajectory, *truth_)
+               : trajectory;
+  }
+
+  [[nodiscard]] Status write_refined(const std::filesystem::path& file) const {
+    if (refined_) {
+      return write_kitti_trajectory(file, *refined_);
+    }
+    std::error_code code;
+    std::filesystem::remove(file, code);
+    if (code) {
+      return fail(fmt::format("{}: an earlier run's file cannot be removed ({})", file.string(),
+                              code.message()));
+    }
+    return {};
+  }
+
+  [[nodiscard]] MetricsReport make_report() const {
+    const std::chrono::duration<double> elapsed =
+        std::chrono::steady_clock::now() - request_.started;
+    const Config& config = request_.config;
+    const auto num_frames = static_cast<double>(trajectory_.size());
+    MetricsReport report;
+    report.stemvo_version = version();
+    report.sequence = sequence_.name();
+    report.first_frame = sequence_.range().begin;
+    report.num_frames = trajectory_.size();
+    report.model = config.stem.model;
+    report.filter = odometry_.stem_info().filter;
+    report.fps = num_frames / std::max(elapsed.count(), 1e-9);
+    report.scale_source = options::to_string(config.scale.source);
+    report.tracked_fraction = static_cast<double>(drive_.num_measured) / num_frames;
+    if (config.scale.source == ScaleSource::kCameraHeight) {
+      report.road_measured_fraction = static_cast<double>(drive_.num_road_measured) / num_frames;
+    }
+    if (truth_) {
+      // A trajectory without a scale has no error in metres until one is fitted.
+      const Alignment alignment =
+          config.scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
+      report.metrics = evaluate_aligned(trajectory_, *truth_, alignment, config.evaluation);
+      if (refined_) {
+        report.refined = evaluate_aligned(*refined_, *truth_, alignment, config.evaluation);
+      }
+    }
+    return report;
+  }
+
+  /// "frames 10:20 of 03", in the folder's numbering.
+  [[nodiscard]] std::string describe_frames(std::size_t num_frames) const {
+    const std::size_t begin = sequence_.range().begin;
+    return one_line(fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence_.name()));
+  }
+
+  [[nodiscard]] std::string config_text() const {
+    const StemInfo& stem = odometry_.stem_info();
+    std::string text =
+        fmt::format("# stemvo {}\n# {}\n", version(), describe_frames(sequence_.size()));
+    text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
+                        stem.num_filters, stem.sampling_px,
+                        stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
+    if (const auto& calibration = sequence_.given_calibration()) {
+      text += fmt::format("# calibration {}\n", one_line(calibration->string()));
+    }
+    // With what auto, -1 and 0 stand for, which may change with the manifest.
+    Config effective = request_.config;
+    effective.stem.upsample = choose_upsample(effective.stem.upsample, effective.features.method,
+                                              sequence_.camera().width_px);
+    effective.stem.filter = stem.filter;
+    effective.stem.sampling_px = stem.sampling_px;
+    return text + "\n" + dump_config(effective);
+  }
+
+  /// The landmarks in the world of trajectory_refined_kitti.txt: where steps were rescaled, they
+  /// are with them.
+  [[nodiscard]] std::vector<ColoredPoint> map_points() const {
+    const Trajectory refined = odometry_.frames().estimator().refined_trajectory();
+    STEMVO_CHECK(refined.size() == refined_->size(), "the same poses, before and after rescaling");
+    std::vector<ColoredPoint> points;
+    for (const MapLandmark& landmark : odometry_.frames().estimator().landmarks()) {
+      const auto frame = static_cast<std::size_t>(landmark.frame);
+      STEMVO_CHECK(frame < refined.size(), "landmarks belong to frames");
+      const Eigen::Vector3d in_camera =
+          stretch_at(refined, *refined_, frame) * landmark.position.cast<double>();
+      points.push_back({((*refined_)[frame] * in_camera).cast<float>(), landmark.rgb});
+    }
+    return points;
+  }
+
+  /// Against the ground truth where there is one.
+  [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
+    TrajectoryPlot plot;
+    plot.title = describe_frames(trajectory_.size());
+    plot.subtitle = describe_numbers(report);
+    plot.estimate = trajectory_;
+    if (truth_) {
+      plot.ground_truth = Trajectory(truth_->begin(), truth_->end());
+      if (report.metrics->alignment != Alignment::kNone) {
+        plot.estimate = align_trajectory(trajectory_, *truth_, report.metrics->alignment);
+      }
+    } else if (report.scale_source == "none") {
+      plot.unit = "units";
+    }
+    return plot;
+  }
+
+  const RunRequest& request_;
+  const FrameSource& sequence_;
+  const PhasedOdometry& odometry_;
+  const Drive& drive_;
+  Trajectory trajectory_;
+  std::optional<Trajectory> refined_;  ///< the same with look-ahead; mode map only
+  std::optional<std::span<const Rigid3>> truth_;
+};
+
 }  // namespace
 
-Status write_trajectories(const std::filesystem::path& out_dir,
-                          const FrameSource& sequence,
-                          std::span<const Rigid3> trajectory) {
-  const std::span<const double> times_s(sequence.timestamps_s().data(), trajectory.size());
-  const Status kitti = write_kitti_trajectory(out_dir / "trajectory_kitti.txt", trajectory);
-  const Status tum = write_tum_trajectory(out_dir / "trajectory_tum.txt", times_s, trajectory);
-  return kitti ? tum : kitti;
+void keep_first(Status& first, Status next) {
+  if (first && !next) {
+    first = std::move(next);
+  }
 }
 
-Status write_refined_trajectory(const std::filesystem::path& out_dir,
-                                const std::optional<Trajectory>& refined) {
-  const std::filesystem::path file = out_dir / "trajectory_refined_kitti.txt";
-  if (refined) {
-    return write_kitti_trajectory(file, *refined);
-  }
-  std::error_code code;
-  std::filesystem::remove(file, code);
-  if (code) {
-    return fail(fmt::format("{}: an earlier run's file cannot be removed ({})", file.string(),
-                            code.message()));
-  }
-  return {};
-}
-
-Status write_config(const std::filesystem::path& out_dir,
-                    const Config& config,
-                    const FrameSource& sequence,
-                    const StemInfo& stem) {
-  const std::filesystem::path file = out_dir / "config.yaml";
-  std::ofstream out(file, std::ios::binary);
-  out << fmt::format("# stemvo {}\n", version());
-  out << fmt::format("# {}\n", one_line(describe_frames(sequence, sequence.size())));
-  out << fmt::format("# model {}: {} filters, sampled every {} px", one_line(stem.model),
-                     stem.num_filters, stem.sampling_px);
-  out << (stem.sha256.empty() ? "" : fmt::format(", sha256 {}", stem.sha256)) << "\n";
-  if (const auto& calibration = sequence.given_calibration()) {
-    out << fmt::format("# calibration {}\n", one_line(calibration->string()));
-  }
-  out << "\n";
-  // With what auto, -1 and 0 stand for, which may change with the manifest.
-  Config effective = config;
-  effective.stem.upsample =
-      choose_upsample(config.stem.upsample, config.features.method, sequence.camera().width_px);
-  effective.stem.filter = stem.filter;
-  effective.stem.sampling_px = stem.sampling_px;
-  out << dump_config(effective);
-  if (!out.flush()) {
-    return fail(fmt::format("{}: cannot be written ({})", file.string(), std::strerror(errno)));
-  }
-  return {};
-}
-
-Status write_map(const std::filesystem::path& out_dir,
-                 const FrameSource& sequence,
-                 std::span<const Rigid3> trajectory,
-                 const MetricsReport& report) {
-  TrajectoryPlot plot;
-  plot.title = one_line(describe_frames(sequence, trajectory.size()));
-  plot.subtitle = describe_numbers(report);
-  plot.estimate.assign(trajectory.begin(), trajectory.end());
-  const Alignment alignment = report.metrics ? report.metrics->alignment : Alignment::kNone;
-  if (const std::optional<Trajectory>& truth = sequence.ground_truth()) {
-    const auto end = truth->begin() + static_cast<std::ptrdiff_t>(trajectory.size());
-    plot.ground_truth = Trajectory(truth->begin(), end);
-    if (alignment != Alignment::kNone) {
-      plot.estimate = align_trajectory(trajectory, *plot.ground_truth, alignment);
-    }
-  } else if (report.scale_source == "none") {
-    plot.unit = "units";
-  }
-  const Status png = write_trajectory_png(out_dir / "trajectory.png", plot);
-  const Status svg = write_trajectory_svg(out_dir / "trajectory.svg", plot);
-  return png ? svg : png;
+Status write_results(const RunRequest& request,
+                     const FrameSource& sequence,
+                     const PhasedOdometry& odometry,
+                     const Drive& drive,
+                     MetricsReport& report) {
+  return ResultWriter(request, sequence, odometry, drive).write(report);
 }
 
 }  // namespace stemvo::pipeline

@@ -1,46 +1,40 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
-#include <optional>
-#include <span>
+#include <cstddef>
+#include <string>
+#include <vector>
 
-#include "config/config.hpp"
 #include "dataset/frame_source.hpp"
 #include "evaluation/trajectory.hpp"
+#include "odometry/phased_odometry.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
 
-/// trajectory_kitti.txt and trajectory_tum.txt. Poses of the first frames of the sequence.
-[[nodiscard]] Status write_trajectories(const std::filesystem::path& out_dir,
-                                        const FrameSource& sequence,
-                                        std::span<const Rigid3> trajectory);
+/// The first thing that went wrong while writing; the rest is written all the same.
+void keep_first(Status& first, Status next);
 
-/// trajectory_refined_kitti.txt; without one, what an earlier run left there is removed.
-[[nodiscard]] Status write_refined_trajectory(const std::filesystem::path& out_dir,
-                                              const std::optional<Trajectory>& refined);
+/// What the loop over the frames leaves behind.
+struct Drive {
+  Trajectory trajectory;  ///< one pose per frame done
+  std::size_t num_measured = 0;
+  std::size_t num_road_measured = 0;
+  std::vector<std::string> warnings;
+  bool interrupted = false;
+  Status written;  ///< of frames.csv and the images
+};
 
-/// map.ply: the landmarks and the camera's path in the world of trajectory_refined_kitti.txt.
-/// `refined` are the poses the landmarks belong to, `written` the same in the file: where steps
-/// were rescaled, landmarks are with them.
-[[nodiscard]] Status write_point_map(const std::filesystem::path& out_dir,
-                                     std::span<const MapLandmark> landmarks,
-                                     std::span<const Rigid3> refined,
-                                     std::span<const Rigid3> written);
-
-/// config.yaml: the effective configuration under comments that say which program, frames and model
-/// made the results. `stemvo run --config` takes it as it is.
-[[nodiscard]] Status write_config(const std::filesystem::path& out_dir,
-                                  const Config& config,
-                                  const FrameSource& sequence,
-                                  const StemInfo& stem);
-
-/// trajectory.png and .svg, against the ground truth where there is one.
-[[nodiscard]] Status write_map(const std::filesystem::path& out_dir,
-                               const FrameSource& sequence,
-                               std::span<const Rigid3> trajectory,
-                               const MetricsReport& report);
+/// Everything that is written at the end but metrics.json, for which it makes `report`:
+/// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
+/// trajectory, what an earlier run left there is removed), config.yaml (the effective configuration
+/// under comments that say which program, frames and model made the results; `stemvo run --config`
+/// takes it as it is), map.ply where it is asked for, trajectory.png and .svg.
+[[nodiscard]] Status write_results(const RunRequest& request,
+                                   const FrameSource& sequence,
+                                   const PhasedOdometry& odometry,
+                                   const Drive& drive,
+                                   MetricsReport& report);
 
 }  // namespace stemvo::pipeline

@@ -12,34 +12,20 @@
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
 #include "report/metrics_json.hpp"
-#include "stem/stem.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/odometry.hpp"
 
 namespace stemvo {
 
-/// Keys that were chosen for this run, whatever a camera file says.
-struct ChosenScale {
-  bool source = false;         ///< scale.source; always, where it is not the default
-  bool camera_height = false;  ///< scale.camera_height_m
-};
-
-/// Everything `stemvo run` was asked for.
-struct RunRequest {
-  std::filesystem::path sequence_dir;  ///< with camera_file: pictures, FrameSourceRequest::path
+/// Everything `stemvo run` was asked for. The camera is that of `config`. A camera file's
+/// camera_height sets scale.camera_height_m where --set did not; without one scale.source becomes
+/// none where neither --set nor a configuration file named it.
+struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;
-  std::optional<FrameRangeRequest> frames;
-  std::optional<std::filesystem::path> ground_truth;
-  std::optional<std::filesystem::path> calibration;  ///< else calib.txt of the sequence
-  /// Of a folder of pictures. Its camera_height sets scale.camera_height_m; without one
-  /// scale.source becomes none; neither where the key was chosen.
-  std::optional<std::filesystem::path> camera_file;
-  std::optional<std::filesystem::path> times;  ///< of a folder of pictures; else its rate_hz
-  ChosenScale chosen;
   int num_threads = 0;         ///< 0: all cores
-  int picture_every = 0;       ///< 0: no per-frame pictures
+  int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
   bool measure_times = false;  ///< RunSummary::report.timing
   /// Where `fps` counts from; the program sets the start of the process.
@@ -48,14 +34,13 @@ struct RunRequest {
 
 /// What became of a run. Every file is written, also after an interrupt.
 struct RunSummary {
-  MetricsReport report;  ///< what metrics.json holds
-  StemInfo stem;
-  std::vector<std::string> warnings;  ///< broken frames and the like, one line each
+  MetricsReport report;               ///< what metrics.json holds
+  std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
   bool interrupted = false;           ///< stopped early; results hold what was computed
   Status written;                     ///< the first result that could not be written, if any
 };
 
-/// Called after each frame: frames done, frames in all; false stops the run (results are written).
+/// Called after each frame: frames done, frames in all; false stops (results are written).
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir

@@ -10,8 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config_yaml.hpp"
-#include "report/text_table.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 
@@ -42,13 +42,12 @@ Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) 
   const auto fail_at = [&](const YAML::Node& node, const std::string& problem) {
     return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, problem));
   };
-  const auto text_of = [](const YAML::Node& node) { return node.IsScalar() ? node.Scalar() : ""; };
   std::vector<Bound> bounds;
   std::set<std::pair<std::string, std::string>> seen;
   for (const auto& entry : *root) {
     const YAML::Node& key_node = entry.first;
     const YAML::Node& bounds_node = entry.second;
-    const std::string key = text_of(key_node);
+    const std::string key = key_node.Scalar();
     if (!key_node.IsScalar()) {
       return fail_at(key_node, "expected the name of a metric, found another kind of key");
     }
@@ -62,14 +61,14 @@ Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) 
     }
     for (const auto& bound : bounds_node) {
       const YAML::Node& name_node = bound.first;
-      const std::string name = text_of(name_node);
+      const std::string name = name_node.Scalar();
       if (name != "min" && name != "max") {
         return fail_at(name_node, fmt::format("{}: expected min or max, found '{}'", key, name));
       }
       if (!seen.emplace(key, name).second) {
         return fail_at(name_node, fmt::format("{}: expected {} once, found it twice", key, name));
       }
-      const Expected<std::vector<double>> limit = parse_numbers(text_of(bound.second), 1);
+      const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
       if (!limit) {
         return fail_at(name_node, fmt::format("{}.{}: {}", key, name, limit.error().message));
       }

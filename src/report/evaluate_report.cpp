@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "report/metrics_keys.hpp"
-#include "report/text_table.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 

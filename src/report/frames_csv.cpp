@@ -3,7 +3,6 @@
 
 #include <cerrno>
 #include <system_error>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -19,36 +18,32 @@ constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // 
 
 }  // namespace
 
-void FramesCsv::put(std::string_view text) {
-  if (!failure_.empty()) {
-    return;
-  }
-  errno = 0;
-  stream_.write(text.data(), static_cast<std::streamsize>(text.size()));
-  stream_.flush();  // a killed run keeps its rows
-  if (!stream_) {
-    failure_ = std::generic_category().message(errno);
-  }
-}
-
-Status FramesCsv::status() const {
-  return failure_.empty() ? Status()
-                          : fail(fmt::format("{}: cannot write: {}", file_.string(), failure_));
-}
-
 Expected<FramesCsv> FramesCsv::create(const std::filesystem::path& file) {
   FramesCsv csv;
   csv.file_ = file;
   errno = 0;
   csv.stream_.open(file, std::ios::binary | std::ios::trunc);
-  if (!csv.stream_) {
-    csv.failure_ = std::generic_category().message(errno);
-  }
+  csv.check();
   csv.put(kHeader);
-  if (const Status created = csv.status(); !created) {
-    return created.error();
+  if (!csv.written_) {
+    return csv.written_.error();
   }
   return csv;
+}
+
+void FramesCsv::put(std::string_view text) {
+  if (written_) {
+    errno = 0;
+    stream_ << text << std::flush;  // a killed run keeps its rows
+    check();
+  }
+}
+
+void FramesCsv::check() {
+  if (written_ && !stream_) {
+    written_ = fail(fmt::format("{}: cannot write: {}", file_.string(),
+                                std::generic_category().message(errno)));
+  }
 }
 
 void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
@@ -62,10 +57,8 @@ void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& 
 
 Status FramesCsv::close() {
   stream_.close();
-  if (failure_.empty() && !stream_) {
-    failure_ = std::generic_category().message(errno);
-  }
-  return status();
+  check();
+  return written_;
 }
 
 }  // namespace stemvo

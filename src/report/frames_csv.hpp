@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
-#include <string>
 #include <string_view>
 
 #include "stemvo/error.hpp"
@@ -29,11 +28,11 @@ class FramesCsv {
  private:
   FramesCsv() = default;
   void put(std::string_view text);
-  [[nodiscard]] Status status() const;
+  void check();
 
   std::filesystem::path file_;
   std::ofstream stream_;
-  std::string failure_;  ///< the first failed write
+  Status written_;  ///< the first failed write
 };
 
 }  // namespace stemvo

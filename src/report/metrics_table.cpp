@@ -5,7 +5,7 @@
 
 #include "report/evaluate_report.hpp"
 #include "report/metrics_json.hpp"
-#include "report/text_table.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 namespace {

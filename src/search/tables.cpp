@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "report/metrics_keys.hpp"
-#include "report/text_table.hpp"
 #include "search/results.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 

@@ -6,7 +6,7 @@
 
 namespace stemvo {
 
-/// Map from pixels of a channel (or of a picture made from it) to pixels of the input frame, per
+/// Map from pixels of a channel (or of an image made from it) to pixels of the input frame, per
 /// axis: input = scale * channel + offset. A k-wide filter with stride s and padding p has scale s
 /// and offset (k - 1) / 2 - p.
 struct PixelMap {

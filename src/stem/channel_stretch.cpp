@@ -38,16 +38,16 @@ std::vector<float> sample(const cv::Mat& values) {
 double percentile(std::vector<float>& samples, double percent) {
   const double last = static_cast<double>(samples.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(std::lround(last * percent / 100.0));
-  const auto place = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
-  std::nth_element(samples.begin(), place, samples.end());
-  return *place;
+  const auto at = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
+  std::nth_element(samples.begin(), at, samples.end());
+  return *at;
 }
 
 bool has_contrast(double low, double high) {
   return high - low > kLeastContrast * std::max({std::abs(low), std::abs(high), 1e-20});
 }
 
-/// Picture pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
+/// Image pixel u of an upsampling by `factor` lies at channel pixel (u + 0.5) / factor - 0.5.
 PixelMap upsampled(const PixelMap& map, int factor) {
   PixelMap up;
   up.scale = map.scale / factor;

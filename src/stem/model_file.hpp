@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,14 +13,19 @@ namespace stemvo::internal {
 /// SHA-256 as 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
 
-/// The default network, whose files are part of the library.
+/// The default network, which is part of the library: its files are names for messages.
 [[nodiscard]] StemNetwork built_in_network();
 
-/// The file of one filter as a model of its own, where the network has one.
-[[nodiscard]] std::optional<StemNetwork> folded_network(const StemNetwork& network);
+/// The file of one filter as a model of its own, of a network that has one.
+[[nodiscard]] StemNetwork folded_network(const StemNetwork& network);
 
 /// Reads, hashes and loads the file, and holds the graph against the network: hash, number of
-/// filters, kernel, stride and padding (window_check.hpp).
+/// filters, stride and sizes of channels; where it may be sampled more densely, also that an output
+/// depends on the pixels of the window of kernel, stride and padding and on no others. So the pixel
+/// map is right, and passes over a shifted frame agree (a graph that normalises over the whole
+/// image, say, is refused).
 [[nodiscard]] Expected<OnnxSession> open_model(const StemNetwork& network);
+/// The same of built_in_network(), or of its one filter.
+[[nodiscard]] Expected<OnnxSession> open_built_in_model(const StemNetwork& network);
 
 }  // namespace stemvo::internal

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,6 +13,9 @@ struct OrtApi;
 struct OrtEnv;
 struct OrtMemoryInfo;
 struct OrtSession;
+struct OrtStatus;
+struct OrtTensorTypeAndShapeInfo;
+struct OrtValue;
 
 namespace stemvo::internal {
 
@@ -52,19 +53,28 @@ class OnnxSession {
                            cv::Size channel_size) const;
 
  private:
-  OnnxSession(std::string label,
-              const OrtApi& api,
-              OnnxHandle<OrtEnv> env,
-              OnnxHandle<OrtMemoryInfo> memory,
-              OnnxHandle<OrtSession> session);
-  [[nodiscard]] Status choose_output(const std::string& layer);
+  struct TensorInfo;
+
+  explicit OnnxSession(const std::string& label) : label_(label) {}
+  [[nodiscard]] Status to_status(OrtStatus* raw) const;
+  [[nodiscard]] Status load(std::string_view model);
   [[nodiscard]] Status check_input();
+  [[nodiscard]] Status choose_output(const std::string& layer);
+  [[nodiscard]] Status read_shape(const OrtTensorTypeAndShapeInfo* raw, TensorInfo& info) const;
+  /// Input (or output) number `index` of the graph.
+  [[nodiscard]] Expected<TensorInfo> read_tensor_info(bool is_input, std::size_t index) const;
+  /// Around the caller's memory.
+  [[nodiscard]] Expected<OnnxHandle<OrtValue>> make_tensor(const float* data,
+                                                           int num_planes,
+                                                           cv::Size size) const;
+  /// A null output is made by the runtime.
+  [[nodiscard]] Status run_graph(const OrtValue* input, OrtValue*& output) const;
 
   std::string label_;
-  const OrtApi* api_;
-  OnnxHandle<OrtEnv> env_;  // must outlive the session: declared before it
-  OnnxHandle<OrtMemoryInfo> memory_;
-  OnnxHandle<OrtSession> session_;
+  const OrtApi* api_ = nullptr;
+  OnnxHandle<OrtEnv> env_{nullptr, nullptr};  // must outlive the session: declared before it
+  OnnxHandle<OrtMemoryInfo> memory_{nullptr, nullptr};
+  OnnxHandle<OrtSession> session_{nullptr, nullptr};
   std::string output_;
   int num_planes_ = 3;
   int num_filters_ = 0;

@@ -5,26 +5,44 @@
 #include <initializer_list>
 #include <numeric>
 #include <tuple>
-#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
-#include "stem/filter_layer.hpp"
 #include "stem/model_file.hpp"
+#include "stem/network_layer.hpp"
 
 namespace stemvo {
 
 namespace {
 
-using internal::FilterLayer;
+using internal::FilterBank;
 
-struct LoadedLayer {
-  StemInfo info;
-  std::unique_ptr<FilterLayer> layer;   ///< all filters; null: not asked for
-  std::unique_ptr<FilterLayer> folded;  ///< the one chosen alone; null: it has no file
-};
+/// One filter: 0.299 R + 0.587 G + 0.114 B, not rounded.
+Expected<std::vector<Channel>> gray_channel(const cv::Mat& frame, int /*first*/, int /*last*/) {
+  std::vector<Channel> channels(1);
+  cv::Mat& values = channels.front().values;
+  frame.convertTo(values, CV_32F);  // first, so that gray is not rounded to 8 bit
+  if (frame.channels() == 3) {
+    cv::cvtColor(values.clone(), values, cv::COLOR_RGB2GRAY);
+  }
+  return channels;
+}
+
+/// Three filters: R, G, B as they are.
+Expected<std::vector<Channel>> input_channels(const cv::Mat& frame, int first, int last) {
+  std::vector<Channel> channels;
+  for (int filter = first; filter < last; ++filter) {
+    cv::Mat plane = frame;  // a gray frame has three equal colours
+    if (frame.channels() == 3) {
+      cv::extractChannel(frame, plane, filter);
+    }
+    plane.convertTo(channels.emplace_back().values, CV_32F);
+  }
+  return channels;
+}
 
 /// -1 stands for the default. Error: outside the layer.
 Expected<int> choose_filter(int asked, const std::string& of, int num_filters, int default_filter) {
@@ -37,8 +55,18 @@ Expected<int> choose_filter(int asked, const std::string& of, int num_filters, i
 }
 
 /// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
-/// worth too many pixels. Error: not a divisor.
-Expected<int> choose_sampling(int asked, int stride) {
+/// worth too many pixels. Error: not a divisor, or a layer that allows its own stride only.
+Expected<int> choose_sampling(int asked, const StemNetwork& network) {
+  const int stride = network.stride_px;
+  if (network.native_sampling_only) {
+    if (asked == 0 || asked == stride) {
+      return stride;
+    }
+    return fail(fmt::format(
+        "stem.sampling_px: expected {} for layer {} of {}, which the manifest allows at its native "
+        "stride only, found {}",
+        stride, network.layer, network.file.string(), asked));
+  }
   if (asked == 0) {
     return std::gcd(stride, 2);
   }
@@ -53,51 +81,6 @@ Expected<int> choose_sampling(int asked, int stride) {
   }
   return fail(fmt::format("stem.sampling_px: expected {} (divisors of the stride {}), found {}",
                           fmt::join(allowed, ", "), stride, asked));
-}
-
-/// The same for a network's layer, which may allow its own stride only.
-Expected<int> choose_sampling(int asked, const StemNetwork& network) {
-  if (!network.native_sampling_only) {
-    return choose_sampling(asked, network.stride_px);
-  }
-  if (asked == 0 || asked == network.stride_px) {
-    return network.stride_px;
-  }
-  return fail(fmt::format(
-      "stem.sampling_px: expected {} for layer {} of {}, which the manifest allows at its native "
-      "stride only, found {}",
-      network.stride_px, network.layer, network.file.string(), asked));
-}
-
-/// Null where the filter, sampled like this, has no file of its own.
-Expected<std::unique_ptr<FilterLayer>> load_folded(const StemNetwork& network,
-                                                   int filter,
-                                                   int sampling) {
-  const auto folded = internal::folded_network(network);
-  if (!folded || network.folded->filter != filter || network.folded->sampling_px != sampling) {
-    return nullptr;
-  }
-  auto session = internal::open_model(*folded);
-  if (!session) {
-    return session.error();
-  }
-  return internal::make_network_layer(folded->file.string(), *std::move(session),
-                                      internal::SamplingPlan(*folded, sampling));
-}
-
-Expected<std::unique_ptr<FilterLayer>> load_all(const StemNetwork& network, int sampling) {
-  auto session = internal::open_model(network);
-  if (!session) {
-    return session.error();
-  }
-  const internal::SamplingPlan plan(network, sampling);
-  if (plan.needs_margin() && !session->fixed_size().empty()) {
-    return fail(fmt::format(
-        "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
-        "found {}",
-        network.stride_px, network.file.string(), sampling));
-  }
-  return internal::make_network_layer(network.file.string(), *std::move(session), plan);
 }
 
 /// What a manifest would refuse: numbers that no convolution has.
@@ -123,8 +106,21 @@ Status check_network(const StemNetwork& network) {
   return {};
 }
 
+bool is_identity(const std::string& model) { return model == "gray" || model == "input_layer"; }
+
 /// Error: a name of no layer of our own, without a network, or a network that is none.
 Expected<StemNetwork> network_of(const StemOptions& options) {
+  if (is_identity(options.model)) {
+    if (options.layer != "first") {
+      return fail(fmt::format("stem.layer: expected none for {}, found '{}'", options.model,
+                              options.layer));
+    }
+    StemNetwork network;
+    network.name = options.model;
+    network.num_filters = options.model == "gray" ? 1 : 3;
+    network.stride_px = 1;
+    return network;
+  }
   if (options.network) {
     const Status status = check_network(*options.network);
     return status ? Expected<StemNetwork>(*options.network) : status.error();
@@ -137,7 +133,30 @@ Expected<StemNetwork> network_of(const StemOptions& options) {
       options.model));
 }
 
-Expected<LoadedLayer> load_network(const StemOptions& options, bool all_filters) {
+Expected<FilterBank> open_bank(const StemNetwork& network, bool is_built_in, int sampling) {
+  auto session =
+      is_built_in ? internal::open_built_in_model(network) : internal::open_model(network);
+  if (!session) {
+    return session.error();
+  }
+  const std::string file = network.file.string();
+  const internal::SamplingPlan plan(network, sampling);
+  if (plan.needs_margin() && !session->fixed_size().empty()) {
+    return fail(fmt::format(
+        "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
+        "found {}",
+        network.stride_px, file, sampling));
+  }
+  return internal::make_network_layer(file, *std::move(session), plan);
+}
+
+void check_frame(const cv::Mat& frame) {
+  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
+}
+
+}  // namespace
+
+Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
   const auto network = network_of(options);
   if (!network) {
     return network.error();
@@ -153,97 +172,44 @@ Expected<LoadedLayer> load_network(const StemOptions& options, bool all_filters)
   if (!filter) {
     return filter.error();
   }
-  LoadedLayer loaded;
-  loaded.info = {.model = network->name,
-                 .layer = network->layer,
-                 .sha256 = network->sha256,
-                 .filter = *filter,
-                 .num_filters = network->num_filters,
-                 .native_stride_px = network->stride_px,
-                 .sampling_px = *sampling};
-  auto folded = load_folded(*network, *filter, *sampling);
-  if (!folded) {
-    return folded.error();
+  const StemInfo info = {.model = network->name,
+                         .layer = network->layer,
+                         .sha256 = network->sha256,
+                         .filter = *filter,
+                         .num_filters = network->num_filters,
+                         .sampling_px = *sampling};
+  if (is_identity(options.model)) {
+    return Stem(info, options.model == "gray" ? gray_channel : input_channels, true);
   }
-  loaded.folded = *std::move(folded);
-  if (loaded.folded == nullptr || all_filters) {
-    auto layer = load_all(*network, *sampling);
-    if (!layer) {
-      return layer.error();
-    }
-    loaded.layer = *std::move(layer);
+  const bool has_all = all_filters || !network->folded || network->folded->filter != *filter ||
+                       network->folded->sampling_px != *sampling;
+  auto bank = open_bank(has_all ? *network : internal::folded_network(*network), !options.network,
+                        *sampling);
+  if (!bank) {
+    return bank.error();
   }
-  return loaded;
+  return Stem(info, *std::move(bank), has_all);
 }
 
-Expected<LoadedLayer> load_layer(const StemOptions& options, bool all_filters) {
-  const bool is_gray = options.model == "gray";
-  if (!is_gray && options.model != "input_layer") {
-    return load_network(options, all_filters);
-  }
-  if (options.layer != "first") {
-    return fail(
-        fmt::format("stem.layer: expected none for {}, found '{}'", options.model, options.layer));
-  }
-  if (const auto sampling = choose_sampling(options.sampling_px, 1); !sampling) {
-    return sampling.error();
-  }
-  LoadedLayer loaded;
-  loaded.info.model = options.model;
-  loaded.info.num_filters = is_gray ? 1 : 3;
-  const auto filter = choose_filter(options.filter, options.model, loaded.info.num_filters, 0);
-  if (!filter) {
-    return filter.error();
-  }
-  loaded.info.filter = *filter;
-  loaded.layer = is_gray ? internal::make_gray_layer() : internal::make_input_layer();
-  return loaded;
-}
-
-}  // namespace
-
-struct Stem::Impl : LoadedLayer {
-  static Expected<Stem> load(const StemOptions& options, bool all_filters) {
-    auto loaded = load_layer(options, all_filters);
-    if (!loaded) {
-      return loaded.error();
-    }
-    return Stem(std::make_unique<Impl>(*std::move(loaded)));
-  }
-};
-
-Stem::Stem(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Stem::Stem(Stem&&) noexcept = default;
-Stem& Stem::operator=(Stem&&) noexcept = default;
-Stem::~Stem() = default;
-
-Expected<Stem> Stem::create(const StemOptions& options) { return Impl::load(options, false); }
-Expected<Stem> Stem::create_all(const StemOptions& options) { return Impl::load(options, true); }
-
-const StemInfo& Stem::info() const { return impl_->info; }
+Expected<Stem> Stem::create(const StemOptions& options) { return load(options, false); }
+Expected<Stem> Stem::create_all(const StemOptions& options) { return load(options, true); }
 
 Expected<Channel> Stem::apply(const cv::Mat& frame) const {
-  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
-  auto channels = impl_->folded != nullptr
-                      ? impl_->folded->apply(frame, 0, 1)
-                      : impl_->layer->apply(frame, impl_->info.filter, impl_->info.filter + 1);
+  check_frame(frame);
+  const int index = has_all_ ? info_.filter : 0;
+  auto channels = bank_(frame, index, index + 1);
   if (!channels) {
     return channels.error();
   }
   return std::move(channels->front());
 }
 
-Expected<std::vector<Channel>> Stem::apply_all(const cv::Mat& frame) const {
-  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
-  return apply_range(frame, 0, impl_->info.num_filters);
-}
-
 Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame, int first, int last) const {
-  STEMVO_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3, "a frame is 8 bit, gray or RGB");
-  STEMVO_CHECK(0 <= first && first < last && last <= impl_->info.num_filters,
+  check_frame(frame);
+  STEMVO_CHECK(0 <= first && first < last && last <= info_.num_filters,
                "a range of filters lies inside the layer");
-  STEMVO_CHECK(impl_->layer != nullptr, "the stem was made with all filters");
-  return impl_->layer->apply(frame, first, last);
+  STEMVO_CHECK(has_all_, "the stem was made with all filters");
+  return bank_(frame, first, last);
 }
 
 }  // namespace stemvo

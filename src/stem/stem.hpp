@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <memory>
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include <opencv2/core.hpp>
 
 #include "stem/channel.hpp"
 #include "stemvo/error.hpp"
@@ -18,12 +21,21 @@ struct StemInfo {
   std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
   int filter = 0;      ///< the one chosen, never -1
   int num_filters = 1;
-  int native_stride_px = 1;
   int sampling_px = 1;
 };
 
-/// One filter of the first layer of a network: frame in, channel out. Movable; `apply` is const and
-/// gives the same bytes whatever the number of threads (cv::setNumThreads).
+namespace internal {
+
+/// Filters over a frame: the channels of filters [first, last).
+using FilterBank =
+    std::function<Expected<std::vector<Channel>>(const cv::Mat& frame, int first, int last)>;
+
+}  // namespace internal
+
+/// Filters of a layer of a network: frame in, channels out. Const and gives the same bytes whatever
+/// the number of threads (cv::setNumThreads). Frames are CV_8UC3 in RGB order, or CV_8UC1
+/// (replicated to three planes). Errors of all: the frame is smaller than the kernel, or the
+/// runtime refused it.
 class Stem {
  public:
   /// Loads and checks the network: the one filter's own file where it has one, for `apply` alone.
@@ -34,17 +46,14 @@ class Stem {
   /// The same with all filters, for `apply_all` and `apply_range` too.
   [[nodiscard]] static Expected<Stem> create_all(const StemOptions& options);
 
-  Stem(Stem&&) noexcept;
-  Stem& operator=(Stem&&) noexcept;
-  ~Stem();
-
-  [[nodiscard]] const StemInfo& info() const;
-  /// Frame: CV_8UC3 in RGB order or CV_8UC1 (replicated to three planes). The one filter chosen.
-  /// Error: the frame is smaller than the kernel, or the runtime refused it.
+  [[nodiscard]] const StemInfo& info() const { return info_; }
+  /// The one filter chosen.
   [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
   /// All filters of the layer from one pass, in order. Of a stem made by create_all, as
   /// apply_range.
-  [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const;
+  [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const {
+    return apply_range(frame, 0, info_.num_filters);
+  }
   /// Filters [first, last) of the layer from one pass: no more memory than theirs.
   /// 0 <= first < last <= info().num_filters.
   [[nodiscard]] Expected<std::vector<Channel>> apply_range(const cv::Mat& frame,
@@ -52,9 +61,13 @@ class Stem {
                                                            int last) const;
 
  private:
-  struct Impl;
-  explicit Stem(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  Stem(StemInfo info, internal::FilterBank bank, bool has_all)
+      : info_(std::move(info)), bank_(std::move(bank)), has_all_(has_all) {}
+  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, bool all_filters);
+
+  StemInfo info_;
+  internal::FilterBank bank_;
+  bool has_all_;  ///< else `bank_` is the one chosen, in a file of its own
 };
 
 /// What kAuto stands for, for frames of this width: kHalf for KLT on 1000 columns and more, else
@@ -67,8 +80,8 @@ class Stem {
 /// channel.
 [[nodiscard]] int enlargement(Upsample upsample, int sampling_px);
 
-/// Float channel -> 8-bit image: percentile limits that follow the drive slowly, so that a patch
-/// keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
+/// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
+/// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
 /// brings it to the input's size, or half of it (PixelMap is adjusted; no resampling between
 /// pixels). A channel without contrast becomes one gray and leaves the limits as they were; NaN
 /// becomes 0 (upsampled: its surroundings too).

@@ -38,12 +38,15 @@ Expected<std::string> read_text_file(const fs::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   std::string text;
+  if (const auto size = fs::file_size(file, ignored); !ignored) {
+    text.reserve(size);
+  }
   std::array<char, 1 << 16> buffer;
   while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
          stream.gcount() > 0) {
     text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
-  if (!stream.eof()) {  // not opened, or broken in the middle
+  if (!stream.eof()) {  // not opened, or failed in the middle
     return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
   }
   return text;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::array<std::string_view, kNumStages> kNames = {
     "read and decode",     "stem",         "stretch",           "pyramid",    "description",
-    "road picture",        "detection",    "tracking",          "homography", "epipolar geometry",
+    "road image",          "detection",    "tracking",          "homography", "epipolar geometry",
     "two-view refinement", "localization", "window refinement", "road scale", "frame files",
     "result files"};
 

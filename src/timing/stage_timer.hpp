@@ -18,7 +18,7 @@ enum class Stage {
   kStretch,      ///< channel to 8-bit image
   kPyramid,      ///< klt
   kDescription,  ///< orb, sift: descriptors
-  kRoadPicture,
+  kRoadImage,
   kDetection,   ///< corners or keypoints
   kTracking,    ///< klt both ways, or matching of descriptors
   kHomography,  ///< robust estimate

@@ -37,7 +37,7 @@ class BadInput : public ::testing::Test {
     return run({"--config", folder_ / "my.yaml"});
   }
 
-  test::TemporaryFolder folder_;
+  test::TempFolder folder_;
   fs::path sequence_ = test::copy_drive(folder_.path(), 10);
   std::string out_ = folder_ / "out";
 };
@@ -119,11 +119,11 @@ TEST_F(BadInput, OutputFolderThatCannotBeWritten) {
 
 TEST_F(BadInput, Model) {
   expect_error(run({"--set", "stem.model=resnet"}), 1, {"resnet", "default"});
-  expect_error(run({"--set", "stem.model=" + (folder_ / "no.onnx")}), 1, {"no.onnx"});
+  expect_error(run({"--set", "stem.model=" + (folder_ / "no.onnx").string()}), 1, {"no.onnx"});
   expect_error(run({"--set", "stem.filter=500"}), 1, {"stem.filter", "500"});
   expect_error(run({"--set", "stem.sampling_px=3"}), 1, {"stem.sampling_px", "3", "1, 2, 4"});
   write_file(folder_ / "text.onnx", "this is not a model\n");
-  expect_error(run({"--set", "stem.model=" + (folder_ / "text.onnx")}), 1, {"text.onnx"});
+  expect_error(run({"--set", "stem.model=" + (folder_ / "text.onnx").string()}), 1, {"text.onnx"});
 }
 
 TEST_F(BadInput, ModelOtherThanTheManifestSays) {
@@ -131,7 +131,7 @@ TEST_F(BadInput, ModelOtherThanTheManifestSays) {
   fs::copy(models / "manifest.yaml", folder_.path() / "manifest.yaml");
   fs::copy(models / "default.onnx", folder_.path() / "default.onnx");
   fs::resize_file(folder_.path() / "default.onnx", 1000);
-  const std::string model = "stem.model=" + (folder_ / "default.onnx");
+  const std::string model = "stem.model=" + (folder_ / "default.onnx").string();
   expect_error(run({"--set", model, "--set", "stem.filter=3"}), 1,
                {"default.onnx", "expected sha256", "found"});
   // Filter 2 has a file of its own, which alone is loaded.

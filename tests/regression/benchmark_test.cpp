@@ -33,7 +33,7 @@ class Benchmark : public ::testing::Test {
            read_file(folder_ / (out + "/benchmark.json"));
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   fs::path kitti_ = folder_.path() / "kitti";
 };
 

@@ -52,12 +52,12 @@ class Calibrate : public ::testing::Test {
     return run_stemvo(more);
   }
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   std::string out_ = folder_ / "refined.txt";
   fs::path sequence_ = rendered_drive() / "sequences/00";
 };
 
-// The whole program: tracks, alignment, solve. The pictures show no distortion, so that what is
+// The whole program: tracks, alignment, solve. The images show no distortion, so that what is
 // found is the camera that rendered them.
 TEST_F(Calibrate, FindsTheCameraThatRenderedTheDrive) {
   sequence_ = rendered_drive({100, 1241, 376}) / "sequences/00";
@@ -138,7 +138,7 @@ TEST_F(Calibrate, WhatIsWrongIsSaid) {
   EXPECT_FALSE(fs::exists(out_));
 }
 
-// The same picture again and again: a camera that stands determines nothing.
+// The same image again and again: a camera that stands determines nothing.
 TEST_F(Calibrate, StandingStillIsAnError) {
   sequence_ = test::copy_drive(folder_.path(), 30);
   for (int i = 1; i < 30; ++i) {

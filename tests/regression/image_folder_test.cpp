@@ -33,7 +33,7 @@ std::string camera_yaml(const fs::path& sequence, const test::DriveSize& size) {
       size.width_px, size.height_px, fx, fy, cx, cy);
 }
 
-/// As many lines of a rendered drive's file as there are pictures.
+/// As many lines of a rendered drive's file as there are images.
 std::string first_ten_lines(const fs::path& file) {
   const std::string text = read_file(file);
   std::size_t end = 0;
@@ -43,11 +43,11 @@ std::string first_ten_lines(const fs::path& file) {
   return text.substr(0, end);
 }
 
-/// Ten rendered frames as a folder of pictures; each test breaks them in its own way.
-class PictureFolderRun : public ::testing::Test {
+/// Ten rendered frames as a folder of images; each test breaks them in its own way.
+class ImageFolderRun : public ::testing::Test {
  protected:
   void SetUp() override {
-    fs::rename(sequence_ / "image_2", pictures_);
+    fs::rename(sequence_ / "image_2", images_);
     write_file(camera_, good_camera_);
   }
 
@@ -57,7 +57,7 @@ class PictureFolderRun : public ::testing::Test {
   }
   ProgramResult run(std::vector<std::string> more = {}) const {
     more.insert(more.begin(), {"--camera", camera_});
-    return run_path(pictures_.string(), more);
+    return run_path(images_.string(), more);
   }
   ProgramResult run_with_camera(const std::string& before, const std::string& after) const {
     std::string text = good_camera_;
@@ -74,20 +74,20 @@ class PictureFolderRun : public ::testing::Test {
     return read_kitti_trajectory(out_ + "/trajectory_kitti.txt").value().size();
   }
 
-  test::TemporaryFolder folder_;
+  test::TempFolder folder_;
   const fs::path sequence_ = test::copy_drive(folder_.path(), 10);
-  const fs::path pictures_ = folder_.path() / "my pictures";
+  const fs::path images_ = folder_.path() / "my images";
   const std::string camera_ = folder_ / "camera.yaml";
   const std::string out_ = folder_ / "out";
   const std::string good_camera_ = camera_yaml(sequence_, {});
 };
 
-TEST_F(PictureFolderRun, GivesTheBytesOfTheSameKittiFolder) {
+TEST_F(ImageFolderRun, GivesTheBytesOfTheSameKittiFolder) {
   fs::create_directories(folder_.path() / "other/00");
   for (const char* name : {"calib.txt", "times.txt"}) {
     fs::copy_file(sequence_ / name, folder_.path() / "other/00" / name);
   }
-  fs::copy(pictures_, folder_.path() / "other/00/image_2");
+  fs::copy(images_, folder_.path() / "other/00/image_2");
   const std::string kitti = folder_ / "kitti";
   ASSERT_EQ(run_stemvo({"run", folder_ / "other/00", "--out", kitti}).exit_code, 0);
   write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
@@ -100,24 +100,24 @@ TEST_F(PictureFolderRun, GivesTheBytesOfTheSameKittiFolder) {
   }
 }
 
-TEST_F(PictureFolderRun, NamesTheFolderAndTheCameraFile) {
+TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
-      run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 pictures
+      run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 images
   expect_error(result, 1, {"00.txt", "10 images", "60 poses"});
   write_file(folder_ / "ten.txt", first_ten_lines(folder_ / "poses/00.txt"));
   const ProgramResult good = run({"--gt", folder_ / "ten.txt", "--frames", "2:9"});
   ASSERT_EQ(good.exit_code, 0) << good.err;
   const auto metrics = nlohmann::json::parse(read_file(out_ + "/metrics.json"));
-  EXPECT_EQ(metrics.at("sequence"), "my pictures");
+  EXPECT_EQ(metrics.at("sequence"), "my images");
   EXPECT_EQ(metrics.at("frames"), 7);
   EXPECT_EQ(metrics.at("scale_source"), "none");
   EXPECT_EQ(metrics.at("alignment"), "sim3");
-  EXPECT_THAT(read_file(out_ + "/config.yaml"), AllOf(HasSubstr("# frames 2:9 of my pictures"),
-                                                      HasSubstr("# calibration " + camera_)));
+  EXPECT_THAT(read_file(out_ + "/config.yaml"),
+              AllOf(HasSubstr("# frames 2:9 of my images"), HasSubstr("# calibration " + camera_)));
   EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("0.200000000 "));
 }
 
-TEST_F(PictureFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
+TEST_F(ImageFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   const std::string height = good_camera_ + "camera_height: 1.25\n";
   const auto expect_scale = [&](const std::vector<std::string>& more, const std::string& source,
                                 const std::string& height_m) {
@@ -141,53 +141,53 @@ TEST_F(PictureFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   expect_scale({"--set", "scale.camera_height_m=1.75"}, "camera_height", "1.75");
 }
 
-TEST_F(PictureFolderRun, PatternsAndJpegs) {
-  const cv::Mat picture = cv::imread((pictures_ / "000003.png").string());
-  cv::imwrite((pictures_ / "000003.jpg").string(), picture);
+TEST_F(ImageFolderRun, PatternsAndJpegs) {
+  const cv::Mat image = cv::imread((images_ / "000003.png").string());
+  cv::imwrite((images_ / "000003.jpg").string(), image);
   const ProgramResult result =
-      run_path((pictures_ / "00000?.*").string(), {"--camera", camera_, "--quiet"});
+      run_path((images_ / "00000?.*").string(), {"--camera", camera_, "--quiet"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(num_poses(), 11U);
-  expect_error(run_path((pictures_ / "1*.png").string(), {"--camera", camera_}), 1,
+  expect_error(run_path((images_ / "1*.png").string(), {"--camera", camera_}), 1,
                {"1*.png", "expected images (.png, .jpg, .jpeg), found none"});
-  expect_error(run_path((pictures_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
+  expect_error(run_path((images_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
 }
 
-TEST_F(PictureFolderRun, ABrokenPictureIsAWarningAndGetsAPose) {
-  const cv::Mat picture = cv::imread((pictures_ / "000003.png").string());
-  fs::remove(pictures_ / "000003.png");
-  cv::imwrite((pictures_ / "000003.jpg").string(), picture);
-  fs::resize_file(pictures_ / "000003.jpg", 5000);
-  cv::imwrite((pictures_ / "000005.png").string(), picture(cv::Rect(0, 0, 100, 100)));
+TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
+  const cv::Mat image = cv::imread((images_ / "000003.png").string());
+  fs::remove(images_ / "000003.png");
+  cv::imwrite((images_ / "000003.jpg").string(), image);
+  fs::resize_file(images_ / "000003.jpg", 5000);
+  cv::imwrite((images_ / "000005.png").string(), image(cv::Rect(0, 0, 100, 100)));
   const ProgramResult result = run({"--quiet"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("warning: " + (pictures_ / "000003.jpg").string() +
+  EXPECT_THAT(result.err, HasSubstr("warning: " + (images_ / "000003.jpg").string() +
                                     ": expected a complete JPEG image, found one cut off"));
   EXPECT_THAT(result.err, HasSubstr("000005.png: expected an image of 620x188 pixels, found 100x"));
   EXPECT_EQ(num_poses(), 10U);
 }
 
-TEST_F(PictureFolderRun, NoCameraFile) {
-  expect_error(run_path(pictures_.string()), 1,
-               {"my pictures: expected KITTI's layout", "--camera FILE, found neither"});
-  expect_error(run_path(pictures_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
+TEST_F(ImageFolderRun, NoCameraFile) {
+  expect_error(run_path(images_.string()), 1,
+               {"my images: expected KITTI's layout", "--camera FILE, found neither"});
+  expect_error(run_path(images_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
   expect_error(run({"--calib", "c.txt"}), 1, {"c.txt", "--camera or --calib"});
   fs::remove(camera_);
   expect_error(run(), 1, {"camera.yaml: cannot read: No such file"});
   EXPECT_FALSE(fs::exists(out_));
 }
 
-TEST_F(PictureFolderRun, APatternThatTheShellReplaced) {
+TEST_F(ImageFolderRun, APatternThatTheShellReplaced) {
   std::vector<std::string> names = {"--camera", camera_};
   for (int i = 1; i < 1000; ++i) {
-    names.push_back((pictures_ / fmt::format("{:06}.png", i)).string());
+    names.push_back((images_ / fmt::format("{:06}.png", i)).string());
   }
-  const ProgramResult result = run_path((pictures_ / "000000.png").string(), names);
+  const ProgramResult result = run_path((images_ / "000000.png").string(), names);
   expect_error(result, 2, {"not expected", "a pattern of files must be quoted", "--help"});
   EXPECT_LT(result.err.size(), 500U);
 }
 
-TEST_F(PictureFolderRun, BadCameraFiles) {
+TEST_F(ImageFolderRun, BadCameraFiles) {
   write_file(camera_, "intrinsics: [1, 2\n");
   expect_error(run(), 1, {"camera.yaml:2", "not YAML"});
   expect_error(run_with_camera("intrinsics", "intrinsic"), 1,
@@ -201,7 +201,7 @@ TEST_F(PictureFolderRun, BadCameraFiles) {
   expect_error(run_with_camera("image_width: 620", "image_width: 0"), 1,
                {"camera.yaml:1: image_width: expected a whole number from 1", "found 0"});
   expect_error(run_with_camera("image_width: 620", "image_width: 621"), 1,
-               {"my pictures: expected images of 621x188 pixels", "found 620x188"});
+               {"my images: expected images of 621x188 pixels", "found 620x188"});
   expect_error(run_with_camera("none", "radial"), 1,
                {"camera.yaml:4: distortion_model: expected one of none, radial-tangential, radtan, "
                 "equidistant, found 'radial'"});
@@ -215,7 +215,7 @@ TEST_F(PictureFolderRun, BadCameraFiles) {
                {"camera.yaml: expected rate_hz (frames per second) or --times FILE"});
 }
 
-TEST_F(PictureFolderRun, BadFoldersTimesAndPoses) {
+TEST_F(ImageFolderRun, BadFoldersTimesAndPoses) {
   expect_error(run_path(folder_ / "none", {"--camera", camera_}), 1, {"none: expected a folder"});
   fs::create_directories(folder_.path() / "empty");
   expect_error(run_path(folder_ / "empty", {"--camera", camera_}), 1,
@@ -227,25 +227,24 @@ TEST_F(PictureFolderRun, BadFoldersTimesAndPoses) {
   expect_error(run({"--times", folder_ / "times.txt"}), 1,
                {"times.txt:6: expected a time after 4 s, found 4 s"});
   expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
-  expect_error(
-      run({"--set", "scale.source=ground_truth"}), 1,
-      {"my pictures: expected a pose file, which scale.source=ground_truth needs", "--gt"});
-  expect_error(run({"--frames", "5:11"}), 1, {"my pictures", "0:10", "5:11"});
-  for (const auto& entry : fs::directory_iterator(pictures_)) {
+  expect_error(run({"--set", "scale.source=ground_truth"}), 1,
+               {"my images: expected a pose file, which scale.source=ground_truth needs", "--gt"});
+  expect_error(run({"--frames", "5:11"}), 1, {"my images", "0:10", "5:11"});
+  for (const auto& entry : fs::directory_iterator(images_)) {
     fs::resize_file(entry.path(), 50);
   }
   expect_error(run(), 1, {"none of 10 images can be read", "000000.png"});
 }
 
-TEST_F(PictureFolderRun, Channel) {
+TEST_F(ImageFolderRun, Channel) {
   const ProgramResult result = run_stemvo(
-      {"channel", pictures_.string(), "--camera", camera_, "--out", out_, "--filters", "0:1"});
+      {"channel", images_.string(), "--camera", camera_, "--out", out_, "--filters", "0:1"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_TRUE(fs::exists(out_ + "/000000_filter_000.png"));
-  expect_error(run_stemvo({"channel", pictures_.string(), "--out", out_}), 1, {"--camera FILE"});
+  expect_error(run_stemvo({"channel", images_.string(), "--out", out_}), 1, {"--camera FILE"});
 }
 
-/// Pictures of other people's cameras.
+/// Images of other people's cameras.
 class OtherCameras : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -267,11 +266,11 @@ class OtherCameras : public ::testing::Test {
   [[nodiscard]] std::vector<std::string> states() const {
     return test::column(read_file(folder_ / "out/frames.csv"), "state");
   }
-  static std::size_t num_pictures(const fs::path& folder) {
+  static std::size_t num_images(const fs::path& folder) {
     return static_cast<std::size_t>(
         std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
   }
-  test::TemporaryFolder folder_;
+  test::TempFolder folder_;
 };
 
 /// The hand-held camera, its frames in an order of ours.
@@ -280,10 +279,10 @@ class Handheld : public OtherCameras {
   /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
   void expect_followed(int first, int step, std::size_t count, double max_ate_m) const {
     const fs::path data = *test::shared_data() / "handheld";
-    std::vector<fs::path> pictures(fs::directory_iterator(data / "images"), {});
-    std::sort(pictures.begin(), pictures.end());
+    std::vector<fs::path> images(fs::directory_iterator(data / "images"), {});
+    std::sort(images.begin(), images.end());
     std::istringstream lines(read_file(data / "poses.txt"));
-    std::vector<std::string> poses(pictures.size());
+    std::vector<std::string> poses(images.size());
     for (std::string& pose : poses) {
       std::getline(lines, pose);
     }
@@ -291,7 +290,7 @@ class Handheld : public OtherCameras {
     std::string chosen;
     for (std::size_t i = 0; i < count; ++i) {
       const auto from = static_cast<std::size_t>(first + step * static_cast<int>(i));
-      fs::create_symlink(pictures[from], folder_ / fmt::format("images/{:06d}.jpg", i));
+      fs::create_symlink(images[from], folder_ / fmt::format("images/{:06d}.jpg", i));
       chosen += poses[from] + "\n";
     }
     write_file(folder_ / "poses.txt", chosen);
@@ -326,7 +325,7 @@ TEST_F(OtherCameras, HandheldJpegsWithPosesAndTimes) {
 TEST_F(OtherCameras, DroneOfEuroc) {
   const fs::path data = *test::shared_data() / "euroc/mav0/cam0";
   expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
-               num_pictures(data / "data"));
+               num_images(data / "data"));
   // It hovers: nothing to make a map of, and nothing is lost.
   for (const std::string& state : states()) {
     EXPECT_THAT(state, ::testing::AnyOf("first", "stationary", "rotating"));
@@ -334,12 +333,12 @@ TEST_F(OtherCameras, DroneOfEuroc) {
 }
 
 TEST_F(OtherCameras, KinectOfTum) {
-  const fs::path pictures = *test::shared_data() / "tum/rgb";
+  const fs::path images = *test::shared_data() / "tum/rgb";
   write_file(folder_ / "camera.yaml",
              "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
              "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
              "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\nrate_hz: 10\n");
-  expect_poses({pictures.string(), "--camera", folder_ / "camera.yaml"}, num_pictures(pictures));
+  expect_poses({images.string(), "--camera", folder_ / "camera.yaml"}, num_images(images));
   const std::vector<std::string> seen = states();
   EXPECT_GE(std::count(seen.begin(), seen.end(), "tracking"), 15);
 }

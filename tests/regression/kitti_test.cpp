@@ -23,7 +23,7 @@ class Kitti : public ::testing::TestWithParam<std::string> {
     if (!data) {
       GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
     }
-    const test::TemporaryFolder folder;
+    const test::TempFolder folder;
     const std::string out = folder / "result";
     const ProgramResult run = run_stemvo({"run", (*data / "kitti/sequences" / GetParam()).string(),
                                           "--out", out, "--set", "scale.source=" + scale_source});
@@ -68,7 +68,7 @@ class KittiSpeed : public ::testing::Test {
   static double t_rel_percent(const std::string& out) {
     return nlohmann::json::parse(test::read_file(out + "/metrics.json")).at("t_rel_percent");
   }
-  test::TemporaryFolder folder_;
+  test::TempFolder folder_;
 };
 
 // Found: 19 to 23 ms.

@@ -39,7 +39,7 @@ std::ptrdiff_t count_lines(const std::string& text) {
 
 class Run : public ::testing::Test {
  protected:
-  TemporaryFolder folder_;
+  TempFolder folder_;
   fs::path sequence_ = rendered_drive() / "sequences/00";
   std::string out_ = folder_ / "result";
 };
@@ -285,7 +285,7 @@ TEST_F(Run, InterruptWritesWhatWasComputed) {
 }
 
 TEST(RunFullSize, HundredRenderedFramesStayUnderTheLimit) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const fs::path drive = rendered_drive({100, 1241, 376});
   const std::string out = folder / "result";
   const ProgramResult result = run_drive(drive / "sequences/00", out, {"--set", kTrueScale});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pictures that show something else than a street that stands still: none, darkness, others.
+// Images that show something else than a street that stands still: none, darkness, others.
 #include <algorithm>
 #include <filesystem>
 #include <functional>
@@ -29,51 +29,51 @@ class Disturbed : public ::testing::Test {
     fs::create_directories(sequence_.parent_path());
     fs::copy(from, sequence_, fs::copy_options::recursive);
   }
-  [[nodiscard]] fs::path picture_file(int frame) const {
+  [[nodiscard]] fs::path image_file(int frame) const {
     char name[32];
     std::snprintf(name, sizeof(name), "image_2/%06d.png", frame);
     return sequence_ / name;
   }
   void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
     for (int i = from; i < to; ++i) {
-      cv::Mat picture = cv::imread(picture_file(i).string(), cv::IMREAD_COLOR);
-      ASSERT_FALSE(picture.empty());
-      edit(i, picture);
-      ASSERT_TRUE(cv::imwrite(picture_file(i).string(), picture));
+      cv::Mat image = cv::imread(image_file(i).string(), cv::IMREAD_COLOR);
+      ASSERT_FALSE(image.empty());
+      edit(i, image);
+      ASSERT_TRUE(cv::imwrite(image_file(i).string(), image));
     }
   }
   [[nodiscard]] StateRun run() const { return test::run_states(sequence_, "map", "camera_height"); }
 
-  test::TemporaryFolder folder_;
+  test::TempFolder folder_;
   fs::path sequence_;
 };
 
 /// A thing with a texture of its own that goes from the left to the right over a third of the
-/// picture.
+/// image.
 struct Passing {
   cv::Mat texture;
   int first_frame;
   int speed_px;
 
-  Passing(int first, int speed, const cv::Size& picture) : first_frame(first), speed_px(speed) {
-    texture.create(picture.height * 3 / 4, picture.width * 4 / 9, CV_8UC3);
+  Passing(int first, int speed, const cv::Size& image) : first_frame(first), speed_px(speed) {
+    texture.create(image.height * 3 / 4, image.width * 4 / 9, CV_8UC3);
     cv::RNG random(7);
     random.fill(texture, cv::RNG::UNIFORM, 0, 256);
     cv::GaussianBlur(texture, texture, {}, 2.0);
     cv::normalize(texture, texture, 20, 230, cv::NORM_MINMAX);
   }
-  void draw(int frame, cv::Mat& picture) const {
+  void draw(int frame, cv::Mat& image) const {
     const int left = (frame - first_frame) * speed_px - texture.cols / 2;
-    const cv::Rect place(left, picture.rows - texture.rows - 4, texture.cols, texture.rows);
-    const cv::Rect inside = place & cv::Rect({}, picture.size());
+    const cv::Rect place(left, image.rows - texture.rows - 4, texture.cols, texture.rows);
+    const cv::Rect inside = place & cv::Rect({}, image.size());
     if (!inside.empty()) {
-      texture(cv::Rect(inside.tl() - place.tl(), inside.size())).copyTo(picture(inside));
+      texture(cv::Rect(inside.tl() - place.tl(), inside.size())).copyTo(image(inside));
     }
   }
 };
 
 constexpr double kStep_m = test::kDriveStep_m;
-const cv::Size kPicture(620, 188);
+const cv::Size kImage(620, 188);
 
 TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   const StateDrive drive = test::steady_drive();
@@ -81,17 +81,17 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   const int begin = 30;
   const int end = 34;
   cv::RNG random(3);
-  change(begin, end, [&](int, cv::Mat& picture) {
-    cv::Mat noise(picture.size(), CV_32FC3);
+  change(begin, end, [&](int, cv::Mat& image) {
+    cv::Mat noise(image.size(), CV_32FC3);
     random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
     cv::Mat dark;
-    picture.convertTo(dark, CV_32FC3, 0.02);
+    image.convertTo(dark, CV_32FC3, 0.02);
     dark += noise;
-    dark.convertTo(picture, CV_8UC3);
+    dark.convertTo(image, CV_8UC3);
   });
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
-  // Two dark frames in a row have the same faint picture: tracks between them are no map.
+  // Two dark frames in a row have the same faint image: tracks between them are no map.
   result.expect_states(begin, end, {"lost", "no_image", "initializing"});
   result.expect_states(end, end + 5, {"lost", "initializing", "tracking"});
   result.expect_states(end + 5, 60, {"tracking"});
@@ -106,13 +106,13 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   }
 }
 
-TEST_F(Disturbed, MissingPicturesAreBridged) {
+TEST_F(Disturbed, MissingImagesAreBridged) {
   const StateDrive drive = test::steady_drive();
   copy("steady", drive);
   const int begin = 30;
   const int end = 33;
   for (int i = begin; i < end; ++i) {
-    fs::resize_file(picture_file(i), 200);
+    fs::resize_file(image_file(i), 200);
   }
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
@@ -130,9 +130,9 @@ TEST_F(Disturbed, MissingPicturesAreBridged) {
 TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
   const StateDrive drive = test::standing_drive();
   copy("standing", drive);
-  const Passing passing(drive.event_begin + 2, 35, kPicture);
+  const Passing passing(drive.event_begin + 2, 35, kImage);
   change(drive.event_begin + 2, drive.event_end,
-         [&](int i, cv::Mat& picture) { passing.draw(i, picture); });
+         [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(drive.event_begin, drive.event_end, {"stationary"});
@@ -152,8 +152,8 @@ TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
   copy("steady", drive);
   const int begin = 15;
   const int end = 45;
-  const Passing passing(begin, 26, kPicture);
-  change(begin, end, [&](int i, cv::Mat& picture) { passing.draw(i, picture); });
+  const Passing passing(begin, 26, kImage);
+  change(begin, end, [&](int i, cv::Mat& image) { passing.draw(i, image); });
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(begin, 60, {"tracking"});

@@ -25,7 +25,7 @@ using test::run_states;
 using test::run_stemvo;
 using test::StateDrive;
 using test::StateRun;
-using test::TemporaryFolder;
+using test::TempFolder;
 
 class States : public ::testing::TestWithParam<std::string> {
  protected:
@@ -131,19 +131,19 @@ INSTANTIATE_TEST_SUITE_P(Modes,
                          [](const auto& mode) { return mode.param; });
 
 TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const StateDrive drive = test::standing_drive();
   const fs::path from = test::rendered_along("standing", drive);
   const fs::path sequence = folder.path() / "sequences" / "00";
   fs::create_directories(sequence.parent_path());
   fs::copy(from, sequence, fs::copy_options::recursive);
-  for (int i = 20; i < 35; ++i) {  // something covers the lower part of the picture
+  for (int i = 20; i < 35; ++i) {  // something covers the lower part of the image
     char name[32];
     std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
-    cv::Mat picture = cv::imread((sequence / name).string(), cv::IMREAD_COLOR);
-    ASSERT_FALSE(picture.empty());
-    picture.rowRange(picture.rows * 52 / 100, picture.rows).setTo(cv::Scalar(90, 90, 90));
-    cv::imwrite((sequence / name).string(), picture);
+    cv::Mat image = cv::imread((sequence / name).string(), cv::IMREAD_COLOR);
+    ASSERT_FALSE(image.empty());
+    image.rowRange(image.rows * 52 / 100, image.rows).setTo(cv::Scalar(90, 90, 90));
+    cv::imwrite((sequence / name).string(), image);
   }
   const std::string out = folder / "result";
   const ProgramResult done =
@@ -156,7 +156,7 @@ TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
   const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");
   ASSERT_TRUE(poses) << poses.error().message;
   for (std::size_t i = 15; i < 45; ++i) {
-    // Frame 35 still has only covered pictures behind it.
+    // Frame 35 still has only covered images behind it.
     const bool is_covered = i >= 20 && i < 35;
     if (i != 35) {
       EXPECT_EQ(roads[i], is_covered ? "held" : "measured") << i;

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using test::ProgramResult;
 using test::read_file;
 using test::run_stemvo;
-using test::TemporaryFolder;
+using test::TempFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;

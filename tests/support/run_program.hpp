@@ -12,7 +12,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "support/temp_folder.hpp"
+
 namespace stemvo::test {
+
+using stemvo::testing::TempFolder;
 
 /// The whole file; empty where there is none.
 inline std::string read_file(const std::filesystem::path& file) {
@@ -94,30 +98,5 @@ inline ProgramResult run_program(const std::string& program,
 inline ProgramResult run_stemvo(const std::vector<std::string>& arguments) {
   return run_program(STEMVO_PROGRAM, arguments);
 }
-
-/// A folder of this test's own, removed with it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    static int count = 0;
-    path_ = std::filesystem::temp_directory_path() /
-            ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++));
-    std::filesystem::create_directories(path_);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] std::string operator/(const std::string& name) const {
-    return (path_ / name).string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace stemvo::test

@@ -50,7 +50,7 @@ class Search : public ::testing::Test {
 
   static constexpr test::DriveSize kSize = {.frames = 30, .width_px = 310, .height_px = 94};
 
-  TemporaryFolder folder_;
+  TempFolder folder_;
   fs::path sequence_ = test::rendered_drive(kSize) / "sequences/00";
 };
 

@@ -109,7 +109,7 @@ inline StateDrive cut_drive(int rate = 1) {
 
 /// Renders it (once per build); the folder of the sequence.
 inline std::filesystem::path rendered_along(const std::string& name, const StateDrive& drive) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const std::filesystem::path poses = folder / "poses.txt";
   if (const Status status = write_kitti_trajectory(poses, drive.world_from_camera); !status) {
     throw std::runtime_error(status.error().message);

@@ -65,7 +65,7 @@ struct StateRun {
 inline StateRun run_states(const std::filesystem::path& sequence,
                            const std::string& mode,
                            const std::string& scale) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const std::string out = folder / "result";
   const ProgramResult done =
       run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",

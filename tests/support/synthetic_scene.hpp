@@ -89,7 +89,7 @@ inline void add_match(const SceneOptions& options,
   scene.is_outlier.push_back(outlier ? 1 : 0);
 }
 
-/// Every point is in front of both cameras and inside both pictures. A motion under which nothing
+/// Every point is in front of both cameras and inside both images. A motion under which nothing
 /// is seen twice gives fewer points than asked for.
 inline Scene make_scene(const SceneOptions& options) {
   SceneRandom random(options.seed);

@@ -15,15 +15,9 @@ namespace stemvo::testing {
 class TempFolder {
  public:
   TempFolder() {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = "stemvo_" + std::to_string(::getpid());
-    if (info != nullptr) {
-      name += std::string("_") + info->test_suite_name() + "_" + info->name();
-    }
-    for (char& c : name) {
-      c = c == '/' ? '_' : c;
-    }
-    path_ = std::filesystem::temp_directory_path() / name;
+    static int count = 0;
+    path_ = std::filesystem::temp_directory_path() /
+            ("stemvo_" + std::to_string(::getpid()) + "_" + std::to_string(count++));
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }

@@ -112,7 +112,7 @@ inline cv::Mat textured_frame(cv::Size size, int type) {
 }
 
 /// The layer in plain loops and doubles at any stride; zeros outside the frame (after the mean was
-/// taken off). One picture per filter.
+/// taken off). One image per filter.
 inline std::vector<cv::Mat1d> reference_channels(const TinyStem& stem,
                                                  const cv::Mat& frame,
                                                  int stride) {

@@ -70,13 +70,14 @@ TEST_F(ConfigLoad, EmptyFileAndEmptySectionAreTheDefaults) {
 }
 
 TEST_F(ConfigLoad, TellsWhichKeysAFileSets) {
-  const auto keys = keys_in_config(write("stem:\n  filter: 3\nscale:\n# source: none\nseed: 2\n"));
-  ASSERT_TRUE(keys) << keys.error().message;
-  EXPECT_THAT(*keys, ::testing::ElementsAre("stem.filter", "seed"));
-  EXPECT_THAT(keys_in_config(write("")).value(), ::testing::IsEmpty());
-  EXPECT_THAT(keys_in_config(write("stem: 3\n")).value(), ::testing::IsEmpty());
-  EXPECT_FALSE(keys_in_config(write("stem: [")));
-  EXPECT_FALSE(keys_in_config("/nowhere.yaml"));
+  const auto config = load_config(write("stem:\n  filter: 3\nscale:\n# source: none\nseed: 2\n"));
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_THAT(config->keys_in_file, ::testing::ElementsAre("seed", "stem.filter"));
+  EXPECT_THAT(config->keys_overridden, ::testing::IsEmpty());
+  EXPECT_THAT(load_config(write(""))->keys_in_file, ::testing::IsEmpty());
+  Config changed = *config;
+  ASSERT_TRUE(apply_override(changed, "scale.source=none"));
+  EXPECT_THAT(changed.keys_overridden, ::testing::ElementsAre("scale.source"));
 }
 
 TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {

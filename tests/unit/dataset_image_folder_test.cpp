@@ -20,23 +20,23 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr int kNumPictures = 4;
+constexpr int kNumImages = 4;
 
 /// Four colour JPEGs of 32x24 pixels, frame8 .. frame11; each test breaks them in its own way.
 class ImageFolderTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    fs::create_directories(pictures_);
-    for (int i = 0; i < kNumPictures; ++i) {
-      cv::imwrite(picture(i), cv::Mat(24, 32, CV_8UC3, cv::Scalar(30, 20, 10 + 40 * i)));
+    fs::create_directories(images_);
+    for (int i = 0; i < kNumImages; ++i) {
+      cv::imwrite(image(i), cv::Mat(24, 32, CV_8UC3, cv::Scalar(30, 20, 10 + 40 * i)));
     }
     write_camera("rate_hz: 10\n");
-    request_.path = pictures_;
+    request_.sequence_dir = images_;
     request_.camera_file = temp_ / "camera.yaml";
   }
 
-  std::string picture(int index) const {
-    return (pictures_ / fmt::format("frame{}.jpg", 8 + index)).string();
+  std::string image(int index) const {
+    return (images_ / fmt::format("frame{}.jpg", 8 + index)).string();
   }
   void write_camera(const std::string& more, const std::string& size = "[32, 24]") const {
     (void)temp_.file("camera.yaml", "resolution: " + size +
@@ -57,14 +57,14 @@ class ImageFolderTest : public ::testing::Test {
   }
 
   testing::TempFolder temp_;
-  const fs::path pictures_ = temp_ / "my drive";
+  const fs::path images_ = temp_ / "my drive";
   FrameSourceRequest request_;
 };
 
 TEST_F(ImageFolderTest, OpensAFolder) {
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  const FrameSource& source = **opened;
+  const FrameSource& source = *opened;
   EXPECT_EQ(source.size(), 4U);
   EXPECT_EQ(source.name(), "my drive");
   EXPECT_EQ(source.camera().fy_px, 31.0);
@@ -75,7 +75,7 @@ TEST_F(ImageFolderTest, OpensAFolder) {
   EXPECT_FALSE(source.camera_height_m());
   EXPECT_EQ(source.given_calibration(), request_.camera_file);
   for (std::size_t i = 0; i < source.size(); ++i) {
-    EXPECT_EQ(source.file(i), picture(static_cast<int>(i))) << "frame8, frame9, frame10, frame11";
+    EXPECT_EQ(source.file(i), image(static_cast<int>(i))) << "frame8, frame9, frame10, frame11";
     const auto frame = source.read(i);
     ASSERT_TRUE(frame) << frame.error().message;
     ASSERT_EQ(frame->type(), CV_8UC3);
@@ -86,26 +86,26 @@ TEST_F(ImageFolderTest, OpensAFolder) {
 }
 
 TEST_F(ImageFolderTest, OpensAPattern) {
-  request_.path = pictures_ / "frame?.jpg";
+  request_.sequence_dir = images_ / "frame?.jpg";
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ((*opened)->size(), 2U);
-  EXPECT_EQ((*opened)->name(), "my drive");
+  EXPECT_EQ(opened->size(), 2U);
+  EXPECT_EQ(opened->name(), "my drive");
 }
 
 TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   request_.frames = parse_frame_range("1:3").value();
-  request_.ground_truth = temp_.file("poses.txt", pose_lines(kNumPictures));
+  request_.ground_truth = temp_.file("poses.txt", pose_lines(kNumImages));
   request_.times = temp_.file("times.txt", "5\n5.5\n6.25\n7\n");
   write_camera("camera_height: 1.25\n");  // no rate: there are times
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  const FrameSource& source = **opened;
+  const FrameSource& source = *opened;
   EXPECT_EQ(source.size(), 2U);
   EXPECT_EQ(source.range().begin, 1U);
   EXPECT_EQ(source.range().end, 3U);
   EXPECT_THAT(source.timestamps_s(), ElementsAre(5.5, 6.25));
-  EXPECT_EQ(source.file(0), picture(1));
+  EXPECT_EQ(source.file(0), image(1));
   EXPECT_EQ(source.camera_height_m(), 1.25);
   ASSERT_TRUE(source.ground_truth());
   ASSERT_EQ(source.ground_truth()->size(), 2U);
@@ -114,80 +114,80 @@ TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   EXPECT_EQ(source.ground_truth_file(), request_.ground_truth);
 }
 
-TEST_F(ImageFolderTest, GrayPicturesAreReadAsGray) {
-  for (int i = 0; i < kNumPictures; ++i) {
-    fs::remove(picture(i));
-    const std::string file = (pictures_ / fmt::format("{}.{}", i, i % 2 == 0 ? "png" : "jpg"));
+TEST_F(ImageFolderTest, GrayImagesAreReadAsGray) {
+  for (int i = 0; i < kNumImages; ++i) {
+    fs::remove(image(i));
+    const std::string file = (images_ / fmt::format("{}.{}", i, i % 2 == 0 ? "png" : "jpg"));
     cv::imwrite(file, cv::Mat(24, 32, CV_8UC1, cv::Scalar(40 + i)));
   }
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
   for (std::size_t i = 0; i < 4; ++i) {
-    const auto frame = (*opened)->read(i);
+    const auto frame = opened->read(i);
     ASSERT_TRUE(frame) << frame.error().message;
     ASSERT_EQ(frame->type(), CV_8UC1);
     EXPECT_EQ(frame->at<std::uint8_t>(3, 4), 40 + i);
   }
 }
 
-TEST_F(ImageFolderTest, OneGrayPictureAmongColourIsMadeColour) {
-  cv::imwrite(picture(2), cv::Mat(24, 32, CV_8UC1, cv::Scalar(77)));
+TEST_F(ImageFolderTest, OneGrayImageAmongColourIsMadeColour) {
+  cv::imwrite(image(2), cv::Mat(24, 32, CV_8UC1, cv::Scalar(77)));
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ((*opened)->read(2).value().type(), CV_8UC3);
+  EXPECT_EQ(opened->read(2).value().type(), CV_8UC3);
 }
 
 TEST_F(ImageFolderTest, AnEndingThatLiesDoesNoHarm) {
   cv::imwrite((temp_ / "really.png").string(), cv::Mat(24, 32, CV_8UC3, cv::Scalar(1, 2, 3)));
-  fs::rename(temp_ / "really.png", picture(1));
+  fs::rename(temp_ / "really.png", image(1));
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ((*opened)->read(1).value().at<cv::Vec3b>(0, 0), cv::Vec3b(3, 2, 1));
+  EXPECT_EQ(opened->read(1).value().at<cv::Vec3b>(0, 0), cv::Vec3b(3, 2, 1));
 }
 
 TEST_F(ImageFolderTest, AJpegCutOffAnywhereIsAnErrorOfThatFrameOnly) {
   cv::Mat noise(24, 32, CV_8UC3);
   cv::randu(noise, 0, 255);
-  cv::imwrite(picture(2), noise);
-  const auto size = fs::file_size(picture(2));
+  cv::imwrite(image(2), noise);
+  const auto size = fs::file_size(image(2));
   for (std::uintmax_t left = 0; left < size; left += left < 700 ? 37 : 5) {
-    cv::imwrite(picture(2), noise);
-    fs::resize_file(picture(2), left);
+    cv::imwrite(image(2), noise);
+    fs::resize_file(image(2), left);
     const auto opened = open_source(request_);
     ASSERT_TRUE(opened) << opened.error().message;
-    const auto frame = (*opened)->read(2);
+    const auto frame = opened->read(2);
     ASSERT_FALSE(frame) << left << " of " << size << " bytes";
     EXPECT_THAT(frame.error().message, HasSubstr("frame10.jpg: expected"));
-    EXPECT_TRUE((*opened)->read(3));
+    EXPECT_TRUE(opened->read(3));
   }
 }
 
 TEST_F(ImageFolderTest, AThumbnailIsNotTheEndOfAJpeg) {
-  std::string text = testing::read_all(picture(1));
+  std::string text = testing::read_all(image(1));
   // An application segment of 8 bytes that holds an end marker, as EXIF's thumbnails do.
   text.insert(2, std::string("\xff\xe1\x00\x08\xff\xd8\xff\xd9\x00\x00", 10));
-  std::ofstream(picture(1), std::ios::binary) << text;
-  EXPECT_TRUE(open_source(request_).value()->read(1));
-  std::ofstream(picture(1), std::ios::binary) << text.substr(0, 14);
-  EXPECT_FALSE(open_source(request_).value()->read(1));
+  std::ofstream(image(1), std::ios::binary) << text;
+  EXPECT_TRUE(open_source(request_).value().read(1));
+  std::ofstream(image(1), std::ios::binary) << text.substr(0, 14);
+  EXPECT_FALSE(open_source(request_).value().read(1));
 }
 
 TEST_F(ImageFolderTest, OtherFilesAreErrorsOfTheirFrameOnly) {
-  std::ofstream(picture(1), std::ios::binary) << "not a picture";
-  std::ofstream(picture(2), std::ios::binary) << "";
-  cv::imwrite(picture(3), cv::Mat(12, 16, CV_8UC3, cv::Scalar(1, 2, 3)));
+  std::ofstream(image(1), std::ios::binary) << "not an image";
+  std::ofstream(image(2), std::ios::binary) << "";
+  cv::imwrite(image(3), cv::Mat(12, 16, CV_8UC3, cv::Scalar(1, 2, 3)));
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  const auto message = [&](std::size_t i) { return (*opened)->read(i).error().message; };
+  const auto message = [&](std::size_t i) { return opened->read(i).error().message; };
   EXPECT_THAT(message(1), HasSubstr("frame9.jpg: expected a PNG or JPEG image, found another"));
   EXPECT_THAT(message(2), HasSubstr("frame10.jpg: expected a PNG or JPEG image, found an empty"));
   EXPECT_THAT(message(3), HasSubstr("frame11.jpg: expected an image of 32x24 pixels, found 16x12"));
-  EXPECT_TRUE((*opened)->read(0));
+  EXPECT_TRUE(opened->read(0));
 }
 
-TEST_F(ImageFolderTest, NoPictureThatCanBeRead) {
-  for (int i = 0; i < kNumPictures; ++i) {
-    fs::resize_file(picture(i), 100);
+TEST_F(ImageFolderTest, NoImageThatCanBeRead) {
+  for (int i = 0; i < kNumImages; ++i) {
+    fs::resize_file(image(i), 100);
   }
   EXPECT_THAT(error_of(), AllOf(HasSubstr("none of 4"), HasSubstr("frame8.jpg")));
 }
@@ -235,7 +235,7 @@ TEST_F(ImageFolderTest, RangeOutside) {
 }
 
 TEST_F(ImageFolderTest, FolderProblems) {
-  request_.path = temp_ / "none";
+  request_.sequence_dir = temp_ / "none";
   EXPECT_THAT(error_of(), HasSubstr("none: expected a folder of images"));
   fs::create_directories(temp_ / "none");
   EXPECT_THAT(error_of(), HasSubstr("none: expected images (.png, .jpg, .jpeg), found none"));
@@ -247,11 +247,11 @@ TEST_F(ImageFolderTest, NeitherCameraFileNorKittisLayout) {
   request_.camera_file.reset();
   EXPECT_THAT(error_of(), AllOf(HasSubstr("my drive: expected KITTI's layout"),
                                 HasSubstr("--camera FILE, found neither")));
-  request_.path = temp_ / "none";
+  request_.sequence_dir = temp_ / "none";
   EXPECT_THAT(error_of(), AllOf(HasSubstr("none: expected"), HasSubstr("--camera FILE")));
-  request_.path = pictures_ / "*.jpg";
+  request_.sequence_dir = images_ / "*.jpg";
   EXPECT_THAT(error_of(), HasSubstr("*.jpg: expected --camera FILE"));
-  request_.path = pictures_;
+  request_.sequence_dir = images_;
   request_.times = temp_.file("times.txt", "0\n1\n2\n3\n");
   EXPECT_THAT(error_of(), HasSubstr("times.txt: expected --times beside --camera only"));
 }
@@ -272,14 +272,15 @@ TEST_F(ImageFolderTest, KittisLayoutNeedsNoCameraFile) {
   const fs::path folder = temp_ / "07";
   fs::create_directories(folder / "image_0");
   cv::imwrite((folder / "image_0/000000.png").string(), cv::Mat(6, 8, CV_8UC1, cv::Scalar(9)));
-  request_ = {.path = folder};
+  request_ = {};
+  request_.sequence_dir = folder;
   EXPECT_THAT(error_of(), HasSubstr("calib.txt")) << "KITTI's own message";
   std::ofstream(folder / "calib.txt") << "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n";
   std::ofstream(folder / "times.txt") << "0\n";
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ((*opened)->name(), "07");
-  EXPECT_EQ((*opened)->camera().fx_px, 90.0);
+  EXPECT_EQ(opened->name(), "07");
+  EXPECT_EQ(opened->camera().fx_px, 90.0);
 }
 
 }  // namespace

@@ -176,7 +176,7 @@ TEST_F(KittiSequenceTest, RangeOutsideTheFolder) {
   EXPECT_THAT(open_error(frames("4:")), HasSubstr("inside 0:4, found --frames 4:"));
 }
 
-/// Wherever a PNG is cut, it is an Error, never a partly gray picture; the others still read.
+/// Wherever a PNG is cut, it is an Error, never a partly gray image; the others still read.
 TEST_F(KittiSequenceTest, TruncatedImageAnywhereIsAnErrorOfThatFrameOnly) {
   const auto bytes = fs::file_size(image(2));
   for (std::uintmax_t keep = 0; keep < bytes; ++keep) {
@@ -204,7 +204,7 @@ TEST_F(KittiSequenceTest, DamagedImageIsAnError) {
 }
 
 TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
-  write(image(0), "not a picture");
+  write(image(0), "not an image");
   cv::imwrite(image(3).string(), cv::Mat(6, 9, CV_8UC3, cv::Scalar(0, 0, 0)));
   const auto sequence = KittiSequence::open(folder_);
   ASSERT_TRUE(sequence) << sequence.error().message;

@@ -88,10 +88,10 @@ cv::Mat draw_through(const Lens& lens, const Camera& view) {
   const auto matrix = [](const Camera& c) {
     return cv::Matx33d(c.fx_px, 0, c.cx_px, 0, c.fy_px, c.cy_px, 0, 0, 1);
   };
-  cv::Mat picture(lens.camera.height_px, lens.camera.width_px, CV_8UC1);
+  cv::Mat image(lens.camera.height_px, lens.camera.width_px, CV_8UC1);
   std::vector<cv::Point2d> pixels;
-  for (int i = 0; i < static_cast<int>(picture.total()); ++i) {
-    pixels.emplace_back(i % picture.cols, i / picture.cols);
+  for (int i = 0; i < static_cast<int>(image.total()); ++i) {
+    pixels.emplace_back(i % image.cols, i / image.cols);
   }
   std::vector<cv::Point2d> scene;
   const cv::TermCriteria exact(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-12);
@@ -103,29 +103,29 @@ cv::Mat draw_through(const Lens& lens, const Camera& view) {
     cv::undistortPoints(pixels, scene, matrix(lens.camera), coefficients, cv::noArray(),
                         matrix(view), exact);
   }
-  for (int i = 0; i < static_cast<int>(picture.total()); ++i) {
-    picture.at<std::uint8_t>(i / picture.cols, i % picture.cols) =
+  for (int i = 0; i < static_cast<int>(image.total()); ++i) {
+    image.at<std::uint8_t>(i / image.cols, i % image.cols) =
         cv::saturate_cast<std::uint8_t>(brightness(scene[static_cast<std::size_t>(i)]));
   }
-  return picture;
+  return image;
 }
 
 /// The centre of the brightness above the background, around a place.
-cv::Point2d center_of_spot(const cv::Mat& picture, const cv::Point2d& near) {
+cv::Point2d center_of_spot(const cv::Mat& image, const cv::Point2d& near) {
   const cv::Rect window(cvRound(near.x) - 9, cvRound(near.y) - 9, 19, 19);
   cv::Mat weight;
-  picture(window).convertTo(weight, CV_64F, 1.0, -20.0);
+  image(window).convertTo(weight, CV_64F, 1.0, -20.0);
   const cv::Moments moments = cv::moments(weight);
   return {window.x + moments.m10 / moments.m00, window.y + moments.m01 / moments.m00};
 }
 
 TEST_P(UndistortionTest, SpotsComeToLieWhereAPinholeCameraShowsThem) {
-  const cv::Mat picture = undistortion_.apply(draw_through(lens_, view_));
-  ASSERT_EQ(picture.size(), cv::Size(view_.width_px, view_.height_px));
+  const cv::Mat image = undistortion_.apply(draw_through(lens_, view_));
+  ASSERT_EQ(image.size(), cv::Size(view_.width_px, view_.height_px));
   double worst_px = 0.0;
   for (double v = kFirst_px; v < view_.height_px - 14; v += kSpacing_px) {
     for (double u = kFirst_px; u < view_.width_px - 14; u += kSpacing_px) {
-      worst_px = std::max(worst_px, cv::norm(center_of_spot(picture, {u, v}) - cv::Point2d(u, v)));
+      worst_px = std::max(worst_px, cv::norm(center_of_spot(image, {u, v}) - cv::Point2d(u, v)));
     }
   }
   EXPECT_LT(worst_px, 0.05);
@@ -144,7 +144,7 @@ TEST_P(UndistortionTest, TheFormulasAreOpencvs) {
 }
 
 TEST_P(UndistortionTest, EveryPixelComesFromInsideAndTheViewIsAsWideAsThatAllows) {
-  double margin_px = 1e9;  // of the rim of the view to that of the lens' picture
+  double margin_px = 1e9;  // of the rim of the view to that of the lens' image
   for (int v = 0; v < view_.height_px; ++v) {
     for (int u = 0; u < view_.width_px; ++u) {
       if (u % 50 != 0 && v % 50 != 0 && u != view_.width_px - 1 && v != view_.height_px - 1) {
@@ -184,17 +184,17 @@ INSTANTIATE_TEST_SUITE_P(Lenses,
 
 TEST(Undistortion, NoDistortionChangesNothing) {
   const Camera camera{585.0, 586.0, 320.0, 240.0, 640, 480};
-  cv::Mat picture(480, 640, CV_8UC3);
-  cv::randu(picture, 0, 255);
+  cv::Mat image(480, 640, CV_8UC3);
+  cv::randu(image, 0, 255);
   for (const Distortion model : {Distortion::kNone, Distortion::kRadialTangential}) {
     const auto undistortion = Undistortion::create({camera, model, {}});
     ASSERT_TRUE(undistortion);
     EXPECT_EQ(undistortion->camera().matrix(), camera.matrix());
-    EXPECT_EQ(cv::norm(undistortion->apply(picture), picture, cv::NORM_INF), 0.0);
+    EXPECT_EQ(cv::norm(undistortion->apply(image), image, cv::NORM_INF), 0.0);
   }
 }
 
-TEST(Undistortion, CoefficientsThatTurnThePictureInsideOutAreRefused) {
+TEST(Undistortion, CoefficientsThatTurnTheImageInsideOutAreRefused) {
   const Camera camera{500.0, 500.0, 320.0, 240.0, 640, 480};
   for (const double k1 : {-8.0, -1e6, 50.0, 1e300}) {
     const auto undistortion =

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A textured wall that comes nearer; frames 4, 5 and the last one are no pictures.
+/// A textured wall that comes nearer; frames 4, 5 and the last one are no images.
 class FramePipeline : public ::testing::Test {
  protected:
   static constexpr int kNumFrames = 10;
@@ -42,7 +42,7 @@ class FramePipeline : public ::testing::Test {
       times << 0.1 * i << "\n";
       const fs::path file = sequence / fmt::format("image_0/{:06}.png", i);
       if (is_broken(static_cast<std::size_t>(i))) {
-        std::ofstream(file) << "no picture";
+        std::ofstream(file) << "no image";
         continue;
       }
       const double scale = 0.5 + 0.02 * i;

@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "evaluation/trajectory.hpp"
-#include "pipeline/channel_pictures.hpp"
+#include "pipeline/channel_images.hpp"
 #include "pipeline/run.hpp"
 #include "report/map_ply.hpp"
 #include "support/ply_reader.hpp"
@@ -86,7 +86,7 @@ class PipelineRun : public ::testing::Test {
 };
 
 TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
-  request_.picture_every = 4;
+  request_.image_every = 4;
   const Expected<RunSummary> summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->report.num_frames, 6U);
@@ -289,20 +289,20 @@ TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "trajectory.png"));
 }
 
-TEST_F(PipelineRun, ChannelPicturesOfTheInputLayer) {
-  ChannelPicturesRequest request;
+TEST_F(PipelineRun, ChannelImagesOfTheInputLayer) {
+  ChannelImagesRequest request;
   request.sequence_dir = request_.sequence_dir;
   request.out_dir = request_.out_dir;
   request.models_dir = request_.models_dir;
   request.config.stem.model = "input_layer";
   request.frames = FrameRangeRequest{2, 4};
-  const auto written = write_channel_pictures(request);
+  const auto written = write_channel_images(request);
   ASSERT_TRUE(written) << written.error().message;
   EXPECT_EQ(*written, 2U * (1 + 3 + 1));
   EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
   EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
   request.filters = FrameRangeRequest{2, 4};
-  const auto outside = write_channel_pictures(request);
+  const auto outside = write_channel_images(request);
   ASSERT_FALSE(outside);
   EXPECT_THAT(outside.error().message,
               HasSubstr("expected filters inside 0:3, found --filters 2:4"));

@@ -33,11 +33,12 @@ TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
     for (const cv::Size size : {cv::Size(96, 64), {97, 66}, {94, 63}, {95, 61}, {800, 93}}) {
       const cv::Mat frame = testing::textured_frame(size, type);
       StemOptions options = options_of("gray_k4s4");
-      const auto folded = create_stem(options, folder.path());
-      ASSERT_TRUE(folded) << folded.error().message;
+      const auto folded = Stem::create(with_network(options, folder.path()).value());
+      const auto all = create_stem(options, folder.path());
+      ASSERT_TRUE(folded && all);
       EXPECT_EQ(folded->info().num_filters, 6);
       const cv::Mat alone = folded->apply(frame)->values;
-      const cv::Mat with_others = folded->apply_range(frame, 1, 2)->front().values;
+      const cv::Mat with_others = all->apply_range(frame, 1, 2)->front().values;
       ASSERT_EQ(alone.size(), with_others.size());
       EXPECT_EQ(cv::norm(alone, with_others, cv::NORM_INF), 0.0);
       EXPECT_EQ(folded->apply(frame)->map.to_input({3, 4}), Eigen::Vector2d(7.5, 9.5));
@@ -74,7 +75,8 @@ TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
     return 0.299 * rgb[0] + 0.587 * rgb[1] + 0.114 * rgb[2];
   });
   for (const int filter : {0, 1, 5}) {  // 1 has a file of its own
-    const auto stem = create_stem(options_of("gray_k4s4", filter), folder.path());
+    const auto stem =
+        Stem::create(with_network(options_of("gray_k4s4", filter), folder.path()).value());
     const cv::Mat1f values = stem->apply(frame)->values;
     for (const cv::Point at : {cv::Point(0, 0), cv::Point(11, 7), cv::Point(46, 30)}) {
       EXPECT_NEAR(values(at), gray_response(gray, at, filter), 1e-5);
@@ -87,7 +89,8 @@ TEST(StemFolded, ADamagedFileIsNotLoaded) {
   testing::write_folded(folder);
   (void)folder.file("gray_k4s4_filter_1.onnx", "no longer what it was");
   const auto error_of = [&](int filter) {
-    const auto stem = create_stem(options_of("gray_k4s4", filter), folder.path());
+    const auto stem =
+        Stem::create(with_network(options_of("gray_k4s4", filter), folder.path()).value());
     return stem ? "no error" : stem.error().message;
   };
   EXPECT_THAT(error_of(1), HasSubstr("gray_k4s4_filter_1.onnx: expected sha256 "));

@@ -178,7 +178,6 @@ TEST(Stem, InfoNamesTheModel) {
   EXPECT_EQ(stem.info().sha256.size(), 64U);
   EXPECT_EQ(stem.info().filter, 1);
   EXPECT_EQ(stem.info().num_filters, 6);
-  EXPECT_EQ(stem.info().native_stride_px, 4);
   EXPECT_EQ(stem.info().sampling_px, 2);
 }
 

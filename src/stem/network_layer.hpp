@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
+#include <string>
 
 #include <opencv2/core.hpp>
 
-#include "stem/channel.hpp"
+#include "internal_check.hpp"
+#include "stem/onnx_session.hpp"
+#include "stem/stem.hpp"
 #include "stemvo/options.hpp"
 
 namespace stemvo::internal {
@@ -15,8 +17,9 @@ namespace stemvo::internal {
 /// at the k pixels from s' J - before on.
 ///
 /// The passes read one buffer, each from its own start. Where the graph pads, a pass would see
-/// padding where the frame goes on, at another place in each pass; then the buffer holds a margin
-/// of repeated border pixels instead, and outputs that touch the graph's padding are left out.
+/// padding where the frame goes on, at another position in each pass; then the buffer holds a
+/// margin of repeated border pixels instead, and outputs that touch the graph's padding are left
+/// out.
 struct SamplingAxis {
   int kernel = 1;
   int stride = 1;
@@ -38,6 +41,8 @@ struct SamplingAxis {
   [[nodiscard]] int pass_size(int size) const { return outputs(buffer_size(size), stride); }
   /// Outputs of each pass before the first that is kept.
   [[nodiscard]] int first_output() const { return margin_before() / stride; }
+  /// Centre of the pixels that channel pixel 0 looks at.
+  [[nodiscard]] double offset_px() const { return (kernel - 1) / 2.0 - before; }
 
  private:
   [[nodiscard]] int outputs(int size, int step) const {
@@ -48,7 +53,15 @@ struct SamplingAxis {
 
 /// Both axes.
 struct SamplingPlan {
-  SamplingPlan(const StemNetwork& network, int sampling_px);
+  SamplingPlan(const StemNetwork& network, int sampling_px)
+      : x{network.kernel_px[1], network.stride_px, sampling_px, network.padding_px[1],
+          network.padding_px[3]},
+        y{network.kernel_px[0], network.stride_px, sampling_px, network.padding_px[0],
+          network.padding_px[2]},
+        sees_windows_only(!network.native_sampling_only) {
+    STEMVO_CHECK(sampling_px >= 1 && network.stride_px % sampling_px == 0,
+                 "sampling divides the stride");
+  }
 
   SamplingAxis x;
   SamplingAxis y;
@@ -69,10 +82,14 @@ struct SamplingPlan {
   [[nodiscard]] cv::Size channel_size(cv::Size frame) const {
     return {x.channel_size(frame.width), y.channel_size(frame.height)};
   }
-  /// Centre of the pixels that a channel pixel looks at.
-  [[nodiscard]] PixelMap map() const;
-  /// Writes the outputs of pass `index` to their places in the channel.
-  void interleave(int index, const cv::Mat1f& pass, cv::Mat1f& channel) const;
+  [[nodiscard]] PixelMap map() const {
+    return {Eigen::Vector2d(x.sampling, y.sampling), {x.offset_px(), y.offset_px()}};
+  }
 };
+
+/// The filters of a network's layer, sampled by `plan`. `label` is what messages call it.
+[[nodiscard]] FilterBank make_network_layer(const std::string& label,
+                                            OnnxSession session,
+                                            const SamplingPlan& plan);
 
 }  // namespace stemvo::internal

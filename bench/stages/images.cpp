@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From the file to what the points are looked for on: decode, stem, stretch, pyramid, road picture.
-#include "stages/pictures.hpp"
+// From the file to what the points are looked for on: decode, stem, stretch, pyramid, road image.
+#include "stages/images.hpp"
 
 #include <fstream>
 #include <iterator>
@@ -68,6 +68,12 @@ void stem(State& state, const StemOptions& options) {
   }
 }
 
+void stem_load(State& state) {
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(load_stem({}).info().num_filters);
+  }
+}
+
 void stretch(State& state) {
   ChannelStretch stretching(chain().config.stem);
   for (auto _ : state) {
@@ -82,7 +88,7 @@ void pyramid(State& state) {
   }
 }
 
-void road_picture(State& state) {
+void road_image(State& state) {
   for (auto _ : state) {
     benchmark::DoNotOptimize(make_road_image(chain().images.back(), chain().camera));
   }
@@ -92,9 +98,10 @@ BENCHMARK_CAPTURE(decode, gray, false)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(decode, color, true)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(decode_by_opencv, gray, false)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(decode_by_opencv, color, true)->Unit(benchmark::kMillisecond);
+BENCHMARK(stem_load)->Unit(benchmark::kMillisecond);
 BENCHMARK(stretch)->Unit(benchmark::kMillisecond);
 BENCHMARK(pyramid)->Unit(benchmark::kMillisecond);
-BENCHMARK(road_picture)->Unit(benchmark::kMillisecond);
+BENCHMARK(road_image)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

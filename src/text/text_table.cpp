@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "report/text_table.hpp"
+#include "text/text_table.hpp"
 
 #include <algorithm>
 
