@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
 #include "stemvo/two_view_model.hpp"
 
@@ -60,6 +61,8 @@ struct FrameResult {
   TwoViewModel model = TwoViewModel::kNone;
   RoadState road = RoadState::kDisabled;
   std::string_view road_reason;       ///< why the road was not measured, else empty
+  Camera camera;  ///< with what was learnt so far (`camera.refine`)
+  std::optional<Eigen::Vector2d> principal_point_sigma_px;  ///< nullopt: it is not refined
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty

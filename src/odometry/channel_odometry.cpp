@@ -88,6 +88,7 @@ FrameResult ChannelOdometry::optimize() {
   STEMVO_CHECK(localized_.has_value(), "a frame was localized");
   FrameInWork work = *std::exchange(localized_, std::nullopt);
   Stopwatch watch;
+  work.localized.result.camera = camera_;
   estimator_->optimize(work.tracked, work.localized);
   if (work.tracked.has_image) {
     work.times.pose_ms += watch.lap_ms();

@@ -39,6 +39,11 @@ CameraChange SelfCalibration::sigma() const {
   return information_.inverse().diagonal().cwiseSqrt();
 }
 
+std::optional<Eigen::Vector2d> SelfCalibration::principal_point_sigma_px() const {
+  return refinement_ == CameraRefinement::kOff ? std::nullopt
+                                               : std::optional<Eigen::Vector2d>(sigma().head<2>());
+}
+
 CameraChange SelfCalibration::applied() const {
   CameraChange change = CameraChange::Zero();
   change[0] = camera_.cx_px - given_.cx_px;

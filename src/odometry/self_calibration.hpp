@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "geometry/bundle.hpp"
@@ -23,11 +25,12 @@ class SelfCalibration {
 
   /// The given one, less what the data insist on.
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// Of the estimate, in the order of CameraChange.
-  [[nodiscard]] CameraChange sigma() const;
+  /// Of the estimate; nullopt: nothing is refined.
+  [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 
  private:
   [[nodiscard]] CameraChange applied() const;
+  [[nodiscard]] CameraChange sigma() const;
 
   Camera given_;
   Camera camera_;

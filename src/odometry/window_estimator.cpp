@@ -234,6 +234,8 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
   measure_scale(frame, result.state);
   remember(frame, result.state);
   scale_.report(result);
+  result.camera = camera_;
+  result.principal_point_sigma_px = calibration_.principal_point_sigma_px();
   result.world_from_camera = world_from_camera_;
 }
 

@@ -136,6 +136,7 @@ class ResultWriter {
     report.fps = num_frames / std::max(elapsed.count(), 1e-9);
     report.scale_source = options::to_string(config.scale.source);
     report.tracked_fraction = static_cast<double>(drive_.num_measured) / num_frames;
+    report.camera = {drive_.last.camera, drive_.last.principal_point_sigma_px};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = static_cast<double>(drive_.num_road_measured) / num_frames;
     }

@@ -21,6 +21,7 @@ struct Drive {
   Trajectory trajectory;  ///< one pose per frame done
   std::size_t num_measured = 0;
   std::size_t num_road_measured = 0;
+  FrameResult last;  ///< of the last frame done
   std::vector<std::string> warnings;
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images

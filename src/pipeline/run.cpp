@@ -79,6 +79,7 @@ pipeline::Drive drive(const RunRequest& request,
       result.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
     }
     result.trajectory.push_back(pose.world_from_camera);
+    result.last = pose;
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     const StageTimer timer(Stage::kFrameFiles);

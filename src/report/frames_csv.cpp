@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::string_view kHeader =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,road\n";
+    "scale_sigma,road,fx_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px\n";
 
 constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
@@ -48,11 +48,14 @@ void FramesCsv::check() {
 
 void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
   const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
-  put(fmt::format("{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{}\n", frame,
-                  timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
-                  r.fundamental_score, r.homography_ratio,
-                  kModels[static_cast<std::size_t>(r.model)], r.times.stem_ms, r.times.features_ms,
-                  r.times.pose_ms, sigma, to_string(r.road)));
+  const auto& camera_sigma = r.principal_point_sigma_px;
+  put(fmt::format(
+      "{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{},{:.2f},{:.2f},{:.2f},{}\n",
+      frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
+      r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
+      r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.road),
+      r.camera.fx_px, r.camera.cx_px, r.camera.cy_px,
+      camera_sigma ? fmt::format("{:.2f},{:.2f}", camera_sigma->x(), camera_sigma->y()) : ","));
 }
 
 Status FramesCsv::close() {

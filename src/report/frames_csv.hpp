@@ -14,7 +14,8 @@ namespace stemvo {
 /// Writes frames.csv row by row, so that a run that is killed keeps the rows it had. Columns:
 /// frame, timestamp_s, state, matches, inliers, s_h, s_f, r_h, model, stem_ms, features_ms,
 /// pose_ms, scale_sigma (of log(metres per unit); empty where no road is asked), road (-, none,
-/// held, measured: RoadState).
+/// held, measured: RoadState), fx_px, cx_px, cy_px (what was learnt of the camera), cx_sigma_px,
+/// cy_sigma_px (empty where it is not refined).
 class FramesCsv {
  public:
   /// Replaces the file and writes the header. Error: it cannot be written.

@@ -52,6 +52,7 @@ void visit_run(Report& report, const Visitor& visit) {
   visit("fps", report.fps);
   visit("scale_source", report.scale_source);
   visit("tracked_fraction", report.tracked_fraction);
+  visit("camera", report.camera);
   visit("road_measured_fraction", report.road_measured_fraction);
 }
 
@@ -88,6 +89,23 @@ void visit_ate(Ate& ate, const Visitor& visit) {
 }  // namespace
 
 // Found by nlohmann's library.
+void to_json(Json& json, const CameraReport& report) {
+  const Camera& camera = report.camera;
+  json = {{"fx_px", camera.fx_px}, {"fy_px", camera.fy_px}, {"cx_px", camera.cx_px}, {"cy_px", camera.cy_px}};
+  json["cx_sigma_px"] = report.sigma_px ? Json(report.sigma_px->x()) : Json();
+  json["cy_sigma_px"] = report.sigma_px ? Json(report.sigma_px->y()) : Json();
+}
+void from_json(const Json& json, CameraReport& report) {
+  const Reader read{json};
+  read("fx_px", report.camera.fx_px);
+  read("fy_px", report.camera.fy_px);
+  read("cx_px", report.camera.cx_px);
+  read("cy_px", report.camera.cy_px);
+  report.sigma_px.reset();
+  if (!json.at("cx_sigma_px").is_null()) {
+    report.sigma_px = {json.at("cx_sigma_px").get<double>(), json.at("cy_sigma_px").get<double>()};
+  }
+}
 void to_json(Json& json, const AbsoluteTrajectoryError& ate) { visit_ate(ate, Writer{json}); }
 void from_json(const Json& json, AbsoluteTrajectoryError& ate) { visit_ate(ate, Reader{json}); }
 void to_json(Json& json, const TimeSummary& time) {

@@ -6,11 +6,20 @@
 #include <optional>
 #include <string>
 
+#include <Eigen/Core>
+
 #include "evaluation/metrics.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "timing/timing_report.hpp"
 
 namespace stemvo {
+
+/// The camera as it was known in the end.
+struct CameraReport {
+  Camera camera;
+  std::optional<Eigen::Vector2d> sigma_px;  ///< of its principal point; nullopt: it is not refined
+};
 
 /// What metrics.json holds. Everything in `metrics` is null in the file without ground truth.
 struct MetricsReport {
@@ -23,6 +32,7 @@ struct MetricsReport {
   double fps = 0.0;  ///< frames over wall time, process start to trajectory written
   std::string scale_source;
   double tracked_fraction = 0.0;                 ///< frames whose pose was measured, over all
+  CameraReport camera;
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;
   std::optional<Metrics> refined;      ///< of trajectory_refined_kitti.txt
@@ -30,7 +40,8 @@ struct MetricsReport {
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// road_measured_fraction (of all frames; null where the road is not asked) alignment (of
+/// camera{fx_px,fy_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px} (as it was known in the end; sigmas are
+/// null where it is not refined) road_measured_fraction (of all frames; null where the road is not asked) alignment (of
 /// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
 /// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
 /// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
