@@ -20,20 +20,8 @@ namespace {
 /// "t_rel 1.41 %", or "stopped after 25 frames".
 std::string outcome_of(const FilterRow& row) {
   return row.status == FilterStatus::kStopped
-             ? fmt::format("stopped after {} frames", row.drives.front().num_frames)
+             ? fmt::format("stopped after {} frames", row.drives.front().frames)
              : fmt::format("t_rel {:.2f} %", row.mean.t_rel_percent.value_or(0.0));
-}
-
-NamedTrajectory trajectory_of(const ShownFilter& shown) {
-  const FilterRow& row = *shown.row;
-  NamedTrajectory named;
-  named.name = row.status == FilterStatus::kStopped
-                   ? fmt::format("{} ({})", shown.rank, outcome_of(row))
-                   : shown.rank;
-  for (const auto& [x_m, z_m] : row.drives.front().path) {
-    named.trajectory.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(x_m, 0.0, z_m));
-  }
-  return named;
 }
 
 Status write_trajectories(const std::filesystem::path& file,
@@ -42,8 +30,14 @@ Status write_trajectories(const std::filesystem::path& file,
   TrajectoryPlot plot;
   plot.title = fmt::format("{}, each step of its true length", sequence.name());
   plot.ground_truth = sequence.ground_truth();
-  for (const ShownFilter& one : shown) {
-    plot.others.push_back(trajectory_of(one));
+  for (const auto& [rank, row] : shown) {
+    NamedTrajectory& one = plot.others.emplace_back();
+    one.name = row->status == FilterStatus::kStopped
+                   ? fmt::format("{} ({})", rank, outcome_of(*row))
+                   : rank;
+    for (const auto& [x_m, z_m] : row->drives.front().path_xz_m) {
+      one.trajectory.emplace_back(Eigen::Quaterniond::Identity(), Eigen::Vector3d(x_m, 0.0, z_m));
+    }
   }
   plot.estimate = plot.others.front().trajectory;
   plot.estimate_name = plot.others.front().name;
@@ -51,9 +45,7 @@ Status write_trajectories(const std::filesystem::path& file,
   return write_trajectory_png(file, plot);
 }
 
-Expected<cv::Mat> draw_channels(const Folders& folders,
-                                const SearchIdentity& identity,
-                                const Config& common,
+Expected<cv::Mat> draw_channels(const Results& results,
                                 const KittiSequence& sequence,
                                 const std::vector<ShownFilter>& shown) {
   const std::size_t middle = sequence.size() / 2;
@@ -65,8 +57,9 @@ Expected<cv::Mat> draw_channels(const Folders& folders,
   std::vector<std::string> captions = {
       fmt::format("{}, frame {}", sequence.name(), sequence.range().begin + middle)};
   for (const auto& [rank, row] : shown) {
-    const Config config = config_of(common, identity.layer_of(row->key), row->key.filter);
-    const Expected<Stem> stem = create_stem(config.stem, folders.models_dir);
+    const LayerIdentity& layer = results.identity.layer_of(row->key);
+    const Config config = config_of(results.config, layer, row->key.filter);
+    const Expected<Stem> stem = create_stem(config.stem, results.models_dir);
     if (!stem) {
       return stem.error();
     }
@@ -90,10 +83,10 @@ std::vector<ShownFilter> choose_rows(const SearchIdentity& identity,
       rows.push_back(&row);
     }
   }
-  if (rows.empty()) {
-    return {};
+  std::vector<ShownFilter> shown;
+  if (!rows.empty()) {
+    shown.push_back({"best", rows.front()});
   }
-  std::vector<ShownFilter> shown = {{"best", rows.front()}};
   if (rows.size() > 2) {
     shown.push_back({"median", rows[rows.size() / 2]});
   }
@@ -103,27 +96,23 @@ std::vector<ShownFilter> choose_rows(const SearchIdentity& identity,
   return shown;
 }
 
-Status write_contact_sheet(const Folders& folders,
-                           const SearchIdentity& identity,
-                           const Config& common,
-                           const std::vector<FilterRow>& rows) {
-  const std::vector<ShownFilter> shown = choose_rows(identity, rows);
+Status write_contact_sheet(const Results& results) {
+  const std::vector<ShownFilter> shown = choose_rows(results.identity, results.rows);
   if (shown.empty()) {
     return {};
   }
-  const SequenceIdentity& first = identity.sequences.front();
+  const SequenceIdentity& first = results.identity.sequences.front();
   const Expected<KittiSequence> sequence = KittiSequence::open(
-      first.directory,
-      {.camera = common.input.camera,
-       .frames = FrameRangeRequest{first.first_frame, first.first_frame + first.num_frames}});
+      first.directory, {.camera = results.config.input.camera,
+                        .frames = FrameRangeRequest{first.first_frame, first.end_frame()}});
   if (!sequence) {
     return sequence.error();
   }
-  const std::filesystem::path plot_file = folders.out_dir / "trajectories.png";
+  const std::filesystem::path plot_file = results.out_dir / "trajectories.png";
   if (const Status status = write_trajectories(plot_file, *sequence, shown); !status) {
     return status;
   }
-  const Expected<cv::Mat> channels = draw_channels(folders, identity, common, *sequence, shown);
+  const Expected<cv::Mat> channels = draw_channels(results, *sequence, shown);
   if (!channels) {
     return channels.error();
   }
@@ -136,7 +125,7 @@ Status write_contact_sheet(const Folders& folders,
   cv::resize(plot, plot, {channels->cols, cvRound(zoom * plot.rows)}, 0, 0, cv::INTER_AREA);
   cv::Mat sheet;
   cv::vconcat(*channels, plot, sheet);
-  return write_image(folders.out_dir / "sheet.png", sheet);
+  return write_image(results.out_dir / "sheet.png", sheet);
 }
 
 }  // namespace stemvo::search

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -34,59 +35,61 @@ std::vector<std::array<double, 2>> path_of(std::span<const Rigid3> trajectory) {
 
 }  // namespace
 
-void FilterDrive::count(const FrameResult& result) {
+FilterDrive::FilterDrive(const Config& config, const FrameSource& sequence)
+    : odometry_(config, sequence.camera()),
+      sequence_(&sequence),
+      evaluation_(config.evaluation),
+      min_inliers_(config.odometry.min_inliers) {}
+
+void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
+  const FrameResult result =
+      odometry_.process(channel == nullptr ? PreparedFrame() : odometry_.prepare(*channel, frame));
   if (num_frames() <= 1) {
     return;
   }
   num_matches_ += static_cast<std::size_t>(result.num_matches);
   num_inliers_ += static_cast<std::size_t>(result.num_inliers);
-  if (is_measured(result.state)) {
-    ++num_measured_;
-  } else if (result.state == FrameState::kNoImage) {
-    ++num_failed_[kNoImage];
-  } else if (result.state == FrameState::kGated) {
-    ++num_failed_[kGated];
-  } else {
-    ++num_failed_[result.num_matches < min_inliers_ ? kFewMatches : kFewInliers];
-  }
+  ++outcomes_[is_measured(result.state)              ? kMeasured
+              : result.state == FrameState::kNoImage ? kNoImage
+              : result.state == FrameState::kGated   ? kGated
+              : result.num_matches < min_inliers_    ? kFewMatches
+                                                     : kFewInliers];
 }
 
 std::string FilterDrive::missing_reason() const {
-  if (num_matches_ == 0 && num_failed_[kNoImage] < num_frames() - 1) {
+  if (num_matches_ == 0 && outcomes_[kNoImage] < num_frames() - 1) {
     return "no matches: a channel without contrast";
   }
-  constexpr std::array<const char*, kNumFailures> kReasons = {"too few matches", "too few inliers",
-                                                              "not a forward motion", "no picture"};
-  const auto most = std::ranges::max_element(num_failed_);
+  constexpr std::array<const char*, kMeasured> kReasons = {"too few matches", "too few inliers",
+                                                           "not a forward motion", "no picture"};
+  const auto most = std::max_element(outcomes_.begin(), outcomes_.begin() + kMeasured);
   return fmt::format("{} in {} of {} frames",
-                     kReasons[static_cast<std::size_t>(most - num_failed_.begin())], *most,
+                     kReasons[static_cast<std::size_t>(most - outcomes_.begin())], *most,
                      num_frames() - 1);
 }
 
-DriveScore FilterDrive::score(const std::string& sequence,
-                              std::span<const Rigid3> truth,
-                              const EvaluationOptions& options) const {
-  STEMVO_CHECK(num_frames() > 0 && truth.size() >= num_frames(), "ground truth for each frame");
+DriveScore FilterDrive::score() const {
+  STEMVO_CHECK(num_frames() > 0, "an odometry that has begun");
+  const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
   DriveScore score;
-  score.sequence = sequence;
-  score.num_frames = num_frames();
-  score.mean_inliers = static_cast<double>(num_inliers_) / num_steps();
-  score.tracked_fraction = static_cast<double>(num_measured_) / num_steps();
-  score.is_detected = num_frames() == 1 || *score.tracked_fraction >= kMinTracked;
-  if (!score.is_detected) {
+  score.sequence = sequence_->name();
+  score.frames = num_frames();
+  score.inliers = static_cast<double>(num_inliers_) / num_steps;
+  score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
+  score.detected = num_frames() == 1 || *score.tracked >= kMinTracked;
+  if (!score.detected) {
     score.reason = missing_reason();
   }
-  if (num_measured_ > 0) {  // else the numbers would be those of the zero-motion baseline
-    add_errors(truth.first(num_frames()), options, score);
+  if (outcomes_[kMeasured] > 0) {  // else the numbers would be those of the zero-motion baseline
+    add_errors(score);
   }
   return score;
 }
 
-void FilterDrive::add_errors(std::span<const Rigid3> truth,
-                             const EvaluationOptions& options,
-                             DriveScore& score) const {
+void FilterDrive::add_errors(DriveScore& score) const {
+  const auto truth = std::span(*sequence_->ground_truth()).first(num_frames());
   const Trajectory trajectory = rescale_steps(odometry_.estimator().trajectory(), truth);
-  const Metrics metrics = evaluate(trajectory, truth, options);
+  const Metrics metrics = evaluate(trajectory, truth, evaluation_);
   score.t_rel_percent = metrics.t_rel_percent;
   score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
   score.average_offset_m = metrics.average_offset_m;
@@ -97,11 +100,12 @@ void FilterDrive::add_errors(std::span<const Rigid3> truth,
     translation_m += change.translation.norm();
     rotation_rad += change.angle_rad();
   }
-  score.translation_change_m = translation_m / num_steps();
-  score.rotation_change_deg = kDegPerRad * rotation_rad / num_steps();
+  const auto num_steps = static_cast<double>(num_frames() - 1);
+  score.E_t_m = translation_m / num_steps;
+  score.E_r_deg = kDegPerRad * rotation_rad / num_steps;
   // A standing start has no segments: nothing is known against the filter.
   score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
-  score.path = path_of(trajectory);
+  score.path_xz_m = path_of(trajectory);
 }
 
 }  // namespace stemvo::search

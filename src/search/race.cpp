@@ -11,7 +11,6 @@
 
 #include "internal_check.hpp"
 #include "search/filter_drive.hpp"
-#include "search/halving.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -21,16 +20,14 @@ using Candidates = std::vector<std::size_t>;  // ascending indices
 /// One frame through all layers of a block.
 struct BlockFrame {
   cv::Mat frame;  ///< empty: could not be read
-  /// Filters from `first` on, by layer; none of a layer that refused the frame.
+  /// Channels of filters [first, last); none where the layer refused the frame.
   struct LayerChannels {
     int first = 0;
-    std::vector<Channel> channels;
+    int last = 0;
+    std::vector<Channel> channels = {};
   };
   std::map<std::size_t, LayerChannels> layers;
 };
-
-/// A candidate's odometry on each sequence; none where it has not started, or cannot.
-using Drives = std::vector<std::optional<FilterDrive>>;
 
 struct Race {
   const SearchPlan& plan;
@@ -38,7 +35,9 @@ struct Race {
   RecordWriter& writer;
   std::vector<FilterRecord>& records;
   std::size_t max_kept = 0;
-  std::vector<Drives> drives{plan.candidates.size()};  ///< of those in flight or kept, else empty
+  /// Of candidates in flight or kept, else empty: the odometry on each sequence; none where it has
+  /// not started, or cannot.
+  std::vector<std::vector<std::optional<FilterDrive>>> drives{plan.candidates.size()};
   std::map<std::pair<std::size_t, FilterKey>, std::size_t> record_of = {};  ///< by rung
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
@@ -52,7 +51,7 @@ struct Race {
     Candidates alive;
     Candidates baselines;
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
-      (plan.candidates[i].is_baseline ? baselines : alive).push_back(i);
+      (is_baseline(i) ? baselines : alive).push_back(i);
     }
     for (std::size_t rung = 0; rung < plan.identity.rungs.size() && !is_stopped; ++rung) {
       if (rung > 0) {
@@ -70,20 +69,18 @@ struct Race {
   }
 
   bool is_last(std::size_t rung) const { return rung + 1 == plan.identity.rungs.size(); }
+  bool is_baseline(std::size_t candidate) const {
+    return plan.identity.layers[plan.candidates[candidate].layer].baseline;
+  }
   /// Why a candidate cannot be run on a sequence; empty: it can.
   const std::string& problem(std::size_t candidate, const PlanSequence& on) const {
     return on.problems[plan.candidates[candidate].layer];
   }
-  const Config& odometry_config(std::size_t candidate) const {
-    return plan.layers[plan.candidates[candidate].layer].config;
-  }
   /// Up to where a rung runs a sequence; 0: not at all.
   std::size_t frames_to(std::size_t rung, const PlanSequence& planned) const {
-    const std::size_t num_frames = planned.sequence.size();
-    if (planned.is_held_out) {
-      return is_last(rung) ? num_frames : 0;
-    }
-    return frames_at(plan.identity.rungs[rung], num_frames);
+    return planned.is_held_out && !is_last(rung)
+               ? 0
+               : frames_at(plan.identity.rungs[rung], planned.sequence.size());
   }
 
   /// Without what is repeated.
@@ -92,8 +89,8 @@ struct Race {
     std::size_t planned = 0;
     std::size_t num_racing = 0;
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
-      std::size_t last = plan.candidates[i].is_baseline ? rungs.size() - 1 : 0;
-      if (plan.candidates[i].races) {
+      std::size_t last = is_baseline(i) ? rungs.size() - 1 : 0;
+      if (plan.candidates[i].races) {  // so many go on, whoever that will be
         while (!is_last(last) && num_racing < rungs[last + 1].filters) {
           ++last;
         }
@@ -158,7 +155,7 @@ struct Race {
       }
     }
     for (const Candidates& group : {going_on, starting}) {
-      for (const Candidates& block : cut_into_blocks(plan, group, plan.block)) {
+      for (const Candidates& block : cut_into_blocks(plan, group)) {
         if (Status status = run_block(rung, block); !status || is_stopped) {
           return status;
         }
@@ -200,39 +197,28 @@ struct Race {
                     const Candidates& block,
                     std::vector<FilterRecord>& done) {
     const PlanSequence& planned = plan.sequences[index];
-    const KittiSequence& sequence = planned.sequence;
-    FrameRange frames{0, end};
     Candidates running;
     for (const std::size_t candidate : block) {
       std::optional<FilterDrive>& drive = drives[candidate][index];
       if (problem(candidate, planned).empty()) {
-        if (!drive) {
-          drive.emplace(odometry_config(candidate), sequence.camera());
-        }
-        frames.begin = drive->num_frames();
         running.push_back(candidate);
+        if (!drive) {
+          const Config& config = plan.layers[plan.candidates[candidate].layer].config;
+          drive.emplace(config, planned.sequence);
+        }
       }
     }
-    STEMVO_CHECK(frames.begin <= end, "odometries are kept at the frames of their last rung");
-    if (!running.empty() && frames.begin < end && !run_frames(index, frames, running)) {
+    const std::size_t begin = running.empty() ? end : drives[running.front()][index]->num_frames();
+    STEMVO_CHECK(begin <= end, "odometries are kept at the frames of their last rung");
+    if (begin < end && !run_frames(index, {begin, end}, running)) {
       return false;
     }
     for (std::size_t i = 0; i < block.size(); ++i) {
       const std::optional<FilterDrive>& drive = drives[block[i]][index];
-      DriveScore score;
-      score.sequence = sequence.name();
-      score.reason = problem(block[i], planned);
-      if (drive) {
-        score = drive->score(sequence.name(), *sequence.ground_truth(),
-                             odometry_config(block[i]).evaluation);
-        (planned.is_held_out ? done[i].held_out_filter_frames : done[i].filter_frames) +=
-            frames.end - frames.begin;
-      }
-      if (planned.is_held_out) {
-        done[i].held_out = std::move(score);
-      } else {
-        done[i].drives.push_back(std::move(score));
-      }
+      DriveScore cannot;
+      cannot.sequence = planned.sequence.name();
+      cannot.reason = problem(block[i], planned);
+      done[i].add(drive ? drive->score() : cannot, planned.is_held_out, drive ? end - begin : 0);
     }
     return true;
   }
@@ -270,17 +256,16 @@ struct Race {
       warn(frame.error().message);
       return {};
     }
-    std::map<std::size_t, std::pair<int, int>> ranges;  // of each layer [first, last)
-    for (const std::size_t candidate : running) {
-      const int filter = plan.candidates[candidate].key.filter;
-      ranges.try_emplace(plan.candidates[candidate].layer, filter, 0).first->second.second =
-          filter + 1;
-    }
     BlockFrame read{*frame, {}};
-    for (const auto& [layer, range] : ranges) {
-      auto channels = plan.layers[layer].stem.apply_range(*frame, range.first, range.second);
+    for (const std::size_t candidate : running) {
+      const auto& [key, layer, races] = plan.candidates[candidate];
+      const BlockFrame::LayerChannels part = {.first = key.filter};
+      read.layers.try_emplace(layer, part).first->second.last = key.filter + 1;
+    }
+    for (auto& [layer, part] : read.layers) {
+      auto channels = plan.layers[layer].stem.apply_range(*frame, part.first, part.last);
       if (channels) {
-        read.layers[layer] = {range.first, std::move(*channels)};
+        part.channels = std::move(*channels);
       } else {
         warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
                          channels.error().message));
@@ -290,14 +275,13 @@ struct Race {
   }
 
   void process(std::size_t candidate, std::size_t sequence, const BlockFrame& read) {
-    FilterDrive& drive = *drives[candidate][sequence];
     const auto found = read.layers.find(plan.candidates[candidate].layer);
-    if (found != read.layers.end()) {
-      const int index = plan.candidates[candidate].key.filter - found->second.first;
-      drive.process(found->second.channels[static_cast<std::size_t>(index)], read.frame);
-    } else {
-      drive.process_missing();
+    const Channel* channel = nullptr;
+    if (found != read.layers.end() && !found->second.channels.empty()) {
+      channel = &found->second.channels[static_cast<std::size_t>(
+          plan.candidates[candidate].key.filter - found->second.first)];
     }
+    drives[candidate][sequence]->process(channel, read.frame);
   }
 
   void warn(const std::string& text) {
@@ -309,15 +293,14 @@ struct Race {
 
 }  // namespace
 
-std::vector<Candidates> cut_into_blocks(const SearchPlan& plan,
-                                        const Candidates& candidates,
-                                        std::size_t block) {
+std::vector<Candidates> cut_into_blocks(const SearchPlan& plan, const Candidates& candidates) {
   std::vector<Candidates> blocks;
   const PlanLayer* first = nullptr;  // of the last block
   for (const std::size_t candidate : candidates) {
     const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
-    const bool goes_on = first != nullptr && (block > 0 || layer.pass == first->pass) &&
-                         blocks.back().size() < (block > 0 ? block : first->max_in_flight);
+    const bool goes_on =
+        first != nullptr && (plan.block > 0 || layer.pass == first->pass) &&
+        blocks.back().size() < (plan.block > 0 ? plan.block : first->max_in_flight);
     if (!goes_on) {
       blocks.emplace_back();
       first = &layer;

@@ -2,23 +2,86 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "search/plan.hpp"
 #include "search/records.hpp"
+#include "search/search.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::search {
+
+/// A layer of the identity, loaded.
+struct PlanLayer {
+  Config config;  ///< of its odometry, with the model and layer; the filter is the candidate's
+  Stem stem;
+  std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
+  std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
+};
+
+struct Candidate {
+  FilterKey key;
+  std::size_t layer = 0;  ///< index
+  /// No baseline, and can be run on all sequences that rank: what halving chooses from.
+  bool races = false;
+};
+
+/// One sequence and what can be said of it before work starts.
+struct PlanSequence {
+  KittiSequence sequence;
+  bool is_held_out = false;
+  std::vector<std::string> problems;  ///< per layer: why it cannot be run here; empty: it can
+};
+
+/// A search that was found to be possible.
+struct SearchPlan {
+  SearchIdentity identity;
+  std::vector<PlanLayer> layers;        ///< as those of the identity
+  std::vector<PlanSequence> sequences;  ///< those to run
+  std::vector<Candidate> candidates;    ///< in the order of layers and filters, baselines last
+  std::size_t block = 0;                ///< filters in flight; 0: as memory allows
+};
+
+/// Errors: those of run_search.
+[[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
+
+/// Bytes of a filter in flight, by an estimate: its channel of this frame and of the next (floats),
+/// and, once per sequence, its odometry: the image (8 bits) with its pyramid and derivatives, where
+/// the channel is brought to another size a buffer of floats, and the path. 256 filters of 620x188
+/// take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
+[[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
+                                          cv::Size image,
+                                          std::size_t num_sequences);
+
+/// Cuts candidates, in the order they are in, into blocks that run in lock-step: those of one pass
+/// of the stem, as far as their layer's max_in_flight allows; if the plan names a block, of so
+/// many.
+[[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
+    const SearchPlan& plan, const std::vector<std::size_t>& candidates);
+
+/// Successive halving (Jamieson and Talwalkar, "Non-stochastic best arm identification and
+/// hyperparameter optimization", AISTATS 2016): rungs at 1/16, 1/8, 1/4, 1/2 and all of the frames.
+/// The number of filters falls as a power of the share, as slowly as a budget of 25 % of the
+/// exhaustive search's filter-frames allows, to 2. Of fewer than 16 filters half go on to 1/4, then
+/// a sixth and a twelfth: about the same budget.
+[[nodiscard]] Schedule halving_schedule(std::size_t num_filters);
+/// Filter-frames over those of the exhaustive search, where odometries go on from rung to rung.
+[[nodiscard]] double cost_share(const Schedule& schedule);
+
+/// Frames of a sequence that a rung runs up to: at least 2, at most all.
+[[nodiscard]] std::size_t frames_at(const Rung& rung, std::size_t num_frames);
+
+/// Of records of one rung, those that go on: indices of the `count` best by their early errors,
+/// near ties by inliers. Of filters with the same numbers (R, G and B of a gray sequence) one goes
+/// on, the others where there is room.
+[[nodiscard]] std::vector<std::size_t> choose_survivors(
+    std::span<const FilterRecord* const> records, std::size_t count);
 
 /// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
 /// go on, they start again, which counts.
 inline constexpr std::size_t kMaxKept = 512;
-
-/// Cuts candidates, in the order they are in, into blocks that run in lock-step: those of one pass
-/// of the stem, as far as their layer's max_in_flight allows. With `block` > 0 each block has so
-/// many instead.
-[[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
-    const SearchPlan& plan, const std::vector<std::size_t>& candidates, std::size_t block);
 
 /// Runs the rungs of a plan; as a block ends its records are added to `records` and appended to the
 /// file. What `records` holds is not run again. Within a block a frame is read once, each layer

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
@@ -12,27 +13,72 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "search/search.hpp"
+#include "config/config.hpp"
+#include "stemvo/error.hpp"
 
-/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line.
+/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line. Members
+/// of what is in it are called like their keys.
 namespace stemvo::search {
 
 /// What the layer of gray and input_layer is called in tables.
 inline constexpr const char* kInputLayer = "input";
 inline constexpr const char* kRecordsFile = "records.jsonl";
 
+/// A filter of a layer of a model, and what finds matches on its channel. Ordered as rows are where
+/// numbers do not decide.
+struct FilterKey {
+  std::string model;
+  std::string layer;     ///< `input` for the input layer and gray
+  std::string features;  ///< `klt`, `orb`, `sift`
+  int filter = 0;
+  auto operator<=>(const FilterKey&) const = default;
+};
+/// "efficientnetv2-b0 stem 12", with the features where they are not `klt`.
+[[nodiscard]] std::string to_string(const FilterKey& key);
+
+/// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
+struct DriveScore {
+  std::string sequence;
+  std::size_t frames = 0;
+  bool detected = false;
+  std::string reason;  ///< why the pose was not detected, else empty
+  // nullopt: no motion was measured, so that there is no trajectory of its own, or no frame ran.
+  std::optional<double> t_rel_percent;  ///< nullopt too: no segment fits into the frames run
+  std::optional<double> r_rel_deg_per_100m;
+  std::optional<double> average_offset_m;
+  std::optional<double> E_t_m;                ///< paper, Table 2: mean over consecutive poses
+  std::optional<double> E_r_deg;              ///< with R_p transposed
+  std::optional<double> early_error_percent;  ///< t_rel of parts of the path: what halving goes by
+  // nullopt: no frame ran.
+  std::optional<double> inliers;  ///< mean
+  std::optional<double> tracked;  ///< share of the frames after the first: motion measured
+  /// Metres: at most 400 points, evenly spaced in frames.
+  std::vector<std::array<double, 2>> path_xz_m;
+  bool operator==(const DriveScore&) const = default;
+};
+
+/// What a filter did on one rung.
+struct FilterRecord {
+  FilterKey key;
+  std::size_t rung = 0;
+  std::vector<DriveScore> drives;      ///< one per sequence that ranks
+  std::optional<DriveScore> held_out;  ///< of filters that ran over all frames
+  std::size_t filter_frames = 0;       ///< that this took, with what a kill made it repeat
+  std::size_t held_out_filter_frames = 0;
+
+  void add(const DriveScore& score, bool is_held_out, std::size_t num_frames);
+};
+
 /// One rung of successive halving: so many filters run up to this share of the frames.
 struct Rung {
   double frame_share = 1.0;
   std::size_t filters = 0;
-  bool operator==(const Rung&) const = default;
 };
 
 /// The last rung has all frames; an exhaustive search has one: every filter over every frame.
 using Schedule = std::vector<Rung>;
 
-/// Filters [first, last) of a layer, and what its response depends on. Members of this and the
-/// next two are called like their keys in the file.
+/// Filters [first, last) of a layer, and what its response depends on.
 struct LayerIdentity {
   std::string model;  ///< the manifest's name, not a path
   std::string layer;
@@ -46,9 +92,7 @@ struct LayerIdentity {
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(last - first); }
   [[nodiscard]] FilterKey key(int filter) const { return {model, layer, features, filter}; }
-  [[nodiscard]] bool is_layer_of(const FilterKey& key) const {
-    return model == key.model && layer == key.layer && features == key.features;
-  }
+  [[nodiscard]] bool is_layer_of(const FilterKey& one) const { return one == key(one.filter); }
 };
 
 struct SequenceIdentity {
@@ -60,6 +104,8 @@ struct SequenceIdentity {
   std::string calibration;
   std::string ground_truth;
   std::string directory;  ///< where it was found; not compared
+
+  [[nodiscard]] std::size_t end_frame() const { return first_frame + num_frames; }
 };
 
 /// Everything that the records depend on.
@@ -72,8 +118,9 @@ struct SearchIdentity {
   std::vector<SequenceIdentity> sequences;   ///< the held-out one is the last
   std::optional<std::size_t> only_sequence;  ///< a part that runs this one of them
 
-  [[nodiscard]] std::size_t num_filters() const;  ///< with the baselines
-  [[nodiscard]] std::size_t num_baselines() const;
+  /// Filters, or baselines.
+  [[nodiscard]] std::size_t count(bool baselines) const;
+  [[nodiscard]] std::size_t num_rows() const { return count(false) + count(true); }
   /// The layer a row belongs to (checked).
   [[nodiscard]] const LayerIdentity& layer_of(const FilterKey& key) const;
 };
@@ -101,11 +148,13 @@ struct SearchRecords {
 /// for the same file is an error.
 class RecordWriter {
  public:
-  /// Goes on behind the whole lines of a file; what a kill tore is cut off. With no good bytes a
-  /// new file, with the identity in it. Error: there is one already, or it cannot be written.
-  [[nodiscard]] static Expected<RecordWriter> open(const std::filesystem::path& file,
-                                                   const SearchIdentity& identity,
-                                                   std::size_t num_good_bytes = 0);
+  /// Goes on behind the whole lines of a file; what a kill tore is cut off, and where nothing is
+  /// left the identity is written. Without good bytes a new file. Errors: that is there already, or
+  /// cannot be written.
+  [[nodiscard]] static Expected<RecordWriter> open(
+      const std::filesystem::path& file,
+      const SearchIdentity& identity,
+      std::optional<std::size_t> num_good_bytes = std::nullopt);
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
 
  private:
@@ -115,28 +164,8 @@ class RecordWriter {
   std::shared_ptr<std::FILE> stream_;
 };
 
-/// A number of a DriveScore: its key in every file, its decimals in filters.csv.
-struct ScoreNumber {
-  const char* key;
-  std::optional<double> DriveScore::* value;
-  int decimals = 4;
-};
-inline constexpr std::array<ScoreNumber, 8> kScoreNumbers = {{
-    {"t_rel_percent", &DriveScore::t_rel_percent},
-    {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m},
-    {"average_offset_m", &DriveScore::average_offset_m},
-    {"E_t_m", &DriveScore::translation_change_m},
-    {"E_r_deg", &DriveScore::rotation_change_deg},
-    {"inliers", &DriveScore::mean_inliers, 1},
-    {"tracked", &DriveScore::tracked_fraction},
-    {"early_error_percent", &DriveScore::early_error_percent},
-}};
-
+void to_json(nlohmann::ordered_json& json, const FilterKey& key);
+void to_json(nlohmann::ordered_json& json, const DriveScore& score);
 void to_json(nlohmann::ordered_json& json, const Rung& rung);
 
 }  // namespace stemvo::search
-
-namespace stemvo {
-void to_json(nlohmann::ordered_json& json, const FilterKey& key);
-void to_json(nlohmann::ordered_json& json, const DriveScore& score);
-}  // namespace stemvo

@@ -5,7 +5,6 @@
 
 #include <gmock/gmock.h>
 
-#include "search/halving.hpp"
 #include "search/race.hpp"
 #include "search/results.hpp"
 #include "support/search_program.hpp"

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include "search/halving.hpp"
 #include "search/race.hpp"
 #include "search/results.hpp"
 
@@ -15,8 +14,8 @@ using ::testing::ElementsAre;
 DriveScore score(double t_rel, double r_rel) {
   DriveScore score;
   score.sequence = "00";
-  score.num_frames = 100;
-  score.is_detected = true;
+  score.frames = 100;
+  score.detected = true;
   score.t_rel_percent = t_rel;
   score.r_rel_deg_per_100m = r_rel;
   return score;
@@ -41,7 +40,7 @@ std::vector<int> filters_of(const std::vector<FilterRow>& rows) {
 
 TEST(Ranking, ByTRelThenRRelThenNotDetected) {
   DriveScore lost = score(0.1, 0.1);  // good numbers do not help
-  lost.is_detected = false;
+  lost.detected = false;
   const std::vector<FilterRecord> records = {record(0, 0, {score(2.0, 1.0)}), record(1, 0, {lost}),
                                              record(2, 0, {score(1.0, 3.0)}),
                                              record(3, 0, {score(1.0, 2.0)})};
@@ -52,7 +51,7 @@ TEST(Ranking, ByTRelThenRRelThenNotDetected) {
 
 TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
   DriveScore lost = score(0.0, 0.0);
-  lost.is_detected = false;
+  lost.detected = false;
   const std::vector<FilterRecord> records = {record(0, 0, {score(1.0, 1.0), score(4.0, 1.0)}),
                                              record(1, 0, {score(2.0, 1.0), score(2.0, 1.0)}),
                                              record(2, 0, {score(0.5, 1.0), lost})};
@@ -63,10 +62,10 @@ TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
 TEST(Ranking, TheMeanOfWhatOneSequenceLacksIsNone) {
   DriveScore good = score(1.0, 1.0);
   good.average_offset_m = 2.0;
-  good.translation_change_m = 0.5;
+  good.E_t_m = 0.5;
   const DriveScore mean = mean_score({good, DriveScore()});
   EXPECT_FALSE(mean.average_offset_m);
-  EXPECT_FALSE(mean.translation_change_m);
+  EXPECT_FALSE(mean.E_t_m);
   EXPECT_FALSE(mean.early_error_percent);
   EXPECT_EQ(mean_score({good, good}).average_offset_m, 2.0);
 }
@@ -76,7 +75,7 @@ TEST(Ranking, HeldOutAndStandingRankNothing) {
   FilterRecord other = record(0, 0, {score(2.0, 1.0)});
   other.held_out = score(0.0, 0.0);
   good.held_out = score(9.0, 9.0);
-  good.drives[0].translation_change_m = 5.0;  // E_t of `other` is that of a camera that stands
+  good.drives[0].E_t_m = 5.0;  // E_t of `other` is that of a camera that stands
   EXPECT_THAT(filters_of(rank_filters(std::vector<FilterRecord>{other, good}, 1)),
               ElementsAre(1, 0));
 }
@@ -144,7 +143,7 @@ TEST(Ranking, SurvivorsAreTheLeastWrongOfThoseDetected) {
     records.push_back(record(i, 0, {score(1.0, 1.0)}));
     records.back().drives[0].early_error_percent = 4.0 - i;
   }
-  records[3].drives[0].is_detected = false;
+  records[3].drives[0].detected = false;
   std::vector<const FilterRecord*> all;
   for (const FilterRecord& one : records) {
     all.push_back(&one);
@@ -161,9 +160,9 @@ TEST(Ranking, MoreInliersDecideBetweenErrorsThatAreNearlyEqual) {
     std::vector<FilterRecord> records = {record(0, 0, {score(1.0, 1.0)}),
                                          record(1, 0, {score(1.0, 1.0)})};
     records[0].drives[0].early_error_percent = 4.0;
-    records[0].drives[0].mean_inliers = 160.0;
+    records[0].drives[0].inliers = 160.0;
     records[1].drives[0].early_error_percent = error;
-    records[1].drives[0].mean_inliers = inliers;
+    records[1].drives[0].inliers = inliers;
     const std::vector<const FilterRecord*> both = {&records[0], &records[1]};
     return choose_survivors(both, 1).front();
   };
@@ -177,7 +176,7 @@ TEST(Ranking, OfTheSameChannelOneSurvives) {
   for (int i = 0; i < 5; ++i) {
     records.push_back(record(i, 0, {score(1.0, 1.0)}));
     records.back().drives[0].early_error_percent = i < 3 ? 1.0 : i;
-    records.back().drives[0].mean_inliers = i == 2 ? 50.0 : 60.0;  // as wrong, and yet another one
+    records.back().drives[0].inliers = i == 2 ? 50.0 : 60.0;  // as wrong, and yet another one
   }
   std::vector<const FilterRecord*> all;
   for (const FilterRecord& one : records) {

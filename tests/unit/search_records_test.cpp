@@ -4,8 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "search/halving.hpp"
-#include "search/records.hpp"
+#include "search/race.hpp"
 #include "support/matchers.hpp"
 #include "support/temp_folder.hpp"
 
@@ -49,11 +48,11 @@ FilterRecord record(int filter, double t_rel = 1.0) {
   record.filter_frames = 100;
   DriveScore score;
   score.sequence = "00";
-  score.num_frames = 100;
-  score.is_detected = true;
+  score.frames = 100;
+  score.detected = true;
   score.t_rel_percent = t_rel;
   score.r_rel_deg_per_100m = 1.0 / 3.0;
-  score.path = {{0.0, 0.0}, {0.25, 1.5}};
+  score.path_xz_m = {{0.0, 0.0}, {0.25, 1.5}};
   record.drives = {score};
   return record;
 }
@@ -147,7 +146,7 @@ TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
   write("b", identity(1, 4), {record(1, 1), record(3, 2), record(2, 3)});  // 1 twice, agreeing
   const auto merged = merge({"b", "a"});
   ASSERT_TRUE(merged) << merged.error().message;
-  EXPECT_EQ(merged->num_filters, 4U);
+  EXPECT_THAT(merged->text, HasSubstr("work: 400 filter-frames, 100.0 % of an exhaustive search"));
   EXPECT_FALSE(merged->interrupted);
   const std::string csv = testing::read_all(folder_ / "merged" / "filters.csv");
   ASSERT_TRUE(merge_searches({folder_ / "whole"}, folder_ / "again", folder_.path()));
