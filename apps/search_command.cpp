@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <memory>
+#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -53,9 +52,10 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   for (const std::string& assignment : arguments.config.overrides) {
     const std::string key = assignment.substr(0, assignment.find('='));
     if (key == "stem.model" || key == "stem.layer" || key == "stem.filter") {
-      return fail(fmt::format("--set {}: expected --model, --layers or --filters, which say what a "
-                              "search runs, found '{}'",
-                              key, assignment));
+      return fail(
+          fmt::format("--set {}: expected --model, --layers or --filters, which say what a "
+                      "search runs, found '{}'",
+                      key, assignment));
     }
   }
   request.config = *config;
@@ -67,14 +67,8 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
 
 int run(Arguments& arguments) {
   const search::SearchRequest& request = arguments.request;
-  const char* problem =
-      arguments.merge.empty() == request.sequence_dirs.empty()
-          ? "expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')"
-      : !request.held_out_dir && request.held_out_frames
-          ? "expected --held-out with --held-out-frames (see 'stemvo search --help')"
-          : nullptr;
-  if (problem != nullptr) {
-    print_error(problem);
+  if (arguments.merge.empty() == request.sequence_dirs.empty()) {
+    print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
     return kExitUsage;
   }
   const Expected<search::SearchReport> report = find_filters(arguments);
@@ -97,12 +91,10 @@ int run(Arguments& arguments) {
 
 /// A merge takes everything but --out from the parts.
 void exclude_from_merge(CLI::App& command) {
-  CLI::Option* merge = command.get_option("--merge");
+  const std::set<std::string> shared = {"--merge", "--help", "--version", "--out", "--quiet"};
   for (CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_name();
-    if (option != merge && name != "--help" && name != "--version" && name != "--out" &&
-        name != "--quiet") {
-      merge->excludes(option);
+    if (!shared.contains(option->get_name())) {
+      command.get_option("--merge")->excludes(option);
     }
   }
 }
@@ -131,7 +123,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
       .add_option("--held-out", request.held_out_dir, "A sequence that is reported, not ranked by")
       ->type_name("DIR");
   add_range_option(command, "--held-out-frames", request.held_out_frames,
-                   "Frames A to B-1 of the held-out sequence");
+                   "Frames A to B-1 of the held-out sequence")
+      ->needs("--held-out");
   command.add_flag("--exhaustive", request.exhaustive, "Every filter over every frame");
   command
       .add_option("--only-sequence", request.only_sequence,

@@ -52,16 +52,14 @@ double early_error(const DriveScore& mean) {
 }
 
 /// Smaller is better, number by number.
-std::tuple<int, double, double> order_of(const FilterRow& row) {
-  switch (row.status) {
-    case FilterStatus::kRanked:
-      return {0, row.mean.t_rel_percent.value_or(kWorst),
-              row.mean.r_rel_deg_per_100m.value_or(kWorst)};
-    case FilterStatus::kStopped:
-      return {1, -static_cast<double>(row.rung), early_error(row.mean)};
-    default:
-      return {2, 0.0, 0.0};
+std::tuple<FilterStatus, double, double> order_of(const FilterRow& row) {
+  if (row.status == FilterStatus::kRanked) {
+    return {row.status, row.mean.t_rel_percent.value_or(kWorst),
+            row.mean.r_rel_deg_per_100m.value_or(kWorst)};
   }
+  const bool is_stopped = row.status == FilterStatus::kStopped;
+  return {row.status, is_stopped ? -static_cast<double>(row.rung) : 0.0,
+          is_stopped ? early_error(row.mean) : 0.0};
 }
 
 /// What survivors are chosen by: first detected or not and the early error; the other numbers tell
@@ -111,15 +109,16 @@ DriveScore mean_score(const std::vector<DriveScore>& drives) {
   DriveScore mean;
   mean.detected = true;
   for (const auto number : kNumbers) {
-    double sum = 0.0;
-    bool all_have_one = true;
-    for (const DriveScore& drive : drives) {
-      all_have_one &= (drive.*number).has_value();
-      sum += (drive.*number).value_or(0.0) / static_cast<double>(drives.size());
-    }
-    mean.*number = all_have_one ? std::optional(sum) : std::nullopt;
+    mean.*number = 0.0;
   }
   for (const DriveScore& drive : drives) {
+    for (const auto number : kNumbers) {
+      if (!(drive.*number)) {
+        (mean.*number).reset();
+      } else if (mean.*number) {
+        *(mean.*number) += *(drive.*number) / static_cast<double>(drives.size());
+      }
+    }
     mean.frames += drive.frames;
     if (mean.detected && !drive.detected) {
       mean.detected = false;
@@ -129,25 +128,23 @@ DriveScore mean_score(const std::vector<DriveScore>& drives) {
   return mean;
 }
 
-std::vector<FilterRow> rank_filters(std::span<const FilterRecord> records, std::size_t num_rungs) {
-  std::map<FilterKey, const FilterRecord*> last;
+std::vector<FilterRow> rank_filters(const FilterRecords& records, std::size_t num_rungs) {
+  std::map<FilterKey, FilterRow> last;
   for (const FilterRecord& record : records) {
-    const FilterRecord*& known = last[record.key];
-    known = known == nullptr || record.rung > known->rung ? &record : known;
+    last[record.key] = {record, {}, mean_score(record.drives)};
   }
   std::vector<FilterRow> rows;
-  for (const auto& [key, record] : last) {
-    FilterRow& row = rows.emplace_back(FilterRow{*record, {}, mean_score(record->drives)});
+  for (auto& [key, row] : last) {
     row.status = !row.mean.detected         ? FilterStatus::kNotDetected
                  : row.rung + 1 < num_rungs ? FilterStatus::kStopped
                                             : FilterStatus::kRanked;
+    rows.push_back(std::move(row));
   }
   std::ranges::stable_sort(rows, {}, order_of);
   return rows;
 }
 
-std::vector<std::size_t> choose_survivors(std::span<const FilterRecord* const> records,
-                                          std::size_t count) {
+std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records) {
   // What gives the same numbers to the last bit is the same channel: one of them tells all.
   std::map<decltype(standing_of({})), std::map<FilterKey, std::size_t>> channels;
   for (std::size_t i = 0; i < records.size(); ++i) {
@@ -161,7 +158,6 @@ std::vector<std::size_t> choose_survivors(std::span<const FilterRecord* const> r
     }
   }
   order.insert(order.end(), repeated.begin(), repeated.end());
-  order.resize(std::min(count, order.size()));
   return order;
 }
 

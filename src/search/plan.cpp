@@ -48,29 +48,23 @@ std::string from_anywhere(const fs::path& path) {
   return fs::absolute(path, ignored).lexically_normal().string();
 }
 
-LayerIdentity layer_of(const SearchRequest& request,
-                       const std::string& model,
-                       FeatureMethod features) {
-  LayerIdentity layer;
-  layer.model = model;
-  layer.layer = kInputLayer;
-  layer.features = options::to_string(features);
-  layer.sampling_px = request.config.stem.sampling_px;
-  layer.stem_model = model.ends_with(".onnx") ? from_anywhere(model) : model;
-  return layer;
-}
-
 /// The model's layers, or those asked for in that order; without what the loaded stem says.
 Expected<std::vector<LayerIdentity>> model_layers(const SearchRequest& request) {
-  LayerIdentity layer = layer_of(request, request.model, request.config.features.method);
-  if (is_input(request.model)) {
+  const std::string& model = request.model;
+  LayerIdentity layer = {
+      .model = model,
+      .layer = kInputLayer,
+      .features = std::string(options::to_string(request.config.features.method)),
+      .sampling_px = request.config.stem.sampling_px,
+      .stem_model = model.ends_with(".onnx") ? from_anywhere(model) : model};
+  if (is_input(model)) {
     if (!request.layers.empty()) {
-      return fail(fmt::format("--layers: expected none for {}, found '{}'", request.model,
+      return fail(fmt::format("--layers: expected none for {}, found '{}'", model,
                               fmt::join(request.layers, ",")));
     }
     return std::vector{layer};
   }
-  const auto entries = find_layers(request.model, request.models_dir);
+  const auto entries = find_layers(model, request.models_dir);
   if (!entries) {
     return entries.error();
   }
@@ -80,7 +74,7 @@ Expected<std::vector<LayerIdentity>> model_layers(const SearchRequest& request) 
   for (const std::string& name : request.layers.empty() ? names : request.layers) {
     const auto entry = std::ranges::find(*entries, name, &ModelEntry::layer);
     if (entry == entries->end()) {
-      return fail(fmt::format("--layers: {}: expected one of {}, found '{}'", request.model,
+      return fail(fmt::format("--layers: {}: expected one of {}, found '{}'", model,
                               fmt::join(names, ", "), name));
     }
     layer.model = entry->name;
@@ -129,15 +123,17 @@ Status add_layers(const SearchRequest& request, SearchPlan& plan) {
   if (!layers) {
     return layers.error();
   }
-  std::vector<LayerIdentity> baselines;
-  if (request.baselines) {
-    baselines = {layer_of(request, "gray", FeatureMethod::kOrb),
-                 layer_of(request, "input_layer", request.config.features.method)};
-  }
-  for (LayerIdentity& layer : baselines) {
-    layer.sampling_px = 1;
-    layer.baseline = true;
-    if (!std::ranges::any_of(*layers, [&](auto& one) { return one.is_layer_of(layer.key(0)); })) {
+  const FeatureMethod asked = request.config.features.method;
+  for (const auto& [model, method] :
+       {std::pair("gray", FeatureMethod::kOrb), std::pair("input_layer", asked)}) {
+    const LayerIdentity layer = {.model = model,
+                                 .layer = kInputLayer,
+                                 .features = std::string(options::to_string(method)),
+                                 .stem_model = model,
+                                 .baseline = true};
+    const FilterKey key = layer.key(0);
+    if (request.baselines &&
+        std::ranges::none_of(*layers, [&](const auto& one) { return one.is_layer_of(key); })) {
       layers->push_back(layer);
     }
   }
@@ -169,9 +165,7 @@ Status check_request(const SearchRequest& request) {
                             num_sequences(request) - 1, *request.only_sequence));
   }
   if (request.only_sequence && !request.exhaustive) {
-    return fail(
-        "--only-sequence: expected --exhaustive with it (halving goes by the mean over all "
-        "sequences), found none");
+    return fail("--only-sequence: expected --exhaustive with it (halving needs all), found none");
   }
   for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
     if (std::find(request.layers.begin(), layer, *layer) != layer) {
@@ -231,9 +225,9 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
 
 /// Why the layer's filters cannot be run on frames of this camera, empty where they can; lowers how
 /// many are in flight.
-std::string fit_layer(const LayerIdentity& identity,
+std::string fit_layer(const SearchRequest& request,
+                      const LayerIdentity& identity,
                       const Camera& camera,
-                      std::size_t num_sequences,
                       PlanLayer& layer) {
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
   const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1);
@@ -244,7 +238,8 @@ std::string fit_layer(const LayerIdentity& identity,
   const Upsample upsample =
       choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera.width_px);
   const int factor = enlargement(upsample, identity.sampling_px);
-  const std::size_t bytes = bytes_in_flight(size, size * factor, num_sequences);
+  const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
+  const std::size_t bytes = bytes_in_flight(size, size * factor, num_run);
   layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);
   const bool is_small = std::min(size.width, size.height) < kMinSide_px;
   return is_small ? fmt::format("channel {}x{}", size.width, size.height) : std::string();
@@ -283,11 +278,10 @@ Status add_sequence(const SearchRequest& request,
   if (!is_run) {
     return {};
   }
-  const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
     problems.push_back(
-        fit_layer(plan.identity.layers[i], sequence->camera(), num_run, plan.layers[i]));
+        fit_layer(request, plan.identity.layers[i], sequence->camera(), plan.layers[i]));
   }
   plan.sequences.push_back({std::move(*sequence), is_held_out, std::move(problems)});
   return {};
@@ -322,15 +316,31 @@ Config config_of(Config common, const LayerIdentity& layer, int filter) {
 }
 
 std::size_t bytes_in_flight(cv::Size channel, cv::Size image, std::size_t num_sequences) {
-  constexpr std::size_t kChannelBytes = 2 * sizeof(float);  // two frames
+  const auto channel_px = static_cast<std::size_t>(channel.area());
+  const auto image_px = static_cast<std::size_t>(image.area());
+  constexpr std::size_t kPathBytes = std::size_t{1} << 17;
   // A gray value and two derivatives of 16 bits on each level of the pyramid, 4/3 of the first
   // one's pixels in all; the image itself; what a thread works in.
-  constexpr std::size_t kImageBytes = 8;
-  constexpr std::size_t kPathBytes = std::size_t{1} << 17;
-  const auto pixels = [](cv::Size size) { return static_cast<std::size_t>(size.area()); };
-  const std::size_t buffer = image == channel ? 0 : sizeof(float);
-  const std::size_t odometry = (kImageBytes + buffer) * pixels(image) + kPathBytes;
-  return kChannelBytes * pixels(channel) + num_sequences * odometry;
+  const std::size_t bytes_per_px = 8 + (image == channel ? 0 : sizeof(float));
+  return 2 * sizeof(float) * channel_px + num_sequences * (bytes_per_px * image_px + kPathBytes);
+}
+
+std::vector<std::vector<std::size_t>> cut_into_blocks(const SearchPlan& plan,
+                                                      const std::vector<std::size_t>& candidates) {
+  std::vector<std::vector<std::size_t>> blocks;
+  const PlanLayer* first = nullptr;  // of the last block
+  for (const std::size_t candidate : candidates) {
+    const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
+    const bool goes_on =
+        first != nullptr && (plan.block > 0 || layer.pass == first->pass) &&
+        blocks.back().size() < (plan.block > 0 ? plan.block : first->max_in_flight);
+    if (!goes_on) {
+      blocks.emplace_back();
+      first = &layer;
+    }
+    blocks.back().push_back(candidate);
+  }
+  return blocks;
 }
 
 Expected<SearchPlan> make_plan(const SearchRequest& request) {

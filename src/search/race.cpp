@@ -2,6 +2,7 @@
 #include "search/race.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
 #include <utility>
@@ -9,44 +10,146 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "evaluation/metrics.hpp"
+#include "geometry/degrees.hpp"
 #include "internal_check.hpp"
-#include "search/filter_drive.hpp"
+#include "odometry/channel_odometry.hpp"
 
 namespace stemvo::search {
 namespace {
 
+constexpr double kMinTracked = 0.5;
+constexpr std::size_t kMaxPathPoints = 400;
+/// Of the path so far; chosen among prefixes of clips (docs/search.md).
+constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
+
+/// Evenly spaced, first and last included, to the centimetre.
+std::vector<std::array<double, 2>> path_of(std::span<const Rigid3> trajectory) {
+  const std::size_t count = std::min(trajectory.size(), kMaxPathPoints);
+  std::vector<std::array<double, 2>> path;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t index = count < 2 ? 0 : i * (trajectory.size() - 1) / (count - 1);
+    const Eigen::Vector3d cm = (100.0 * trajectory[index].translation).array().round();
+    path.push_back({cm.x() / 100.0, cm.z() / 100.0});
+  }
+  return path;
+}
+
+/// One filter's odometry over one sequence, and what is counted on the way.
+class FilterDrive {
+ public:
+  /// The sequence, with ground truth, stays where it is.
+  FilterDrive(const Config& config, const FrameSource& sequence)
+      : odometry_(config, sequence.camera()), config_(&config), sequence_(&sequence) {}
+
+  [[nodiscard]] std::size_t num_frames() const { return odometry_.estimator().trajectory().size(); }
+
+  /// Null: no image, or a stem that refused it.
+  void process(const Channel* channel, const cv::Mat& frame) {
+    const FrameResult result = odometry_.process(
+        channel == nullptr ? PreparedFrame() : odometry_.prepare(*channel, frame));
+    if (num_frames() <= 1) {
+      return;
+    }
+    num_matches_ += static_cast<std::size_t>(result.num_matches);
+    num_inliers_ += static_cast<std::size_t>(result.num_inliers);
+    ++outcomes_[is_measured(result.state)                            ? kMeasured
+                : result.state == FrameState::kNoImage               ? kNoImage
+                : result.state == FrameState::kGated                 ? kGated
+                : result.num_matches < config_->odometry.min_inliers ? kFewMatches
+                                                                     : kFewInliers];
+  }
+
+  /// Of the frames so far, at least one.
+  [[nodiscard]] DriveScore score() const {
+    const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
+    DriveScore score;
+    score.sequence = sequence_->name();
+    score.frames = num_frames();
+    score.inliers = static_cast<double>(num_inliers_) / num_steps;
+    score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
+    score.detected = num_frames() == 1 || *score.tracked >= kMinTracked;
+    score.reason = score.detected ? "" : missing_reason();
+    if (outcomes_[kMeasured] > 0) {  // else the numbers would be those of the zero-motion baseline
+      add_errors(num_steps, score);
+    }
+    return score;
+  }
+
+ private:
+  void add_errors(double num_steps, DriveScore& score) const {
+    const auto truth = std::span(*sequence_->ground_truth()).first(num_frames());
+    const Trajectory trajectory = rescale_steps(odometry_.estimator().trajectory(), truth);
+    const Metrics metrics = evaluate(trajectory, truth, config_->evaluation);
+    score.t_rel_percent = metrics.t_rel_percent;
+    score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
+    score.average_offset_m = metrics.average_offset_m;
+    double translation_m = 0.0;
+    double rotation_rad = 0.0;
+    for (std::size_t i = 1; i < trajectory.size(); ++i) {
+      const Rigid3 change = trajectory[i - 1].inverse() * trajectory[i];
+      translation_m += change.translation.norm();
+      rotation_rad += change.angle_rad();
+    }
+    score.E_t_m = translation_m / num_steps;
+    score.E_r_deg = kDegPerRad * rotation_rad / num_steps;
+    // A standing start has no segments: nothing is known against the filter.
+    score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
+    score.path_xz_m = path_of(trajectory);
+  }
+
+  [[nodiscard]] std::string missing_reason() const {
+    if (num_matches_ == 0 && outcomes_[kNoImage] < num_frames() - 1) {
+      return "no matches: a channel without contrast";
+    }
+    constexpr std::array<const char*, kMeasured> kReasons = {"too few matches", "too few inliers",
+                                                             "not a forward motion", "no picture"};
+    const auto most = std::max_element(outcomes_.begin(), outcomes_.begin() + kMeasured);
+    return fmt::format("{} in {} of {} frames",
+                       kReasons[static_cast<std::size_t>(most - outcomes_.begin())], *most,
+                       num_frames() - 1);
+  }
+
+  ChannelOdometry odometry_;
+  const Config* config_;
+  const FrameSource* sequence_;
+  // Of the frames after the first.
+  std::size_t num_matches_ = 0;
+  std::size_t num_inliers_ = 0;
+  enum Outcome { kFewMatches, kFewInliers, kGated, kNoImage, kMeasured, kNumOutcomes };
+  std::array<std::size_t, kNumOutcomes> outcomes_{};
+};
+
 using Candidates = std::vector<std::size_t>;  // ascending indices
+
+/// Filters [first, last) of a layer on one frame; no channels: the layer refused it.
+struct LayerChannels {
+  int first = 0;
+  int last = 0;
+  std::vector<Channel> channels = {};
+};
 
 /// One frame through all layers of a block.
 struct BlockFrame {
   cv::Mat frame;  ///< empty: could not be read
-  /// Channels of filters [first, last); none where the layer refused the frame.
-  struct LayerChannels {
-    int first = 0;
-    int last = 0;
-    std::vector<Channel> channels = {};
-  };
   std::map<std::size_t, LayerChannels> layers;
 };
 
 struct Race {
   const SearchPlan& plan;
   const SearchProgress& progress;
-  RecordWriter& writer;
-  std::vector<FilterRecord>& records;
+  RecordFile& file;
   std::size_t max_kept = 0;
   /// Of candidates in flight or kept, else empty: the odometry on each sequence; none where it has
   /// not started, or cannot.
   std::vector<std::vector<std::optional<FilterDrive>>> drives{plan.candidates.size()};
-  std::map<std::pair<std::size_t, FilterKey>, std::size_t> record_of = {};  ///< by rung
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
   bool is_stopped = false;
 
   Status run() {
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      frames_done += records[i].filter_frames + records[i].held_out_filter_frames;
-      record_of.try_emplace({records[i].rung, records[i].key}, i);
+    for (const FilterRecord& record : file.records()) {
+      frames_done += record.filter_frames + record.held_out_filter_frames;
     }
     Candidates alive;
     Candidates baselines;
@@ -104,8 +207,11 @@ struct Race {
   }
 
   const FilterRecord* find(std::size_t candidate, std::size_t rung) const {
-    const auto found = record_of.find({rung, plan.candidates[candidate].key});
-    return found == record_of.end() ? nullptr : &records[found->second];
+    FilterRecord wanted;
+    wanted.rung = rung;
+    wanted.key = plan.candidates[candidate].key;
+    const auto found = file.records().find(wanted);
+    return found == file.records().end() ? nullptr : &*found;
   }
 
   /// Of candidates that ran the rung; the odometries of the others are given up.
@@ -116,15 +222,14 @@ struct Race {
       STEMVO_CHECK(found.back() != nullptr, "a rung is complete before the next");
     }
     Candidates best;
-    for (const std::size_t index : choose_survivors(found, count)) {
-      best.push_back(group[index]);
-    }
-    std::ranges::sort(best);
-    for (const std::size_t candidate : group) {
-      if (!std::ranges::binary_search(best, candidate)) {
-        drives[candidate].clear();
+    for (const std::size_t index : best_first(found)) {
+      if (best.size() < count) {
+        best.push_back(group[index]);
+      } else {
+        drives[group[index]].clear();
       }
     }
+    std::ranges::sort(best);
     return best;
   }
 
@@ -135,8 +240,8 @@ struct Race {
     for (std::size_t i = 0; i < drives.size(); ++i) {
       if (!drives[i].empty() && find(i, rung) != nullptr) {
         done.push_back(i);
-      } else if (!drives[i].empty()) {
-        ++num_waiting;
+      } else {
+        num_waiting += drives[i].empty() ? 0 : 1;
       }
     }
     if (done.size() + num_waiting > max_kept) {
@@ -178,17 +283,14 @@ struct Race {
         return {};
       }
     }
-    for (const FilterRecord& record : done) {
-      record_of.try_emplace({rung, record.key}, records.size());
-      records.push_back(record);
-    }
+    const Status written = file.append(done);
     for (const std::size_t candidate : block) {
       if (is_last(rung) || !plan.candidates[candidate].races) {
         drives[candidate].clear();
       }
     }
     limit_kept(rung);
-    return writer.append(done);
+    return written;
   }
 
   /// False: stopped before the last frame.
@@ -259,7 +361,7 @@ struct Race {
     BlockFrame read{*frame, {}};
     for (const std::size_t candidate : running) {
       const auto& [key, layer, races] = plan.candidates[candidate];
-      const BlockFrame::LayerChannels part = {.first = key.filter};
+      const LayerChannels part = {.first = key.filter};
       read.layers.try_emplace(layer, part).first->second.last = key.filter + 1;
     }
     for (auto& [layer, part] : read.layers) {
@@ -275,13 +377,14 @@ struct Race {
   }
 
   void process(std::size_t candidate, std::size_t sequence, const BlockFrame& read) {
-    const auto found = read.layers.find(plan.candidates[candidate].layer);
-    const Channel* channel = nullptr;
-    if (found != read.layers.end() && !found->second.channels.empty()) {
-      channel = &found->second.channels[static_cast<std::size_t>(
-          plan.candidates[candidate].key.filter - found->second.first)];
-    }
-    drives[candidate][sequence]->process(channel, read.frame);
+    const auto& [key, layer, races] = plan.candidates[candidate];
+    const auto found = read.layers.find(layer);
+    const bool is_seen = found != read.layers.end() && !found->second.channels.empty();
+    drives[candidate][sequence]->process(
+        is_seen
+            ? &found->second.channels.at(static_cast<std::size_t>(key.filter - found->second.first))
+            : nullptr,
+        read.frame);
   }
 
   void warn(const std::string& text) {
@@ -293,29 +396,11 @@ struct Race {
 
 }  // namespace
 
-std::vector<Candidates> cut_into_blocks(const SearchPlan& plan, const Candidates& candidates) {
-  std::vector<Candidates> blocks;
-  const PlanLayer* first = nullptr;  // of the last block
-  for (const std::size_t candidate : candidates) {
-    const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
-    const bool goes_on =
-        first != nullptr && (plan.block > 0 || layer.pass == first->pass) &&
-        blocks.back().size() < (plan.block > 0 ? plan.block : first->max_in_flight);
-    if (!goes_on) {
-      blocks.emplace_back();
-      first = &layer;
-    }
-    blocks.back().push_back(candidate);
-  }
-  return blocks;
-}
-
 Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
                                             const SearchProgress& progress,
-                                            RecordWriter& writer,
-                                            std::vector<FilterRecord>& records,
+                                            RecordFile& file,
                                             std::size_t max_kept) {
-  Race race{plan, progress, writer, records, max_kept};
+  Race race{plan, progress, file, max_kept};
   return race.run().map([&race] { return race.warnings; });
 }
 

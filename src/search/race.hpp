@@ -73,26 +73,23 @@ struct SearchPlan {
 /// Frames of a sequence that a rung runs up to: at least 2, at most all.
 [[nodiscard]] std::size_t frames_at(const Rung& rung, std::size_t num_frames);
 
-/// Of records of one rung, those that go on: indices of the `count` best by their early errors,
-/// near ties by inliers. Of filters with the same numbers (R, G and B of a gray sequence) one goes
-/// on, the others where there is room.
-[[nodiscard]] std::vector<std::size_t> choose_survivors(
-    std::span<const FilterRecord* const> records, std::size_t count);
+/// Of records of one rung, the order in which they may go on: indices, best first, by their early
+/// errors, near ties by inliers. Of filters with the same numbers (R, G and B of a gray sequence)
+/// one stands there, the others behind all.
+[[nodiscard]] std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records);
 
 /// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
 /// go on, they start again, which counts.
 inline constexpr std::size_t kMaxKept = 512;
 
-/// Runs the rungs of a plan; as a block ends its records are added to `records` and appended to the
-/// file. What `records` holds is not run again. Within a block a frame is read once, each layer
-/// makes one pass over it, then the filters work side by side, while the next frame is prepared:
-/// what a filter does depends neither on the number of threads nor on who runs beside it. Returns
-/// warnings: frames that cannot be read, or that a stem refuses. Error: the records cannot be
-/// written.
+/// Runs the rungs of a plan but for what is in the file, to which records are appended as a block
+/// ends. Within a block a frame is read once, each layer makes one pass over it, then the filters
+/// work side by side, while the next frame is prepared: what a filter does depends neither on the
+/// number of threads nor on who runs beside it. Returns warnings: frames that cannot be read, or
+/// that a stem refuses. Error: the records cannot be written.
 [[nodiscard]] Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
                                                           const SearchProgress& progress,
-                                                          RecordWriter& writer,
-                                                          std::vector<FilterRecord>& records,
+                                                          RecordFile& file,
                                                           std::size_t max_kept = kMaxKept);
 
 }  // namespace stemvo::search

@@ -19,47 +19,43 @@
 using Json = nlohmann::ordered_json;
 
 /// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order.
-#define STEMVO_JSON_MEMBERS(Type, ...)                                         \
-  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {           \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, __VA_ARGS__))   \
-  }                                                                            \
-  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {  \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, __VA_ARGS__)) \
+#define STEMVO_LIST(...) __VA_ARGS__
+#define STEMVO_JSON_MEMBERS(Type, members)                                             \
+  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {                   \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, STEMVO_LIST members))   \
+  }                                                                                    \
+  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {          \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, STEMVO_LIST members)) \
   }
 
 namespace stemvo::search {
 
-STEMVO_JSON_MEMBERS(FilterKey, model, layer, filter, features)
+STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
 STEMVO_JSON_MEMBERS(DriveScore,
-                    sequence,
-                    frames,
-                    detected,
-                    reason,
-                    t_rel_percent,
-                    r_rel_deg_per_100m,
-                    average_offset_m,
-                    E_t_m,
-                    E_r_deg,
-                    inliers,
-                    tracked,
-                    early_error_percent,
-                    path_xz_m)
+                    (sequence,
+                     frames,
+                     detected,
+                     reason,
+                     t_rel_percent,
+                     r_rel_deg_per_100m,
+                     average_offset_m,
+                     E_t_m,
+                     E_r_deg,
+                     inliers,
+                     tracked,
+                     early_error_percent,
+                     path_xz_m))
 /// Beside those of its key.
-STEMVO_JSON_MEMBERS(FilterRecord, rung, filter_frames, held_out_filter_frames, drives, held_out)
-STEMVO_JSON_MEMBERS(Rung, frame_share, filters)
+STEMVO_JSON_MEMBERS(FilterRecord, (rung, filter_frames, held_out_filter_frames, drives, held_out))
+STEMVO_JSON_MEMBERS(Rung, (frame_share, filters))
+STEMVO_JSON_MEMBERS(LayerIdentity,
+                    (model, layer, features, first, last, hash, sampling_px, stem_model, baseline))
 STEMVO_JSON_MEMBERS(
-    LayerIdentity, model, layer, features, first, last, hash, sampling_px, stem_model, baseline)
-STEMVO_JSON_MEMBERS(SequenceIdentity,
-                    name,
-                    held_out,
-                    first_frame,
-                    num_frames,
-                    frames,
-                    calibration,
-                    ground_truth,
-                    directory)
+    SequenceIdentity,
+    (name, held_out, first_frame, num_frames, frames, calibration, ground_truth, directory))
 STEMVO_JSON_MEMBERS(
-    SearchIdentity, stemvo_search, program, configuration, rungs, layers, sequences, only_sequence)
+    SearchIdentity,
+    (stemvo_search, program, configuration, rungs, layers, sequences, only_sequence))
 
 namespace {
 
@@ -127,8 +123,9 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
   try {
     const Json json = Json::parse(line);
     if (!is_first) {
-      json.get_to(records.records.emplace_back());
-      json.get_to(records.records.back().key);
+      FilterRecord record = json.get<FilterRecord>();
+      json.get_to(record.key);
+      records.records.insert(std::move(record));
     } else if (json.at("stemvo_search") == records.identity.stemvo_search) {
       json.get_to(records.identity);
     } else {
@@ -216,33 +213,44 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   return records;
 }
 
-Expected<RecordWriter> RecordWriter::open(const std::filesystem::path& file,
-                                          const SearchIdentity& identity,
-                                          std::optional<std::size_t> num_good_bytes) {
-  std::FILE* stream = std::fopen(file.c_str(), num_good_bytes ? "ae" : "axe");
-  if (stream == nullptr) {
-    return fail(
-        errno == EEXIST
-            ? fmt::format("{}: expected a folder without a search, found one: a search "
-                          "with --resume goes on with it",
-                          file.string())
-            : fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
+Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
+                                      const SearchIdentity& identity,
+                                      bool resume) {
+  RecordFile opened;
+  opened.file_ = file;
+  opened.stream_.reset(std::fopen(file.c_str(), resume ? "ae" : "axe"), [](std::FILE* stream) {
+    return stream == nullptr ? 0 : std::fclose(stream);
+  });
+  if (opened.stream_ == nullptr) {
+    return fail(fmt::format("{}: {}", file.string(),
+                            errno == EEXIST ? "expected a folder without a search, found one: a "
+                                              "search with --resume goes on with it"
+                                            : std::strerror(errno)));
   }
-  RecordWriter writer;
-  writer.file_ = file;
-  writer.stream_.reset(stream, &std::fclose);
-  if (::flock(::fileno(stream), LOCK_EX | LOCK_NB) != 0) {  // as long as the stream is open
+  if (::flock(::fileno(opened.stream_.get()), LOCK_EX | LOCK_NB) != 0) {  // as long as it is open
     return fail(fmt::format("{}: another search is writing it", file.string()));
   }
-  const auto num_kept = static_cast<off_t>(num_good_bytes.value_or(0));
-  if (::ftruncate(::fileno(stream), num_kept) != 0) {
+  auto before = read_records(file);
+  if (!before) {
+    return before.error();
+  }
+  const bool is_new = before->num_good_bytes == 0;  // or killed before its first line was written
+  const std::string change = is_new ? "" : describe_change(before->identity, identity, false);
+  if (!change.empty()) {
+    return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
+                            file.string(), change));
+  }
+  opened.records_ = std::move(before->records);
+  if (::ftruncate(::fileno(opened.stream_.get()), static_cast<off_t>(before->num_good_bytes)) !=
+      0) {
     return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
   }
-  const Status written = writer.write(num_kept == 0 ? line_of(identity) : std::string());
-  return written ? Expected<RecordWriter>(writer) : written.error();
+  const Status written = opened.write(is_new ? line_of(identity) : std::string());
+  return written ? Expected<RecordFile>(opened) : written.error();
 }
 
-Status RecordWriter::append(const std::vector<FilterRecord>& records) {
+Status RecordFile::append(const std::vector<FilterRecord>& records) {
+  records_.insert(records.begin(), records.end());
   std::string text;
   for (const FilterRecord& record : records) {
     Json json = record.key;
@@ -252,7 +260,7 @@ Status RecordWriter::append(const std::vector<FilterRecord>& records) {
   return write(text);
 }
 
-Status RecordWriter::write(const std::string& text) {
+Status RecordFile::write(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stream_.get()) != text.size() ||
       std::fflush(stream_.get()) != 0 || ::fsync(::fileno(stream_.get())) != 0) {
     return fail(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));

@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
@@ -59,15 +61,19 @@ struct DriveScore {
 
 /// What a filter did on one rung.
 struct FilterRecord {
-  FilterKey key;
   std::size_t rung = 0;
+  FilterKey key;
   std::vector<DriveScore> drives;      ///< one per sequence that ranks
   std::optional<DriveScore> held_out;  ///< of filters that ran over all frames
   std::size_t filter_frames = 0;       ///< that this took, with what a kill made it repeat
   std::size_t held_out_filter_frames = 0;
 
   void add(const DriveScore& score, bool is_held_out, std::size_t num_frames);
+  bool operator<(const FilterRecord& other) const {
+    return std::tie(rung, key) < std::tie(other.rung, other.key);
+  }
 };
+using FilterRecords = std::set<FilterRecord>;  ///< by rung and filter
 
 /// One rung of successive halving: so many filters run up to this share of the frames.
 struct Rung {
@@ -80,14 +86,14 @@ using Schedule = std::vector<Rung>;
 
 /// Filters [first, last) of a layer, and what its response depends on.
 struct LayerIdentity {
-  std::string model;  ///< the manifest's name, not a path
-  std::string layer;
-  std::string features;
+  std::string model = {};  ///< the manifest's name, not a path
+  std::string layer = {};
+  std::string features = {};
   int first = 0;
   int last = 0;
-  std::string hash;  ///< of the model's file and the manifest's entry
+  std::string hash = {};  ///< of the model's file and the manifest's entry
   int sampling_px = 1;
-  std::string stem_model;  ///< as stem.model takes it here; not compared
+  std::string stem_model = {};  ///< as stem.model takes it here; not compared
   bool baseline = false;
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(last - first); }
@@ -137,31 +143,31 @@ struct SearchIdentity {
 
 struct SearchRecords {
   SearchIdentity identity;
-  std::vector<FilterRecord> records;
+  FilterRecords records;
   std::size_t num_good_bytes = 0;  ///< up to the last whole line; a kill may tear the next
 };
 
 /// Reads all whole lines. Errors: not there, a whole line that is no record, another format.
 [[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file);
 
-/// Appends records, so that what append() returned for is on the disk. One at a time: a second one
-/// for the same file is an error.
-class RecordWriter {
+/// Records that grow, on the disk when append() returns. A second writer of a file is an error.
+class RecordFile {
  public:
-  /// Goes on behind the whole lines of a file; what a kill tore is cut off, and where nothing is
-  /// left the identity is written. Without good bytes a new file. Errors: that is there already, or
-  /// cannot be written.
-  [[nodiscard]] static Expected<RecordWriter> open(
-      const std::filesystem::path& file,
-      const SearchIdentity& identity,
-      std::optional<std::size_t> num_good_bytes = std::nullopt);
+  /// A new file or, with `resume`, one of the same search, if there is one; what a kill tore is cut
+  /// off. Errors: it is there, or is of another search (says what changed), or those of
+  /// read_records.
+  [[nodiscard]] static Expected<RecordFile> open(const std::filesystem::path& file,
+                                                 const SearchIdentity& identity,
+                                                 bool resume);
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
+  [[nodiscard]] const FilterRecords& records() const { return records_; }
 
  private:
   [[nodiscard]] Status write(const std::string& text);
 
   std::filesystem::path file_;
   std::shared_ptr<std::FILE> stream_;
+  FilterRecords records_;
 };
 
 void to_json(nlohmann::ordered_json& json, const FilterKey& key);

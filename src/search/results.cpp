@@ -2,8 +2,10 @@
 #include "search/results.hpp"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <set>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,7 +31,7 @@ struct ScoreNumber {
   const char* title;
   int decimals;
 };
-constexpr ScoreNumber kNumbers[] = {
+constexpr std::array<ScoreNumber, 7> kNumbers = {{
     {"t_rel_percent", &DriveScore::t_rel_percent, 4, "t_rel %", 3},
     {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m, 4, "r_rel deg/100m", 3},
     {"average_offset_m", &DriveScore::average_offset_m, 4, "offset m", 2},
@@ -37,24 +39,21 @@ constexpr ScoreNumber kNumbers[] = {
     {"E_r_deg", &DriveScore::E_r_deg, 4, "E_r deg", 3},
     {"inliers", &DriveScore::inliers, 1, "inliers", 0},
     {"tracked", &DriveScore::tracked, 4, "tracked %", 1},
-};
+}};
 constexpr std::span kScoreNumbers = kNumbers;
 
-const char* word_for(FilterStatus status) {
-  return status == FilterStatus::kRanked    ? "ranked"
-         : status == FilterStatus::kStopped ? "stopped"
-                                            : "not detected";
-}
+constexpr const char* kStatusWords[] = {"ranked", "stopped", "not detected"};
+std::string word_for(FilterStatus status) { return kStatusWords[static_cast<int>(status)]; }
 
 /// What a search costs: frames times filters, and what was run again after a kill.
 struct Work {
   std::size_t filter_frames = 0;             ///< of the filters, on the sequences that rank
-  std::size_t baseline_filter_frames = 0;    ///< of the baselines, which always run to the end
   std::size_t held_out_filter_frames = 0;    ///< of both
+  std::size_t baseline_filter_frames = 0;    ///< of the baselines, which always run to the end
   std::size_t exhaustive_filter_frames = 0;  ///< of all filters that can run, on all frames
 };
 
-Work work_of(const SearchIdentity& identity, const std::vector<FilterRecord>& records) {
+Work work_of(const SearchIdentity& identity, const FilterRecords& records) {
   Work work;
   std::set<std::pair<const LayerIdentity*, std::string>> impossible;  // layer and sequence
   for (const FilterRecord& record : records) {
@@ -240,7 +239,7 @@ std::string format_csv(const SearchIdentity& identity, const std::vector<FilterR
   return text;
 }
 
-Expected<SearchReport> write_results(Results results, const std::vector<FilterRecord>& records) {
+Expected<SearchReport> write_results(Results results, const FilterRecords& records) {
   const SearchIdentity& identity = results.identity;
   const Work work = work_of(identity, records);
   const auto num_done = std::ranges::count(records, identity.rungs.size() - 1, &FilterRecord::rung);

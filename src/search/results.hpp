@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -30,8 +29,8 @@ struct FilterRow : FilterRecord {
 [[nodiscard]] DriveScore mean_score(const std::vector<DriveScore>& drives);
 
 /// One row per filter from its last rung, ranked: by t_rel, ties by r_rel; then those that were
-/// stopped, the later the better; not detected last. Does not depend on the records' order.
-[[nodiscard]] std::vector<FilterRow> rank_filters(std::span<const FilterRecord> records,
+/// stopped, the later the better; not detected last.
+[[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
                                                   std::size_t num_rungs);
 
 /// filters.csv: a header, then the rows by rank; `model,layer,filter` first, no times. Columns per
@@ -53,8 +52,7 @@ struct Results {
 /// its row by `stemvo run --config`), and the sheet (a warning where that cannot be drawn). Where
 /// records are missing the search was interrupted. Of a part with one sequence only the work is
 /// reported.
-[[nodiscard]] Expected<SearchReport> write_results(Results results,
-                                                   const std::vector<FilterRecord>& records);
+[[nodiscard]] Expected<SearchReport> write_results(Results results, const FilterRecords& records);
 
 /// A filter of the sheet and what it is there.
 struct ShownFilter {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <map>
 #include <system_error>
-#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,26 +17,6 @@ namespace stemvo::search {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// What the folder holds of the same search; nothing, with no good bytes, where none was begun.
-Expected<SearchRecords> records_before(const SearchRequest& request,
-                                       const SearchIdentity& identity) {
-  const fs::path file = request.out_dir / kRecordsFile;
-  std::error_code code;
-  if (!request.resume || !fs::exists(file, code)) {
-    return SearchRecords();
-  }
-  auto records = read_records(file);
-  if (!records || records->num_good_bytes == 0) {  // killed before its first line was written
-    return records;
-  }
-  if (const std::string change = describe_change(records->identity, identity, false);
-      !change.empty()) {
-    return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
-                            file.string(), change));
-  }
-  return records;
-}
 
 Expected<SearchRecords> read_part(const fs::path& folder) {
   const std::string file = (folder / kRecordsFile).string();
@@ -78,39 +57,24 @@ Status add_identity(const SearchIdentity& part, SearchIdentity& joined) {
   return {};
 }
 
-/// Ranges of a layer that meet or overlap become one.
-std::vector<LayerIdentity> join_layers(std::vector<LayerIdentity> layers) {
-  std::ranges::sort(layers, {}, [](const LayerIdentity& layer) {
-    return std::tie(layer.model, layer.layer, layer.features, layer.first);
-  });
-  std::vector<LayerIdentity> joined;
-  for (const LayerIdentity& layer : layers) {
-    if (!joined.empty() && joined.back().is_layer_of(layer.key(0)) &&
-        layer.first <= joined.back().last) {
-      joined.back().last = std::max(joined.back().last, layer.last);
-    } else {
-      joined.push_back(layer);
-    }
-  }
-  return joined;
-}
-
 /// What all parts found: of each filter, by (is it held out, name of the sequence).
 using Scores = std::map<FilterKey, std::map<std::pair<bool, std::string>, DriveScore>>;
 
 /// What two parts hold is no trouble where they agree; else an error.
 Status add_record(const FilterRecord& record, Scores& scores) {
-  auto found = record.drives;
-  if (record.held_out) {
-    found.push_back(*record.held_out);
+  auto& known = scores[record.key];
+  Scores::mapped_type found;
+  for (const DriveScore& drive : record.drives) {
+    found[{false, drive.sequence}] = drive;
   }
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const bool is_held_out = i == record.drives.size();
-    const auto [known, is_new] =
-        scores[record.key].try_emplace({is_held_out, found[i].sequence}, found[i]);
-    if (!is_new && known->second != found[i]) {
+  if (record.held_out) {
+    found[{true, record.held_out->sequence}] = *record.held_out;
+  }
+  known.insert(found.begin(), found.end());
+  for (const auto& [sequence, score] : found) {
+    if (known[sequence] != score) {
       return fail(fmt::format("expected the result of another part for {} on {}, found another one",
-                              to_string(record.key), found[i].sequence));
+                              to_string(record.key), score.sequence));
     }
   }
   return {};
@@ -118,13 +82,12 @@ Status add_record(const FilterRecord& record, Scores& scores) {
 
 /// A record per filter, as a search over all sequences writes it. Error: a filter that no part ran
 /// on one of the sequences.
-Expected<std::vector<FilterRecord>> join_records(const std::vector<SequenceIdentity>& sequences,
-                                                 const Scores& scores) {
-  std::vector<FilterRecord> records;
+Expected<FilterRecords> join_records(const SearchIdentity& identity, const Scores& scores) {
+  FilterRecords records;
   for (const auto& [key, found] : scores) {
-    FilterRecord& record = records.emplace_back();
+    FilterRecord record;
     record.key = key;
-    for (const SequenceIdentity& sequence : sequences) {
+    for (const SequenceIdentity& sequence : identity.sequences) {
       const auto score = found.find({sequence.held_out, sequence.name});
       if (score == found.end()) {
         return fail(fmt::format("--merge: expected a part with {} on {}{}, found none",
@@ -134,8 +97,22 @@ Expected<std::vector<FilterRecord>> join_records(const std::vector<SequenceIdent
       // An exhaustive search runs each frame once, or none where the layer cannot be run.
       record.add(score->second, sequence.held_out, score->second.frames);
     }
+    records.insert(std::move(record));
   }
   return records;
+}
+
+/// Ranges of filters that meet or overlap become one.
+std::vector<LayerIdentity> join_layers(const SearchIdentity& parts, const Scores& scores) {
+  std::vector<LayerIdentity> joined;
+  for (const auto& [key, found] : scores) {
+    if (joined.empty() || !joined.back().is_layer_of(key) || joined.back().last < key.filter) {
+      joined.push_back(parts.layer_of(key));
+      joined.back().first = key.filter;
+    }
+    joined.back().last = key.filter + 1;
+  }
+  return joined;
 }
 
 }  // namespace
@@ -162,22 +139,16 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (const Status status = pipeline::create_out_folder(request.out_dir); !status) {
     return status.error();
   }
-  auto before = records_before(request, plan->identity);
-  if (!before) {
-    return before.error();
+  auto records = RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
+  if (!records) {
+    return records.error();
   }
-  auto writer =
-      RecordWriter::open(request.out_dir / kRecordsFile, plan->identity,
-                         request.resume ? std::optional(before->num_good_bytes) : std::nullopt);
-  if (!writer) {
-    return writer.error();
-  }
-  const auto warnings = run_race(*plan, progress, *writer, before->records);
+  const auto warnings = run_race(*plan, progress, *records);
   if (!warnings) {
     return warnings.error();
   }
   auto report =
-      write_results({request.out_dir, request.models_dir, plan->identity}, before->records);
+      write_results({request.out_dir, request.models_dir, plan->identity}, records->records());
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
   }
@@ -204,18 +175,18 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
       }
     }
   }
-  const auto records = join_records(identity.sequences, scores);
+  const auto records = join_records(identity, scores);
   if (!records) {
     return records.error();
   }
-  identity.layers = join_layers(std::move(identity.layers));
+  identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
   if (const Status status = pipeline::create_out_folder(out_dir); !status) {
     return status.error();
   }
-  auto writer = RecordWriter::open(out_dir / kRecordsFile, identity);
-  const Status written = writer ? writer->append(*records) : writer.error();
+  auto file = RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false);
+  const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
   return written ? write_results({out_dir, models_dir, identity}, *records) : written.error();
 }
 

@@ -61,7 +61,7 @@ class Records : public ::testing::Test {
  protected:
   void write(const std::string& name, const SearchIdentity& of, std::vector<FilterRecord> records) {
     std::filesystem::create_directories(folder_ / name);
-    auto writer = RecordWriter::open(file(name), of);
+    auto writer = RecordFile::open(file(name), of, false);
     ASSERT_TRUE(writer) << writer.error().message;
     ASSERT_TRUE(writer->append(records));
   }
@@ -84,9 +84,9 @@ TEST_F(Records, ComeBackToTheBit) {
   const auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
-  EXPECT_EQ(content->records[1].key, record(1).key);
-  EXPECT_EQ(content->records[1].drives, record(1, 1e-17).drives);
-  EXPECT_EQ(*content->records[0].drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
+  EXPECT_EQ((*content->records.rbegin()).key, record(1).key);
+  EXPECT_EQ((*content->records.rbegin()).drives, record(1, 1e-17).drives);
+  EXPECT_EQ(*content->records.begin()->drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
   EXPECT_EQ(describe_change(content->identity, identity(0, 2), false), "");
   EXPECT_EQ(content->num_good_bytes, std::filesystem::file_size(file("a")));
 }
@@ -97,26 +97,26 @@ TEST_F(Records, ATornLineIsLeftOutAndOverwritten) {
   auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   EXPECT_EQ(content->records.size(), 1U);
-  auto writer = RecordWriter::open(file("a"), content->identity, content->num_good_bytes);
-  ASSERT_TRUE(writer);
+  auto writer = RecordFile::open(file("a"), content->identity, true);
+  ASSERT_TRUE(writer) << writer.error().message;
   ASSERT_TRUE(writer->append(std::vector<FilterRecord>{record(2)}));
   content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
-  EXPECT_EQ(content->records[1].key.filter, 2);
+  EXPECT_EQ((*content->records.rbegin()).key.filter, 2);
 }
 
 TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
   write("a", identity(0, 3), {record(0)});
   std::ofstream(file("a"), std::ios::app) << "{\"model\": 1}\n";
   EXPECT_THAT(read_records(file("a")).error().message, HasSubstr("records.jsonl:3: expected"));
-  EXPECT_FALSE(RecordWriter::open(file("a"), identity(0, 3)));  // never replaced
+  EXPECT_FALSE(RecordFile::open(file("a"), identity(0, 3), false));  // never replaced
 }
 
 TEST_F(Records, OneWriterAtATime) {
-  const auto writer = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3));
+  const auto writer = RecordFile::open(folder_ / "records.jsonl", identity(0, 3), false);
   ASSERT_TRUE(writer);
-  const auto second = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3), 1);
+  const auto second = RecordFile::open(folder_ / "records.jsonl", identity(0, 3), true);
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("another search is writing it"));
 }
