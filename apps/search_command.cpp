@@ -9,7 +9,6 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "install_paths.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "search/search.hpp"
@@ -61,7 +60,7 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   request.config = *config;
   Progress progress("filter-frames", arguments.is_quiet);
   return search::run_search(request, [&progress](std::size_t done, std::size_t total) {
-    return progress.update(done, total) && !is_interrupted();
+    return progress.update(done, total);
   });
 }
 

@@ -24,22 +24,15 @@ constexpr int kMinSide_px = 16;
 /// weights and layers of the network.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
 
-/// Shifted passes of a coarse layer cost more than they tell.
-constexpr int kMaxShifts = 2;
+/// What the layer of gray and input_layer is called in tables.
+constexpr const char* kInputLayer = "input";
 
 bool is_input(const std::string& model) { return model == "gray" || model == "input_layer"; }
 
-/// 0: every second pixel where that takes no more than 4 passes, else half the stride.
+/// 0: half the stride; shifted passes of a coarse layer cost more than more of them tell.
 int sampling_of(int asked, const ModelEntry& entry) {
-  if (asked != 0 || entry.native_sampling_only) {
-    return asked;
-  }
-  for (int sampling = 2; sampling < entry.stride_px; ++sampling) {
-    if (entry.stride_px % sampling == 0 && entry.stride_px / sampling <= kMaxShifts) {
-      return sampling;
-    }
-  }
-  return entry.stride_px;
+  const bool is_halved = entry.stride_px > 2 && entry.stride_px % 2 == 0;
+  return asked != 0 || entry.native_sampling_only ? asked : entry.stride_px / (is_halved ? 2 : 1);
 }
 
 /// Found from any folder later on.
@@ -165,7 +158,9 @@ Status check_request(const SearchRequest& request) {
                             num_sequences(request) - 1, *request.only_sequence));
   }
   if (request.only_sequence && !request.exhaustive) {
-    return fail("--only-sequence: expected --exhaustive with it (halving needs all), found none");
+    return fail(
+        "--only-sequence: expected --exhaustive with it (halving goes by all sequences), found "
+        "none");
   }
   for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
     if (std::find(request.layers.begin(), layer, *layer) != layer) {

@@ -122,17 +122,10 @@ class FilterDrive {
 
 using Candidates = std::vector<std::size_t>;  // ascending indices
 
-/// Filters [first, last) of a layer on one frame; no channels: the layer refused it.
-struct LayerChannels {
-  int first = 0;
-  int last = 0;
-  std::vector<Channel> channels = {};
-};
-
 /// One frame through all layers of a block.
 struct BlockFrame {
-  cv::Mat frame;  ///< empty: could not be read
-  std::map<std::size_t, LayerChannels> layers;
+  cv::Mat frame;                            ///< empty: could not be read
+  std::map<std::size_t, Channel> channels;  ///< of candidates whose layer took the frame
 };
 
 struct Race {
@@ -359,32 +352,33 @@ struct Race {
       return {};
     }
     BlockFrame read{*frame, {}};
-    for (const std::size_t candidate : running) {
-      const auto& [key, layer, races] = plan.candidates[candidate];
-      const LayerChannels part = {.first = key.filter};
-      read.layers.try_emplace(layer, part).first->second.last = key.filter + 1;
-    }
-    for (auto& [layer, part] : read.layers) {
-      auto channels = plan.layers[layer].stem.apply_range(*frame, part.first, part.last);
-      if (channels) {
-        part.channels = std::move(*channels);
-      } else {
+    const auto filter = [&](std::size_t candidate) {
+      return plan.candidates[candidate].key.filter;
+    };
+    for (auto first = running.begin(), last = first; first != running.end(); first = last) {
+      const std::size_t layer = plan.candidates[*first].layer;
+      last = std::find_if(first, running.end(), [&](std::size_t candidate) {
+        return plan.candidates[candidate].layer != layer;
+      });
+      auto channels =
+          plan.layers[layer].stem.apply_range(*frame, filter(*first), filter(last[-1]) + 1);
+      if (!channels) {
         warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
                          channels.error().message));
+        continue;
+      }
+      for (auto one = first; one != last; ++one) {
+        const auto behind = static_cast<std::size_t>(filter(*one) - filter(*first));
+        read.channels[*one] = std::move((*channels)[behind]);
       }
     }
     return read;
   }
 
   void process(std::size_t candidate, std::size_t sequence, const BlockFrame& read) {
-    const auto& [key, layer, races] = plan.candidates[candidate];
-    const auto found = read.layers.find(layer);
-    const bool is_seen = found != read.layers.end() && !found->second.channels.empty();
+    const auto channel = read.channels.find(candidate);
     drives[candidate][sequence]->process(
-        is_seen
-            ? &found->second.channels.at(static_cast<std::size_t>(key.filter - found->second.first))
-            : nullptr,
-        read.frame);
+        channel == read.channels.end() ? nullptr : &channel->second, read.frame);
   }
 
   void warn(const std::string& text) {

@@ -47,25 +47,22 @@ struct SearchPlan {
 /// Errors: those of run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
-/// Bytes of a filter in flight, by an estimate: its channel of this frame and of the next (floats),
-/// and, once per sequence, its odometry: the image (8 bits) with its pyramid and derivatives, where
-/// the channel is brought to another size a buffer of floats, and the path. 256 filters of 620x188
-/// take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
+/// Of a filter in flight, by an estimate: its channel of this frame and of the next and, once per
+/// sequence, its odometry. 256 filters of 620x188 take 1.7 to 2.1 MB each (1 and 2 threads), by
+/// this 2.0.
 [[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
                                           cv::Size image,
                                           std::size_t num_sequences);
 
-/// Cuts candidates, in the order they are in, into blocks that run in lock-step: those of one pass
-/// of the stem, as far as their layer's max_in_flight allows; if the plan names a block, of so
-/// many.
+/// Candidates, in the order they are in, in blocks that run in lock-step: those of one pass of the
+/// stem, as far as their layer's max_in_flight allows; if the plan names a block, of so many.
 [[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
     const SearchPlan& plan, const std::vector<std::size_t>& candidates);
 
 /// Successive halving (Jamieson and Talwalkar, "Non-stochastic best arm identification and
 /// hyperparameter optimization", AISTATS 2016): rungs at 1/16, 1/8, 1/4, 1/2 and all of the frames.
-/// The number of filters falls as a power of the share, as slowly as a budget of 25 % of the
-/// exhaustive search's filter-frames allows, to 2. Of fewer than 16 filters half go on to 1/4, then
-/// a sixth and a twelfth: about the same budget.
+/// As many filters go on, at least 2, as a budget of 25 % of the exhaustive search's filter-frames
+/// allows; of fewer than 16 half to 1/4, then a sixth and a twelfth: about the same budget.
 [[nodiscard]] Schedule halving_schedule(std::size_t num_filters);
 /// Filter-frames over those of the exhaustive search, where odometries go on from rung to rung.
 [[nodiscard]] double cost_share(const Schedule& schedule);
@@ -73,9 +70,9 @@ struct SearchPlan {
 /// Frames of a sequence that a rung runs up to: at least 2, at most all.
 [[nodiscard]] std::size_t frames_at(const Rung& rung, std::size_t num_frames);
 
-/// Of records of one rung, the order in which they may go on: indices, best first, by their early
-/// errors, near ties by inliers. Of filters with the same numbers (R, G and B of a gray sequence)
-/// one stands there, the others behind all.
+/// The order in which filters go on, by their records of one rung (indices): by the early errors,
+/// near ties by inliers. Of the same numbers (R, G and B of a gray sequence) one stands there, the
+/// others behind all.
 [[nodiscard]] std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records);
 
 /// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
@@ -83,10 +80,9 @@ struct SearchPlan {
 inline constexpr std::size_t kMaxKept = 512;
 
 /// Runs the rungs of a plan but for what is in the file, to which records are appended as a block
-/// ends. Within a block a frame is read once, each layer makes one pass over it, then the filters
-/// work side by side, while the next frame is prepared: what a filter does depends neither on the
-/// number of threads nor on who runs beside it. Returns warnings: frames that cannot be read, or
-/// that a stem refuses. Error: the records cannot be written.
+/// ends. What a filter does depends neither on the number of threads nor on who runs beside it.
+/// Returns warnings: frames that cannot be read, or that a stem refuses. Error: the records cannot
+/// be written.
 [[nodiscard]] Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
                                                           const SearchProgress& progress,
                                                           RecordFile& file,

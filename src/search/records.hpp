@@ -22,8 +22,6 @@
 /// of what is in it are called like their keys.
 namespace stemvo::search {
 
-/// What the layer of gray and input_layer is called in tables.
-inline constexpr const char* kInputLayer = "input";
 inline constexpr const char* kRecordsFile = "records.jsonl";
 
 /// A filter of a layer of a model, and what finds matches on its channel. Ordered as rows are where

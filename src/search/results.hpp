@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "search/records.hpp"
@@ -38,35 +39,18 @@ struct FilterRow : FilterRecord {
 [[nodiscard]] std::string format_csv(const SearchIdentity& identity,
                                      const std::vector<FilterRow>& rows);
 
-/// What is written to a folder, and where named models are found.
-struct Results {
-  std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
-  SearchIdentity identity;
-  Config config = {};  ///< of all rows
-  std::vector<FilterRow> rows = {};
-};
+/// Ranks the records and writes the files of run_search, of which filters.json says what was
+/// searched, how, and the work it took. A sheet that cannot be drawn is a warning. Where records
+/// are missing the search was interrupted. Of a part with one sequence nothing is written.
+[[nodiscard]] Expected<SearchReport> write_results(const std::filesystem::path& out_dir,
+                                                   const std::filesystem::path& models_dir,
+                                                   const SearchIdentity& identity,
+                                                   const FilterRecords& records);
 
-/// Ranks the records and writes config.yaml (of all rows), filters.csv, filters.json (the same, and
-/// what was searched, how, and the work it took), where a filter was ranked best.yaml (what repeats
-/// its row by `stemvo run --config`), and the sheet (a warning where that cannot be drawn). Where
-/// records are missing the search was interrupted. Of a part with one sequence only the work is
-/// reported.
-[[nodiscard]] Expected<SearchReport> write_results(Results results, const FilterRecords& records);
-
-/// A filter of the sheet and what it is there.
-struct ShownFilter {
-  const char* rank;
-  const FilterRow* row;
-};
 /// Best, median and worst of the filters (no baselines) whose pose was detected, those that halving
 /// stopped behind the others, the later the better; the same filter once.
-[[nodiscard]] std::vector<ShownFilter> choose_rows(const SearchIdentity& identity,
-                                                   const std::vector<FilterRow>& rows);
-
-/// sheet.png: the input and the channels of the filters of choose_rows on the middle frame of the
-/// first sequence, above their trajectories (trajectories.png), and where they were stopped.
-/// Nothing where there is none. Error: the sequence or the model is not where it was.
-[[nodiscard]] Status write_contact_sheet(const Results& results);
+using ShownFilters = std::vector<std::pair<const char*, const FilterRow*>>;
+[[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
+                                       const std::vector<FilterRow>& rows);
 
 }  // namespace stemvo::search

@@ -25,16 +25,14 @@ Expected<SearchRecords> read_part(const fs::path& folder) {
     return part;
   }
   const std::size_t num_rows = part->identity.num_rows();
-  const std::string problem =
-      part->num_good_bytes == 0 ? "expected the records of a search, found none"
-      : part->identity.rungs.size() != 1
-          ? "expected a search with --exhaustive, found one that halves: its parts cannot be joined"
-      : part->records.size() != num_rows
-          ? fmt::format("expected {} filters, found {}: finish it with --resume", num_rows,
-                        part->records.size())
-          : "";
-  if (!problem.empty()) {
-    return fail(fmt::format("{}: {}", file, problem));
+  if (part->identity.rungs.size() != 1) {
+    return fail(fmt::format(
+        "{}: expected the records of a search with --exhaustive, found {}", file,
+        part->num_good_bytes == 0 ? "none" : "one that halves: its parts cannot be joined"));
+  }
+  if (part->records.size() != num_rows) {
+    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume", file,
+                            num_rows, part->records.size()));
   }
   return part;
 }
@@ -148,7 +146,7 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
     return warnings.error();
   }
   auto report =
-      write_results({request.out_dir, request.models_dir, plan->identity}, records->records());
+      write_results(request.out_dir, request.models_dir, plan->identity, records->records());
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
   }
@@ -187,7 +185,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   }
   auto file = RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false);
   const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
-  return written ? write_results({out_dir, models_dir, identity}, *records) : written.error();
+  return written ? write_results(out_dir, models_dir, identity, *records) : written.error();
 }
 
 }  // namespace stemvo::search

@@ -52,13 +52,12 @@ struct SearchReport {
 /// Called after each frame of a block: filter-frames done, and in all as far as known; false stops.
 using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 
-/// Ranks the filters. Each has an odometry of its own; one pass of the stem serves all filters of a
-/// layer; filters run in parallel. out_dir receives records.jsonl (appended as blocks of filters
-/// end, what `resume` reads), filters.csv, filters.json, config.yaml, best.yaml and, where the
-/// frames can be read, sheet.png and trajectories.png. The tables do not depend on threads, blocks
-/// or interruptions. Errors, before work starts: unknown model or layer (lists the known ones),
-/// filters outside, no ground truth, a path too short for a segment, out_dir holds another search,
-/// or with `resume` one of another model, sequence or configuration (says what changed).
+/// Ranks the filters, in parallel. out_dir receives records.jsonl (appended as blocks of filters
+/// end, what `resume` reads), filters.csv, filters.json, config.yaml (of all rows), best.yaml (what
+/// repeats the first row) and, where the frames can be read, sheet.png and trajectories.png. Tables
+/// do not depend on threads, blocks or interruptions. Errors, before work starts: unknown model or
+/// layer (lists the known ones), filters outside, no ground truth, a path too short for a segment,
+/// out_dir holds another search, or with `resume` one of other inputs (says what changed).
 [[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
                                                 const SearchProgress& progress = {});
 

@@ -116,9 +116,9 @@ TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
   }
   const auto shown = choose_rows(identity, rows);
   ASSERT_EQ(shown.size(), 3U);
-  EXPECT_EQ(shown[0].row, &rows[1]);
-  EXPECT_EQ(shown[1].row->key.filter, 2);
-  EXPECT_EQ(shown[2].row->key.filter, 4);
+  EXPECT_EQ(shown[0].second, &rows[1]);
+  EXPECT_EQ(shown[1].second->key.filter, 2);
+  EXPECT_EQ(shown[2].second->key.filter, 4);
   rows.clear();
   EXPECT_TRUE(choose_rows(identity, rows).empty());
 }
