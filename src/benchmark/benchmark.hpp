@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "config/config.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
@@ -54,4 +56,17 @@ struct BenchmarkSummary {
 [[nodiscard]] Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
                                                        const BenchmarkCallbacks& callbacks = {});
 
+namespace benchmark {
+
+/// For people: "camera height", "per-step ground-truth scale".
+[[nodiscard]] std::string words_for(const nlohmann::ordered_json& scale_source);
+
+/// "all 4541 frames", "clip 0:200 of 4541", "frames 0:60".
+[[nodiscard]] std::string describe_frames(const nlohmann::ordered_json& sequence);
+
+/// benchmark.json for people: a table over all sequences, then one per sequence with the
+/// zero-motion baseline and, where all official frames ran, the published numbers.
+[[nodiscard]] std::string format_markdown(const nlohmann::ordered_json& report);
+
+}  // namespace benchmark
 }  // namespace stemvo
