@@ -52,17 +52,17 @@ int benchmark(Arguments& arguments) {
   }
   request.configurations = {{"default", Config{}}, {"paper", *paper}};
   std::optional<Progress> progress;
-  const auto start_run = [&](const std::string& run) {
+  request.on_run = [&](const std::string& run) {
     if (!arguments.is_quiet) {
       fmt::print(stderr, "{}\n", run);
     }
     progress.emplace("frames", arguments.is_quiet);
     return !is_interrupted();
   };
-  const Expected<BenchmarkSummary> summary = run_benchmark(
-      request, {.on_run = start_run, .on_frame = [&](std::size_t done, std::size_t total) {
-                  return progress->update(done, total);
-                }});
+  request.on_frame = [&](std::size_t done, std::size_t total) {
+    return progress->update(done, total);
+  };
+  const Expected<BenchmarkSummary> summary = run_benchmark(request);
   if (!summary) {
     print_error(summary.error().message);
     return kExitFailed;

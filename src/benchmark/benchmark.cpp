@@ -29,19 +29,12 @@ constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that i
 constexpr const char* kMetricsFile = "metrics.json";
 constexpr double kLengthTolerance_m = 1.5;
 
+/// Those asked for, where one that is not there is a row, or all.
 Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& request) {
   const fs::path folder = request.kitti_root / "sequences";
   std::vector<std::string> names;
   std::error_code code;
-  if (request.sequences.empty()) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
-      if (entry.is_directory()) {
-        names.push_back(entry.path().filename().string());
-      }
-    }
-    std::sort(names.begin(), names.end());
-  }
-  for (const std::string& name : request.sequences) {  // one that is not there is a row
+  for (const std::string& name : request.sequences) {
     if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
       return fail(fmt::format("{}: expected the names of folders in it, found '{}'",
                               folder.string(), name));
@@ -50,10 +43,19 @@ Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& reques
       names.push_back(name);
     }
   }
+  if (!names.empty()) {
+    return names;
+  }
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
+    if (entry.is_directory()) {
+      names.push_back(entry.path().filename().string());
+    }
+  }
   if (names.empty()) {
     return fail(fmt::format("{}: expected a folder per sequence, found: {}", folder.string(),
                             code ? code.message() : "none"));
   }
+  std::sort(names.begin(), names.end());
   return names;
 }
 
@@ -130,8 +132,7 @@ const std::string& text_of(const Json& json) { return json.get_ref<const std::st
 /// benchmark.json grows while the runs are done; the other files are made of it.
 class Benchmark {
  public:
-  Benchmark(const BenchmarkRequest& request, const BenchmarkCallbacks& callbacks)
-      : request_(request), callbacks_(callbacks) {}
+  explicit Benchmark(const BenchmarkRequest& request) : request_(request) {}
 
   /// A row for the sequence, with all runs to be done. Throws Json::exception where `published` is
   /// not what it should be.
@@ -159,7 +160,7 @@ class Benchmark {
   Expected<BenchmarkSummary> run() {
     for (Json& sequence : report_["sequences"]) {
       for (std::size_t i = 0; i < sequence["runs"].size() && !summary_.interrupted; ++i) {
-        complete(sequence, request_.configurations[i / 2].config, sequence["runs"][i]);
+        complete(sequence, request_.configurations[i / 2].second, sequence["runs"][i]);
       }
       report_["interrupted"] = summary_.interrupted;
       if (const Status written = write_files(sequence); !written) {
@@ -184,9 +185,9 @@ class Benchmark {
 
   [[nodiscard]] Json pending_runs() const {
     Json runs = Json::array();
-    for (const BenchmarkConfiguration& configuration : request_.configurations) {
+    for (const auto& [name, config] : request_.configurations) {
       for (const char* scale_source : kScaleSources) {
-        runs.push_back({{"configuration", configuration.name},
+        runs.push_back({{"configuration", name},
                         {"scale_source", scale_source},
                         {"alignment", "none"},
                         {"state", "pending"},
@@ -254,8 +255,8 @@ class Benchmark {
     }
     if (const std::optional<std::string> reason = reason_to_run(one.out_dir, *inputs)) {
       summary_.interrupted =
-          callbacks_.on_run &&
-          !callbacks_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, *reason));
+          request_.on_run &&
+          !request_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, *reason));
       const Status done = summary_.interrupted ? Status() : run_now(one, *inputs, title);
       if (!done) {
         return done.error();
@@ -268,7 +269,7 @@ class Benchmark {
     std::error_code ignored;
     fs::remove(one.out_dir / kInputsFile, ignored);  // an interrupted run must not pass for done
     one.started = std::chrono::steady_clock::now();
-    const Expected<RunSummary> done = run_sequence(one, callbacks_.on_frame);
+    const Expected<RunSummary> done = run_sequence(one, request_.on_frame);
     if (!done || !done->written) {
       return done ? done->written.error() : done.error();
     }
@@ -306,17 +307,15 @@ class Benchmark {
     for (std::size_t i = 0; i < runs.size(); i += 2) {
       const std::size_t wanted = i == 0 ? 0 : i + 1;
       const Json& run = runs[wanted]["state"] == "done" ? runs[wanted] : runs[wanted ^ 1U];
-      if (run["state"] != "done") {
-        continue;
+      if (run["state"] == "done") {
+        auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
+        if (!poses) {
+          return poses.error();
+        }
+        plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
+        plot.subtitle += (plot.subtitle.empty() ? "" : "   ") + plot.others.back().name + ": " +
+                         benchmark::words_for(run["scale_source"]);
       }
-      auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
-      if (!poses) {
-        return poses.error();
-      }
-      plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
-      plot.subtitle +=
-          fmt::format("{}{}: {}", plot.subtitle.empty() ? "" : "   ", plot.others.back().name,
-                      benchmark::words_for(run["scale_source"]));
     }
     if (plot.others.empty()) {
       return {};
@@ -331,7 +330,6 @@ class Benchmark {
   }
 
   const BenchmarkRequest& request_;
-  const BenchmarkCallbacks& callbacks_;
   Json report_ = {{"stemvo_version", version()}, {"interrupted", false}};
   Json speed_ = Json::array();
   std::size_t num_runs_ = 0;
@@ -341,8 +339,7 @@ class Benchmark {
 
 }  // namespace
 
-Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
-                                         const BenchmarkCallbacks& callbacks) {
+Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   const Expected<std::vector<std::string>> names = find_sequences(request);
   if (!names) {
     return names.error();
@@ -354,7 +351,7 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
   if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
     return made.error();
   }
-  Benchmark benchmark(request, callbacks);
+  Benchmark benchmark(request);
   try {
     const Json json = Json::parse(*published, nullptr, true, /*ignore_comments=*/true);
     for (const std::string& name : *names) {

@@ -109,17 +109,16 @@ std::string explain(const Json& run) {
                      has_metrics(run) ? "" : "; no ground truth");
 }
 
-std::string run_row(const Json& run) {
-  const Json& ate = run["ate_rmse_m"];
-  return row({safe(run["configuration"]), words_for(run["scale_source"]), "none",
-              fmt::format("{}", fmt::join(errors(run, 3), " | ")),
-              ate.is_null() ? "-" : number(ate["sim3"], 2), explain(run)});
-}
-
-std::string published_row(const Json& numbers) {
-  return row({numbers["method"], numbers["scale_source"], numbers["alignment"],
-              fmt::format("{}", fmt::join(errors(numbers, 2), " | ")),
-              number(numbers["ate_rmse_m"], 2), "published: " + std::string(numbers["source"])});
+/// A run's, or a published one's.
+std::string result_row(const Json& result, bool is_published) {
+  const Json& ate = result["ate_rmse_m"];
+  return row(
+      {safe(result[is_published ? "method" : "configuration"]),
+       is_published ? std::string(result["scale_source"]) : words_for(result["scale_source"]),
+       is_published ? std::string(result["alignment"]) : "none",
+       fmt::format("{}", fmt::join(errors(result, is_published ? 2 : 3), " | ")),
+       number(ate.is_object() ? ate["sim3"] : ate, 2),
+       is_published ? "published: " + std::string(result["source"]) : explain(result)});
 }
 
 std::string section(const Json& sequence) {
@@ -138,14 +137,14 @@ std::string section(const Json& sequence) {
   text += fmt::format(".\n\n![the map of {}](<{}.png>)\n\n", name, name);
   text += head_row({"", "scale from", "alignment", "t_rel", "r_rel", "offset", "ATE", ""});
   for (const Json& run : runs) {
-    text += run_row(run);
+    text += result_row(run, false);
   }
   if (any != runs.end()) {
     text +=
         row({"zero motion", "-", "none", "-", "-", number((*any)["null_offset_m"], 2), "-", ""});
   }
   for (const Json& numbers : sequence["published"]) {
-    text += published_row(numbers);
+    text += result_row(numbers, true);
   }
   if (sequence["published"].empty() && !sequence["official_frames"].is_null()) {
     text += "\nPublished numbers are of all official frames, and stand here when those ran.\n";
