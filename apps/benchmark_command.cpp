@@ -92,16 +92,12 @@ CLI::App* add_benchmark(CLI::App& app, Action& action) {
   command->add_option("KITTI_ROOT", request.kitti_root, "Folder that holds sequences and poses")
       ->required()
       ->type_name("");
-  command->add_option("--out", request.out_dir, "Folder for the results; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, request.out_dir);
   command->add_option("--sequences", request.sequences, "Only these, e.g. 00,02; default: all")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NN,..");
-  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(*command, request.num_threads);
   command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
   command->footer(kFooter);
   command->callback(

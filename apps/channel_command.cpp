@@ -65,9 +65,7 @@ CLI::App* add_channel(CLI::App& app, Action& action) {
                    "Sequence in KITTI's layout; with --camera, pictures")
       ->required()
       ->type_name("");
-  command->add_option("--out", arguments->request.out_dir, "Folder for the pictures; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, arguments->request.out_dir, "Folder for the pictures; created");
   add_range_option(*command, "--frames", arguments->request.frames,
                    "Frames A to B-1; default: the first one");
   add_range_option(*command, "--filters", arguments->request.filters,

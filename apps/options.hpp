@@ -37,6 +37,14 @@ struct NamedKeys {
 /// Whole numbers from min to max; leaves the help's line short.
 [[nodiscard]] CLI::Validator in_range(int min, int max);
 
+/// --out DIR, which must be given.
+void add_out_folder(CLI::App& command,
+                    std::filesystem::path& folder,
+                    const std::string& help = "Folder for the results; created");
+
+/// --threads N.
+void add_threads_option(CLI::App& command, int& num_threads);
+
 /// An option "A:B"; text of another form is wrong usage.
 CLI::Option* add_range_option(CLI::App& command,
                               const std::string& name,

@@ -133,9 +133,7 @@ CLI::App* add_run(CLI::App& app, Action& action) {
                    "Sequence in KITTI's layout; with --camera, pictures")
       ->required()
       ->type_name("");
-  command->add_option("--out", request.out_dir, "Folder for the results; created, files replaced")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
   command->add_option("--gt", arguments->ground_truth, "Ground truth: a pose file of KITTI")
@@ -152,9 +150,7 @@ CLI::App* add_run(CLI::App& app, Action& action) {
       ->add_option("--calib", arguments->calibration,
                    "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'")
       ->type_name("FILE");
-  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(*command, request.num_threads);
   command->add_option("--pictures", request.picture_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));

@@ -104,9 +104,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
       .add_option("SEQUENCE_DIR", request.sequence_dirs,
                   "Sequences in KITTI's layout, with ground truth; ranked by the mean")
       ->type_name("");
-  command.add_option("--out", request.out_dir, "Folder for the results; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(command, request.out_dir);
   command
       .add_option("--model", request.model,
                   "Name in models/manifest.yaml or path of an .onnx; default: default")
@@ -144,9 +142,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
           "default is a whole layer, as far as about 1 GB allows")
       ->type_name("N")
       ->check(in_range(1, 100000));
-  command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(command, request.num_threads);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
   add_config_options(command, arguments.config);
   exclude_from_merge(command);

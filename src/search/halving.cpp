@@ -7,7 +7,6 @@
 #include <tuple>
 
 #include "search/race.hpp"
-#include "search/results.hpp"
 
 namespace stemvo::search {
 namespace {

@@ -185,13 +185,13 @@ struct Race {
     std::size_t planned = 0;
     std::size_t num_racing = 0;
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
-      std::size_t last = is_baseline(i) ? rungs.size() - 1 : 0;
-      if (plan.candidates[i].races) {  // so many go on, whoever that will be
-        while (!is_last(last) && num_racing < rungs[last + 1].filters) {
-          ++last;
-        }
-        ++num_racing;
-      }
+      const bool races = plan.candidates[i].races;  // so many reach a rung, whoever that will be
+      const auto reached =
+          std::ranges::count_if(rungs, [&](auto& one) { return one.filters > num_racing; });
+      const std::size_t last = is_baseline(i) ? rungs.size() - 1
+                               : races        ? static_cast<std::size_t>(reached) - 1
+                                              : 0;
+      num_racing += races ? 1 : 0;
       for (const PlanSequence& sequence : plan.sequences) {
         planned += problem(i, sequence).empty() ? frames_to(last, sequence) : 0;
       }

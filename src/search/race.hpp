@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "search/records.hpp"
-#include "search/search.hpp"
 #include "stem/stem.hpp"
 
 namespace stemvo::search {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "search/results.hpp"
-
 #include <algorithm>
 #include <array>
 #include <iterator>
@@ -20,6 +18,7 @@
 #include "report/metrics_keys.hpp"
 #include "report/text_table.hpp"
 #include "report/trajectory_plot.hpp"
+#include "search/records.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 

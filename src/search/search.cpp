@@ -11,7 +11,6 @@
 #include "pipeline/out_folder.hpp"
 #include "pipeline/thread_scope.hpp"
 #include "search/race.hpp"
-#include "search/results.hpp"
 
 namespace stemvo::search {
 namespace {

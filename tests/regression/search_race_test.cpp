@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 
 #include "search/race.hpp"
-#include "search/results.hpp"
 #include "support/search_program.hpp"
 
 namespace stemvo::search {

@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 
 #include "search/race.hpp"
-#include "search/results.hpp"
 
 namespace stemvo::search {
 namespace {
