@@ -88,16 +88,6 @@ int run(Arguments& arguments) {
   return kExitDone;
 }
 
-/// A merge takes everything but --out from the parts.
-void exclude_from_merge(CLI::App& command) {
-  const std::set<std::string> shared = {"--merge", "--help", "--version", "--out", "--quiet"};
-  for (CLI::Option* option : command.get_options()) {
-    if (!shared.contains(option->get_name())) {
-      command.get_option("--merge")->excludes(option);
-    }
-  }
-}
-
 void add_options(CLI::App& command, Arguments& arguments) {
   search::SearchRequest& request = arguments.request;
   command
@@ -145,7 +135,13 @@ void add_options(CLI::App& command, Arguments& arguments) {
   add_threads_option(command, request.num_threads);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
   add_config_options(command, arguments.config);
-  exclude_from_merge(command);
+  // A merge takes everything but --out from the parts.
+  const std::set<std::string> shared = {"--merge", "--help", "--version", "--out", "--quiet"};
+  for (CLI::Option* option : command.get_options()) {
+    if (!shared.contains(option->get_name())) {
+      command.get_option("--merge")->excludes(option);
+    }
+  }
 }
 
 }  // namespace

@@ -107,17 +107,16 @@ std::size_t frames_at(const Rung& rung, std::size_t num_frames) {
 DriveScore mean_score(const std::vector<DriveScore>& drives) {
   DriveScore mean;
   mean.detected = true;
+  const auto count = static_cast<double>(drives.size());
   for (const auto number : kNumbers) {
     mean.*number = 0.0;
+    for (const DriveScore& drive : drives) {
+      const bool is_known = mean.*number && drive.*number;
+      mean.*number =
+          is_known ? std::optional(*(mean.*number) + *(drive.*number) / count) : std::nullopt;
+    }
   }
   for (const DriveScore& drive : drives) {
-    for (const auto number : kNumbers) {
-      if (!(drive.*number)) {
-        (mean.*number).reset();
-      } else if (mean.*number) {
-        *(mean.*number) += *(drive.*number) / static_cast<double>(drives.size());
-      }
-    }
     mean.frames += drive.frames;
     if (mean.detected && !drive.detected) {
       mean.detected = false;

@@ -116,17 +116,16 @@ Status add_layers(const SearchRequest& request, SearchPlan& plan) {
   if (!layers) {
     return layers.error();
   }
-  const FeatureMethod asked = request.config.features.method;
-  for (const auto& [model, method] :
-       {std::pair("gray", FeatureMethod::kOrb), std::pair("input_layer", asked)}) {
+  const std::pair<const char*, FeatureMethod> baselines[] = {
+      {"gray", FeatureMethod::kOrb}, {"input_layer", request.config.features.method}};
+  for (const auto& [model, method] : baselines) {
     const LayerIdentity layer = {.model = model,
                                  .layer = kInputLayer,
                                  .features = std::string(options::to_string(method)),
                                  .stem_model = model,
                                  .baseline = true};
-    const FilterKey key = layer.key(0);
-    if (request.baselines &&
-        std::ranges::none_of(*layers, [&](const auto& one) { return one.is_layer_of(key); })) {
+    const auto is_it = [&](const LayerIdentity& one) { return one.is_layer_of(layer.key(0)); };
+    if (request.baselines && std::ranges::none_of(*layers, is_it)) {
       layers->push_back(layer);
     }
   }
@@ -341,10 +340,7 @@ std::vector<std::vector<std::size_t>> cut_into_blocks(const SearchPlan& plan,
 Expected<SearchPlan> make_plan(const SearchRequest& request) {
   SearchPlan plan;
   plan.block = static_cast<std::size_t>(std::max(0, request.block));
-  Status status = check_request(request);
-  if (status) {
-    status = add_layers(request, plan);
-  }
+  Status status = check_request(request).and_then([&] { return add_layers(request, plan); });
   for (const fs::path& directory : request.sequence_dirs) {
     status = status ? add_sequence(request, directory, false, plan) : status;
   }

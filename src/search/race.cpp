@@ -200,10 +200,7 @@ struct Race {
   }
 
   const FilterRecord* find(std::size_t candidate, std::size_t rung) const {
-    FilterRecord wanted;
-    wanted.rung = rung;
-    wanted.key = plan.candidates[candidate].key;
-    const auto found = file.records().find(wanted);
+    const auto found = file.records().find({rung, plan.candidates[candidate].key, {}, {}});
     return found == file.records().end() ? nullptr : &*found;
   }
 
@@ -265,9 +262,7 @@ struct Race {
   Status run_block(std::size_t rung, const Candidates& block) {
     std::vector<FilterRecord> done;
     for (const std::size_t candidate : block) {
-      FilterRecord& record = done.emplace_back();
-      record.key = plan.candidates[candidate].key;
-      record.rung = rung;
+      done.push_back({rung, plan.candidates[candidate].key, {}, {}});
       drives[candidate].resize(plan.sequences.size());
     }
     for (std::size_t i = 0; i < plan.sequences.size(); ++i) {
@@ -328,7 +323,10 @@ struct Race {
       const auto run_tasks = [&](const cv::Range& tasks) {
         for (int task = tasks.start; task < tasks.end; ++task) {
           if (task > 0) {
-            process(running[static_cast<std::size_t>(task - 1)], sequence, now);
+            const std::size_t candidate = running[static_cast<std::size_t>(task - 1)];
+            const auto found = now.channels.find(candidate);
+            drives[candidate][sequence]->process(
+                found == now.channels.end() ? nullptr : &found->second, now.frame);
           } else if (i + 1 < frames.end) {
             next = read_frame(sequence, i + 1, running);
           }
@@ -352,33 +350,26 @@ struct Race {
       return {};
     }
     BlockFrame read{*frame, {}};
-    const auto filter = [&](std::size_t candidate) {
-      return plan.candidates[candidate].key.filter;
-    };
-    for (auto first = running.begin(), last = first; first != running.end(); first = last) {
-      const std::size_t layer = plan.candidates[*first].layer;
-      last = std::find_if(first, running.end(), [&](std::size_t candidate) {
-        return plan.candidates[candidate].layer != layer;
-      });
-      auto channels =
-          plan.layers[layer].stem.apply_range(*frame, filter(*first), filter(last[-1]) + 1);
+    const auto layer_of = [this](std::size_t one) { return plan.candidates[one].layer; };
+    for (std::size_t layer = 0; layer < plan.layers.size(); ++layer) {
+      const auto group = std::ranges::equal_range(running, layer, {}, layer_of);
+      if (group.empty()) {
+        continue;
+      }
+      const int first = plan.candidates[group.front()].key.filter;
+      const int last = plan.candidates[group.back()].key.filter;
+      auto channels = plan.layers[layer].stem.apply_range(*frame, first, last + 1);
       if (!channels) {
         warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
                          channels.error().message));
         continue;
       }
-      for (auto one = first; one != last; ++one) {
-        const auto behind = static_cast<std::size_t>(filter(*one) - filter(*first));
-        read.channels[*one] = std::move((*channels)[behind]);
+      for (const std::size_t one : group) {
+        const int behind = plan.candidates[one].key.filter - first;
+        read.channels[one] = std::move((*channels)[static_cast<std::size_t>(behind)]);
       }
     }
     return read;
-  }
-
-  void process(std::size_t candidate, std::size_t sequence, const BlockFrame& read) {
-    const auto channel = read.channels.find(candidate);
-    drives[candidate][sequence]->process(
-        channel == read.channels.end() ? nullptr : &channel->second, read.frame);
   }
 
   void warn(const std::string& text) {

@@ -172,15 +172,13 @@ const LayerIdentity& SearchIdentity::layer_of(const FilterKey& key) const {
   return *layer;
 }
 
-std::string describe_change(const SearchIdentity& before,
-                            const SearchIdentity& now,
-                            bool as_parts) {
+std::string SearchIdentity::change_to(const SearchIdentity& now, bool as_parts) const {
   std::vector<std::string> changed;
-  if (before.configuration != now.configuration) {
-    changed.push_back(fmt::format("the configuration ({})",
-                                  first_difference(before.configuration, now.configuration)));
+  if (configuration != now.configuration) {
+    changed.push_back(
+        fmt::format("the configuration ({})", first_difference(configuration, now.configuration)));
   }
-  const std::vector<Fact> old_facts = facts_of(before, as_parts);
+  const std::vector<Fact> old_facts = facts_of(*this, as_parts);
   for (const Fact& fact : facts_of(now, as_parts)) {
     const auto old = std::ranges::find(old_facts, fact.name, &Fact::name);
     if (old == old_facts.end()) {
@@ -216,18 +214,17 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
 Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
                                       const SearchIdentity& identity,
                                       bool resume) {
+  std::FILE* stream = std::fopen(file.c_str(), resume ? "ae" : "axe");
+  if (stream == nullptr) {
+    const bool is_there = errno == EEXIST;
+    return fail(fmt::format("{}: expected a {}, found: {}", file.string(),
+                            is_there ? "folder without a search" : "file that can be written",
+                            is_there ? "one; --resume goes on with it" : std::strerror(errno)));
+  }
   RecordFile opened;
   opened.file_ = file;
-  opened.stream_.reset(std::fopen(file.c_str(), resume ? "ae" : "axe"), [](std::FILE* stream) {
-    return stream == nullptr ? 0 : std::fclose(stream);
-  });
-  if (opened.stream_ == nullptr) {
-    return fail(fmt::format("{}: {}", file.string(),
-                            errno == EEXIST ? "expected a folder without a search, found one: a "
-                                              "search with --resume goes on with it"
-                                            : std::strerror(errno)));
-  }
-  if (::flock(::fileno(opened.stream_.get()), LOCK_EX | LOCK_NB) != 0) {  // as long as it is open
+  opened.stream_.reset(stream, &std::fclose);
+  if (::flock(::fileno(stream), LOCK_EX | LOCK_NB) != 0) {  // as long as it is open
     return fail(fmt::format("{}: another search is writing it", file.string()));
   }
   auto before = read_records(file);
@@ -235,14 +232,13 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
     return before.error();
   }
   const bool is_new = before->num_good_bytes == 0;  // or killed before its first line was written
-  const std::string change = is_new ? "" : describe_change(before->identity, identity, false);
+  const std::string change = is_new ? "" : before->identity.change_to(identity, false);
   if (!change.empty()) {
     return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
                             file.string(), change));
   }
   opened.records_ = std::move(before->records);
-  if (::ftruncate(::fileno(opened.stream_.get()), static_cast<off_t>(before->num_good_bytes)) !=
-      0) {
+  if (::ftruncate(::fileno(stream), static_cast<off_t>(before->num_good_bytes)) != 0) {
     return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
   }
   const Status written = opened.write(is_new ? line_of(identity) : std::string());

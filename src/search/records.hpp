@@ -127,17 +127,14 @@ struct SearchIdentity {
   [[nodiscard]] std::size_t num_rows() const { return count(false) + count(true); }
   /// The layer a row belongs to (checked).
   [[nodiscard]] const LayerIdentity& layer_of(const FilterKey& key) const;
+  /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty
+  /// where nothing did. With `as_parts` other layers, models and filters are no change, nor are
+  /// frames that a part did not run.
+  [[nodiscard]] std::string change_to(const SearchIdentity& now, bool as_parts) const;
 };
 
 /// The configuration of a filter's odometry, from that of all.
 [[nodiscard]] Config config_of(Config common, const LayerIdentity& layer, int filter);
-
-/// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty where
-/// nothing did. With `as_parts` other layers, models and filters are no change, nor are frames that
-/// a part did not run.
-[[nodiscard]] std::string describe_change(const SearchIdentity& before,
-                                          const SearchIdentity& now,
-                                          bool as_parts);
 
 struct SearchRecords {
   SearchIdentity identity;
@@ -168,12 +165,9 @@ class RecordFile {
   FilterRecords records_;
 };
 
-/// What became of a filter.
-enum class FilterStatus {
-  kRanked,       ///< ran over all frames, has a t_rel
-  kStopped,      ///< halving: others were better on the frames it ran
-  kNotDetected,  ///< the paper's "pose not detected"
-};
+/// Ran over all frames, so that it has a t_rel; was stopped by halving, others being better on the
+/// frames it ran; the paper's "pose not detected".
+enum class FilterStatus { kRanked, kStopped, kNotDetected };
 
 /// A filter's record of the last rung it ran.
 struct FilterRow : FilterRecord {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <iomanip>
 #include <iterator>
 #include <set>
 #include <span>
+#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -59,9 +61,8 @@ constexpr std::array<ScoreNumber, 7> kScoreNumbers = {{
 constexpr const char* kStatusWords[] = {"ranked", "stopped", "not detected"};
 std::string word_for(FilterStatus status) { return kStatusWords[static_cast<int>(status)]; }
 
-/// What a search costs: frames times filters, and what was run again after a kill. As in
-/// filters.json: of the filters, on the sequences that rank; of all, on the held-out one; of the
-/// baselines, which always run to the end; of all filters that can run, on all frames.
+/// Frames times filters, and what was run again after a kill: of the filters, of all on the
+/// held-out sequence, of the baselines, and of an exhaustive search of all filters that can run.
 Json work_of(const SearchIdentity& identity, const FilterRecords& records) {
   std::size_t done = 0;
   std::size_t held_out = 0;
@@ -128,14 +129,9 @@ std::string format_table(const std::vector<FilterRow>& rows) {
 
 /// RFC 4180: quoted where it must be.
 std::string csv_cell(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted.append(c == '"' ? 2 : 1, c);
-  }
-  return quoted + '"';
+  std::ostringstream quoted;
+  quoted << std::quoted(text, '"', '"');
+  return text.find_first_of(",\"\n\r") == std::string::npos ? text : quoted.str();
 }
 
 /// A column's name, and what the row has there.
@@ -374,10 +370,10 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
     return report;
   }
   const fs::path config_file = out_dir / "config.yaml";
-  if (const Status status = write_text_file(config_file, identity.configuration); !status) {
-    return status.error();
-  }
-  const Expected<Config> config = load_config(config_file);
+  const Expected<Config> config =
+      write_text_file(config_file, identity.configuration).and_then([&] {
+        return load_config(config_file);
+      });
   if (!config) {
     return config.error();
   }

@@ -42,7 +42,7 @@ Status add_identity(const SearchIdentity& part, SearchIdentity& joined) {
     joined = part;
     return {};
   }
-  if (const std::string change = describe_change(joined, part, true); !change.empty()) {
+  if (const std::string change = joined.change_to(part, true); !change.empty()) {
     return fail(change);
   }
   joined.layers.insert(joined.layers.end(), part.layers.begin(), part.layers.end());
@@ -59,19 +59,15 @@ using Scores = std::map<FilterKey, std::map<std::pair<bool, std::string>, DriveS
 
 /// What two parts hold is no trouble where they agree; else an error.
 Status add_record(const FilterRecord& record, Scores& scores) {
-  auto& known = scores[record.key];
-  Scores::mapped_type found;
-  for (const DriveScore& drive : record.drives) {
-    found[{false, drive.sequence}] = drive;
-  }
+  std::vector<DriveScore> found = record.drives;
   if (record.held_out) {
-    found[{true, record.held_out->sequence}] = *record.held_out;
+    found.push_back(*record.held_out);
   }
-  known.insert(found.begin(), found.end());
-  for (const auto& [sequence, score] : found) {
-    if (known[sequence] != score) {
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::pair where(i == record.drives.size(), found[i].sequence);
+    if (scores[record.key].try_emplace(where, found[i]).first->second != found[i]) {
       return fail(fmt::format("expected the result of another part for {} on {}, found another one",
-                              to_string(record.key), score.sequence));
+                              to_string(record.key), found[i].sequence));
     }
   }
   return {};
@@ -82,8 +78,7 @@ Status add_record(const FilterRecord& record, Scores& scores) {
 Expected<FilterRecords> join_records(const SearchIdentity& identity, const Scores& scores) {
   FilterRecords records;
   for (const auto& [key, found] : scores) {
-    FilterRecord record;
-    record.key = key;
+    FilterRecord record = {0, key, {}, {}};
     for (const SequenceIdentity& sequence : identity.sequences) {
       const auto score = found.find({sequence.held_out, sequence.name});
       if (score == found.end()) {
@@ -133,10 +128,9 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!plan) {
     return plan.error();
   }
-  if (const Status status = pipeline::create_out_folder(request.out_dir); !status) {
-    return status.error();
-  }
-  auto records = RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
+  auto records = pipeline::create_out_folder(request.out_dir).and_then([&] {
+    return RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
+  });
   if (!records) {
     return records.error();
   }
@@ -179,10 +173,8 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
-  if (const Status status = pipeline::create_out_folder(out_dir); !status) {
-    return status.error();
-  }
-  auto file = RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false);
+  auto file = pipeline::create_out_folder(out_dir).and_then(
+      [&] { return RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false); });
   const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
   return written ? write_results(out_dir, models_dir, identity, *records) : written.error();
 }

@@ -14,9 +14,8 @@
 
 namespace stemvo::search {
 
-/// The configuration a search starts from: the same odometry as a run's, made cheap (pairs of
-/// frames on images of the channel's own size, fewer points), steps of the true length. Ranks
-/// filters as the defaults of a run do (docs/search.md).
+/// The configuration a search starts from: a run's odometry made cheap (pairs of frames, fewer
+/// points), steps of the true length. Ranks filters as the defaults of a run do (docs/search.md).
 [[nodiscard]] Config search_defaults();
 
 /// Everything `stemvo search` was asked for.

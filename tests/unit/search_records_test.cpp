@@ -87,7 +87,7 @@ TEST_F(Records, ComeBackToTheBit) {
   EXPECT_EQ((*content->records.rbegin()).key, record(1).key);
   EXPECT_EQ((*content->records.rbegin()).drives, record(1, 1e-17).drives);
   EXPECT_EQ(*content->records.begin()->drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
-  EXPECT_EQ(describe_change(content->identity, identity(0, 2), false), "");
+  EXPECT_EQ(content->identity.change_to(identity(0, 2), false), "");
   EXPECT_EQ(content->num_good_bytes, std::filesystem::file_size(file("a")));
 }
 
@@ -126,18 +126,17 @@ TEST_F(Records, ChangesAreNamed) {
   SearchIdentity now = before;
   now.configuration = "seed: 1\nfeatures:\n  # levels\n  klt_levels: 4\n";
   now.sequences[0].frames = "other";
-  EXPECT_EQ(describe_change(before, now, true),
+  EXPECT_EQ(before.change_to(now, true),
             "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed");
   now = before;
   now.layers[0].hash = "other";
-  EXPECT_EQ(describe_change(before, now, true), "the model net stem changed");
+  EXPECT_EQ(before.change_to(now, true), "the model net stem changed");
   now = before;
   now.layers[0].sampling_px = 4;
-  EXPECT_THAT(describe_change(before, now, true),
-              HasSubstr("the sampling of net stem (2 px, now 4 px)"));
+  EXPECT_THAT(before.change_to(now, true), HasSubstr("the sampling of net stem (2 px, now 4 px)"));
   now = identity(0, 4);
-  EXPECT_THAT(describe_change(before, now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
-  EXPECT_EQ(describe_change(before, now, true), "");
+  EXPECT_THAT(before.change_to(now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
+  EXPECT_EQ(before.change_to(now, true), "");
 }
 
 TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
