@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <functional>
 #include <memory>
 #include <set>
 #include <string>
@@ -59,9 +60,7 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   }
   request.config = *config;
   Progress progress("filter-frames", arguments.is_quiet);
-  return search::run_search(request, [&progress](std::size_t done, std::size_t total) {
-    return progress.update(done, total);
-  });
+  return search::run_search(request, std::bind_front(&Progress::update, &progress));
 }
 
 int run(Arguments& arguments) {

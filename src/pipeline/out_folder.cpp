@@ -35,7 +35,7 @@ Status create_out_folder(const std::filesystem::path& folder) {
   return {};
 }
 
-Status remove_old_pictures(const std::filesystem::path& folder) {
+Status remove_old_frames(const std::filesystem::path& folder, const std::string& extension) {
   std::error_code code;
   std::vector<std::filesystem::path> old;
   std::filesystem::directory_iterator entry(folder, code);
@@ -43,13 +43,13 @@ Status remove_old_pictures(const std::filesystem::path& folder) {
     const std::string stem = entry->path().stem().string();
     const bool is_number = stem.size() == 6 && stem.find_first_not_of("0123456789") == stem.npos;
     std::error_code ignored;
-    if (is_number && entry->path().extension() == ".png" && entry->is_regular_file(ignored)) {
+    if (is_number && entry->path().extension() == extension && entry->is_regular_file(ignored)) {
       old.push_back(entry->path());
     }
   }
   for (const std::filesystem::path& file : old) {
     if (!code && !std::filesystem::remove(file, code) && code) {
-      return fail(fmt::format("{}: an earlier run's picture cannot be removed ({})", file.string(),
+      return fail(fmt::format("{}: an earlier run's frame cannot be removed ({})", file.string(),
                               code.message()));
     }
   }

@@ -210,7 +210,7 @@ Status prepare_out_folder(const RunRequest& request) {
   }
   const std::filesystem::path pictures = request.out_dir / "pictures";
   const Status status = pipeline::create_out_folder(pictures);
-  return status ? pipeline::remove_old_pictures(pictures) : status;
+  return status ? pipeline::remove_old_frames(pictures, ".png") : status;
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,

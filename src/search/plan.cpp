@@ -201,8 +201,8 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
   }
   if (!sequence->ground_truth()) {
     const fs::path file = directory / "../../poses" / (sequence->name() + ".txt");
-    return fail(fmt::format("{}: expected a pose file, by which filters are ranked, found none",
-                            file.lexically_normal().string()));
+    return fail(file.lexically_normal().string() +
+                ": expected a pose file, by which filters are ranked, found none");
   }
   const Trajectory& truth = *sequence->ground_truth();
   const Metrics metrics = evaluate(truth, truth, request.config.evaluation);

@@ -226,16 +226,14 @@ struct Race {
   /// Keeps the best odometries of those that ran this rung, beside those that are still to run it.
   void limit_kept(std::size_t rung) {
     Candidates done;
-    std::size_t num_waiting = 0;
+    Candidates waiting;
     for (std::size_t i = 0; i < drives.size(); ++i) {
-      if (!drives[i].empty() && find(i, rung) != nullptr) {
-        done.push_back(i);
-      } else {
-        num_waiting += drives[i].empty() ? 0 : 1;
+      if (!drives[i].empty()) {
+        (find(i, rung) != nullptr ? done : waiting).push_back(i);
       }
     }
-    if (done.size() + num_waiting > max_kept) {
-      best_of(done, rung, max_kept - std::min(max_kept, num_waiting));
+    if (done.size() + waiting.size() > max_kept) {
+      best_of(done, rung, max_kept - std::min(max_kept, waiting.size()));
     }
   }
 

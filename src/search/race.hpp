@@ -46,9 +46,8 @@ struct SearchPlan {
 /// Errors: those of run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
-/// Of a filter in flight, by an estimate: its channel of this frame and of the next and, once per
-/// sequence, its odometry. 256 filters of 620x188 take 1.7 to 2.1 MB each (1 and 2 threads), by
-/// this 2.0.
+/// Of a filter in flight, by an estimate: its channel of two frames and, per sequence, its
+/// odometry. 256 filters of 620x188 take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
 [[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
                                           cv::Size image,
                                           std::size_t num_sequences);
@@ -74,14 +73,12 @@ struct SearchPlan {
 /// others behind all.
 [[nodiscard]] std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records);
 
-/// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
-/// go on, they start again, which counts.
+/// The best odometries, some 2 MB each, are kept from rung to rung; others start again.
 inline constexpr std::size_t kMaxKept = 512;
 
-/// Runs the rungs of a plan but for what is in the file, to which records are appended as a block
-/// ends. What a filter does depends neither on the number of threads nor on who runs beside it.
-/// Returns warnings: frames that cannot be read, or that a stem refuses. Error: the records cannot
-/// be written.
+/// Runs the rungs of a plan but for what is in the file, which grows as blocks end. What a filter
+/// does depends neither on threads nor on who runs beside it. Returns warnings: frames that cannot
+/// be read, or that a stem refuses. Error: the records cannot be written.
 [[nodiscard]] Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
                                                           const SearchProgress& progress,
                                                           RecordFile& file,

@@ -112,7 +112,7 @@ std::vector<Fact> facts_of(const SearchIdentity& identity, bool as_part) {
   return facts;
 }
 
-/// One line; bytes of a file name that are not UTF-8 become the replacement character.
+/// Bytes of a file name that are not UTF-8 become the replacement character.
 std::string line_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }

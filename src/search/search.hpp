@@ -32,13 +32,12 @@ struct SearchRequest {
   bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B
   Config config = search_defaults();         ///< stem.model, .layer and .filter are not used
   bool exhaustive = false;                   ///< every filter over every frame; else halving
-  /// Runs one sequence only, a part for merge_searches: index in sequence_dirs, the held-out one is
-  /// behind them. Needs `exhaustive`; writes records.jsonl and no tables.
+  /// Index in sequence_dirs, the held-out one behind them: runs it alone, as a part for
+  /// merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
   std::optional<std::size_t> only_sequence;
   bool resume = false;  ///< go on from what out_dir holds
   int num_threads = 0;  ///< 0: all cores
-  /// Filters in flight, which is what a kill may lose; 0: those of a whole layer, so that one pass
-  /// of the stem serves them all, as far as some 1 GB of channels and odometries allows.
+  /// Filters in flight, which a kill may lose; 0: a layer's, as far as 1 GB of odometries allows.
   int block = 0;
 };
 
