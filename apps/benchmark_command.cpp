@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -67,12 +68,8 @@ int benchmark(Arguments& arguments) {
     print_error(summary.error().message);
     return kExitFailed;
   }
-  for (const std::string& failure : summary->failures) {
-    print_error(failure);
-  }
-  for (const std::string& warning : summary->warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(summary->failures, print_error);
+  std::ranges::for_each(summary->warnings, print_warning);
   if (summary->interrupted) {
     print_warning("interrupted; what is done is kept, the same command goes on from there");
     return kExitInterrupted;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <set>
@@ -74,9 +75,7 @@ int run(Arguments& arguments) {
     print_error(report.error().message);
     return kExitFailed;
   }
-  for (const std::string& warning : report->warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(report->warnings, print_warning);
   if (!arguments.is_quiet) {
     print(report->text);
   }

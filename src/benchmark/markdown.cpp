@@ -98,15 +98,11 @@ std::string overview(const Json& report) {
 }
 
 std::string explain(const Json& run) {
-  if (!run["problem"].is_null()) {
-    return safe(run["problem"]);
-  }
-  if (run["state"] == "pending") {
-    return "not run yet";
-  }
-  return fmt::format("{:.1f} % of the frames measured{}",
-                     100.0 * run["tracked_fraction"].get<double>(),
-                     has_metrics(run) ? "" : "; no ground truth");
+  return !run["problem"].is_null()   ? safe(run["problem"])
+         : run["state"] == "pending" ? "not run yet"
+                                     : fmt::format("{:.1f} % of the frames measured{}",
+                                                   100.0 * run["tracked_fraction"].get<double>(),
+                                                   has_metrics(run) ? "" : "; no ground truth");
 }
 
 /// A run's, or a published one's.
