@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -52,27 +53,23 @@ int benchmark(Arguments& arguments) {
   }
   request.configurations = {{"default", Config{}}, {"paper", *paper}};
   std::optional<Progress> progress;
-  const auto start_run = [&](const std::string& run) {
+  request.on_run = [&](const std::string& run) {
     if (!arguments.is_quiet) {
       fmt::print(stderr, "{}\n", run);
     }
     progress.emplace("frames", arguments.is_quiet);
     return !is_interrupted();
   };
-  const Expected<BenchmarkSummary> summary = run_benchmark(
-      request, {.on_run = start_run, .on_frame = [&](std::size_t done, std::size_t total) {
-                  return progress->update(done, total);
-                }});
+  request.on_frame = [&](std::size_t done, std::size_t total) {
+    return progress->update(done, total);
+  };
+  const Expected<BenchmarkSummary> summary = run_benchmark(request);
   if (!summary) {
     print_error(summary.error().message);
     return kExitFailed;
   }
-  for (const std::string& failure : summary->failures) {
-    print_error(failure);
-  }
-  for (const std::string& warning : summary->warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(summary->failures, print_error);
+  std::ranges::for_each(summary->warnings, print_warning);
   if (summary->interrupted) {
     print_warning("interrupted; what is done is kept, the same command goes on from there");
     return kExitInterrupted;
@@ -92,16 +89,12 @@ CLI::App* add_benchmark(CLI::App& app, Action& action) {
   command->add_option("KITTI_ROOT", request.kitti_root, "Folder that holds sequences and poses")
       ->required()
       ->type_name("");
-  command->add_option("--out", request.out_dir, "Folder for the results; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(*command, request.out_dir);
   command->add_option("--sequences", request.sequences, "Only these, e.g. 00,02; default: all")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NN,..");
-  command->add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(*command, request.num_threads);
   command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
   command->footer(kFooter);
   command->callback(

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <functional>
 #include <memory>
+#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -10,7 +11,6 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "install_paths.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "search/search.hpp"
@@ -34,83 +34,50 @@ Examples:
   stemvo search --merge part0 part1 --out result                              parts to one table)";
 
 struct Arguments {
-  SearchRequest request;
+  search::SearchRequest request;
   ConfigArguments config;
   std::vector<std::filesystem::path> merge;
   bool is_quiet = false;
 };
 
-/// Keys of the configuration that are options of their own here.
-Status check_overrides(const ConfigArguments& config) {
-  for (const auto& [key, option] :
-       {std::pair("stem.model", "--model"), std::pair("stem.layer", "--layers"),
-        std::pair("stem.filter", "--filters")}) {
-    for (const std::string& assignment : config.overrides) {
-      if (assignment.substr(0, assignment.find('=')) == key) {
-        return Error{fmt::format("--set {}: expected {}, which says what a search runs, found '{}'",
-                                 key, option, assignment)};
-      }
-    }
-  }
-  return {};
-}
-
-Expected<SearchReport> search(Arguments& arguments) {
-  SearchRequest& request = arguments.request;
+Expected<search::SearchReport> find_filters(Arguments& arguments) {
+  search::SearchRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   if (!arguments.merge.empty()) {
-    return merge_searches(arguments.merge, request.out_dir, request.models_dir);
+    return search::merge_searches(arguments.merge, request.out_dir, request.models_dir);
   }
-  if (const Status overrides = check_overrides(arguments.config); !overrides) {
-    return overrides.error();
-  }
-  const Expected<Config> config = read_config(arguments.config, search_defaults());
+  const Expected<Config> config = read_config(arguments.config, search::search_defaults());
   if (!config) {
     return config.error();
   }
+  for (const std::string& assignment : arguments.config.overrides) {
+    const std::string key = assignment.substr(0, assignment.find('='));
+    if (key == "stem.model" || key == "stem.layer" || key == "stem.filter") {
+      return fail(
+          fmt::format("--set {}: expected --model, --layers or --filters, which say what a "
+                      "search runs, found '{}'",
+                      key, assignment));
+    }
+  }
   request.config = *config;
   Progress progress("filter-frames", arguments.is_quiet);
-  return run_search(request, [&progress](std::size_t done, std::size_t total) {
-    return progress.update(done, total) && !is_interrupted();
-  });
-}
-
-void print_summary(const SearchReport& report, const std::filesystem::path& out_dir) {
-  if (report.is_part) {
-    print(fmt::format(
-        "part: {} filters on one sequence; 'stemvo search --merge' joins it with the others\n",
-        report.num_filters));
-    return;
-  }
-  const SearchWork& work = report.work;
-  const double share = static_cast<double>(work.filter_frames) /
-                       static_cast<double>(std::max<std::size_t>(work.exhaustive_filter_frames, 1));
-  print(fmt::format(
-      "{}work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
-      format_search_table(report), work.filter_frames, 100.0 * share, work.baseline_filter_frames,
-      (out_dir / "filters.csv").string()));
+  return search::run_search(request, std::bind_front(&Progress::update, &progress));
 }
 
 int run(Arguments& arguments) {
-  const bool is_merge = !arguments.merge.empty();
-  if (is_merge != arguments.request.sequence_dirs.empty()) {
+  const search::SearchRequest& request = arguments.request;
+  if (arguments.merge.empty() == request.sequence_dirs.empty()) {
     print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
     return kExitUsage;
   }
-  if (!arguments.request.held_out_dir && arguments.request.held_out_frames) {
-    print_error("expected --held-out with --held-out-frames (see 'stemvo search --help')");
-    return kExitUsage;
-  }
-  const Expected<SearchReport> report = search(arguments);
+  const Expected<search::SearchReport> report = find_filters(arguments);
   if (!report) {
     print_error(report.error().message);
     return kExitFailed;
   }
-  for (const std::string& warning : report->warnings) {
-    print_warning(warning);
-  }
+  std::ranges::for_each(report->warnings, print_warning);
   if (!arguments.is_quiet) {
-    print_summary(*report, arguments.request.out_dir);
+    print(report->text);
   }
   if (report->interrupted) {
     print_warning("interrupted; what is done is kept, --resume goes on from there");
@@ -119,27 +86,13 @@ int run(Arguments& arguments) {
   return kExitDone;
 }
 
-/// A merge takes everything but --out from the parts.
-void exclude_from_merge(CLI::App& command) {
-  CLI::Option* merge = command.get_option("--merge");
-  for (CLI::Option* option : command.get_options()) {
-    const std::string name = option->get_name();
-    if (option != merge && name != "--help" && name != "--version" && name != "--out" &&
-        name != "--quiet") {
-      merge->excludes(option);
-    }
-  }
-}
-
 void add_options(CLI::App& command, Arguments& arguments) {
-  SearchRequest& request = arguments.request;
+  search::SearchRequest& request = arguments.request;
   command
       .add_option("SEQUENCE_DIR", request.sequence_dirs,
                   "Sequences in KITTI's layout, with ground truth; ranked by the mean")
       ->type_name("");
-  command.add_option("--out", request.out_dir, "Folder for the results; created")
-      ->required()
-      ->type_name("DIR");
+  add_out_folder(command, request.out_dir);
   command
       .add_option("--model", request.model,
                   "Name in models/manifest.yaml or path of an .onnx; default: default")
@@ -155,7 +108,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
       .add_option("--held-out", request.held_out_dir, "A sequence that is reported, not ranked by")
       ->type_name("DIR");
   add_range_option(command, "--held-out-frames", request.held_out_frames,
-                   "Frames A to B-1 of the held-out sequence");
+                   "Frames A to B-1 of the held-out sequence")
+      ->needs("--held-out");
   command.add_flag("--exhaustive", request.exhaustive, "Every filter over every frame");
   command
       .add_option("--only-sequence", request.only_sequence,
@@ -176,12 +130,16 @@ void add_options(CLI::App& command, Arguments& arguments) {
           "default is a whole layer, as far as about 1 GB allows")
       ->type_name("N")
       ->check(in_range(1, 100000));
-  command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
+  add_threads_option(command, request.num_threads);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
   add_config_options(command, arguments.config);
-  exclude_from_merge(command);
+  // A merge takes everything but --out from the parts.
+  const std::set<std::string> shared = {"--merge", "--help", "--version", "--out", "--quiet"};
+  for (CLI::Option* option : command.get_options()) {
+    if (!shared.contains(option->get_name())) {
+      command.get_option("--merge")->excludes(option);
+    }
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -33,10 +34,8 @@ struct Arguments {
 
 int render(const Arguments& arguments) {
   Progress progress("frames", /*is_quiet=*/false);
-  const Status status = render_synthetic_drive(
-      arguments.out_dir, arguments.options, [&progress](int done, int total) {
-        return progress.update(static_cast<std::size_t>(done), static_cast<std::size_t>(total));
-      });
+  const Status status = render_synthetic_drive(arguments.out_dir, arguments.options,
+                                               std::bind_front(&Progress::update, &progress));
   if (is_interrupted()) {
     return kExitInterrupted;
   }

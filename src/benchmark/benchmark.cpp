@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "benchmark/markdown.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/metrics_keys.hpp"
@@ -27,21 +26,15 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
 constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
+constexpr const char* kMetricsFile = "metrics.json";
 constexpr double kLengthTolerance_m = 1.5;
 
+/// Those asked for, where one that is not there is a row, or all.
 Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& request) {
   const fs::path folder = request.kitti_root / "sequences";
   std::vector<std::string> names;
   std::error_code code;
-  if (request.sequences.empty()) {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
-      if (entry.is_directory()) {
-        names.push_back(entry.path().filename().string());
-      }
-    }
-    std::sort(names.begin(), names.end());
-  }
-  for (const std::string& name : request.sequences) {  // one that is not there is a row
+  for (const std::string& name : request.sequences) {
     if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos) {
       return fail(fmt::format("{}: expected the names of folders in it, found '{}'",
                               folder.string(), name));
@@ -50,10 +43,19 @@ Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& reques
       names.push_back(name);
     }
   }
+  if (!names.empty()) {
+    return names;
+  }
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, code)) {
+    if (entry.is_directory()) {
+      names.push_back(entry.path().filename().string());
+    }
+  }
   if (names.empty()) {
     return fail(fmt::format("{}: expected a folder per sequence, found: {}", folder.string(),
                             code ? code.message() : "none"));
   }
+  std::sort(names.begin(), names.end());
   return names;
 }
 
@@ -104,13 +106,12 @@ Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence)
               {"ground_truth", files->ground_truth}};
 }
 
-/// The result of an earlier call where nothing changed; else says in `note` what did.
-std::optional<MetricsReport> kept_result(const fs::path& folder,
-                                         const Json& inputs,
-                                         std::string& note) {
+/// Why the run of this folder is to be done (again), for its title; nothing where its result
+/// counts.
+std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inputs) {
   const Expected<std::string> text = read_text_file(folder / kInputsFile);
   if (!text) {
-    return std::nullopt;  // never completed
+    return "";  // never completed
   }
   const Json before = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
   std::vector<std::string> changed;
@@ -120,25 +121,18 @@ std::optional<MetricsReport> kept_result(const fs::path& folder,
     }
   }
   if (!changed.empty()) {
-    note = fmt::format(" (again: {} changed)", fmt::join(changed, ", "));
-    return std::nullopt;
+    return fmt::format(" (again: {} changed)", fmt::join(changed, ", "));
   }
-  const Expected<MetricsReport> report = read_metrics_json(folder / "metrics.json");
-  if (!report) {
-    note = fmt::format(" (again: {})", report.error().message);
-    return std::nullopt;
-  }
-  return *report;
+  const Expected<MetricsReport> report = read_metrics_json(folder / kMetricsFile);
+  return report ? std::nullopt : std::optional(fmt::format(" (again: {})", report.error().message));
 }
+
+const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
 
 /// benchmark.json grows while the runs are done; the other files are made of it.
 class Benchmark {
  public:
-  Benchmark(const BenchmarkRequest& request, const BenchmarkCallbacks& callbacks)
-      : request_(request), callbacks_(callbacks) {
-    report_["stemvo_version"] = version();
-    report_["interrupted"] = false;
-  }
+  explicit Benchmark(const BenchmarkRequest& request) : request_(request) {}
 
   /// A row for the sequence, with all runs to be done. Throws Json::exception where `published` is
   /// not what it should be.
@@ -147,30 +141,29 @@ class Benchmark {
     const Json official = published.at("sequences").value(name, Json::object());
     const Json publications = published_rows(published.at("published"), name);
     const bool is_complete = opened && !official.empty() && is_official(official, *opened);
-    Json& sequence = report_["sequences"].emplace_back();
-    sequence["name"] = name;
-    sequence["problem"] = opened ? Json() : Json(opened.error().message);
-    sequence["first_frame"] = opened ? opened->range().begin : 0;
-    sequence["frames"] = opened ? opened->size() : 0;
-    sequence["official_frames"] = official.value("frames", Json());
-    sequence["is_complete"] = is_complete;
-    sequence["runs"] = opened ? pending_runs() : Json::array();
-    sequence["never_moving"]["average_offset_m"] = nullptr;
-    sequence["published"] = is_complete ? publications : Json::array();
-    num_runs_ += sequence["runs"].size();
     if (!opened) {
       summary_.failures.push_back(fmt::format("{}: {}", name, opened.error().message));
     }
+    const Json runs = opened ? pending_runs() : Json::array();
+    num_runs_ += runs.size();
+    report_["sequences"].push_back({{"name", name},
+                                    {"problem", opened ? Json() : Json(opened.error().message)},
+                                    {"first_frame", opened ? opened->range().begin : 0},
+                                    {"frames", opened ? opened->size() : 0},
+                                    {"official_frames", official.value("frames", Json())},
+                                    {"is_complete", is_complete},
+                                    {"runs", runs},
+                                    {"never_moving", {{"average_offset_m", nullptr}}},
+                                    {"published", is_complete ? publications : Json::array()}});
   }
 
   Expected<BenchmarkSummary> run() {
     for (Json& sequence : report_["sequences"]) {
       for (std::size_t i = 0; i < sequence["runs"].size() && !summary_.interrupted; ++i) {
-        complete(sequence, request_.configurations[i / 2], sequence["runs"][i]);
+        complete(sequence, request_.configurations[i / 2].second, sequence["runs"][i]);
       }
       report_["interrupted"] = summary_.interrupted;
-      const Status written = write_files(sequence);
-      if (!written) {
+      if (const Status written = write_files(sequence); !written) {
         return written.error();
       }
       if (summary_.interrupted) {
@@ -190,75 +183,69 @@ class Benchmark {
            (text_of(run["configuration"]) + "_" + text_of(run["scale_source"]));
   }
 
-  static const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
-
   [[nodiscard]] Json pending_runs() const {
     Json runs = Json::array();
-    for (const BenchmarkConfiguration& configuration : request_.configurations) {
+    for (const auto& [name, config] : request_.configurations) {
       for (const char* scale_source : kScaleSources) {
-        Json& run = runs.emplace_back();
-        run["configuration"] = configuration.name;
-        run["scale_source"] = scale_source;
-        run["alignment"] = "none";
-        run["state"] = "pending";
-        run["problem"] = nullptr;
-        run["tracked_fraction"] = nullptr;
-        add_metrics(run, std::nullopt);
+        runs.push_back({{"configuration", name},
+                        {"scale_source", scale_source},
+                        {"alignment", "none"},
+                        {"state", "pending"},
+                        {"problem", nullptr},
+                        {"tracked_fraction", nullptr}});
+        add_metrics(runs.back(), std::nullopt);
       }
     }
     return runs;
   }
 
-  /// A run that is stopped stays pending.
-  void complete(Json& sequence, const BenchmarkConfiguration& with, Json& run) {
-    const std::string title = fmt::format("{}, {}, {}", text_of(sequence["name"]), with.name,
-                                          text_of(run["scale_source"]));
+  void complete(Json& sequence, const Config& config, Json& run) {
+    const std::string title =
+        fmt::format("{}, {}, {}", text_of(sequence["name"]), text_of(run["configuration"]),
+                    text_of(run["scale_source"]));
     ++num_begun_;
-    const Expected<std::optional<MetricsReport>> result = result_of(sequence, with, title, run);
-    if (!result) {
-      run["problem"] = result.error().message;
+    const Expected<MetricsReport> report = result_of(sequence, config, title, run);
+    if (summary_.interrupted) {  // stays pending
+      return;
+    }
+    if (!report) {
+      run["problem"] = report.error().message;
       if (run["state"] == "pending") {
         run["state"] = "failed";
-        summary_.failures.push_back(fmt::format("{}: {}", title, result.error().message));
+        summary_.failures.push_back(fmt::format("{}: {}", title, report.error().message));
       }
       return;
     }
-    if (!*result) {
-      summary_.interrupted = true;
-      return;
-    }
-    const MetricsReport& report = **result;
     run["state"] = "done";
-    run["tracked_fraction"] = report.tracked_fraction;
-    add_metrics(run, report.metrics);
-    if (report.metrics) {
-      sequence["never_moving"]["average_offset_m"] = report.metrics->null_offset_m;
+    run["tracked_fraction"] = report->tracked_fraction;
+    add_metrics(run, report->metrics);
+    if (report->metrics) {
+      sequence["never_moving"]["average_offset_m"] = report->metrics->null_offset_m;
     }
     speed_.push_back({{"sequence", sequence["name"]},
-                      {"configuration", with.name},
+                      {"configuration", run["configuration"]},
                       {"scale_source", run["scale_source"]},
-                      {"fps", report.fps}});
+                      {"fps", report->fps}});
   }
 
-  /// Of an earlier call, or of a run now; nothing where it was stopped. Marks a run that is not
-  /// possible.
-  Expected<std::optional<MetricsReport>> result_of(const Json& sequence,
-                                                   const BenchmarkConfiguration& with,
-                                                   const std::string& title,
-                                                   Json& run) {
+  /// Of an earlier call, or of a run now, which may be stopped. Marks a run that is not possible.
+  Expected<MetricsReport> result_of(const Json& sequence,
+                                    const Config& config,
+                                    const std::string& title,
+                                    Json& run) {
     RunRequest one;
     one.sequence_dir = sequence_dir(sequence["name"]);
     one.out_dir = run_dir(sequence, run);
     one.models_dir = request_.models_dir;
-    one.config = with.config;
-    one.config.scale.source = run["scale_source"] == "ground_truth" ? ScaleSource::kGroundTruth
-                                                                    : ScaleSource::kCameraHeight;
+    one.config = config;
+    const bool takes_truth = run["scale_source"] == "ground_truth";
+    one.config.scale.source = takes_truth ? ScaleSource::kGroundTruth : ScaleSource::kCameraHeight;
     one.num_threads = request_.num_threads;
-    const auto opened = KittiSequence::open(one.sequence_dir, {.camera = one.config.input.camera});
+    const auto opened = KittiSequence::open(one.sequence_dir, {.camera = config.input.camera});
     if (!opened) {
       return opened.error();
     }
-    if (one.config.scale.source == ScaleSource::kGroundTruth && !opened->ground_truth()) {
+    if (takes_truth && !opened->ground_truth()) {
       run["state"] = "not possible";
       return fail("no ground truth");
     }
@@ -266,38 +253,34 @@ class Benchmark {
     if (!inputs) {
       return inputs.error();
     }
-    std::string note;
-    if (std::optional<MetricsReport> kept = kept_result(one.out_dir, *inputs, note)) {
-      return kept;
+    if (const std::optional<std::string> reason = reason_to_run(one.out_dir, *inputs)) {
+      summary_.interrupted =
+          request_.on_run &&
+          !request_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, *reason));
+      const Status done = summary_.interrupted ? Status() : run_now(one, *inputs, title);
+      if (!done) {
+        return done.error();
+      }
     }
-    if (callbacks_.on_run &&
-        !callbacks_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, note))) {
-      return std::optional<MetricsReport>();
-    }
-    return run_now(one, *inputs, title);
+    return read_metrics_json(one.out_dir / kMetricsFile);
   }
 
-  Expected<std::optional<MetricsReport>> run_now(RunRequest& one,
-                                                 const Json& inputs,
-                                                 const std::string& title) {
+  Status run_now(RunRequest& one, const Json& inputs, const std::string& title) {
     std::error_code ignored;
     fs::remove(one.out_dir / kInputsFile, ignored);  // an interrupted run must not pass for done
     one.started = std::chrono::steady_clock::now();
-    const Expected<RunSummary> done = run_sequence(one, callbacks_.on_frame);
+    const Expected<RunSummary> done = run_sequence(one, request_.on_frame);
     if (!done || !done->written) {
       return done ? done->written.error() : done.error();
     }
+    summary_.interrupted = done->interrupted;
     if (done->interrupted) {
-      return std::optional<MetricsReport>();
+      return {};
     }
     for (const std::string& warning : done->warnings) {
       summary_.warnings.push_back(fmt::format("{}: {}", title, warning));
     }
-    const Status kept = write_text_file(one.out_dir / kInputsFile, inputs.dump(2) + '\n');
-    if (!kept) {
-      return kept.error();
-    }
-    return std::optional(done->report);
+    return write_text_file(one.out_dir / kInputsFile, inputs.dump(2) + '\n');
   }
 
   [[nodiscard]] Status write_files(const Json& last) const {
@@ -324,17 +307,15 @@ class Benchmark {
     for (std::size_t i = 0; i < runs.size(); i += 2) {
       const std::size_t wanted = i == 0 ? 0 : i + 1;
       const Json& run = runs[wanted]["state"] == "done" ? runs[wanted] : runs[wanted ^ 1U];
-      if (run["state"] != "done") {
-        continue;
+      if (run["state"] == "done") {
+        auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
+        if (!poses) {
+          return poses.error();
+        }
+        plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
+        plot.subtitle += (plot.subtitle.empty() ? "" : "   ") + plot.others.back().name + ": " +
+                         benchmark::words_for(run["scale_source"]);
       }
-      auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
-      if (!poses) {
-        return poses.error();
-      }
-      plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
-      plot.subtitle +=
-          fmt::format("{}{}: {}", plot.subtitle.empty() ? "" : "   ", plot.others.back().name,
-                      benchmark::words_for(run["scale_source"]));
     }
     if (plot.others.empty()) {
       return {};
@@ -349,8 +330,7 @@ class Benchmark {
   }
 
   const BenchmarkRequest& request_;
-  const BenchmarkCallbacks& callbacks_;
-  Json report_;
+  Json report_ = {{"stemvo_version", version()}, {"interrupted", false}};
   Json speed_ = Json::array();
   std::size_t num_runs_ = 0;
   std::size_t num_begun_ = 0;
@@ -359,8 +339,7 @@ class Benchmark {
 
 }  // namespace
 
-Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
-                                         const BenchmarkCallbacks& callbacks) {
+Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   const Expected<std::vector<std::string>> names = find_sequences(request);
   if (!names) {
     return names.error();
@@ -372,7 +351,7 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
   if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
     return made.error();
   }
-  Benchmark benchmark(request, callbacks);
+  Benchmark benchmark(request);
   try {
     const Json json = Json::parse(*published, nullptr, true, /*ignore_comments=*/true);
     for (const std::string& name : *names) {

@@ -4,7 +4,10 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "config/config.hpp"
 #include "pipeline/run.hpp"
@@ -12,28 +15,19 @@
 
 namespace stemvo {
 
-/// What is measured: a configuration under a name that is also a folder's, e.g. "default".
-struct BenchmarkConfiguration {
-  std::string name;
-  Config config;
-};
-
 struct BenchmarkRequest {
   std::filesystem::path kitti_root;  ///< holds sequences/NN and poses/NN.txt
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   std::filesystem::path published;     ///< the official sequences and published numbers
   std::vector<std::string> sequences;  ///< names of folders; empty: every folder that is there
-  std::vector<BenchmarkConfiguration> configurations;
+  /// What is measured, under names that are also folders', e.g. "default".
+  std::vector<std::pair<std::string, Config>> configurations;
   int num_threads = 0;  ///< 0: all cores
-};
-
-/// What may be watched; either returns false to stop.
-struct BenchmarkCallbacks {
   /// Before a run: "2/12 03, default, ground_truth", and why an earlier result does not count any
-  /// more. Not called for results that are kept.
-  std::function<bool(const std::string& run)> on_run;
-  RunProgress on_frame;
+  /// more. Not called for results that are kept. False stops, here and after a frame.
+  std::function<bool(const std::string& run)> on_run = {};
+  RunProgress on_frame = {};
 };
 
 /// One line each, with the names of sequence, configuration and scale source.
@@ -51,7 +45,19 @@ struct BenchmarkSummary {
 /// model, frames (names, sizes), calib, times and pose file are those of a result in OUT is not
 /// repeated. A sequence or run that fails is a row with its reason. Errors: no folder
 /// kitti_root/sequences, none in it, `published` cannot be read, OUT cannot be written.
-[[nodiscard]] Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request,
-                                                       const BenchmarkCallbacks& callbacks = {});
+[[nodiscard]] Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request);
 
+namespace benchmark {
+
+/// For people: "camera height", "per-step ground-truth scale".
+[[nodiscard]] std::string words_for(const nlohmann::ordered_json& scale_source);
+
+/// "all 4541 frames", "clip 0:200 of 4541", "frames 0:60".
+[[nodiscard]] std::string describe_frames(const nlohmann::ordered_json& sequence);
+
+/// benchmark.json for people: a table over all sequences, then one per sequence with the
+/// zero-motion baseline and, where all official frames ran, the published numbers.
+[[nodiscard]] std::string format_markdown(const nlohmann::ordered_json& report);
+
+}  // namespace benchmark
 }  // namespace stemvo

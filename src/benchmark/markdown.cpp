@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include "benchmark/markdown.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
+#include "benchmark/benchmark.hpp"
 #include "text/text_table.hpp"
 
 namespace stemvo::benchmark {
@@ -42,13 +42,12 @@ std::string number(const Json& value, int decimals) {
              : "-";
 }
 
-std::string row(const std::vector<std::string>& cells) {
-  return fmt::format("| {} |\n", fmt::join(cells, " | "));
-}
+using Cells = std::vector<std::string>;
 
-std::string head_row(const std::vector<std::string>& cells) {
-  const std::vector<std::string> rule(cells.size(), "---|");
-  return row(cells) + fmt::format("|{}\n", fmt::join(rule, ""));
+std::string row(const Cells& cells) { return fmt::format("| {} |\n", fmt::join(cells, " | ")); }
+
+std::string head_row(const Cells& cells) {
+  return row(cells) + fmt::format("|{}\n", fmt::join(Cells(cells.size(), "---|"), ""));
 }
 
 bool has_metrics(const Json& run) { return !run["segments"].is_null(); }
@@ -68,59 +67,54 @@ std::string short_cell(const Json& run) {
                                      : "-";
 }
 
+/// A column per sequence that could be read; all have the same runs.
 std::string overview(const Json& report) {
-  std::vector<std::vector<std::string>> rows = {{""}, {"t_rel / r_rel / offset"}};
-  std::vector<std::string> baseline = {"zero motion"};
+  std::vector<Cells> rows = {{""}, {"t_rel / r_rel / offset"}};
+  Cells baseline = {"zero motion"};
   for (const Json& sequence : report["sequences"]) {
     if (!sequence["problem"].is_null()) {
       continue;
     }
-    const Json& runs = sequence["runs"];
-    rows.resize(2 + runs.size());
     rows[0].push_back(safe(sequence["name"]));
     rows[1].push_back(describe_frames(sequence));
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-      if (rows[2 + i].empty()) {
-        rows[2 + i].push_back(fmt::format("{}, {}", safe(runs[i]["configuration"]),
-                                          words_for(runs[i]["scale_source"])));
+    rows.resize(2 + sequence["runs"].size());
+    for (std::size_t i = 2; i < rows.size(); ++i) {
+      const Json& run = sequence["runs"][i - 2];
+      if (rows[i].empty()) {
+        rows[i] = {safe(run["configuration"]) + ", " + words_for(run["scale_source"])};
       }
-      rows[2 + i].push_back(short_cell(runs[i]));
+      rows[i].push_back(short_cell(run));
     }
     const Json& offset_m = sequence["never_moving"]["average_offset_m"];
-    baseline.push_back(offset_m.is_null() ? "-" : fmt::format("- / - / {}", number(offset_m, 2)));
+    baseline.push_back(offset_m.is_null() ? "-" : "- / - / " + number(offset_m, 2));
   }
-  if (rows[0].size() == 1) {
+  if (baseline.size() == 1) {
     return {};
   }
   std::string text = "\n## All sequences\n\n" + head_row(rows[0]);
-  std::for_each(rows.begin() + 1, rows.end(), [&](const auto& cells) { text += row(cells); });
-  return text + row(baseline);
+  rows.push_back(baseline);
+  std::for_each(rows.begin() + 1, rows.end(), [&](const Cells& cells) { text += row(cells); });
+  return text;
 }
 
 std::string explain(const Json& run) {
-  if (!run["problem"].is_null()) {
-    return safe(run["problem"]);
-  }
-  if (run["state"] == "pending") {
-    return "not run yet";
-  }
-  return fmt::format("{:.1f} % of the frames measured{}",
-                     100.0 * run["tracked_fraction"].get<double>(),
-                     has_metrics(run) ? "" : "; no ground truth");
+  return !run["problem"].is_null()   ? safe(run["problem"])
+         : run["state"] == "pending" ? "not run yet"
+                                     : fmt::format("{:.1f} % of the frames measured{}",
+                                                   100.0 * run["tracked_fraction"].get<double>(),
+                                                   has_metrics(run) ? "" : "; no ground truth");
 }
 
-std::string run_row(const Json& run) {
-  const Json& ate = run["ate_rmse_m"];
-  return row({safe(run["configuration"]), std::string(words_for(run["scale_source"])), "none",
-              fmt::format("{}", fmt::join(errors(run, 3), " | ")),
-              ate.is_null() ? "-" : number(ate["sim3"], 2), explain(run)});
-}
-
-std::string published_row(const Json& numbers) {
-  return row({numbers["method"], numbers["scale_source"], numbers["alignment"],
-              fmt::format("{}", fmt::join(errors(numbers, 2), " | ")),
-              number(numbers["ate_rmse_m"], 2),
-              "published: " + numbers["source"].get<std::string>()});
+/// A run's, or a published one's.
+std::string result_row(const Json& result, bool is_published) {
+  const Json& ate = result["ate_rmse_m"];
+  return row(
+      {safe(result[is_published ? "method" : "configuration"]),
+       is_published ? std::string(result["scale_source"]) : words_for(result["scale_source"]),
+       is_published ? std::string(result["alignment"]) : "none",
+       fmt::format("{}", fmt::join(errors(result, is_published ? 2 : 3), " | ")),
+       number(ate.is_object() ? ate["sim3"] : ate, 2),
+       is_published ? "published: " + std::string(result["source"]) : explain(result)});
 }
 
 std::string section(const Json& sequence) {
@@ -139,14 +133,14 @@ std::string section(const Json& sequence) {
   text += fmt::format(".\n\n![the map of {}](<{}.png>)\n\n", name, name);
   text += head_row({"", "scale from", "alignment", "t_rel", "r_rel", "offset", "ATE", ""});
   for (const Json& run : runs) {
-    text += run_row(run);
+    text += result_row(run, false);
   }
   if (any != runs.end()) {
     text +=
         row({"zero motion", "-", "none", "-", "-", number((*any)["null_offset_m"], 2), "-", ""});
   }
   for (const Json& numbers : sequence["published"]) {
-    text += published_row(numbers);
+    text += result_row(numbers, true);
   }
   if (sequence["published"].empty() && !sequence["official_frames"].is_null()) {
     text += "\nPublished numbers are of all official frames, and stand here when those ran.\n";
@@ -156,21 +150,20 @@ std::string section(const Json& sequence) {
 
 }  // namespace
 
-std::string_view words_for(const Json& scale_source) {
+std::string words_for(const Json& scale_source) {
   return scale_source == "camera_height" ? "camera height" : "per-step ground-truth scale";
 }
 
 std::string describe_frames(const Json& sequence) {
   const auto begin = sequence["first_frame"].get<std::size_t>();
   const auto num_frames = sequence["frames"].get<std::size_t>();
-  const Json& official = sequence["official_frames"];
   if (sequence["is_complete"] == true) {
     return fmt::format("all {} frames", num_frames);
   }
-  if (!official.is_null()) {
-    return fmt::format("clip {}:{} of {}", begin, begin + num_frames, official.get<std::size_t>());
-  }
-  return fmt::format("frames {}:{}", begin, begin + num_frames);
+  const Json& official = sequence["official_frames"];
+  return official.is_null()
+             ? fmt::format("frames {}:{}", begin, begin + num_frames)
+             : fmt::format("clip {}:{} of {}", begin, begin + num_frames, official.dump());
 }
 
 std::string format_markdown(const Json& report) {

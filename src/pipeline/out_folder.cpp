@@ -39,14 +39,14 @@ Status create_out_folder(const fs::path& folder) {
   return {};
 }
 
-Status remove_old_images(const fs::path& folder) {
+Status remove_old_frames(const fs::path& folder, const std::string& extension) {
   for (const fs::path& file : dataset::list_folder(folder).value_or(std::vector<fs::path>())) {
     const std::string stem = file.stem().string();
     const bool is_number = stem.size() == 6 && stem.find_first_not_of("0123456789") == stem.npos;
     std::error_code code;
-    if (is_number && file.extension() == ".png" && fs::is_regular_file(file, code) &&
+    if (is_number && file.extension() == extension && fs::is_regular_file(file, code) &&
         !fs::remove(file, code) && code) {
-      return fail(fmt::format("{}: an earlier run's image cannot be removed ({})", file.string(),
+      return fail(fmt::format("{}: an earlier run's frame cannot be removed ({})", file.string(),
                               code.message()));
     }
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "stemvo/error.hpp"
 
@@ -11,8 +12,10 @@ namespace stemvo::pipeline {
 /// folder, what was expected, what the system says.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
 
-/// Removes the images an earlier run left in its folder, so that those of one run are not taken
-/// for another's: files of six digits and `.png`, nothing else. Error: one that cannot be removed.
-[[nodiscard]] Status remove_old_images(const std::filesystem::path& folder);
+/// Removes what an earlier run left in its folder, so that images of one run are not taken for
+/// another's: files of six digits and the extension, nothing else; no folder is none. Error: one
+/// that cannot be removed.
+[[nodiscard]] Status remove_old_frames(const std::filesystem::path& folder,
+                                       const std::string& extension);
 
 }  // namespace stemvo::pipeline

@@ -104,7 +104,7 @@ Status prepare_out_folder(const RunRequest& request) {
   }
   const std::filesystem::path images = request.out_dir / "pictures";
   const Status status = pipeline::create_out_folder(images);
-  return status ? pipeline::remove_old_images(images) : status;
+  return status ? pipeline::remove_old_frames(images, ".png") : status;
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: MIT
-#include "search/plan.hpp"
-
 #include <algorithm>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "evaluation/metrics.hpp"
+#include "models/manifest.hpp"
 #include "options/option_fields.hpp"
 #include "pipeline/input_hashes.hpp"
-#include "search/halving.hpp"
-#include "stem/stem.hpp"
+#include "search/race.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -24,6 +23,119 @@ constexpr int kMinSide_px = 16;
 /// What the filters in flight may take by the estimate; the process takes some 0.2 GB more, and the
 /// weights and layers of the network.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
+
+/// What the layer of gray and input_layer is called in tables.
+constexpr const char* kInputLayer = "input";
+
+bool is_input(const std::string& model) { return model == "gray" || model == "input_layer"; }
+
+/// 0: half the stride; shifted passes of a coarse layer cost more than more of them tell.
+int sampling_of(int asked, const ModelEntry& entry) {
+  const bool is_halved = entry.stride_px > 2 && entry.stride_px % 2 == 0;
+  return asked != 0 || entry.native_sampling_only ? asked : entry.stride_px / (is_halved ? 2 : 1);
+}
+
+/// Found from any folder later on.
+std::string from_anywhere(const fs::path& path) {
+  std::error_code ignored;
+  return fs::absolute(path, ignored).lexically_normal().string();
+}
+
+/// The model's layers, or those asked for in that order; without what the loaded stem says.
+Expected<std::vector<LayerIdentity>> model_layers(const SearchRequest& request) {
+  const std::string& model = request.model;
+  LayerIdentity layer = {
+      .model = model,
+      .layer = kInputLayer,
+      .features = std::string(options::to_string(request.config.features.method)),
+      .sampling_px = request.config.stem.sampling_px,
+      .stem_model = model.ends_with(".onnx") ? from_anywhere(model) : model};
+  if (is_input(model)) {
+    if (!request.layers.empty()) {
+      return fail(fmt::format("--layers: expected none for {}, found '{}'", model,
+                              fmt::join(request.layers, ",")));
+    }
+    return std::vector{layer};
+  }
+  const auto entries = find_layers(model, request.models_dir);
+  if (!entries) {
+    return entries.error();
+  }
+  std::vector<std::string> names(entries->size());
+  std::ranges::transform(*entries, names.begin(), &ModelEntry::layer);
+  std::vector<LayerIdentity> chosen;
+  for (const std::string& name : request.layers.empty() ? names : request.layers) {
+    const auto entry = std::ranges::find(*entries, name, &ModelEntry::layer);
+    if (entry == entries->end()) {
+      return fail(fmt::format("--layers: {}: expected one of {}, found '{}'", model,
+                              fmt::join(names, ", "), name));
+    }
+    layer.model = entry->name;
+    layer.layer = name;
+    layer.sampling_px = sampling_of(request.config.stem.sampling_px, *entry);
+    chosen.push_back(layer);
+  }
+  return chosen;
+}
+
+Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan& plan) {
+  const Config config = config_of(request.config, layer, 0);
+  Expected<Stem> stem = create_stem(config.stem, request.models_dir);
+  if (!stem) {
+    return stem.error();
+  }
+  const StemInfo& info = stem->info();
+  const auto count = static_cast<std::size_t>(info.num_filters);
+  const FrameRangeRequest all;
+  const FrameRangeRequest asked = layer.baseline ? all : request.filters.value_or(all);
+  const FrameRange filters{asked.begin, asked.end.value_or(count)};
+  if (filters.begin >= filters.end || filters.end > count) {
+    return fail(fmt::format("--filters: expected filters inside 0:{} of {}{}, found {}:{}", count,
+                            request.model, info.layer.empty() ? "" : " layer " + info.layer,
+                            filters.begin, filters.end));
+  }
+  const auto hash = pipeline::hash_model(config, request.models_dir);
+  if (!hash) {
+    return hash.error();
+  }
+  layer.first = static_cast<int>(filters.begin);
+  layer.last = static_cast<int>(filters.end);
+  layer.hash = *hash;
+  layer.sampling_px = info.sampling_px;
+  // Gray and R, G, B take no pass: one for all.
+  const std::size_t pass = is_input(layer.model) ? SIZE_MAX : plan.layers.size();
+  plan.layers.push_back({config, std::move(*stem), pass});
+  plan.identity.layers.push_back(std::move(layer));
+  return {};
+}
+
+/// Loads the model's layers, those asked for, and the baselines: ORB on gray, and R, G, B, where
+/// they are not what is searched.
+Status add_layers(const SearchRequest& request, SearchPlan& plan) {
+  Expected<std::vector<LayerIdentity>> layers = model_layers(request);
+  if (!layers) {
+    return layers.error();
+  }
+  const std::pair<const char*, FeatureMethod> baselines[] = {
+      {"gray", FeatureMethod::kOrb}, {"input_layer", request.config.features.method}};
+  for (const auto& [model, method] : baselines) {
+    const LayerIdentity layer = {.model = model,
+                                 .layer = kInputLayer,
+                                 .features = std::string(options::to_string(method)),
+                                 .stem_model = model,
+                                 .baseline = true};
+    const auto is_it = [&](const LayerIdentity& one) { return one.is_layer_of(layer.key(0)); };
+    if (request.baselines && std::ranges::none_of(*layers, is_it)) {
+      layers->push_back(layer);
+    }
+  }
+  for (const LayerIdentity& layer : *layers) {
+    if (Status status = load_layer(request, layer, plan); !status) {
+      return status;
+    }
+  }
+  return {};
+}
 
 std::size_t num_sequences(const SearchRequest& request) {
   return request.sequence_dirs.size() + (request.held_out_dir ? 1 : 0);
@@ -46,8 +158,8 @@ Status check_request(const SearchRequest& request) {
   }
   if (request.only_sequence && !request.exhaustive) {
     return fail(
-        "--only-sequence: expected --exhaustive with it (halving goes by the mean over all "
-        "sequences), found none");
+        "--only-sequence: expected --exhaustive with it (halving goes by all sequences), found "
+        "none");
   }
   for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
     if (std::find(request.layers.begin(), layer, *layer) != layer) {
@@ -62,24 +174,18 @@ Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added)
   std::error_code code;
   const bool same_folder = before.directory == added.directory ||
                            fs::equivalent(before.directory, added.directory, code);
-  const std::size_t added_end = added.first_frame + added.num_frames;
   const std::size_t begin = std::max(before.first_frame, added.first_frame);
-  const std::size_t end = std::min(before.first_frame + before.num_frames, added_end);
+  const std::size_t end = std::min(before.end_frame(), added.end_frame());
   if (added.held_out && same_folder && begin < end) {
     return fail(
         fmt::format("--held-out: {}: expected frames that do not rank, found {}:{}, of which {}:{} "
                     "do (--held-out-frames, --frames)",
-                    added.directory, added.first_frame, added_end, begin, end));
+                    added.directory, added.first_frame, added.end_frame(), begin, end));
   }
-  if (!added.held_out && same_folder) {
-    return fail(fmt::format("SEQUENCE_DIR: expected each folder once, found {} and {}",
+  if (!added.held_out && (same_folder || before.name == added.name)) {
+    return fail(fmt::format("SEQUENCE_DIR: expected each {} once, found {} and {}",
+                            same_folder ? "folder" : "name, by which sequences are told apart,",
                             before.directory, added.directory));
-  }
-  if (!added.held_out && before.name == added.name) {
-    return fail(fmt::format(
-        "SEQUENCE_DIR: expected names by which sequences can be told apart, found two of the name "
-        "{}: {} and {}",
-        added.name, before.directory, added.directory));
   }
   return {};
 }
@@ -95,8 +201,8 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
   }
   if (!sequence->ground_truth()) {
     const fs::path file = directory / "../../poses" / (sequence->name() + ".txt");
-    return fail(fmt::format("{}: expected a pose file, by which filters are ranked, found none",
-                            file.lexically_normal().string()));
+    return fail(file.lexically_normal().string() +
+                ": expected a pose file, by which filters are ranked, found none");
   }
   const Trajectory& truth = *sequence->ground_truth();
   const Metrics metrics = evaluate(truth, truth, request.config.evaluation);
@@ -113,9 +219,9 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
 
 /// Why the layer's filters cannot be run on frames of this camera, empty where they can; lowers how
 /// many are in flight.
-std::string fit_layer(const LayerIdentity& identity,
+std::string fit_layer(const SearchRequest& request,
+                      const LayerIdentity& identity,
                       const Camera& camera,
-                      std::size_t num_sequences,
                       PlanLayer& layer) {
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
   const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1);
@@ -126,7 +232,8 @@ std::string fit_layer(const LayerIdentity& identity,
   const Upsample upsample =
       choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera.width_px);
   const int factor = enlargement(upsample, identity.sampling_px);
-  const std::size_t bytes = bytes_in_flight(size, size * factor, num_sequences);
+  const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
+  const std::size_t bytes = bytes_in_flight(size, size * factor, num_run);
   layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);
   const bool is_small = std::min(size.width, size.height) < kMinSide_px;
   return is_small ? fmt::format("channel {}x{}", size.width, size.height) : std::string();
@@ -148,69 +255,92 @@ Status add_sequence(const SearchRequest& request,
   if (!hashes) {
     return hashes.error();
   }
-  std::error_code ignored;
-  SequenceIdentity identity = {
-      .name = sequence->name(),
-      .held_out = is_held_out,
-      .first_frame = sequence->range().begin,
-      .num_frames = sequence->size(),
-      .frames = is_run ? hashes->frames : std::string(),
-      .calibration = hashes->calibration,
-      .ground_truth = hashes->ground_truth,
-      .directory = fs::absolute(directory, ignored).lexically_normal().string()};
+  const SequenceIdentity added = {.name = sequence->name(),
+                                  .held_out = is_held_out,
+                                  .first_frame = sequence->range().begin,
+                                  .num_frames = sequence->size(),
+                                  .frames = is_run ? hashes->frames : std::string(),
+                                  .calibration = hashes->calibration,
+                                  .ground_truth = hashes->ground_truth,
+                                  .directory = from_anywhere(directory)};
   for (const SequenceIdentity& before : known) {
-    if (Status status = check_pair(before, identity); !status) {
+    if (Status status = check_pair(before, added); !status) {
       return status;
     }
   }
-  known.push_back(std::move(identity));
-  if (is_run) {
-    const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
-    std::vector<std::string> problems;
-    for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-      problems.push_back(
-          fit_layer(plan.identity.layers[i], sequence->camera(), num_run, plan.layers[i]));
-    }
-    plan.sequences.push_back({std::move(*sequence), is_held_out, std::move(problems)});
+  known.push_back(added);
+  if (!is_run) {
+    return {};
   }
+  std::vector<std::string> problems;
+  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+    problems.push_back(
+        fit_layer(request, plan.identity.layers[i], sequence->camera(), plan.layers[i]));
+  }
+  plan.sequences.push_back({std::move(*sequence), is_held_out, std::move(problems)});
   return {};
 }
 
-/// Which candidates halving chooses from, and the rungs.
+/// The candidates, which of them halving chooses from, and the rungs.
 void add_race(bool exhaustive, SearchPlan& plan) {
   std::size_t num_racing = 0;
-  for (Candidate& candidate : plan.candidates) {
-    const auto runs = [&candidate](const PlanSequence& sequence) {
-      return sequence.is_held_out || sequence.problems[candidate.layer].empty();
-    };
-    candidate.races = !candidate.is_baseline && std::ranges::all_of(plan.sequences, runs);
-    num_racing += candidate.races ? 1 : 0;
+  for (std::size_t i = 0; i < plan.layers.size(); ++i) {
+    const LayerIdentity& layer = plan.identity.layers[i];
+    const bool races = !layer.baseline && std::ranges::all_of(plan.sequences, [i](const auto& one) {
+      return one.is_held_out || one.problems[i].empty();
+    });
+    for (int filter = layer.first; filter < layer.last; ++filter) {
+      plan.candidates.push_back({layer.key(filter), i, races});
+    }
+    num_racing += races ? layer.size() : 0;
   }
-  const std::size_t num_filters = plan.identity.num_filters() - plan.identity.num_baselines();
-  plan.identity.rungs = exhaustive ? Schedule{{1.0, num_filters}} : halving_schedule(num_racing);
+  plan.identity.rungs =
+      exhaustive ? Schedule{{1.0, plan.identity.count(false)}} : halving_schedule(num_racing);
 }
 
 }  // namespace
 
+Config config_of(Config common, const LayerIdentity& layer, int filter) {
+  common.stem.model = layer.stem_model;
+  common.stem.layer = is_input(layer.model) ? StemOptions().layer : layer.layer;
+  common.stem.filter = filter;
+  common.stem.sampling_px = layer.sampling_px;
+  common.features.method = options::feature_method(layer.features);
+  return common;
+}
+
 std::size_t bytes_in_flight(cv::Size channel, cv::Size image, std::size_t num_sequences) {
-  constexpr std::size_t kChannelBytes = 2 * sizeof(float);  // two frames
+  const auto channel_px = static_cast<std::size_t>(channel.area());
+  const auto image_px = static_cast<std::size_t>(image.area());
+  constexpr std::size_t kPathBytes = std::size_t{1} << 17;
   // A gray value and two derivatives of 16 bits on each level of the pyramid, 4/3 of the first
   // one's pixels in all; the image itself; what a thread works in.
-  constexpr std::size_t kImageBytes = 8;
-  constexpr std::size_t kPathBytes = std::size_t{1} << 17;
-  const auto pixels = [](cv::Size size) { return static_cast<std::size_t>(size.area()); };
-  const std::size_t buffer = image == channel ? 0 : sizeof(float);
-  const std::size_t odometry = (kImageBytes + buffer) * pixels(image) + kPathBytes;
-  return kChannelBytes * pixels(channel) + num_sequences * odometry;
+  const std::size_t bytes_per_px = 8 + (image == channel ? 0 : sizeof(float));
+  return 2 * sizeof(float) * channel_px + num_sequences * (bytes_per_px * image_px + kPathBytes);
+}
+
+std::vector<std::vector<std::size_t>> cut_into_blocks(const SearchPlan& plan,
+                                                      const std::vector<std::size_t>& candidates) {
+  std::vector<std::vector<std::size_t>> blocks;
+  const PlanLayer* first = nullptr;  // of the last block
+  for (const std::size_t candidate : candidates) {
+    const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
+    const bool goes_on =
+        first != nullptr && (plan.block > 0 || layer.pass == first->pass) &&
+        blocks.back().size() < (plan.block > 0 ? plan.block : first->max_in_flight);
+    if (!goes_on) {
+      blocks.emplace_back();
+      first = &layer;
+    }
+    blocks.back().push_back(candidate);
+  }
+  return blocks;
 }
 
 Expected<SearchPlan> make_plan(const SearchRequest& request) {
   SearchPlan plan;
   plan.block = static_cast<std::size_t>(std::max(0, request.block));
-  Status status = check_request(request);
-  if (status) {
-    status = add_layers(request, plan);
-  }
+  Status status = check_request(request).and_then([&] { return add_layers(request, plan); });
   for (const fs::path& directory : request.sequence_dirs) {
     status = status ? add_sequence(request, directory, false, plan) : status;
   }

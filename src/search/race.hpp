@@ -2,34 +2,86 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "search/plan.hpp"
 #include "search/records.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo::search {
 
-/// Candidates whose odometries are kept from rung to rung, some 2 MB each: the best; should others
-/// go on, they start again, which counts.
+/// A layer of the identity, loaded.
+struct PlanLayer {
+  Config config;  ///< of its odometry, with the model and layer; the filter is the candidate's
+  Stem stem;
+  std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
+  std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
+};
+
+struct Candidate {
+  FilterKey key;
+  std::size_t layer = 0;  ///< index
+  /// No baseline, and can be run on all sequences that rank: what halving chooses from.
+  bool races = false;
+};
+
+/// One sequence and what can be said of it before work starts.
+struct PlanSequence {
+  KittiSequence sequence;
+  bool is_held_out = false;
+  std::vector<std::string> problems;  ///< per layer: why it cannot be run here; empty: it can
+};
+
+/// A search that was found to be possible.
+struct SearchPlan {
+  SearchIdentity identity;
+  std::vector<PlanLayer> layers;        ///< as those of the identity
+  std::vector<PlanSequence> sequences;  ///< those to run
+  std::vector<Candidate> candidates;    ///< in the order of layers and filters, baselines last
+  std::size_t block = 0;                ///< filters in flight; 0: as memory allows
+};
+
+/// Errors: those of run_search.
+[[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
+
+/// Of a filter in flight, by an estimate: its channel of two frames and, per sequence, its
+/// odometry. 256 filters of 620x188 take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
+[[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
+                                          cv::Size image,
+                                          std::size_t num_sequences);
+
+/// Candidates, in the order they are in, in blocks that run in lock-step: those of one pass of the
+/// stem, as far as their layer's max_in_flight allows; if the plan names a block, of so many.
+[[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
+    const SearchPlan& plan, const std::vector<std::size_t>& candidates);
+
+/// Successive halving (Jamieson and Talwalkar, "Non-stochastic best arm identification and
+/// hyperparameter optimization", AISTATS 2016): rungs at 1/16, 1/8, 1/4, 1/2 and all of the frames.
+/// As many filters go on, at least 2, as a budget of 25 % of the exhaustive search's filter-frames
+/// allows; of fewer than 16 half to 1/4, then a sixth and a twelfth: about the same budget.
+[[nodiscard]] Schedule halving_schedule(std::size_t num_filters);
+/// Filter-frames over those of the exhaustive search, where odometries go on from rung to rung.
+[[nodiscard]] double cost_share(const Schedule& schedule);
+
+/// Frames of a sequence that a rung runs up to: at least 2, at most all.
+[[nodiscard]] std::size_t frames_at(const Rung& rung, std::size_t num_frames);
+
+/// The order in which filters go on, by their records of one rung (indices): by the early errors,
+/// near ties by inliers. Of the same numbers (R, G and B of a gray sequence) one stands there, the
+/// others behind all.
+[[nodiscard]] std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records);
+
+/// The best odometries, some 2 MB each, are kept from rung to rung; others start again.
 inline constexpr std::size_t kMaxKept = 512;
 
-/// Cuts candidates, in the order they are in, into blocks that run in lock-step: those of one pass
-/// of the stem, as far as their layer's max_in_flight allows. With `block` > 0 each block has so
-/// many instead.
-[[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
-    const SearchPlan& plan, const std::vector<std::size_t>& candidates, std::size_t block);
-
-/// Runs the rungs of a plan; as a block ends its records are added to `records` and appended to the
-/// file. What `records` holds is not run again. Within a block a frame is read once, each layer
-/// makes one pass over it, then the filters work side by side, while the next frame is prepared:
-/// what a filter does depends neither on the number of threads nor on who runs beside it. Returns
-/// warnings: frames that cannot be read, or that a stem refuses. Error: the records cannot be
-/// written.
+/// Runs the rungs of a plan but for what is in the file, which grows as blocks end. What a filter
+/// does depends neither on threads nor on who runs beside it. Returns warnings: frames that cannot
+/// be read, or that a stem refuses. Error: the records cannot be written.
 [[nodiscard]] Expected<std::vector<std::string>> run_race(const SearchPlan& plan,
                                                           const SearchProgress& progress,
-                                                          RecordWriter& writer,
-                                                          std::vector<FilterRecord>& records,
+                                                          RecordFile& file,
                                                           std::size_t max_kept = kMaxKept);
 
 }  // namespace stemvo::search

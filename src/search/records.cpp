@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <functional>
-#include <numeric>
+#include <string_view>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <sys/file.h>
 #include <unistd.h>
@@ -19,65 +19,100 @@
 using Json = nlohmann::ordered_json;
 
 /// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order.
-#define STEMVO_JSON_MEMBERS(Type, ...)                                         \
-  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {           \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, __VA_ARGS__))   \
-  }                                                                            \
-  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {  \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, __VA_ARGS__)) \
+#define STEMVO_LIST(...) __VA_ARGS__
+#define STEMVO_JSON_MEMBERS(Type, members)                                             \
+  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {                   \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, STEMVO_LIST members))   \
+  }                                                                                    \
+  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {          \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, STEMVO_LIST members)) \
   }
-
-namespace stemvo {
-
-STEMVO_JSON_MEMBERS(FilterKey, model, layer, filter, features)
-
-void to_json(Json& json, const DriveScore& score) {
-  json = {{"sequence", score.sequence},
-          {"frames", score.num_frames},
-          {"detected", score.is_detected},
-          {"reason", score.reason}};
-  for (const search::ScoreNumber& number : search::kScoreNumbers) {
-    json[number.key] = score.*number.value;
-  }
-  json["path_xz_m"] = score.path;
-}
-
-static void from_json(const Json& json, DriveScore& score) {
-  json.at("sequence").get_to(score.sequence);
-  json.at("frames").get_to(score.num_frames);
-  json.at("detected").get_to(score.is_detected);
-  json.at("reason").get_to(score.reason);
-  for (const search::ScoreNumber& number : search::kScoreNumbers) {
-    json.at(number.key).get_to(score.*number.value);
-  }
-  json.at("path_xz_m").get_to(score.path);
-}
-
-/// Beside those of its key.
-STEMVO_JSON_MEMBERS(FilterRecord, rung, filter_frames, held_out_filter_frames, drives, held_out)
-
-}  // namespace stemvo
 
 namespace stemvo::search {
 
-STEMVO_JSON_MEMBERS(Rung, frame_share, filters)
+STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
+STEMVO_JSON_MEMBERS(DriveScore,
+                    (sequence,
+                     frames,
+                     detected,
+                     reason,
+                     t_rel_percent,
+                     r_rel_deg_per_100m,
+                     average_offset_m,
+                     E_t_m,
+                     E_r_deg,
+                     inliers,
+                     tracked,
+                     early_error_percent,
+                     path_xz_m))
+/// Beside those of its key.
+STEMVO_JSON_MEMBERS(FilterRecord, (rung, filter_frames, held_out_filter_frames, drives, held_out))
+STEMVO_JSON_MEMBERS(Rung, (frame_share, filters))
+STEMVO_JSON_MEMBERS(LayerIdentity,
+                    (model, layer, features, first, last, hash, sampling_px, stem_model, baseline))
 STEMVO_JSON_MEMBERS(
-    LayerIdentity, model, layer, features, first, last, hash, sampling_px, stem_model, baseline)
-STEMVO_JSON_MEMBERS(SequenceIdentity,
-                    name,
-                    held_out,
-                    first_frame,
-                    num_frames,
-                    frames,
-                    calibration,
-                    ground_truth,
-                    directory)
+    SequenceIdentity,
+    (name, held_out, first_frame, num_frames, frames, calibration, ground_truth, directory))
 STEMVO_JSON_MEMBERS(
-    SearchIdentity, stemvo_search, program, configuration, rungs, layers, sequences, only_sequence)
+    SearchIdentity,
+    (stemvo_search, program, configuration, rungs, layers, sequences, only_sequence))
 
 namespace {
 
-/// One line; bytes of a file name that are not UTF-8 become the replacement character.
+/// The first key that differs: "klt_levels: 3, now klt_levels: 4".
+std::string first_difference(const std::string& before, const std::string& now) {
+  const auto old_lines = split_lines(before);
+  const auto new_lines = split_lines(now);
+  const auto [a, b] = std::ranges::mismatch(old_lines, new_lines);
+  if (a == old_lines.end() || b == new_lines.end()) {
+    return "other keys";
+  }
+  const auto trimmed = [](std::string_view line) {
+    line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
+    return line.substr(0, line.find(" #"));
+  };
+  return fmt::format("{}, now {}", trimmed(*a), trimmed(*b));
+}
+
+/// One thing that records depend on, by its value or by a hash (empty: not known).
+struct Fact {
+  std::string name;
+  std::string value;
+  std::string hash = {};
+};
+
+std::vector<Fact> facts_of(const SearchIdentity& identity, bool as_part) {
+  std::vector<Fact> facts = {{"the program", "", identity.program}};
+  std::vector<std::string> layers;
+  for (const LayerIdentity& layer : identity.layers) {
+    const std::string& name = layers.emplace_back(fmt::format(
+        "{} {}{}", layer.model, layer.layer, layer.features == "klt" ? "" : " " + layer.features));
+    facts.push_back({"the model " + name, "", layer.hash});
+    facts.push_back({"the sampling of " + name, fmt::format("{} px", layer.sampling_px)});
+    if (!as_part) {
+      facts.push_back({"the filters of " + name, fmt::format("{}:{}", layer.first, layer.last)});
+    }
+  }
+  std::vector<std::string> sequences;
+  for (const SequenceIdentity& one : identity.sequences) {
+    const std::string& name =
+        sequences.emplace_back(one.name + (one.held_out ? " (held out)" : ""));
+    facts.push_back({"the frames of " + name,
+                     fmt::format("{}:{}", one.first_frame, one.end_frame()), one.frames});
+    facts.push_back({"calib.txt or times.txt of " + name, "", one.calibration});
+    facts.push_back({"the pose file of " + name, "", one.ground_truth});
+  }
+  facts.push_back({"the sequences", fmt::format("{}", fmt::join(sequences, ", "))});
+  if (!as_part) {
+    const auto& only = identity.only_sequence;
+    facts.push_back({"the layers", fmt::format("{}", fmt::join(layers, ", "))});
+    facts.push_back({"--only-sequence", only ? std::to_string(*only) : "not given"});
+    facts.push_back({"--exhaustive", identity.rungs.size() == 1 ? "given" : "not given"});
+  }
+  return facts;
+}
+
+/// Bytes of a file name that are not UTF-8 become the replacement character.
 std::string line_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
@@ -88,16 +123,15 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
   try {
     const Json json = Json::parse(line);
     if (!is_first) {
-      records.records.push_back(json.get<FilterRecord>());
-      json.get_to(records.records.back().key);
-      return {};
+      FilterRecord record = json.get<FilterRecord>();
+      json.get_to(record.key);
+      records.records.insert(std::move(record));
+    } else if (json.at("stemvo_search") == records.identity.stemvo_search) {
+      json.get_to(records.identity);
+    } else {
+      return fail(fmt::format("expected records of format {}, found {}",
+                              records.identity.stemvo_search, json["stemvo_search"].dump()));
     }
-    const int format = json.at("stemvo_search").get<int>();
-    const int expected = records.identity.stemvo_search;
-    if (format != expected) {
-      return fail(fmt::format("expected records of format {}, found {}", expected, format));
-    }
-    json.get_to(records.identity);
     return {};
   } catch (const Json::exception& error) {
     return fail(fmt::format("expected {}, found: {}",
@@ -108,15 +142,26 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
 
 }  // namespace
 
-std::size_t SearchIdentity::num_filters() const {
-  return std::transform_reduce(layers.begin(), layers.end(), std::size_t{0}, std::plus<>(),
-                               [](const LayerIdentity& layer) { return layer.size(); });
+std::string to_string(const FilterKey& key) {
+  return fmt::format("{} {} {}{}", key.model, key.layer, key.filter,
+                     key.features == "klt" ? "" : " " + key.features);
 }
 
-std::size_t SearchIdentity::num_baselines() const {
-  return std::transform_reduce(
-      layers.begin(), layers.end(), std::size_t{0}, std::plus<>(),
-      [](const LayerIdentity& layer) { return layer.baseline ? layer.size() : 0; });
+void FilterRecord::add(const DriveScore& score, bool is_held_out, std::size_t num_frames) {
+  if (is_held_out) {
+    held_out = score;
+  } else {
+    drives.push_back(score);
+  }
+  (is_held_out ? held_out_filter_frames : filter_frames) += num_frames;
+}
+
+std::size_t SearchIdentity::count(bool baselines) const {
+  std::size_t sum = 0;
+  for (const LayerIdentity& layer : layers) {
+    sum += layer.baseline == baselines ? layer.size() : 0;
+  }
+  return sum;
 }
 
 const LayerIdentity& SearchIdentity::layer_of(const FilterKey& key) const {
@@ -125,6 +170,27 @@ const LayerIdentity& SearchIdentity::layer_of(const FilterKey& key) const {
   });
   STEMVO_CHECK(layer != layers.end(), "each row has a layer");
   return *layer;
+}
+
+std::string SearchIdentity::change_to(const SearchIdentity& now, bool as_parts) const {
+  std::vector<std::string> changed;
+  if (configuration != now.configuration) {
+    changed.push_back(
+        fmt::format("the configuration ({})", first_difference(configuration, now.configuration)));
+  }
+  const std::vector<Fact> old_facts = facts_of(*this, as_parts);
+  for (const Fact& fact : facts_of(now, as_parts)) {
+    const auto old = std::ranges::find(old_facts, fact.name, &Fact::name);
+    if (old == old_facts.end()) {
+      continue;  // of another layer or sequence, which the list of them tells
+    }
+    if (old->value != fact.value) {
+      changed.push_back(fmt::format("{} ({}, now {})", fact.name, old->value, fact.value));
+    } else if (!old->hash.empty() && !fact.hash.empty() && old->hash != fact.hash) {
+      changed.push_back(fact.name);
+    }
+  }
+  return changed.empty() ? std::string() : fmt::format("{} changed", fmt::join(changed, " and "));
 }
 
 Expected<SearchRecords> read_records(const std::filesystem::path& file) {
@@ -145,29 +211,42 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   return records;
 }
 
-Expected<RecordWriter> RecordWriter::open(const std::filesystem::path& file,
-                                          const SearchIdentity& identity,
-                                          std::size_t num_good_bytes) {
-  const bool is_new = num_good_bytes == 0;
-  std::FILE* stream = std::fopen(file.c_str(), is_new ? "axe" : "ae");
+Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
+                                      const SearchIdentity& identity,
+                                      bool resume) {
+  std::FILE* stream = std::fopen(file.c_str(), resume ? "ae" : "axe");
   if (stream == nullptr) {
-    return fail(fmt::format("{}: cannot be {}: {}", file.string(), is_new ? "created" : "written",
-                            std::strerror(errno)));
+    const bool is_there = errno == EEXIST;
+    return fail(fmt::format("{}: expected a {}, found: {}", file.string(),
+                            is_there ? "folder without a search" : "file that can be written",
+                            is_there ? "one; --resume goes on with it" : std::strerror(errno)));
   }
-  RecordWriter writer;
-  writer.file_ = file;
-  writer.stream_.reset(stream, &std::fclose);
-  if (::flock(::fileno(stream), LOCK_EX | LOCK_NB) != 0) {  // as long as the stream is open
+  RecordFile opened;
+  opened.file_ = file;
+  opened.stream_.reset(stream, &std::fclose);
+  if (::flock(::fileno(stream), LOCK_EX | LOCK_NB) != 0) {  // as long as it is open
     return fail(fmt::format("{}: another search is writing it", file.string()));
   }
-  if (::ftruncate(::fileno(stream), static_cast<off_t>(num_good_bytes)) != 0) {
+  auto before = read_records(file);
+  if (!before) {
+    return before.error();
+  }
+  const bool is_new = before->num_good_bytes == 0;  // or killed before its first line was written
+  const std::string change = is_new ? "" : before->identity.change_to(identity, false);
+  if (!change.empty()) {
+    return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
+                            file.string(), change));
+  }
+  opened.records_ = std::move(before->records);
+  if (::ftruncate(::fileno(stream), static_cast<off_t>(before->num_good_bytes)) != 0) {
     return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
   }
-  const Status written = writer.write(is_new ? line_of(identity) : std::string());
-  return written ? Expected<RecordWriter>(writer) : written.error();
+  const Status written = opened.write(is_new ? line_of(identity) : std::string());
+  return written ? Expected<RecordFile>(opened) : written.error();
 }
 
-Status RecordWriter::append(const std::vector<FilterRecord>& records) {
+Status RecordFile::append(const std::vector<FilterRecord>& records) {
+  records_.insert(records.begin(), records.end());
   std::string text;
   for (const FilterRecord& record : records) {
     Json json = record.key;
@@ -177,7 +256,7 @@ Status RecordWriter::append(const std::vector<FilterRecord>& records) {
   return write(text);
 }
 
-Status RecordWriter::write(const std::string& text) {
+Status RecordFile::write(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stream_.get()) != text.size() ||
       std::fflush(stream_.get()) != 0 || ::fsync(::fileno(stream_.get())) != 0) {
     return fail(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));

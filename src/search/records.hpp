@@ -2,53 +2,101 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "search/search.hpp"
 
-/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line.
+/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line. Members
+/// of what is in it are called like their keys.
 namespace stemvo::search {
 
-/// What the layer of gray and input_layer is called in tables.
-inline constexpr const char* kInputLayer = "input";
 inline constexpr const char* kRecordsFile = "records.jsonl";
+
+/// A filter of a layer of a model, and what finds matches on its channel. Ordered as rows are where
+/// numbers do not decide.
+struct FilterKey {
+  std::string model;
+  std::string layer;     ///< `input` for the input layer and gray
+  std::string features;  ///< `klt`, `orb`, `sift`
+  int filter = 0;
+  auto operator<=>(const FilterKey&) const = default;
+};
+/// "efficientnetv2-b0 stem 12", with the features where they are not `klt`.
+[[nodiscard]] std::string to_string(const FilterKey& key);
+
+/// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
+struct DriveScore {
+  std::string sequence;
+  std::size_t frames = 0;
+  bool detected = false;
+  std::string reason;  ///< why the pose was not detected, else empty
+  // nullopt: no motion was measured, so that there is no trajectory of its own, or no frame ran.
+  std::optional<double> t_rel_percent;  ///< nullopt too: no segment fits into the frames run
+  std::optional<double> r_rel_deg_per_100m;
+  std::optional<double> average_offset_m;
+  std::optional<double> E_t_m;                ///< paper, Table 2: mean over consecutive poses
+  std::optional<double> E_r_deg;              ///< with R_p transposed
+  std::optional<double> early_error_percent;  ///< t_rel of parts of the path: what halving goes by
+  // nullopt: no frame ran.
+  std::optional<double> inliers;  ///< mean
+  std::optional<double> tracked;  ///< share of the frames after the first: motion measured
+  /// Metres: at most 400 points, evenly spaced in frames.
+  std::vector<std::array<double, 2>> path_xz_m;
+  bool operator==(const DriveScore&) const = default;
+};
+
+/// What a filter did on one rung.
+struct FilterRecord {
+  std::size_t rung = 0;
+  FilterKey key;
+  std::vector<DriveScore> drives;      ///< one per sequence that ranks
+  std::optional<DriveScore> held_out;  ///< of filters that ran over all frames
+  std::size_t filter_frames = 0;       ///< that this took, with what a kill made it repeat
+  std::size_t held_out_filter_frames = 0;
+
+  void add(const DriveScore& score, bool is_held_out, std::size_t num_frames);
+  bool operator<(const FilterRecord& other) const {
+    return std::tie(rung, key) < std::tie(other.rung, other.key);
+  }
+};
+using FilterRecords = std::set<FilterRecord>;  ///< by rung and filter
 
 /// One rung of successive halving: so many filters run up to this share of the frames.
 struct Rung {
   double frame_share = 1.0;
   std::size_t filters = 0;
-  bool operator==(const Rung&) const = default;
 };
 
 /// The last rung has all frames; an exhaustive search has one: every filter over every frame.
 using Schedule = std::vector<Rung>;
 
-/// Filters [first, last) of a layer, and what its response depends on. Members of this and the
-/// next two are called like their keys in the file.
+/// Filters [first, last) of a layer, and what its response depends on.
 struct LayerIdentity {
-  std::string model;  ///< the manifest's name, not a path
-  std::string layer;
-  std::string features;
+  std::string model = {};  ///< the manifest's name, not a path
+  std::string layer = {};
+  std::string features = {};
   int first = 0;
   int last = 0;
-  std::string hash;  ///< of the model's file and the manifest's entry
+  std::string hash = {};  ///< of the model's file and the manifest's entry
   int sampling_px = 1;
-  std::string stem_model;  ///< as stem.model takes it here; not compared
+  std::string stem_model = {};  ///< as stem.model takes it here; not compared
   bool baseline = false;
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(last - first); }
   [[nodiscard]] FilterKey key(int filter) const { return {model, layer, features, filter}; }
-  [[nodiscard]] bool is_layer_of(const FilterKey& key) const {
-    return model == key.model && layer == key.layer && features == key.features;
-  }
+  [[nodiscard]] bool is_layer_of(const FilterKey& one) const { return one == key(one.filter); }
 };
 
 struct SequenceIdentity {
@@ -60,6 +108,8 @@ struct SequenceIdentity {
   std::string calibration;
   std::string ground_truth;
   std::string directory;  ///< where it was found; not compared
+
+  [[nodiscard]] std::size_t end_frame() const { return first_frame + num_frames; }
 };
 
 /// Everything that the records depend on.
@@ -72,71 +122,89 @@ struct SearchIdentity {
   std::vector<SequenceIdentity> sequences;   ///< the held-out one is the last
   std::optional<std::size_t> only_sequence;  ///< a part that runs this one of them
 
-  [[nodiscard]] std::size_t num_filters() const;  ///< with the baselines
-  [[nodiscard]] std::size_t num_baselines() const;
+  /// Filters, or baselines.
+  [[nodiscard]] std::size_t count(bool baselines) const;
+  [[nodiscard]] std::size_t num_rows() const { return count(false) + count(true); }
   /// The layer a row belongs to (checked).
   [[nodiscard]] const LayerIdentity& layer_of(const FilterKey& key) const;
+  /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty
+  /// where nothing did. With `as_parts` other layers, models and filters are no change, nor are
+  /// frames that a part did not run.
+  [[nodiscard]] std::string change_to(const SearchIdentity& now, bool as_parts) const;
 };
 
 /// The configuration of a filter's odometry, from that of all.
 [[nodiscard]] Config config_of(Config common, const LayerIdentity& layer, int filter);
 
-/// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty where
-/// nothing did. With `as_parts` other layers, models and filters are no change, nor are frames that
-/// a part did not run.
-[[nodiscard]] std::string describe_change(const SearchIdentity& before,
-                                          const SearchIdentity& now,
-                                          bool as_parts);
-
 struct SearchRecords {
   SearchIdentity identity;
-  std::vector<FilterRecord> records;
+  FilterRecords records;
   std::size_t num_good_bytes = 0;  ///< up to the last whole line; a kill may tear the next
 };
 
 /// Reads all whole lines. Errors: not there, a whole line that is no record, another format.
 [[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file);
 
-/// Appends records, so that what append() returned for is on the disk. One at a time: a second one
-/// for the same file is an error.
-class RecordWriter {
+/// Records that grow, on the disk when append() returns. A second writer of a file is an error.
+class RecordFile {
  public:
-  /// Goes on behind the whole lines of a file; what a kill tore is cut off. With no good bytes a
-  /// new file, with the identity in it. Error: there is one already, or it cannot be written.
-  [[nodiscard]] static Expected<RecordWriter> open(const std::filesystem::path& file,
-                                                   const SearchIdentity& identity,
-                                                   std::size_t num_good_bytes = 0);
+  /// A new file or, with `resume`, one of the same search, if there is one; what a kill tore is cut
+  /// off. Errors: it is there, or is of another search (says what changed), or those of
+  /// read_records.
+  [[nodiscard]] static Expected<RecordFile> open(const std::filesystem::path& file,
+                                                 const SearchIdentity& identity,
+                                                 bool resume);
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
+  [[nodiscard]] const FilterRecords& records() const { return records_; }
 
  private:
   [[nodiscard]] Status write(const std::string& text);
 
   std::filesystem::path file_;
   std::shared_ptr<std::FILE> stream_;
+  FilterRecords records_;
 };
 
-/// A number of a DriveScore: its key in every file, its decimals in filters.csv.
-struct ScoreNumber {
-  const char* key;
-  std::optional<double> DriveScore::* value;
-  int decimals = 4;
-};
-inline constexpr std::array<ScoreNumber, 8> kScoreNumbers = {{
-    {"t_rel_percent", &DriveScore::t_rel_percent},
-    {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m},
-    {"average_offset_m", &DriveScore::average_offset_m},
-    {"E_t_m", &DriveScore::translation_change_m},
-    {"E_r_deg", &DriveScore::rotation_change_deg},
-    {"inliers", &DriveScore::mean_inliers, 1},
-    {"tracked", &DriveScore::tracked_fraction},
-    {"early_error_percent", &DriveScore::early_error_percent},
-}};
+/// Ran over all frames, so that it has a t_rel; was stopped by halving, others being better on the
+/// frames it ran; the paper's "pose not detected".
+enum class FilterStatus { kRanked, kStopped, kNotDetected };
 
+/// A filter's record of the last rung it ran.
+struct FilterRow : FilterRecord {
+  FilterStatus status = FilterStatus::kRanked;
+  DriveScore mean;  ///< of the drives
+};
+
+/// Over the sequences that rank; nullopt where one of them has none, `frames` is the sum, the
+/// reason that of the first sequence whose pose was not detected.
+[[nodiscard]] DriveScore mean_score(const std::vector<DriveScore>& drives);
+
+/// One row per filter from its last rung, ranked: by t_rel, ties by r_rel; then those that were
+/// stopped, the later the better; not detected last.
+[[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
+                                                  std::size_t num_rungs);
+
+/// filters.csv: a header, then the rows by rank; `model,layer,filter` first, no times. Columns per
+/// sequence where there are several, and of the held-out one.
+[[nodiscard]] std::string format_csv(const SearchIdentity& identity,
+                                     const std::vector<FilterRow>& rows);
+
+/// Ranks the records and writes the files of run_search, of which filters.json says what was
+/// searched, how, and the work it took. A sheet that cannot be drawn is a warning. Where records
+/// are missing the search was interrupted. Of a part with one sequence nothing is written.
+[[nodiscard]] Expected<SearchReport> write_results(const std::filesystem::path& out_dir,
+                                                   const std::filesystem::path& models_dir,
+                                                   const SearchIdentity& identity,
+                                                   const FilterRecords& records);
+
+/// Best, median and worst of the filters (no baselines) whose pose was detected, those that halving
+/// stopped behind the others, the later the better; the same filter once.
+using ShownFilters = std::vector<std::pair<const char*, const FilterRow*>>;
+[[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
+                                       const std::vector<FilterRow>& rows);
+
+void to_json(nlohmann::ordered_json& json, const FilterKey& key);
+void to_json(nlohmann::ordered_json& json, const DriveScore& score);
 void to_json(nlohmann::ordered_json& json, const Rung& rung);
 
 }  // namespace stemvo::search
-
-namespace stemvo {
-void to_json(nlohmann::ordered_json& json, const FilterKey& key);
-void to_json(nlohmann::ordered_json& json, const DriveScore& score);
-}  // namespace stemvo

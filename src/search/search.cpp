@@ -2,6 +2,7 @@
 #include "search/search.hpp"
 
 #include <algorithm>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -9,104 +10,104 @@
 
 #include "pipeline/out_folder.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "search/halving.hpp"
 #include "search/race.hpp"
-#include "search/results.hpp"
-#include "text/text_file.hpp"
 
-namespace stemvo {
-namespace search {
+namespace stemvo::search {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// What the folder holds of the same search; nothing, with no good bytes, where none was begun.
-Expected<SearchRecords> records_before(const SearchRequest& request,
-                                       const SearchIdentity& identity) {
-  const fs::path file = request.out_dir / kRecordsFile;
-  std::error_code code;
-  if (!fs::exists(file, code)) {
-    return SearchRecords();
+Expected<SearchRecords> read_part(const fs::path& folder) {
+  const std::string file = (folder / kRecordsFile).string();
+  auto part = read_records(file);
+  if (!part) {
+    return part;
   }
-  if (!request.resume) {
-    return fail(
-        fmt::format("{}: expected a folder without a search, found one: --resume goes on with it",
-                    file.string()));
+  const std::size_t num_rows = part->identity.num_rows();
+  if (part->identity.rungs.size() != 1) {
+    return fail(fmt::format(
+        "{}: expected the records of a search with --exhaustive, found {}", file,
+        part->num_good_bytes == 0 ? "none" : "one that halves: its parts cannot be joined"));
   }
-  auto records = read_records(file);
-  if (!records) {
-    return records;
+  if (part->records.size() != num_rows) {
+    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume", file,
+                            num_rows, part->records.size()));
   }
-  if (records->num_good_bytes == 0) {  // killed before its first line was written
-    fs::remove(file, code);
-    return records;
+  return part;
+}
+
+/// The identity of all parts takes in another one's.
+Status add_identity(const SearchIdentity& part, SearchIdentity& joined) {
+  if (joined.layers.empty()) {  // the first
+    joined = part;
+    return {};
   }
-  if (const std::string change = describe_change(records->identity, identity, false);
-      !change.empty()) {
-    return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
-                            file.string(), change));
+  if (const std::string change = joined.change_to(part, true); !change.empty()) {
+    return fail(change);
+  }
+  joined.layers.insert(joined.layers.end(), part.layers.begin(), part.layers.end());
+  for (std::size_t i = 0; i < joined.sequences.size(); ++i) {
+    if (joined.sequences[i].frames.empty()) {  // not run by the parts before
+      joined.sequences[i].frames = part.sequences[i].frames;
+    }
+  }
+  return {};
+}
+
+/// What all parts found: of each filter, by (is it held out, name of the sequence).
+using Scores = std::map<FilterKey, std::map<std::pair<bool, std::string>, DriveScore>>;
+
+/// What two parts hold is no trouble where they agree; else an error.
+Status add_record(const FilterRecord& record, Scores& scores) {
+  std::vector<DriveScore> found = record.drives;
+  if (record.held_out) {
+    found.push_back(*record.held_out);
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::pair where(i == record.drives.size(), found[i].sequence);
+    if (scores[record.key].try_emplace(where, found[i]).first->second != found[i]) {
+      return fail(fmt::format("expected the result of another part for {} on {}, found another one",
+                              to_string(record.key), found[i].sequence));
+    }
+  }
+  return {};
+}
+
+/// A record per filter, as a search over all sequences writes it. Error: a filter that no part ran
+/// on one of the sequences.
+Expected<FilterRecords> join_records(const SearchIdentity& identity, const Scores& scores) {
+  FilterRecords records;
+  for (const auto& [key, found] : scores) {
+    FilterRecord record = {0, key, {}, {}};
+    for (const SequenceIdentity& sequence : identity.sequences) {
+      const auto score = found.find({sequence.held_out, sequence.name});
+      if (score == found.end()) {
+        return fail(fmt::format("--merge: expected a part with {} on {}{}, found none",
+                                to_string(key), sequence.name,
+                                sequence.held_out ? " (held out)" : ""));
+      }
+      // An exhaustive search runs each frame once, or none where the layer cannot be run.
+      record.add(score->second, sequence.held_out, score->second.frames);
+    }
+    records.insert(std::move(record));
   }
   return records;
 }
 
-SearchWork work_of(const SearchIdentity& identity, const std::vector<FilterRecord>& records) {
-  SearchWork work;
-  for (const FilterRecord& record : records) {
-    (identity.layer_of(record.key).baseline ? work.baseline_filter_frames : work.filter_frames) +=
-        record.filter_frames;
-    work.held_out_filter_frames += record.held_out_filter_frames;
-  }
-  for (const SequenceIdentity& sequence : identity.sequences) {
-    for (const LayerIdentity& layer : identity.layers) {
-      // Of a layer that cannot be run on a sequence all filters have no frames there.
-      const bool cannot_run = std::ranges::any_of(records, [&](const FilterRecord& record) {
-        return layer.is_layer_of(record.key) &&
-               std::ranges::any_of(record.drives, [&](const DriveScore& drive) {
-                 return drive.sequence == sequence.name && drive.num_frames == 0;
-               });
-      });
-      if (!sequence.held_out && !layer.baseline && !cannot_run) {
-        work.exhaustive_filter_frames += sequence.num_frames * layer.size();
-      }
+/// Ranges of filters that meet or overlap become one.
+std::vector<LayerIdentity> join_layers(const SearchIdentity& parts, const Scores& scores) {
+  std::vector<LayerIdentity> joined;
+  for (const auto& [key, found] : scores) {
+    if (joined.empty() || !joined.back().is_layer_of(key) || joined.back().last < key.filter) {
+      joined.push_back(parts.layer_of(key));
+      joined.back().first = key.filter;
     }
+    joined.back().last = key.filter + 1;
   }
-  return work;
+  return joined;
 }
 
 }  // namespace
-
-Expected<SearchReport> write_results(const Folders& folders,
-                                     const SearchIdentity& identity,
-                                     const std::vector<FilterRecord>& records) {
-  SearchReport report;
-  report.is_part = identity.only_sequence.has_value();
-  report.num_filters = identity.num_filters();
-  report.work = work_of(identity, records);
-  const auto num_done = std::ranges::count(records, identity.rungs.size() - 1, &FilterRecord::rung);
-  report.interrupted = static_cast<std::size_t>(num_done) !=
-                       identity.rungs.back().filters + identity.num_baselines();
-  if (report.is_part) {  // ranks nothing
-    return report;
-  }
-  report.rows = rank_filters(records, identity.rungs.size());
-  const fs::path file = folders.out_dir / "config.yaml";
-  if (const Status status = write_text_file(file, identity.configuration); !status) {
-    return status.error();
-  }
-  const Expected<Config> common = load_config(file);
-  if (!common) {
-    return common.error();
-  }
-  if (const Status status = write_tables(folders, identity, *common, report); !status) {
-    return status.error();
-  }
-  if (const Status status = write_contact_sheet(folders, identity, *common, report.rows); !status) {
-    report.warnings.push_back("no sheet.png: " + status.error().message);
-  }
-  return report;
-}
-
-}  // namespace search
 
 Config search_defaults() {
   Config config;
@@ -123,32 +124,59 @@ Config search_defaults() {
 
 Expected<SearchReport> run_search(const SearchRequest& request, const SearchProgress& progress) {
   const pipeline::ThreadScope threads(request.num_threads);
-  const Expected<search::SearchPlan> plan = search::make_plan(request);
+  const Expected<SearchPlan> plan = make_plan(request);
   if (!plan) {
     return plan.error();
   }
-  if (const Status status = pipeline::create_out_folder(request.out_dir); !status) {
-    return status.error();
+  auto records = pipeline::create_out_folder(request.out_dir).and_then([&] {
+    return RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
+  });
+  if (!records) {
+    return records.error();
   }
-  auto before = search::records_before(request, plan->identity);
-  if (!before) {
-    return before.error();
-  }
-  auto writer = search::RecordWriter::open(request.out_dir / search::kRecordsFile, plan->identity,
-                                           before->num_good_bytes);
-  if (!writer) {
-    return writer.error();
-  }
-  const auto warnings = search::run_race(*plan, progress, *writer, before->records);
+  const auto warnings = run_race(*plan, progress, *records);
   if (!warnings) {
     return warnings.error();
   }
   auto report =
-      search::write_results({request.out_dir, request.models_dir}, plan->identity, before->records);
+      write_results(request.out_dir, request.models_dir, plan->identity, records->records());
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
   }
   return report;
 }
 
-}  // namespace stemvo
+Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
+                                      const std::filesystem::path& out_dir,
+                                      const std::filesystem::path& models_dir) {
+  SearchIdentity identity;
+  Scores scores;
+  for (const std::filesystem::path& folder : parts) {
+    const auto part = read_part(folder);
+    if (!part) {
+      return part.error();
+    }
+    if (const Status fits = add_identity(part->identity, identity); !fits) {
+      return fail(fmt::format("{}: expected a part of the same search as {}, found that {}",
+                              folder.string(), parts.front().string(), fits.error().message));
+    }
+    for (const FilterRecord& record : part->records) {
+      if (const Status agrees = add_record(record, scores); !agrees) {
+        return fail(fmt::format("{}: {}", folder.string(), agrees.error().message));
+      }
+    }
+  }
+  const auto records = join_records(identity, scores);
+  if (!records) {
+    return records.error();
+  }
+  identity.layers = join_layers(identity, scores);
+  identity.rungs = {{1.0, identity.count(false)}};
+  identity.only_sequence.reset();
+  auto file = pipeline::create_out_folder(out_dir).and_then(
+      [&] { return RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false); });
+  const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
+  return written ? write_results(out_dir, models_dir, identity, *records) : written.error();
+}
+
+}  // namespace stemvo::search

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include "synth/painter.hpp"
-
 #include <algorithm>
 #include <limits>
 #include <optional>
 #include <span>
 
 #include "synth/materials.hpp"
+#include "synth/renderer.hpp"
 
 namespace stemvo::synth {
 namespace {

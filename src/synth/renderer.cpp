@@ -6,7 +6,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "synth/painter.hpp"
 #include "synth/street.hpp"
 
 namespace stemvo::synth {

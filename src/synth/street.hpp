@@ -49,7 +49,6 @@ struct Street {
   }
 };
 
-void add_buildings(const Street& street);
 void add_plants(const Street& street);
 
 /// The whole street near `arc_m`, seen from `camera_position`.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <iterator>
 #include <span>
 #include <utility>
 #include <variant>
@@ -23,20 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> find_frames(const fs::path& folder, const std::string& extension) {
-  std::error_code code;
-  std::vector<fs::path> frames;
-  for (fs::directory_iterator entry(folder, code), end; !code && entry != end;
-       entry.increment(code)) {
-    const std::string stem = entry->path().stem().string();
-    if (entry->path().extension() == extension && stem.size() == 6 &&
-        stem.find_first_not_of("0123456789") == std::string::npos) {
-      frames.push_back(entry->path());
-    }
-  }
-  return frames;
-}
-
 /// OUT/sequences/NAME and OUT/poses in KITTI's layout. Every Error names the file.
 struct Output {
   std::filesystem::path sequence_dir;
@@ -54,17 +39,16 @@ struct Output {
         }
       }
     }
-    std::vector<fs::path> old = find_frames(images, ".png");
-    std::ranges::copy(find_frames(depth, ".npy"), std::back_inserter(old));
-    old.push_back(sequence_dir / "camera.yaml");
-    for (const fs::path& file : old) {
-      std::error_code code;
-      fs::remove(file, code);
-      if (code) {
-        return fail(fmt::format("{}: cannot replace the file: {}", file.string(), code.message()));
-      }
+    std::error_code code;
+    const fs::path camera_file = sequence_dir / "camera.yaml";
+    fs::remove(camera_file, code);
+    if (code) {
+      return fail(
+          fmt::format("{}: cannot replace the file: {}", camera_file.string(), code.message()));
     }
-    return {};
+    return pipeline::remove_old_frames(images, ".png").and_then([&] {
+      return pipeline::remove_old_frames(depth, ".npy");
+    });
   }
 
   /// image_2/%06d.png. May be called from several threads for different frames.
@@ -264,7 +248,7 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
       return status;
     }
     done = frames.end;
-    go_on = !progress || progress(done, total);
+    go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
   return output.write_truth(std::span(poses).first(static_cast<std::size_t>(done)), pace.rate_hz);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -30,7 +31,7 @@ struct SyntheticDriveOptions {
 };
 
 /// Called after each batch of frames: frames done, frames in all; false stops (an interrupt).
-using RenderProgress = std::function<bool(int, int)>;
+using RenderProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Writes OUT/sequences/NAME/{image_2,calib.txt,times.txt} and OUT/poses/NAME.txt; of a walk also
 /// camera.yaml beside calib.txt. The same options give the same bytes, whatever the number of

@@ -5,9 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "search/halving.hpp"
 #include "search/race.hpp"
-#include "search/results.hpp"
 #include "support/search_program.hpp"
 
 namespace stemvo::search {
@@ -35,19 +33,15 @@ class SearchRace : public Search {
                              std::size_t max_frames = SIZE_MAX) const {
     const auto plan = make_plan(request_);
     EXPECT_TRUE(plan) << plan.error().message;
-    const fs::path file = folder_ / (out + ".jsonl");
-    SearchRecords known;
-    if (fs::exists(file)) {
-      known = read_records(file).value();
-    }
-    auto writer = RecordWriter::open(file, plan->identity, known.num_good_bytes);
-    std::vector<FilterRecord>& records = known.records;
+    auto file = RecordFile::open(folder_ / (out + ".jsonl"), plan->identity, true);
+    EXPECT_TRUE(file) << file.error().message;
     std::size_t done_before = SIZE_MAX;
     const auto progress = [&](std::size_t done, std::size_t) {
       done_before = std::min(done_before, done);
       return done - done_before < max_frames;
     };
-    EXPECT_TRUE(run_race(*plan, progress, *writer, records, max_kept));
+    EXPECT_TRUE(run_race(*plan, progress, *file, max_kept));
+    const FilterRecords& records = file->records();
     Outcome outcome;
     outcome.table = format_csv(plan->identity, rank_filters(records, plan->identity.rungs.size()));
     for (const FilterRecord& record : records) {

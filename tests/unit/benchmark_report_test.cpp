@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "benchmark/markdown.hpp"
+#include "benchmark/benchmark.hpp"
 #include "report/metrics_keys.hpp"
 #include "support/temp_folder.hpp"
 

@@ -84,18 +84,15 @@ class BenchmarkRuns : public ::testing::Test {
   BenchmarkSummary run(std::size_t stop_at_run = 1000) {
     runs_.clear();
     bool stop = false;
-    const auto summary = run_benchmark(
-        request_,
-        {.on_run =
-             [&](const std::string& run) {
-               runs_.push_back(run);
-               return !stop;
-             },
-         .on_frame =
-             [&](std::size_t done, std::size_t) {
-               stop = stop || (runs_.back()[0] - '1' >= static_cast<int>(stop_at_run) && done >= 2);
-               return !stop;
-             }});
+    request_.on_run = [&](const std::string& run) {
+      runs_.push_back(run);
+      return !stop;
+    };
+    request_.on_frame = [&](std::size_t done, std::size_t) {
+      stop = stop || (runs_.back()[0] - '1' >= static_cast<int>(stop_at_run) && done >= 2);
+      return !stop;
+    };
+    const auto summary = run_benchmark(request_);
     EXPECT_TRUE(summary) << summary.error().message;
     return summary.value_or(BenchmarkSummary{});
   }
@@ -135,7 +132,7 @@ TEST_F(BenchmarkRuns, RunsEachSequenceUnderEachConfigurationAndProtocolOnce) {
 
 TEST_F(BenchmarkRuns, OnlyWhatChangedIsRepeated) {
   run();
-  request_.configurations[1].config.seed = 3;
+  request_.configurations[1].second.seed = 3;
   run();
   EXPECT_THAT(runs_, AllOf(SizeIs(4), Each(AllOf(HasSubstr(" two, "),
                                                  HasSubstr("(again: configuration changed)")))));

@@ -17,6 +17,7 @@ struct LayerShape {
 /// The sizes of the blocks of these layers.
 std::vector<std::size_t> sizes(const std::vector<LayerShape>& layers, std::size_t block = 0) {
   SearchPlan plan;
+  plan.block = block;
   std::vector<std::size_t> all;
   for (const LayerShape& layer : layers) {
     StemOptions gray;
@@ -29,7 +30,7 @@ std::vector<std::size_t> sizes(const std::vector<LayerShape>& layers, std::size_
   }
   std::vector<std::size_t> sizes;
   std::vector<std::size_t> joined;
-  for (const auto& one : cut_into_blocks(plan, all, block)) {
+  for (const auto& one : cut_into_blocks(plan, all)) {
     sizes.push_back(one.size());
     joined.insert(joined.end(), one.begin(), one.end());
   }

@@ -4,8 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "search/halving.hpp"
-#include "search/records.hpp"
+#include "search/race.hpp"
 #include "support/matchers.hpp"
 #include "support/temp_folder.hpp"
 
@@ -49,11 +48,11 @@ FilterRecord record(int filter, double t_rel = 1.0) {
   record.filter_frames = 100;
   DriveScore score;
   score.sequence = "00";
-  score.num_frames = 100;
-  score.is_detected = true;
+  score.frames = 100;
+  score.detected = true;
   score.t_rel_percent = t_rel;
   score.r_rel_deg_per_100m = 1.0 / 3.0;
-  score.path = {{0.0, 0.0}, {0.25, 1.5}};
+  score.path_xz_m = {{0.0, 0.0}, {0.25, 1.5}};
   record.drives = {score};
   return record;
 }
@@ -62,7 +61,7 @@ class Records : public ::testing::Test {
  protected:
   void write(const std::string& name, const SearchIdentity& of, std::vector<FilterRecord> records) {
     std::filesystem::create_directories(folder_ / name);
-    auto writer = RecordWriter::open(file(name), of);
+    auto writer = RecordFile::open(file(name), of, false);
     ASSERT_TRUE(writer) << writer.error().message;
     ASSERT_TRUE(writer->append(records));
   }
@@ -85,10 +84,10 @@ TEST_F(Records, ComeBackToTheBit) {
   const auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
-  EXPECT_EQ(content->records[1].key, record(1).key);
-  EXPECT_EQ(content->records[1].drives, record(1, 1e-17).drives);
-  EXPECT_EQ(*content->records[0].drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
-  EXPECT_EQ(describe_change(content->identity, identity(0, 2), false), "");
+  EXPECT_EQ((*content->records.rbegin()).key, record(1).key);
+  EXPECT_EQ((*content->records.rbegin()).drives, record(1, 1e-17).drives);
+  EXPECT_EQ(*content->records.begin()->drives[0].r_rel_deg_per_100m, 1.0 / 3.0);
+  EXPECT_EQ(content->identity.change_to(identity(0, 2), false), "");
   EXPECT_EQ(content->num_good_bytes, std::filesystem::file_size(file("a")));
 }
 
@@ -98,26 +97,26 @@ TEST_F(Records, ATornLineIsLeftOutAndOverwritten) {
   auto content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   EXPECT_EQ(content->records.size(), 1U);
-  auto writer = RecordWriter::open(file("a"), content->identity, content->num_good_bytes);
-  ASSERT_TRUE(writer);
+  auto writer = RecordFile::open(file("a"), content->identity, true);
+  ASSERT_TRUE(writer) << writer.error().message;
   ASSERT_TRUE(writer->append(std::vector<FilterRecord>{record(2)}));
   content = read_records(file("a"));
   ASSERT_TRUE(content) << content.error().message;
   ASSERT_EQ(content->records.size(), 2U);
-  EXPECT_EQ(content->records[1].key.filter, 2);
+  EXPECT_EQ((*content->records.rbegin()).key.filter, 2);
 }
 
 TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
   write("a", identity(0, 3), {record(0)});
   std::ofstream(file("a"), std::ios::app) << "{\"model\": 1}\n";
   EXPECT_THAT(read_records(file("a")).error().message, HasSubstr("records.jsonl:3: expected"));
-  EXPECT_FALSE(RecordWriter::open(file("a"), identity(0, 3)));  // never replaced
+  EXPECT_FALSE(RecordFile::open(file("a"), identity(0, 3), false));  // never replaced
 }
 
 TEST_F(Records, OneWriterAtATime) {
-  const auto writer = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3));
+  const auto writer = RecordFile::open(folder_ / "records.jsonl", identity(0, 3), false);
   ASSERT_TRUE(writer);
-  const auto second = RecordWriter::open(folder_ / "records.jsonl", identity(0, 3), 1);
+  const auto second = RecordFile::open(folder_ / "records.jsonl", identity(0, 3), true);
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error().message, HasSubstr("another search is writing it"));
 }
@@ -127,18 +126,17 @@ TEST_F(Records, ChangesAreNamed) {
   SearchIdentity now = before;
   now.configuration = "seed: 1\nfeatures:\n  # levels\n  klt_levels: 4\n";
   now.sequences[0].frames = "other";
-  EXPECT_EQ(describe_change(before, now, true),
+  EXPECT_EQ(before.change_to(now, true),
             "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed");
   now = before;
   now.layers[0].hash = "other";
-  EXPECT_EQ(describe_change(before, now, true), "the model net stem changed");
+  EXPECT_EQ(before.change_to(now, true), "the model net stem changed");
   now = before;
   now.layers[0].sampling_px = 4;
-  EXPECT_THAT(describe_change(before, now, true),
-              HasSubstr("the sampling of net stem (2 px, now 4 px)"));
+  EXPECT_THAT(before.change_to(now, true), HasSubstr("the sampling of net stem (2 px, now 4 px)"));
   now = identity(0, 4);
-  EXPECT_THAT(describe_change(before, now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
-  EXPECT_EQ(describe_change(before, now, true), "");
+  EXPECT_THAT(before.change_to(now, false), HasSubstr("filters of net stem (0:3, now 0:4)"));
+  EXPECT_EQ(before.change_to(now, true), "");
 }
 
 TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
@@ -147,7 +145,7 @@ TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
   write("b", identity(1, 4), {record(1, 1), record(3, 2), record(2, 3)});  // 1 twice, agreeing
   const auto merged = merge({"b", "a"});
   ASSERT_TRUE(merged) << merged.error().message;
-  EXPECT_EQ(merged->num_filters, 4U);
+  EXPECT_THAT(merged->text, HasSubstr("work: 400 filter-frames, 100.0 % of an exhaustive search"));
   EXPECT_FALSE(merged->interrupted);
   const std::string csv = testing::read_all(folder_ / "merged" / "filters.csv");
   ASSERT_TRUE(merge_searches({folder_ / "whole"}, folder_ / "again", folder_.path()));

@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <iomanip>
+#include <iterator>
+#include <set>
+#include <span>
+#include <sstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "dataset/sequence.hpp"
+#include "models/manifest.hpp"
+#include "report/frame_image.hpp"
+#include "report/metrics_keys.hpp"
+#include "text/text_table.hpp"
+#include "report/trajectory_plot.hpp"
+#include "search/records.hpp"
+#include "stemvo/version.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo::search {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// What is written to a folder, and where named models are found.
+struct Results {
+  fs::path out_dir;
+  fs::path models_dir;
+  SearchIdentity identity;
+  Config config;  ///< of all rows
+  std::vector<FilterRow> rows;
+};
+
+/// A number of a DriveScore: its key, its decimals in filters.csv, its column in the table for
+/// people.
+struct ScoreNumber {
+  const char* key;
+  std::optional<double> DriveScore::* value;
+  int csv_decimals;
+  const char* title;
+  int decimals;
+};
+constexpr std::array<ScoreNumber, 7> kScoreNumbers = {{
+    {"t_rel_percent", &DriveScore::t_rel_percent, 4, "t_rel %", 3},
+    {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m, 4, "r_rel deg/100m", 3},
+    {"average_offset_m", &DriveScore::average_offset_m, 4, "offset m", 2},
+    {"E_t_m", &DriveScore::E_t_m, 4, "E_t m", 3},
+    {"E_r_deg", &DriveScore::E_r_deg, 4, "E_r deg", 3},
+    {"inliers", &DriveScore::inliers, 1, "inliers", 0},
+    {"tracked", &DriveScore::tracked, 4, "tracked %", 1},
+}};
+
+constexpr const char* kStatusWords[] = {"ranked", "stopped", "not detected"};
+std::string word_for(FilterStatus status) { return kStatusWords[static_cast<int>(status)]; }
+
+/// Frames times filters, and what was run again after a kill: of the filters, of all on the
+/// held-out sequence, of the baselines, and of an exhaustive search of all filters that can run.
+Json work_of(const SearchIdentity& identity, const FilterRecords& records) {
+  std::size_t done = 0;
+  std::size_t held_out = 0;
+  std::size_t baselines = 0;
+  std::size_t exhaustive = 0;
+  std::set<std::pair<const LayerIdentity*, std::string>> impossible;  // layer and sequence
+  for (const FilterRecord& record : records) {
+    const LayerIdentity& layer = identity.layer_of(record.key);
+    (layer.baseline ? baselines : done) += record.filter_frames;
+    held_out += record.held_out_filter_frames;
+    for (const DriveScore& drive : record.drives) {
+      if (drive.frames == 0) {
+        impossible.emplace(&layer, drive.sequence);
+      }
+    }
+  }
+  for (const SequenceIdentity& sequence : identity.sequences) {
+    for (const LayerIdentity& layer : identity.layers) {
+      if (!sequence.held_out && !layer.baseline && !impossible.contains({&layer, sequence.name})) {
+        exhaustive += sequence.num_frames * layer.size();
+      }
+    }
+  }
+  return {{"filter_frames", done},
+          {"held_out_filter_frames", held_out},
+          {"baseline_filter_frames", baselines},
+          {"exhaustive_filter_frames", exhaustive}};
+}
+
+std::string format_table(const std::vector<FilterRow>& rows) {
+  const bool has_held_out =
+      std::ranges::any_of(rows, [](const FilterRow& row) { return row.held_out.has_value(); });
+  TextTable table("rllrlrrrrrrrrrl");
+  std::vector<std::string> cells = {"", "model", "layer", "filter", "by"};
+  std::ranges::transform(kScoreNumbers, std::back_inserter(cells), &ScoreNumber::title);
+  cells.insert(cells.end(), {"frames", has_held_out ? "held out t_rel %" : "", ""});
+  table.add(cells);
+  table.rule();
+  int rank = 0;
+  for (const FilterRow& row : rows) {
+    DriveScore mean = row.mean;
+    std::string remark = row.status == FilterStatus::kStopped ? "stopped" : "";
+    if (row.status == FilterStatus::kNotDetected) {
+      mean.t_rel_percent.reset();
+      mean.r_rel_deg_per_100m.reset();
+      remark = "pose not detected: " + mean.reason;
+    }
+    if (mean.tracked) {
+      *mean.tracked *= 100.0;
+    }
+    cells = {row.status == FilterStatus::kRanked ? std::to_string(++rank) : "", row.key.model,
+             row.key.layer, std::to_string(row.key.filter), row.key.features};
+    for (const ScoreNumber& number : kScoreNumbers) {
+      cells.push_back(number_or_dash(mean.*number.value, number.decimals));
+    }
+    const bool is_known = row.held_out && row.held_out->detected;
+    cells.insert(cells.end(),
+                 {std::to_string(mean.frames),
+                  is_known ? number_or_dash(row.held_out->t_rel_percent, 3) : "", remark});
+    table.add(cells);
+  }
+  return table.str();
+}
+
+/// RFC 4180: quoted where it must be.
+std::string csv_cell(const std::string& text) {
+  std::ostringstream quoted;
+  quoted << std::quoted(text, '"', '"');
+  return text.find_first_of(",\"\n\r") == std::string::npos ? text : quoted.str();
+}
+
+/// A column's name, and what the row has there.
+using Column = std::pair<std::string, std::string>;
+
+std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow& row) {
+  std::vector<Column> columns = {{"model", row.key.model},
+                                 {"layer", row.key.layer},
+                                 {"filter", std::to_string(row.key.filter)},
+                                 {"features", row.key.features},
+                                 {"status", word_for(row.status)}};
+  const auto add = [&](const std::string& name, const ScoreNumber& number, const DriveScore& of) {
+    const std::optional<double>& value = of.*number.value;
+    columns.emplace_back(name, value ? fmt::format("{:.{}f}", *value, number.csv_decimals) : "");
+  };
+  for (const ScoreNumber& number : kScoreNumbers) {
+    add(number.key, number, row.mean);
+  }
+  columns.emplace_back("frames", std::to_string(row.mean.frames));
+  const bool has_held_out = identity.sequences.back().held_out;
+  const std::size_t num_ranking = identity.sequences.size() - (has_held_out ? 1 : 0);
+  for (std::size_t i = 0; num_ranking > 1 && i < num_ranking; ++i) {
+    for (const ScoreNumber& number : std::span(kScoreNumbers).first<2>()) {
+      add(number.key + ("_" + identity.sequences[i].name), number,
+          row.drives.empty() ? DriveScore() : row.drives[i]);
+    }
+  }
+  const bool is_known = row.held_out && row.held_out->detected;
+  for (const ScoreNumber& number : std::span(kScoreNumbers).first<3>()) {
+    if (has_held_out) {
+      add(std::string("held_out_") + number.key, number, is_known ? *row.held_out : DriveScore());
+    }
+  }
+  columns.emplace_back("reason", row.mean.reason);
+  return columns;
+}
+
+Json drive_json(const DriveScore& drive) {
+  Json json = drive;
+  json.erase("path_xz_m");
+  if (drive.detected) {
+    json.erase("reason");
+  }
+  return json;
+}
+
+Json row_json(const FilterRow& row) {
+  Json json = row.key;
+  json["status"] = word_for(row.status);
+  json["t_rel_percent"] = row.mean.t_rel_percent;
+  json["r_rel_deg_per_100m"] = row.mean.r_rel_deg_per_100m;
+  json["rung"] = row.rung;
+  json["sequences"] = Json::array();
+  std::ranges::transform(row.drives, std::back_inserter(json["sequences"]), drive_json);
+  if (row.held_out) {
+    json["held_out"] = drive_json(*row.held_out);
+  }
+  return json;
+}
+
+std::string format_json(const Results& results, const Json& work, bool is_complete) {
+  const SearchIdentity& identity = results.identity;
+  Json json;
+  json["stemvo_version"] = std::string(version());
+  json["complete"] = is_complete;
+  json["search"] = identity.rungs.size() == 1 ? "exhaustive" : "successive halving";
+  json["rungs"] = identity.rungs;
+  json["sequences"] = Json::array();
+  for (const SequenceIdentity& sequence : identity.sequences) {
+    json["sequences"].push_back({{"name", sequence.name},
+                                 {"first_frame", sequence.first_frame},
+                                 {"frames", sequence.num_frames},
+                                 {"held_out", sequence.held_out}});
+  }
+  json["work"] = work;
+  json["filters"] = Json::array();
+  std::ranges::transform(results.rows, std::back_inserter(json["filters"]), row_json);
+  json["configuration"] = identity.configuration;
+  return to_text(json);
+}
+
+/// best.yaml: what repeats the first row.
+std::string format_best(const Results& results) {
+  const FilterRow& best = results.rows.front();
+  const Config config =
+      config_of(results.config, results.identity.layer_of(best.key), best.key.filter);
+  return fmt::format(
+      "# stemvo {}\n"
+      "# {}: the best of the search, t_rel {:.4f} %{}\n"
+      "# What repeats its row: the search's fast odometry, steps of the true length.\n"
+      "# The filter with the defaults of a run: stemvo run SEQUENCE --out DIR --set stem.model={} "
+      "--set stem.layer={} --set stem.filter={}\n\n{}",
+      version(), to_string(best.key), best.mean.t_rel_percent.value_or(0.0),
+      results.identity.rungs.size() > 1 ? " (successive halving)" : "", config.stem.model,
+      config.stem.layer, config.stem.filter, dump_config(config));
+}
+
+/// "t_rel 1.41 %", or "stopped after 25 frames".
+std::string outcome_of(const FilterRow& row) {
+  return row.status == FilterStatus::kStopped
+             ? fmt::format("stopped after {} frames", row.drives.front().frames)
+             : fmt::format("t_rel {:.2f} %", row.mean.t_rel_percent.value_or(0.0));
+}
+
+Status write_trajectories(const fs::path& file,
+                          const KittiSequence& sequence,
+                          const ShownFilters& shown) {
+  TrajectoryPlot plot;
+  plot.title = fmt::format("{}, each step of its true length", sequence.name());
+  plot.ground_truth = sequence.ground_truth();
+  for (const auto& [rank, row] : shown) {
+    const bool is_stopped = row->status == FilterStatus::kStopped;
+    plot.others.push_back({is_stopped ? fmt::format("{} ({})", rank, outcome_of(*row)) : rank, {}});
+    for (const auto& [x_m, z_m] : row->drives.front().path_xz_m) {
+      plot.others.back().trajectory.emplace_back(Eigen::Quaterniond::Identity(),
+                                                 Eigen::Vector3d(x_m, 0.0, z_m));
+    }
+  }
+  plot.estimate = plot.others.front().trajectory;
+  plot.estimate_name = plot.others.front().name;
+  plot.others.erase(plot.others.begin());
+  return write_trajectory_png(file, plot);
+}
+
+Expected<cv::Mat> draw_channels(const Results& results,
+                                const KittiSequence& sequence,
+                                const ShownFilters& shown) {
+  const std::size_t middle = sequence.size() / 2;
+  const Expected<cv::Mat> frame = sequence.read(middle);
+  if (!frame) {
+    return frame;
+  }
+  std::vector<cv::Mat> channels;
+  std::vector<std::string> captions = {
+      fmt::format("{}, frame {}", sequence.name(), sequence.range().begin + middle)};
+  for (const auto& [rank, row] : shown) {
+    const LayerIdentity& layer = results.identity.layer_of(row->key);
+    const Config config = config_of(results.config, layer, row->key.filter);
+    const Expected<Channel> channel =
+        create_stem(config.stem, results.models_dir).and_then([&](const Stem& s) {
+          return s.apply(*frame);
+        });
+    if (!channel) {
+      return channel.error();
+    }
+    channels.push_back(channel->values);
+    captions.push_back(fmt::format("{}: {}, {}", rank, to_string(row->key), outcome_of(*row)));
+  }
+  return draw_channel_sheet(*frame, channels, captions);
+}
+
+/// sheet.png: the input and the channels of the filters of choose_rows on the middle frame of the
+/// first sequence, above their trajectories (trajectories.png), and where they were stopped.
+/// Nothing where there is none. Error: the sequence or the model is not where it was.
+Status write_contact_sheet(const Results& results) {
+  const ShownFilters shown = choose_rows(results.identity, results.rows);
+  if (shown.empty()) {
+    return {};
+  }
+  const SequenceIdentity& first = results.identity.sequences.front();
+  const Expected<KittiSequence> sequence = KittiSequence::open(
+      first.directory, {.camera = results.config.input.camera,
+                        .frames = FrameRangeRequest{first.first_frame, first.end_frame()}});
+  if (!sequence) {
+    return sequence.error();
+  }
+  const fs::path plot_file = results.out_dir / "trajectories.png";
+  if (const Status status = write_trajectories(plot_file, *sequence, shown); !status) {
+    return status;
+  }
+  const Expected<cv::Mat> channels = draw_channels(results, *sequence, shown);
+  if (!channels) {
+    return channels.error();
+  }
+  cv::Mat plot = cv::imread(plot_file.string(), cv::IMREAD_COLOR);
+  if (plot.empty()) {
+    return fail(fmt::format("{}: cannot be read back", plot_file.string()));
+  }
+  cv::cvtColor(plot, plot, cv::COLOR_BGR2RGB);
+  const double zoom = static_cast<double>(channels->cols) / plot.cols;
+  cv::resize(plot, plot, {channels->cols, cvRound(zoom * plot.rows)}, 0, 0, cv::INTER_AREA);
+  cv::vconcat(*channels, plot, plot);
+  return write_image(results.out_dir / "sheet.png", plot);
+}
+
+}  // namespace
+
+std::string format_csv(const SearchIdentity& identity, const std::vector<FilterRow>& rows) {
+  const auto line_of = [&identity](const FilterRow& row, std::string Column::* part) {
+    std::vector<std::string> cells;
+    for (const Column& column : csv_columns(identity, row)) {
+      cells.push_back(csv_cell(column.*part));
+    }
+    return fmt::format("{}\n", fmt::join(cells, ","));
+  };
+  std::string text = line_of(FilterRow(), &Column::first);
+  for (const FilterRow& row : rows) {
+    text += line_of(row, &Column::second);
+  }
+  return text;
+}
+
+ShownFilters choose_rows(const SearchIdentity& identity, const std::vector<FilterRow>& all) {
+  std::vector<const FilterRow*> rows;
+  for (const FilterRow& row : all) {
+    if (row.status != FilterStatus::kNotDetected && !identity.layer_of(row.key).baseline) {
+      rows.push_back(&row);
+    }
+  }
+  ShownFilters shown;
+  if (!rows.empty()) {
+    shown.emplace_back("best", rows.front());
+  }
+  if (rows.size() > 2) {
+    shown.emplace_back("median", rows[rows.size() / 2]);
+  }
+  if (rows.size() > 1) {
+    shown.emplace_back("worst", rows.back());
+  }
+  return shown;
+}
+
+Expected<SearchReport> write_results(const fs::path& out_dir,
+                                     const fs::path& models_dir,
+                                     const SearchIdentity& identity,
+                                     const FilterRecords& records) {
+  const Json work = work_of(identity, records);
+  const auto num_done = std::ranges::count(records, identity.rungs.size() - 1, &FilterRecord::rung);
+  SearchReport report;
+  report.interrupted =
+      static_cast<std::size_t>(num_done) != identity.rungs.back().filters + identity.count(true);
+  if (identity.only_sequence) {
+    report.text = fmt::format(
+        "part: {} filters on one sequence; 'stemvo search --merge' joins it with the others\n",
+        identity.num_rows());
+    return report;
+  }
+  const fs::path config_file = out_dir / "config.yaml";
+  const Expected<Config> config =
+      write_text_file(config_file, identity.configuration).and_then([&] {
+        return load_config(config_file);
+      });
+  if (!config) {
+    return config.error();
+  }
+  const Results results = {out_dir, models_dir, identity, *config,
+                           rank_filters(records, identity.rungs.size())};
+  std::vector<std::pair<const char*, std::string>> files = {
+      {"filters.csv", format_csv(identity, results.rows)},
+      {"filters.json", format_json(results, work, !report.interrupted)}};
+  if (!results.rows.empty() && results.rows.front().status == FilterStatus::kRanked) {
+    files.emplace_back("best.yaml", format_best(results));
+  }
+  for (const auto& [name, text] : files) {
+    if (const Status status = write_text_file(out_dir / name, text); !status) {
+      return status.error();
+    }
+  }
+  if (const Status status = write_contact_sheet(results); !status) {
+    report.warnings.push_back("no sheet.png: " + status.error().message);
+  }
+  const auto num_frames = work["filter_frames"].get<std::size_t>();
+  const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();
+  report.text = fmt::format(
+      "{}work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
+      format_table(results.rows), num_frames,
+      100.0 * static_cast<double>(num_frames) /
+          static_cast<double>(std::max<std::size_t>(num_exhaustive, 1)),
+      work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string());
+  return report;
+}
+
+}  // namespace stemvo::search
