@@ -94,16 +94,6 @@ void add_threads_option(CLI::App& command, int& num_threads) {
       ->check(in_range(0, 1024));
 }
 
-void add_out_folder(CLI::App& command, std::filesystem::path& folder, const std::string& help) {
-  command.add_option("--out", folder, help)->required()->type_name("DIR");
-}
-
-void add_threads_option(CLI::App& command, int& num_threads) {
-  command.add_option("--threads", num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
-}
-
 CLI::Option* add_range_option(CLI::App& command,
                               const std::string& name,
                               std::optional<FrameRangeRequest>& range,

@@ -60,8 +60,8 @@ struct FrameResult {
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
   RoadState road = RoadState::kDisabled;
-  std::string_view road_reason;       ///< why the road was not measured, else empty
-  Camera camera;  ///< with what was learnt so far (`camera.refine`)
+  std::string_view road_reason;  ///< why the road was not measured, else empty
+  Camera camera;                 ///< with what was learnt so far (`camera.refine`)
   std::optional<Eigen::Vector2d> principal_point_sigma_px;  ///< nullopt: it is not refined
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;

@@ -65,9 +65,9 @@ struct StemOptions {
 
 enum class FeatureMethod {
   kPatch,  ///< corners, tracked by aligning the patch of their first frame
-  kKlt,   ///< corners, tracked by pyramidal Lucas-Kanade from frame to frame
-  kOrb,   ///< described and matched (the paper's)
-  kSift,  ///< described and matched
+  kKlt,    ///< corners, tracked by pyramidal Lucas-Kanade from frame to frame
+  kOrb,    ///< described and matched (the paper's)
+  kSift,   ///< described and matched
 };
 
 /// Keys `features.*`.

@@ -39,11 +39,12 @@ Status check_request(const CalibrationRequest& request) {
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  if (request.config.features.method != FeatureMethod::kKlt) {
+  const FeatureMethod method = request.config.features.method;
+  if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
     return fail(
-        fmt::format("features.method: expected klt, whose tracks calibration needs, "
+        fmt::format("features.method: expected patch or klt, whose tracks calibration needs, "
                     "found '{}'",
-                    options::to_string(request.config.features.method)));
+                    options::to_string(method)));
   }
   std::error_code code;
   if (fs::equivalent(request.out_file, calibration_file(request), code)) {

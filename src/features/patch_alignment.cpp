@@ -64,7 +64,8 @@ void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coa
     yy += coarse.gy[i] * coarse.gy[i];
   }
   const float determinant = xx * yy - xy * xy;
-  const float inverse = determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;
+  const float inverse =
+      determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;
   coarse.inverse_hessian = {yy * inverse, -xy * inverse, xx * inverse};
 }
 
@@ -108,7 +109,8 @@ bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
   const Eigen::Matrix<float, 2, kFineSide * kFineSide> translation =
       hessian.topLeftCorner<2, 2>().inverse() * columns.leftCols<2>().transpose();
   for (std::size_t k = 0; k < 2; ++k) {
-    FineVector(patch.translation_step[k].data()) = translation.row(static_cast<Eigen::Index>(k)).transpose();
+    FineVector(patch.translation_step[k].data()) =
+        translation.row(static_cast<Eigen::Index>(k)).transpose();
     patch.translation_step[k + 2].fill(0.0F);
   }
   return true;

@@ -24,7 +24,7 @@ struct Patch {
   /// orthogonal to {1, value}: bias and gain drop out.
   std::array<FineValues, 4> step;
   std::array<FineValues, 4> translation_step;  ///< of a translation alone; the last two are 0
-  float norm_sq = 0.0F;  ///< of value
+  float norm_sq = 0.0F;                        ///< of value
 };
 
 /// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y).

@@ -45,13 +45,12 @@ cv::Point2f Motions::near(const cv::Point2f& uv) const {
     return {};
   }
   std::array<Known, kNumNeighbours> nearest;
-  const auto end = std::partial_sort_copy(
-      known_.begin(), known_.end(), nearest.begin(), nearest.end(),
-      [&](const Known& a, const Known& b) {
-        const cv::Point2f to_a = a.from - uv;
-        const cv::Point2f to_b = b.from - uv;
-        return to_a.dot(to_a) < to_b.dot(to_b);
-      });
+  const auto end = std::partial_sort_copy(known_.begin(), known_.end(), nearest.begin(),
+                                          nearest.end(), [&](const Known& a, const Known& b) {
+                                            const cv::Point2f to_a = a.from - uv;
+                                            const cv::Point2f to_b = b.from - uv;
+                                            return to_a.dot(to_a) < to_b.dot(to_b);
+                                          });
   const auto median = [&](float cv::Point2f::* axis) {
     const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(nearest.begin(), middle, end, [&](const Known& a, const Known& b) {
@@ -173,8 +172,9 @@ void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
                                         [](const Point& point, int i) { return point.id < i; });
     return found != points.end() && found->id == id;
   };
-  std::erase_if(tracks_,
-                [&](const auto& track) { return !has(last, track.first) && !has(good, track.first); });
+  std::erase_if(tracks_, [&](const auto& track) {
+    return !has(last, track.first) && !has(good, track.first);
+  });
 }
 
 }  // namespace stemvo

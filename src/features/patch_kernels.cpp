@@ -36,7 +36,10 @@ STEMVO_INLINE float value_at(const Bilinear& at,
          at.w10 * static_cast<float>(bottom[i]) + at.w11 * static_cast<float>(bottom[i + 1]);
 }
 
-STEMVO_INLINE void sample_coarse(const BorderedImage& image, float x, float y, CoarseValues& values) {
+STEMVO_INLINE void sample_coarse(const BorderedImage& image,
+                                 float x,
+                                 float y,
+                                 CoarseValues& values) {
   const Bilinear at = bilinear(image, x, y);
   for (int j = 0; j < kCoarseSide; ++j) {
     const std::uint8_t* top = at.top_left + j * image.stride;
@@ -124,7 +127,8 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
       float wy[4];
       catmull_rom(x - column, wx);
       catmull_rom(y - row, wy);
-      const std::uint8_t* pixel = image.origin + (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
+      const std::uint8_t* pixel = image.origin +
+                                  (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
                                   static_cast<std::ptrdiff_t>(column) - 1;
       float sum = 0.0F;
       for (float w : wy) {
@@ -190,8 +194,7 @@ STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
   const __m256 t_sq = _mm256_mul_ps(t, t);
   const __m256 half_t = _mm256_mul_ps(half, t);
   w[0] = _mm256_mul_ps(t, _mm256_fmsub_ps(t, _mm256_sub_ps(one, half_t), half));
-  w[1] = _mm256_fmadd_ps(
-      t_sq, _mm256_fmsub_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.5F)), one);
+  w[1] = _mm256_fmadd_ps(t_sq, _mm256_fmsub_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.5F)), one);
   w[2] = _mm256_mul_ps(
       t, _mm256_fmadd_ps(t, _mm256_fnmadd_ps(_mm256_set1_ps(1.5F), t, _mm256_set1_ps(2.0F)), half));
   w[3] = _mm256_mul_ps(t_sq, _mm256_sub_ps(half_t, half));
@@ -228,7 +231,8 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
       const __m256 p2 = _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32(taps, 16), low));
       const __m256 p3 = _mm256_cvtepi32_ps(_mm256_srli_epi32(taps, 24));
       const __m256 in_row = _mm256_fmadd_ps(
-          wx[0], p0, _mm256_fmadd_ps(wx[1], p1, _mm256_fmadd_ps(wx[2], p2, _mm256_mul_ps(wx[3], p3))));
+          wx[0], p0,
+          _mm256_fmadd_ps(wx[1], p1, _mm256_fmadd_ps(wx[2], p2, _mm256_mul_ps(wx[3], p3))));
       sum = _mm256_fmadd_ps(w, in_row, sum);
       offset = _mm256_add_epi32(offset, stride);
     }
@@ -236,7 +240,8 @@ STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
   }
 }
 
-constexpr PatchKernels kAvx2{sample_coarse_avx2, coarse_sums_avx2, sample_fine_avx2, fine_sums_avx2};
+constexpr PatchKernels kAvx2{sample_coarse_avx2, coarse_sums_avx2, sample_fine_avx2,
+                             fine_sums_avx2};
 #endif
 
 }  // namespace

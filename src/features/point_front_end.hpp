@@ -23,7 +23,7 @@ class PointFrontEnd : public FrontEnd {
   /// With the pyramid that the derived class tracks on.
   struct Picture : PreparedPicture {
     using PreparedPicture::PreparedPicture;
-    cv::Mat corner_pixels;       ///< where corners are looked for
+    cv::Mat corner_pixels;      ///< where corners are looked for
     float corner_scale = 1.0F;  ///< pixels of the image per pixel of it
   };
   /// A point of an image, in that image's pixels.
@@ -40,8 +40,8 @@ class PointFrontEnd : public FrontEnd {
   explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}
 
   [[nodiscard]] const FeatureOptions& options() const { return options_; }
-  /// Levels of a pyramid over an image of the given scale (input pixels per pixel): an image of half
-  /// the input's size is its pyramid's second level.
+  /// Levels of a pyramid over an image of the given scale (input pixels per pixel): an image of
+  /// half the input's size is its pyramid's second level.
   [[nodiscard]] int num_levels(double scale) const;
 
  private:

@@ -39,7 +39,10 @@ class NormalEquations {
   /// Around the bundle, with the points' blocks damped.
   void linearize(const Bundle& bundle, double damping);
   /// Moves `bundle` by the solution; false where there is none.
-  [[nodiscard]] bool step(double damping, const CameraChange& from_prior, Bundle& bundle, CameraChange& camera_change) const;
+  [[nodiscard]] bool step(double damping,
+                          const CameraChange& from_prior,
+                          Bundle& bundle,
+                          CameraChange& camera_change) const;
   [[nodiscard]] CameraInformation camera_information() const;
 
  private:
@@ -56,7 +59,7 @@ class NormalEquations {
   BundleOptions options_;
   int num_camera_;
   int size_;
-  Eigen::MatrixXd reduced_;   ///< camera first, then the free poses; upper triangle
+  Eigen::MatrixXd reduced_;  ///< camera first, then the free poses; upper triangle
   Eigen::VectorXd gradient_;
   Eigen::VectorXd diagonal_;  ///< before the elimination
   std::vector<PointBlock> points_;
@@ -148,9 +151,8 @@ void NormalEquations::linearize(const Bundle& bundle, double damping) {
     }
   }
   diagonal_ = reduced_.diagonal();
-  for_each_point(bundle, [&](std::size_t begin, std::size_t end) {
-    eliminate(bundle, begin, end, damping);
-  });
+  for_each_point(
+      bundle, [&](std::size_t begin, std::size_t end) { eliminate(bundle, begin, end, damping); });
 }
 
 void NormalEquations::eliminate(const Bundle& bundle,
@@ -184,7 +186,10 @@ void NormalEquations::eliminate(const Bundle& bundle,
   }
 }
 
-bool NormalEquations::step(double damping, const CameraChange& from_prior, Bundle& bundle, CameraChange& camera_change) const {
+bool NormalEquations::step(double damping,
+                           const CameraChange& from_prior,
+                           Bundle& bundle,
+                           CameraChange& camera_change) const {
   Eigen::MatrixXd damped = reduced_;
   Eigen::VectorXd gradient = gradient_;
   damped.diagonal() += damping * diagonal_;
@@ -206,16 +211,15 @@ bool NormalEquations::step(double damping, const CameraChange& from_prior, Bundl
     }
     for (std::size_t i = begin; i < end; ++i) {
       if (bundle.observations[i].pose >= options_.num_fixed_poses) {
-        rest +=
-            by_pose_[i].transpose() * change.segment<6>(row_of(bundle.observations[i]));
+        rest += by_pose_[i].transpose() * change.segment<6>(row_of(bundle.observations[i]));
       }
     }
     bundle.points[index] -= point.inverse * rest;
   });
   for (std::size_t i = static_cast<std::size_t>(options_.num_fixed_poses);
        i < bundle.camera_from_world.size(); ++i) {
-    const Vector6 of_pose = change.segment<6>(
-        num_camera_ + 6 * (static_cast<int>(i) - options_.num_fixed_poses));
+    const Vector6 of_pose =
+        change.segment<6>(num_camera_ + 6 * (static_cast<int>(i) - options_.num_fixed_poses));
     const Eigen::Quaterniond turn = so3_exp(of_pose.head<3>());
     Rigid3& pose = bundle.camera_from_world[i];
     pose = Rigid3(turn * pose.rotation, turn * pose.translation + of_pose.tail<3>());
@@ -287,7 +291,8 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
     equations.linearize(bundle, damping);
     Bundle trial = bundle;
     CameraChange change = CameraChange::Zero();
-    const CameraChange from_prior = options.camera ? CameraChange(result.camera_change - options.camera->mean) : change;
+    const CameraChange from_prior =
+        options.camera ? CameraChange(result.camera_change - options.camera->mean) : change;
     const bool is_solved = equations.step(damping, from_prior, trial, change);
     change += result.camera_change;
     const double cost = is_solved ? cost_of(trial, options.loss_scale_px) + prior_cost(change)

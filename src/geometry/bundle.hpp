@@ -39,23 +39,23 @@ struct CameraPrior {
 struct BundleOptions {
   int num_fixed_poses = 2;  ///< the first ones; with fewer than 2 lengths are free
   int max_iterations = 10;
-  double loss_scale_px = 0.2;          ///< Cauchy
-  double min_relative_decrease = 5e-3; ///< of the cost; a smaller one ends the minimization
-  std::optional<CameraPrior> camera;   ///< the camera is an unknown too
+  double loss_scale_px = 0.2;           ///< Cauchy
+  double min_relative_decrease = 5e-3;  ///< of the cost; a smaller one ends the minimization
+  std::optional<CameraPrior> camera;    ///< the camera is an unknown too
 };
 
 struct BundleResult {
   bool is_usable = false;  ///< the cost fell or stayed; else the bundle is unchanged
   double cost = 0.0;       ///< sum of the robust loss, px^2
   CameraChange camera_change = CameraChange::Zero();
-  /// Of the camera without its prior, all else left free: inverse of its covariance for observations
-  /// of a noise of 1 px.
+  /// Of the camera without its prior, all else left free: inverse of its covariance for
+  /// observations of a noise of 1 px.
   CameraInformation information = CameraInformation::Zero();
 };
 
 /// Bundle adjustment (Triggs et al., 2000): reprojection error under Cauchy's loss,
-/// Levenberg-Marquardt, the points eliminated by the Schur complement. Every point must lie in front
-/// of every pose that sees it. One thread; the same bytes on every run.
+/// Levenberg-Marquardt, the points eliminated by the Schur complement. Every point must lie in
+/// front of every pose that sees it. One thread; the same bytes on every run.
 BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options);
 
 }  // namespace stemvo

@@ -58,8 +58,8 @@ WindowBundle read_window(const Window& window,
   }
   for (const auto& [track_id, point] : window.landmarks) {
     const std::vector<Sighting> sightings = sightings_of(window, track_id, next);
-    const bool is_in_front = std::all_of(
-        sightings.begin(), sightings.end(), [&, &at = point](const Sighting& sighting) {
+    const bool is_in_front =
+        std::all_of(sightings.begin(), sightings.end(), [&, &at = point](const Sighting& sighting) {
           const auto pose = static_cast<std::size_t>(sighting.pose);
           return (bundle.camera_from_world[pose] * at).z() > kMinDepth;
         });

@@ -53,15 +53,14 @@ CameraChange SelfCalibration::applied() const {
 }
 
 void SelfCalibration::observe(const Window& window, const BundleAdjustmentOptions& options) {
-  if (refinement_ == CameraRefinement::kOff ||
-      ++keyframes_since_ < static_cast<int>(window.keyframes.size())) {
+  if (refinement_ == CameraRefinement::kOff || window.keyframes.front().frame <= newest_used_) {
     return;
   }
-  keyframes_since_ = 0;
+  newest_used_ = window.keyframes.back().frame;
   constexpr double factor_sq = kSigmaFactor * kSigmaFactor;
   const CameraChange before = applied();
-  const auto found = measure_camera(window, camera_,
-                                    {mean_ - before, factor_sq * information_}, options);
+  const auto found =
+      measure_camera(window, camera_, {mean_ - before, factor_sq * information_}, options);
   if (!found.has_value() || !is_plausible(*found)) {
     return;
   }

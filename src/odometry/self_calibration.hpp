@@ -20,7 +20,8 @@ class SelfCalibration {
  public:
   SelfCalibration(const Camera& given, CameraRefinement refinement);
 
-  /// Once per keyframe, after its window was refined.
+  /// A window of full length, once it was refined; one that shares a keyframe with the last one
+  /// that was used is left out.
   void observe(const Window& window, const BundleAdjustmentOptions& options);
 
   /// The given one, less what the data insist on.
@@ -37,7 +38,7 @@ class SelfCalibration {
   CameraRefinement refinement_;
   CameraChange mean_ = CameraChange::Zero();  ///< less the given camera
   CameraInformation information_;
-  int keyframes_since_ = 0;
+  int newest_used_ = -1;  ///< frame of the newest keyframe that was used
 };
 
 }  // namespace stemvo

@@ -271,8 +271,10 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
     anchor_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera_, window_options_);
-  calibration_.observe(window_, refinement_);
-  camera_ = calibration_.camera();
+  if (window_.keyframes.size() >= length) {
+    calibration_.observe(window_, refinement_);
+    camera_ = calibration_.camera();
+  }
   history_.observe(window_, frame.image);
 }
 

@@ -48,7 +48,8 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
   return {
       {"features", "method", enum_value(&o.method),
        Rule::one_of({kFeatureMethods.begin(), kFeatureMethods.end()}),
-       "patch: corners tracked by the patch of their first frame; klt: by optical flow from frame to "
+       "patch: corners tracked by the patch of their first frame; klt: by optical flow from frame "
+       "to "
        "frame; orb (the paper's), sift: described and matched"},
       {"features", "max_features", &o.max_features, Rule::between(8, 100000),
        "keypoints aimed at per frame"},

@@ -91,7 +91,10 @@ void visit_ate(Ate& ate, const Visitor& visit) {
 // Found by nlohmann's library.
 void to_json(Json& json, const CameraReport& report) {
   const Camera& camera = report.camera;
-  json = {{"fx_px", camera.fx_px}, {"fy_px", camera.fy_px}, {"cx_px", camera.cx_px}, {"cy_px", camera.cy_px}};
+  json = {{"fx_px", camera.fx_px},
+          {"fy_px", camera.fy_px},
+          {"cx_px", camera.cx_px},
+          {"cy_px", camera.cy_px}};
   json["cx_sigma_px"] = report.sigma_px ? Json(report.sigma_px->x()) : Json();
   json["cy_sigma_px"] = report.sigma_px ? Json(report.sigma_px->y()) : Json();
 }

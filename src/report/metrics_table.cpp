@@ -28,9 +28,10 @@ std::string head(const MetricsReport& report) {
   table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
                                     100.0 * report.tracked_fraction)});
   if (const auto& sigma = report.camera.sigma_px) {
-    table.add({"camera", fmt::format("principal point {:.1f}, {:.1f} px, known to {:.1f}, {:.1f} px",
-                                     report.camera.camera.cx_px, report.camera.camera.cy_px,
-                                     sigma->x(), sigma->y())});
+    table.add(
+        {"camera", fmt::format("principal point {:.1f}, {:.1f} px, known to {:.1f}, {:.1f} px",
+                               report.camera.camera.cx_px, report.camera.camera.cy_px, sigma->x(),
+                               sigma->y())});
   }
   if (report.road_measured_fraction) {
     table.add({"road", fmt::format("measured on {:.1f} % of the frames",

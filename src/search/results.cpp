@@ -18,11 +18,11 @@
 #include "models/manifest.hpp"
 #include "report/frame_image.hpp"
 #include "report/metrics_keys.hpp"
-#include "text/text_table.hpp"
 #include "report/trajectory_plot.hpp"
 #include "search/records.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo::search {
 namespace {

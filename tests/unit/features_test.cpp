@@ -56,7 +56,8 @@ TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
   const Matches matches =
       front_end_->process(image_of(textured_picture(size, {3.25, -1.75}), 2.0, 1.5));
   EXPECT_GT(matches.cur_uv.size(), 150U);
-  EXPECT_LE(median_error_px(matches, {-6.5, 3.5}), GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
+  EXPECT_LE(median_error_px(matches, {-6.5, 3.5}),
+            GetParam() == FeatureMethod::kPatch || GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
 }
 
 TEST_P(FrontEndTest, GivesTheSameMatchesForAnyNumberOfThreads) {
@@ -85,7 +86,8 @@ TEST_P(FrontEndTest, ABlankOrResizedPictureStartsOver) {
 
 INSTANTIATE_TEST_SUITE_P(Methods,
                          FrontEndTest,
-                         testing::Values(FeatureMethod::kKlt,
+                         testing::Values(FeatureMethod::kPatch,
+                                         FeatureMethod::kKlt,
                                          FeatureMethod::kOrb,
                                          FeatureMethod::kSift));
 

@@ -131,7 +131,7 @@ TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
 TEST(OdometryProcess, TinyImagesAreTrackedOrNotButNothingThrows) {
   for (const cv::Size size : {cv::Size(4, 4), {5, 9}, {12, 12}, {40, 6}, {7, 300}}) {
     for (const FeatureMethod method :
-         {FeatureMethod::kKlt, FeatureMethod::kOrb, FeatureMethod::kSift}) {
+         {FeatureMethod::kPatch, FeatureMethod::kKlt, FeatureMethod::kOrb, FeatureMethod::kSift}) {
       Camera camera{50, 50, size.width / 2.0, size.height / 2.0, size.width, size.height};
       Options options;
       options.features.method = method;

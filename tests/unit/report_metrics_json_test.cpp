@@ -39,6 +39,7 @@ MetricsReport example() {
           .fps = 31.5,
           .scale_source = "ground_truth",
           .tracked_fraction = 0.995,
+          .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, Eigen::Vector2d(0.5, 0.75)},
           .road_measured_fraction = 0.75,
           .metrics = metrics,
           .refined = refined,
@@ -83,7 +84,9 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["refined"]["average_offset_m"], 0.25);
   EXPECT_EQ(json["refined"]["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
-  EXPECT_EQ(json.size(), 21U);
+  EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
+      "cx_px": 600.5, "cy_px": 180.25, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
+  EXPECT_EQ(json.size(), 22U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {

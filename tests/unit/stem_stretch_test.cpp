@@ -209,6 +209,8 @@ TEST(Upsampling, AutoGoesByFeaturesAndWidth) {
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1241), kHalf);
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1000), kHalf);
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 999), kBicubic);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kPatch, 1241), kHalf);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kPatch, 640), kHalf);
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, 1241), kBicubic);
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, 1241), kBicubic);
   for (const Upsample asked : {kBicubic, kHalf, kNative}) {

@@ -76,6 +76,9 @@ RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
   road.pixels = image.pixels;
   road.map = image.map;
   road.camera = camera_in(camera, image.map, image.pixels.size());
+  if (std::min(image.pixels.rows, image.pixels.cols) < 2) {
+    return road;
+  }
   const int contrast_px = std::max(4, cvRound(kContrast_px / road.map.scale.x()));
   cv::Mat half;
   cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);

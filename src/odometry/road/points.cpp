@@ -34,7 +34,8 @@ constexpr int kBorder_px = 24;  ///< room for the tracker's window around the st
 
 /// Input pixels -> the image's.
 cv::Size in_pixels_of(const RoadImage& image, cv::Size size) {
-  return {static_cast<int>(size.width / image.map.scale.x()), static_cast<int>(size.height / image.map.scale.x())};
+  return {static_cast<int>(size.width / image.map.scale.x()),
+          static_cast<int>(size.height / image.map.scale.x())};
 }
 
 /// Where the strip of road is in the current image, and the corners in it.

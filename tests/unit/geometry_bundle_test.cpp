@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <vector>
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+#include <gtest/gtest.h>
+
+#include "geometry/bundle.hpp"
+#include "support/synthetic_drive_tracks.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+
+/// A drive as it is measured, poses and points pushed away from the truth.
+Bundle bundle_of(const DriveTracks& drive, double push) {
+  Bundle bundle;
+  bundle.camera = drive.camera;
+  for (int i = 0; i < drive.num_frames(); ++i) {
+    const Rigid3 off(so3_exp(push * Eigen::Vector3d(0.001, -0.002, 0.001)),
+                     push * Eigen::Vector3d(0.01, -0.02, 0.03));
+    bundle.camera_from_world.push_back((i < 2 ? drive.pose(i) : drive.pose(i) * off).inverse());
+  }
+  for (std::size_t id = 0; id < drive.points.size(); ++id) {
+    std::vector<Bundle::Observation> seen;
+    for (int i = 0; i < drive.num_frames(); ++i) {
+      const auto& frame = drive.observations[static_cast<std::size_t>(i)];
+      if (const auto found = frame.find(static_cast<int>(id)); found != frame.end()) {
+        seen.push_back({i, static_cast<int>(bundle.points.size()), found->second});
+      }
+    }
+    if (seen.size() >= 3) {
+      bundle.points.push_back(drive.points[id] * (1.0 + 0.005 * push));
+      bundle.observations.insert(bundle.observations.end(), seen.begin(), seen.end());
+    }
+  }
+  return bundle;
+}
+
+struct Reprojection {
+  const Camera& camera;
+  Eigen::Vector2d uv;
+
+  template <typename T>
+  bool operator()(const T* rotation, const T* translation, const T* point, T* residual) const {
+    T x[3];
+    ceres::AngleAxisRotatePoint(rotation, point, x);
+    for (int i = 0; i < 3; ++i) {
+      x[i] += translation[i];
+    }
+    residual[0] = camera.fx_px * x[0] / x[2] + camera.cx_px - uv.x();
+    residual[1] = camera.fy_px * x[1] / x[2] + camera.cy_px - uv.y();
+    return true;
+  }
+};
+
+/// Ceres's solution of the same problem; returns the sum of its loss, px^2.
+double solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
+  ceres::Problem problem;
+  std::vector<Eigen::Matrix<double, 6, 1>> poses;
+  for (const Rigid3& pose : bundle.camera_from_world) {
+    poses.emplace_back() << so3_log(pose.rotation), pose.translation;
+  }
+  auto* loss = new ceres::CauchyLoss(options.loss_scale_px);
+  for (const Bundle::Observation& seen : bundle.observations) {
+    double* pose = poses[static_cast<std::size_t>(seen.pose)].data();
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 3, 3, 3>(
+                                 new Reprojection{bundle.camera, seen.uv}),
+                             loss, pose, pose + 3,
+                             bundle.points[static_cast<std::size_t>(seen.point)].data());
+  }
+  for (int i = 0; i < options.num_fixed_poses; ++i) {
+    problem.SetParameterBlockConstant(poses[static_cast<std::size_t>(i)].data());
+    problem.SetParameterBlockConstant(poses[static_cast<std::size_t>(i)].data() + 3);
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  solver.max_num_iterations = 200;
+  solver.function_tolerance = 1e-14;
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    bundle.camera_from_world[i] = Rigid3(so3_exp(poses[i].head<3>()), poses[i].tail<3>());
+  }
+  return 2.0 * summary.final_cost;
+}
+
+TEST(Bundle, EndsWhereCeresDoes) {
+  const DriveTracks drive(8, 0.3, 5);
+  BundleOptions options;
+  options.max_iterations = 100;
+  options.min_relative_decrease = 1e-14;
+  Bundle ours = bundle_of(drive, 1.0);
+  Bundle judge = ours;
+  const BundleResult result = adjust_bundle(ours, options);
+  ASSERT_TRUE(result.is_usable);
+  const double cost = solve_by_ceres(judge, options);
+  EXPECT_NEAR(result.cost, cost, 1e-6 * cost);
+  for (std::size_t i = 0; i < ours.camera_from_world.size(); ++i) {
+    const Rigid3& a = ours.camera_from_world[i];
+    const Rigid3& b = judge.camera_from_world[i];
+    EXPECT_LE((a.translation - b.translation).norm(), 1e-5) << i;
+    EXPECT_LE(a.rotation.angularDistance(b.rotation), 1e-6) << i;
+  }
+}
+
+TEST(Bundle, ATenthOfTheStepsIsNearlyAsGood) {
+  const DriveTracks drive(8, 0.3, 6);
+  BundleOptions options;
+  Bundle few = bundle_of(drive, 1.0);
+  Bundle many = few;
+  const double cost_of_few = adjust_bundle(few, options).cost;
+  options.max_iterations = 100;
+  options.min_relative_decrease = 1e-12;
+  EXPECT_LE(cost_of_few, 1.01 * adjust_bundle(many, options).cost);
+}
+
+TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
+  const DriveTracks drive(6, 0.0, 7);
+  Bundle bundle = bundle_of(drive, 1.0);
+  bundle.points[3].z() = -20.0;
+  const Bundle before = bundle;
+  EXPECT_FALSE(adjust_bundle(bundle, {}).is_usable);
+  EXPECT_EQ(bundle.points[0], before.points[0]);
+  EXPECT_EQ(bundle.camera_from_world[4].translation, before.camera_from_world[4].translation);
+}
+
+/// Turns tell the camera: planted changes are found within their sigmas, and those are small.
+TEST(Bundle, FindsAPlantedCamera) {
+  std::vector<Rigid3> path(1);
+  for (int i = 1; i < 14; ++i) {
+    const double turn = i % 4 < 2 ? 0.06 : -0.05;
+    path.push_back(path.back() * Rigid3(so3_exp({0.01 * (i % 3 - 1), turn, 0.0}), {0.1, 0.0, 0.8}));
+  }
+  DriveTracks drive(path, DriveTracks(2, 0.0, 8).points, 0.1, 8);
+  Bundle bundle = bundle_of(drive, 0.3);
+  bundle.camera.cx_px += 3.0;
+  bundle.camera.cy_px -= 2.0;
+  BundleOptions options;
+  options.num_fixed_poses = 1;
+  options.max_iterations = 50;
+  options.min_relative_decrease = 1e-8;
+  CameraChange sigma;
+  sigma << 10.0, 10.0, 0.003, 0.01, 0.005;
+  constexpr double kNoiseSq = 0.01;
+  options.camera =
+      CameraPrior{CameraChange::Zero(),
+                  kNoiseSq * sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
+  const BundleResult result = adjust_bundle(bundle, options);
+  ASSERT_TRUE(result.is_usable);
+  EXPECT_NEAR(bundle.camera.cx_px, drive.camera.cx_px, 0.3);
+  EXPECT_NEAR(bundle.camera.cy_px, drive.camera.cy_px, 0.3);
+  const CameraInformation information =
+      (result.information + options.camera->information) / kNoiseSq;
+  const CameraChange found_sigma = information.inverse().diagonal().cwiseSqrt();
+  EXPECT_LE(found_sigma[0], 0.3);
+  EXPECT_LE(std::abs(bundle.camera.cx_px - drive.camera.cx_px), 4.0 * found_sigma[0]);
+  EXPECT_LE(std::abs(bundle.camera.cy_px - drive.camera.cy_px), 4.0 * found_sigma[1]);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "odometry/self_calibration.hpp"
+#include "support/synthetic_drive_tracks.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+
+/// Windows of a drive with turns, seen by `drive`'s camera and refined with the calibration's.
+void drive_windows(const Camera& true_camera, SelfCalibration& calibration) {
+  BundleAdjustmentOptions options;
+  for (int k = 0; k < 12; ++k) {
+    std::vector<Rigid3> path(1);
+    for (int i = 1; i < 8; ++i) {
+      path.push_back(
+          path.back() *
+          Rigid3(so3_exp({0.004 * (i % 3 - 1), k % 2 == 0 ? 0.05 : -0.04, 0.0}), {0.0, 0.0, 0.9}));
+    }
+    const DriveTracks drive(path, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points, 0.1,
+                            static_cast<std::uint64_t>(k), true_camera);
+    Window window;
+    for (int i = 0; i < drive.num_frames(); ++i) {
+      Keyframe keyframe{8 * k + i, drive.pose(i), {}, {}};
+      for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
+        keyframe.points.push_back({id, uv});
+      }
+      add_keyframe(window, std::move(keyframe), {});
+      triangulate_landmarks(window, calibration.camera(), {});
+      refine_window(window, calibration.camera(), options);
+    }
+    calibration.observe(window, options);
+  }
+}
+
+TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
+  const Camera truth = testing::kitti_camera();
+  Camera given = truth;
+  given.cx_px += 3.0;
+  given.cy_px -= 2.0;
+  SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
+  drive_windows(truth, calibration);
+  EXPECT_NEAR(calibration.camera().cx_px, truth.cx_px, 0.5);
+  EXPECT_NEAR(calibration.camera().cy_px, truth.cy_px, 0.5);
+  EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
+  EXPECT_LE(calibration.principal_point_sigma_px()->maxCoeff(), 0.5);
+}
+
+TEST(SelfCalibration, ARightCameraIsKept) {
+  const Camera truth = testing::kitti_camera();
+  SelfCalibration calibration(truth, CameraRefinement::kAll);
+  drive_windows(truth, calibration);
+  EXPECT_EQ(calibration.camera().cx_px, truth.cx_px);
+  EXPECT_EQ(calibration.camera().cy_px, truth.cy_px);
+  EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
+}
+
+TEST(SelfCalibration, OffMeansOff) {
+  const Camera truth = testing::kitti_camera();
+  Camera given = truth;
+  given.cx_px += 3.0;
+  SelfCalibration calibration(given, CameraRefinement::kOff);
+  drive_windows(truth, calibration);
+  EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
+  EXPECT_FALSE(calibration.principal_point_sigma_px().has_value());
+}
+
+}  // namespace
+}  // namespace stemvo
