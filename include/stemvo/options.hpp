@@ -39,8 +39,8 @@ struct StemNetwork {
   std::optional<FoldedFilter> folded;
 };
 
-/// Size of the image that points are tracked on. kAuto: kHalf for patches, and for KLT on frames of
-/// 1000 columns and more, else kBicubic.
+/// Size of the image that points are tracked on. kAuto: kHalf for patches and KLT where the focal
+/// length is 500 px or more, else kBicubic.
 enum class Upsample {
   kAuto,
   kBicubic,  ///< the input's

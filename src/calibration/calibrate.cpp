@@ -94,7 +94,9 @@ Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, cons
   Config config = request.config;
   config.odometry.mode = OdometryMode::kMap;
   config.scale.source = ScaleSource::kConstant;
+  config.camera.refine = CameraRefinement::kOff;
   // Long tracks count here, and their bias does not: every observation is aligned anew.
+  config.features.method = FeatureMethod::kKlt;
   config.features.klt_window = std::max(config.features.klt_window, kTrackWindow);
   config.features.max_features = std::max(config.features.max_features, kNumTracks);
   config.stem.upsample = Upsample::kBicubic;

@@ -23,6 +23,8 @@ constexpr float kMinGain = 0.1F;
 /// The finest level may not leave what the coarser ones found by more.
 constexpr float kMaxFineMove_px = 4.0F;
 constexpr float kMaxScale = 1.7F;
+/// Of the surroundings, one level up: in another scene the best of a few pixels often looks right.
+constexpr float kMinCoarseCorrelation = 0.5F;
 /// Of a patch about its mean, gray values squared.
 constexpr float kMinNormSq = 64.0F;
 /// Hessians worse conditioned than this have no inverse.
@@ -190,6 +192,31 @@ Alignment align_fine(const Patch& patch, const BorderedImage& image, const Simil
   return is_plausible(result.warp, image, start) ? result : Alignment{result.warp, 0.0F};
 }
 
+/// Correlation of the surroundings, which the finest level does not see.
+float coarse_correlation(const Patch::Coarse& patch, const BorderedImage& image, float x, float y) {
+  constexpr float kHalf = 0.5F * (kCoarseSide - 1);
+  constexpr float kNumPixels = kCoarseSide * kCoarseSide;
+  CoarseValues values;
+  patch_kernels().sample_coarse(image, x - kHalf, y - kHalf, values);
+  float sum_a = 0.0F;
+  float sum_b = 0.0F;
+  float sum_aa = 0.0F;
+  float sum_bb = 0.0F;
+  float sum_ab = 0.0F;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float a = values[i];
+    const float b = patch.value[i];
+    sum_a += a;
+    sum_b += b;
+    sum_aa += a * a;
+    sum_bb += b * b;
+    sum_ab += a * b;
+  }
+  const float variances =
+      (sum_aa - sum_a * sum_a / kNumPixels) * (sum_bb - sum_b * sum_b / kNumPixels);
+  return variances > 0.0F ? (sum_ab - sum_a * sum_b / kNumPixels) / std::sqrt(variances) : 0.0F;
+}
+
 }  // namespace
 
 bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch) {
@@ -221,7 +248,12 @@ Alignment align_patch(const Patch& patch,
     warp.x = x / scale;
     warp.y = y / scale;
   }
-  return align_fine(patch, pyramid.front(), warp);
+  const Alignment found = align_fine(patch, pyramid.front(), warp);
+  const bool is_alone = pyramid.size() < 2 || found.correlation <= 0.0F;
+  const bool is_there =
+      is_alone || coarse_correlation(patch.coarse[0], pyramid[1], 0.5F * found.warp.x,
+                                     0.5F * found.warp.y) >= kMinCoarseCorrelation;
+  return is_there ? found : Alignment{found.warp, 0.0F};
 }
 
 }  // namespace stemvo

@@ -13,9 +13,9 @@
 namespace stemvo {
 namespace {
 
-StemOptions stretch_options(const Options& options, int width_px) {
+StemOptions stretch_options(const Options& options, const Camera& camera) {
   StemOptions stretch = options.stem;
-  stretch.upsample = choose_upsample(stretch.upsample, options.features.method, width_px);
+  stretch.upsample = choose_upsample(stretch.upsample, options.features.method, camera);
   return stretch;
 }
 
@@ -24,7 +24,7 @@ StemOptions stretch_options(const Options& options, int width_px) {
 ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera)
     : camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
-      stretch_(stretch_options(options, camera.width_px)),
+      stretch_(stretch_options(options, camera)),
       front_end_(create_front_end(options.features)) {
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
     estimator_ = std::make_unique<PairEstimator>(options, camera);

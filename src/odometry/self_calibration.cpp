@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/self_calibration.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
@@ -18,6 +19,11 @@ constexpr double kMaxSigma_px = 1.5;
 constexpr double kMaxSigmaOfFocal = 0.0015;
 /// .. where it leaves the given value by more than so many sigmas.
 constexpr double kMinSigmas = 2.0;
+/// The camera moves by this at a keyframe: the window can follow.
+constexpr double kMaxStep_px = 0.25;
+/// Fewer do not tell the principal point from the distortion: 6 find -8 px on a clip where 8, 12
+/// and 16 find -2 to -4.
+constexpr std::size_t kMinKeyframes = 8;
 
 /// Finite, and nowhere less than nothing.
 bool is_plausible(const CameraMeasurement& found) {
@@ -53,7 +59,9 @@ CameraChange SelfCalibration::applied() const {
 }
 
 void SelfCalibration::observe(const Window& window, const BundleAdjustmentOptions& options) {
-  if (refinement_ == CameraRefinement::kOff || window.keyframes.front().frame <= newest_used_) {
+  approach_believed();
+  if (refinement_ == CameraRefinement::kOff || window.keyframes.front().frame <= newest_used_ ||
+      window.keyframes.size() < kMinKeyframes) {
     return;
   }
   newest_used_ = window.keyframes.back().frame;
@@ -70,13 +78,22 @@ void SelfCalibration::observe(const Window& window, const BundleAdjustmentOption
   const auto insists = [&](int i, double max) {
     return sigma[i] < max && std::abs(mean_[i]) > kMinSigmas * sigma[i];
   };
-  camera_ = given_;
-  camera_.cx_px += insists(0, kMaxSigma_px) ? mean_[0] : 0.0;
-  camera_.cy_px += insists(1, kMaxSigma_px) ? mean_[1] : 0.0;
+  believed_.setZero();
+  believed_[0] = insists(0, kMaxSigma_px) ? mean_[0] : 0.0;
+  believed_[1] = insists(1, kMaxSigma_px) ? mean_[1] : 0.0;
   if (refinement_ == CameraRefinement::kAll && insists(2, kMaxSigmaOfFocal)) {
-    camera_.fx_px *= 1.0 + mean_[2];
-    camera_.fy_px *= 1.0 + mean_[2];
+    believed_[2] = mean_[2];
   }
+}
+
+void SelfCalibration::approach_believed() {
+  const CameraChange left = believed_ - applied();
+  const auto step = [&](int i, double max) { return std::clamp(left[i], -max, max); };
+  camera_.cx_px += step(0, kMaxStep_px);
+  camera_.cy_px += step(1, kMaxStep_px);
+  const double focal = step(2, kMaxStep_px / given_.mean_focal_px());
+  camera_.fx_px += focal * given_.fx_px;
+  camera_.fy_px += focal * given_.fy_px;
 }
 
 }  // namespace stemvo

@@ -34,7 +34,7 @@ std::vector<Field> stem_fields(StemOptions& o) {
        Rule::one_of({"auto", "bicubic", "half", "native"}),
        "size of the image to track on: bicubic (the input's), half (of the input's where the "
        "channel is coarser, else the channel's), native (the channel's), or auto: half for "
-       "patch, and for klt on frames of 1000 columns and more, else bicubic"},
+       "patch and klt where the focal length is 500 px or more, else bicubic"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, Rule::between(0, 100),
        "percentile of the response that becomes black"},
       {"stem", "stretch_high_percent", &o.stretch_high_percent, Rule::between(0, 100),

@@ -170,8 +170,8 @@ class ResultWriter {
     }
     // With what auto, -1 and 0 stand for, which may change with the manifest.
     Config effective = request_.config;
-    effective.stem.upsample = choose_upsample(effective.stem.upsample, effective.features.method,
-                                              sequence_.camera().width_px);
+    effective.stem.upsample =
+        choose_upsample(effective.stem.upsample, effective.features.method, sequence_.camera());
     effective.stem.filter = stem.filter;
     effective.stem.sampling_px = stem.sampling_px;
     return text + "\n" + dump_config(effective);

@@ -230,7 +230,7 @@ std::string fit_layer(const SearchRequest& request,
   }
   const cv::Size size = channels->front().values.size();
   const Upsample upsample =
-      choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera.width_px);
+      choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera);
   const int factor = enlargement(upsample, identity.sampling_px);
   const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
   const std::size_t bytes = bytes_in_flight(size, size * factor, num_run);

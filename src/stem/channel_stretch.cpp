@@ -94,14 +94,14 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
   return image;
 }
 
-Upsample choose_upsample(Upsample asked, FeatureMethod method, int width_px) {
-  constexpr int kWideFrame_px = 1000;
+Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera) {
+  constexpr double kLongFocal_px = 500.0;
   if (asked != Upsample::kAuto) {
     return asked;
   }
-  const bool is_half = method == FeatureMethod::kPatch ||
-                       (method == FeatureMethod::kKlt && width_px >= kWideFrame_px);
-  return is_half ? Upsample::kHalf : Upsample::kBicubic;
+  const bool is_tracked = method == FeatureMethod::kPatch || method == FeatureMethod::kKlt;
+  return is_tracked && camera.mean_focal_px() >= kLongFocal_px ? Upsample::kHalf
+                                                               : Upsample::kBicubic;
 }
 
 int enlargement(Upsample upsample, int sampling_px) {

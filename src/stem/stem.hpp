@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "stem/channel.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/options.hpp"
 
@@ -70,11 +71,9 @@ class Stem {
   bool has_all_;  ///< else `bank_` is the one chosen, in a file of its own
 };
 
-/// What kAuto stands for, for frames of this width: kHalf for KLT on 1000 columns and more, else
-/// kBicubic. KLT finds subpixel positions on a channel of every second pixel as it is, but not on a
-/// coarser one (of 16 random filters of stride 16 none is tracked). orb and sift lose their
-/// keypoints on a smaller image, and small frames the texture of the road.
-[[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, int width_px);
+/// What kAuto stands for: kHalf for tracked points where half the size still has many pixels per
+/// degree (a focal length of 500 px and more in the input), else kBicubic.
+[[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera);
 
 /// How many times larger than its channel an image is; `sampling`: input pixels per pixel of the
 /// channel.

@@ -204,18 +204,21 @@ INSTANTIATE_TEST_SUITE_P(All,
                                   std::to_string(static_cast<int>(tested.param.upsample));
                          });
 
-TEST(Upsampling, AutoGoesByFeaturesAndWidth) {
+TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
   using enum Upsample;
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1241), kHalf);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 1000), kHalf);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kKlt, 999), kBicubic);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kPatch, 1241), kHalf);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kPatch, 640), kHalf);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, 1241), kBicubic);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, 1241), kBicubic);
+  const auto camera = [](double focal_px) {
+    return Camera{focal_px, focal_px, 320, 240, 640, 480};
+  };
+  for (const FeatureMethod method : {FeatureMethod::kPatch, FeatureMethod::kKlt}) {
+    EXPECT_EQ(choose_upsample(kAuto, method, camera(718)), kHalf);
+    EXPECT_EQ(choose_upsample(kAuto, method, camera(500)), kHalf);
+    EXPECT_EQ(choose_upsample(kAuto, method, camera(499)), kBicubic);
+  }
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, camera(718)), kBicubic);
+  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, camera(718)), kBicubic);
   for (const Upsample asked : {kBicubic, kHalf, kNative}) {
-    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kKlt, 1241), asked);
-    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kOrb, 640), asked);
+    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kKlt, camera(718)), asked);
+    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kOrb, camera(300)), asked);
   }
 }
 
