@@ -40,7 +40,9 @@ ROAD = ("camera_height",)
 ROWS = (
     Row("the defaults"),
     Row("gray image instead of the learned channel", ("stem.model=gray",)),
-    Row("ORB and brute force instead of KLT", ("features.method=orb",)),
+    Row("Lucas-Kanade instead of patches", ("features.method=klt",)),
+    Row("the camera as given", ("camera.refine=off",)),
+    Row("ORB and brute force instead of patches", ("features.method=orb",)),
     Row("pairs of frames chained instead of the map", ("odometry.mode=two_frame",)),
     Row("pairs of frames, ORB and brute force", ("odometry.mode=two_frame", "features.method=orb")),
     Row("map without refinement", ("refine.every=0",)),

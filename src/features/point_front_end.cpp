@@ -40,7 +40,7 @@ Matches PointFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, 
   if (last_.picture != nullptr) {
     replenish(last_);
     matches = track(last_, now);
-    if (is_lost(matches, last_)) {
+    if (is_lost(matches, last_good_.picture != nullptr ? last_good_ : last_)) {
       track_from_last_good(now, matches);
     } else {
       last_good_ = {};

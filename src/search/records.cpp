@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "internal_check.hpp"
+#include "options/option_fields.hpp"
 #include "report/metrics_keys.hpp"
 #include "text/text_file.hpp"
 
@@ -81,12 +82,17 @@ struct Fact {
   std::string hash = {};
 };
 
+/// What is said of a feature method in a name.
+std::string unless_default(const std::string& features) {
+  return features == options::to_string(FeatureOptions().method) ? "" : " " + features;
+}
+
 std::vector<Fact> facts_of(const SearchIdentity& identity, bool as_part) {
   std::vector<Fact> facts = {{"the program", "", identity.program}};
   std::vector<std::string> layers;
   for (const LayerIdentity& layer : identity.layers) {
-    const std::string& name = layers.emplace_back(fmt::format(
-        "{} {}{}", layer.model, layer.layer, layer.features == "klt" ? "" : " " + layer.features));
+    const std::string& name =
+        layers.emplace_back(layer.model + " " + layer.layer + unless_default(layer.features));
     facts.push_back({"the model " + name, "", layer.hash});
     facts.push_back({"the sampling of " + name, fmt::format("{} px", layer.sampling_px)});
     if (!as_part) {
@@ -143,8 +149,7 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
 }  // namespace
 
 std::string to_string(const FilterKey& key) {
-  return fmt::format("{} {} {}{}", key.model, key.layer, key.filter,
-                     key.features == "klt" ? "" : " " + key.features);
+  return fmt::format("{} {} {}{}", key.model, key.layer, key.filter, unless_default(key.features));
 }
 
 void FilterRecord::add(const DriveScore& score, bool is_held_out, std::size_t num_frames) {

@@ -20,7 +20,7 @@ DriveScore score(double t_rel, double r_rel) {
 
 FilterRecord record(int filter, std::size_t rung, std::vector<DriveScore> drives) {
   return {.rung = rung,
-          .key = {"net", "stem", "klt", filter},
+          .key = {"net", "stem", "patch", filter},
           .drives = std::move(drives),
           .held_out = std::nullopt,
           .filter_frames = 100,
@@ -95,7 +95,7 @@ TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
   std::vector<FilterRow> rows;
   const auto add = [&rows](int filter, FilterStatus status, const std::string& model = "net") {
     FilterRow& row = rows.emplace_back();
-    row.key = {model, "stem", "klt", filter};
+    row.key = {model, "stem", "patch", filter};
     row.status = status;
   };
   add(0, FilterStatus::kRanked, "input_layer");
@@ -109,7 +109,7 @@ TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
     LayerIdentity& layer = identity.layers.emplace_back();
     layer.model = model;
     layer.layer = "stem";
-    layer.features = "klt";
+    layer.features = "patch";
     layer.last = 6;
     layer.baseline = model != "net";
   }

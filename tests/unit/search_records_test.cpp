@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 LayerIdentity layer(int first, int last) {
   return {.model = "net",
           .layer = "stem",
-          .features = "klt",
+          .features = "patch",
           .first = first,
           .last = last,
           .hash = "abc",
@@ -44,7 +44,7 @@ SearchIdentity identity(int first, int last) {
 
 FilterRecord record(int filter, double t_rel = 1.0) {
   FilterRecord record;
-  record.key = {"net", "stem", "klt", filter};
+  record.key = {"net", "stem", "patch", filter};
   record.filter_frames = 100;
   DriveScore score;
   score.sequence = "00";
@@ -151,7 +151,7 @@ TEST_F(Records, PartsInAnyOrderGiveTheTableOfOneSearch) {
   ASSERT_TRUE(merge_searches({folder_ / "whole"}, folder_ / "again", folder_.path()));
   EXPECT_EQ(csv, testing::read_all(folder_ / "again" / "filters.csv"));
   EXPECT_THAT(csv, AllOf(::testing::StartsWith("model,layer,filter,"),
-                         HasSubstr("\nnet,stem,1,klt,ranked,1.0000,0.3333,")));
+                         HasSubstr("\nnet,stem,1,patch,ranked,1.0000,0.3333,")));
 }
 
 TEST_F(Records, PartsThatDoNotFitAreRefused) {
