@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Points from picture to picture: detection, KLT, ORB.
+// Points from picture to picture: detection, patches, KLT, ORB.
 #include <array>
 #include <utility>
 
@@ -25,7 +25,8 @@ FeatureOptions options_of(FeatureMethod method) {
 /// All pictures, prepared; then over and over from the first to the last, as in a drive.
 class Pictures {
  public:
-  explicit Pictures(FeatureMethod method) : front_end_(create_front_end(options_of(method))) {
+  explicit Pictures(FeatureMethod method)
+      : method_(method), front_end_(create_front_end(options_of(method))) {
     for (const ChannelImage& image : chain().images) {
       prepared_.push_back(front_end_->prepare(image));
     }
@@ -34,7 +35,7 @@ class Pictures {
   template <typename Measured>
   void advance(const Measured& measured) {
     if (next_ == 0 || next_ == prepared_.size()) {
-      front_end_ = create_front_end(options_of(FeatureMethod::kKlt));
+      front_end_ = create_front_end(options_of(method_));
       static_cast<void>(front_end_->process(prepared_.front(), 0));
       next_ = 1;
     }
@@ -44,13 +45,14 @@ class Pictures {
   [[nodiscard]] const std::vector<Prepared>& prepared() const { return prepared_; }
 
  private:
+  FeatureMethod method_;
   std::unique_ptr<FrontEnd> front_end_;
   std::vector<Prepared> prepared_;
   std::size_t next_ = 0;
 };
 
-void run_klt(State& state, Stage stage) {
-  Pictures pictures(FeatureMethod::kKlt);
+void run_tracker(State& state, FeatureMethod method, Stage stage) {
+  Pictures pictures(method);
   run_stage(state, stage, [&] {
     pictures.advance([](FrontEnd& front_end, const Prepared& picture) {
       benchmark::DoNotOptimize(front_end.process(picture, 0));
@@ -59,10 +61,12 @@ void run_klt(State& state, Stage stage) {
 }
 
 /// Corners where the tracks of the frame before left room.
-void detection(State& state) { run_klt(state, Stage::kDetection); }
+void detection(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::kDetection); }
+
+void patches(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::kTracking); }
 
 /// Forward and back.
-void klt(State& state) { run_klt(state, Stage::kTracking); }
+void klt(State& state) { run_tracker(state, FeatureMethod::kKlt, Stage::kTracking); }
 
 /// OpenCV's tracker alone, there only, on all levels of the pyramid, with as many corners.
 void klt_forward(State& state) {
@@ -109,6 +113,7 @@ void orb_match(State& state) {
 }
 
 BENCHMARK(detection)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(patches)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(klt)->Name("klt/both_ways")->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(klt_forward)->Name("klt/opencv_forward")->Unit(benchmark::kMillisecond);
 BENCHMARK(orb_detect_and_describe)->Name("orb/detect_and_describe")->Unit(benchmark::kMillisecond);
