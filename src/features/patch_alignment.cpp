@@ -31,7 +31,7 @@ constexpr float kMinNormSq = 64.0F;
 constexpr float kMinDeterminant = 1e-3F;
 constexpr float kMinCondition = 1e-5F;
 
-/// A window of 16 pixels around it, and its neighbours, are inside the border.
+/// A coarse patch around it, with the samples of its gradient, is inside the border.
 bool is_readable(const BorderedImage& image, float x, float y) {
   constexpr float kOutside = 12.0F;
   return x >= -kOutside && y >= -kOutside && x <= static_cast<float>(image.width - 1) + kOutside &&
@@ -128,7 +128,7 @@ bool align_coarse(const Patch::Coarse& patch, const BorderedImage& image, float&
       return false;
     }
     float sums[2];
-    kernels.coarse_sums(image, x - kHalf, y - kHalf, patch.value, patch.gx, patch.gy, sums);
+    kernels.coarse_sums(image, x - kHalf, y - kHalf, patch, sums);
     const float dx = inverse[0] * sums[0] + inverse[1] * sums[1];
     const float dy = inverse[1] * sums[0] + inverse[2] * sums[1];
     x -= dx;

@@ -12,19 +12,16 @@ namespace stemvo {
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
   static constexpr int kNumCoarse = 3;
-  struct Coarse {  ///< 8x8, moved by a translation
-    CoarseValues value;
-    CoarseValues gx;
-    CoarseValues gy;
+  struct Coarse : CoarsePatch {            ///< 8x8, moved by a translation
     std::array<float, 3> inverse_hessian;  ///< xx, xy, yy; all 0 where it has no inverse
   };
   std::array<Coarse, kNumCoarse> coarse;  ///< of levels 1, 2, ..
   FineValues value;                       ///< 8x8 of level 0, mean 0
   /// Rows of the inverse Hessian times the steepest-descent images (x, y, scale, rotation) made
   /// orthogonal to {1, value}: bias and gain drop out.
-  std::array<FineValues, 4> step;
-  std::array<FineValues, 4> translation_step;  ///< of a translation alone; the last two are 0
-  float norm_sq = 0.0F;                        ///< of value
+  FineColumns step;
+  FineColumns translation_step;  ///< of a translation alone; the last two are 0
+  float norm_sq = 0.0F;          ///< of value
 };
 
 /// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y).

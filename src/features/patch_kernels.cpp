@@ -50,22 +50,17 @@ STEMVO_INLINE void sample_coarse(const BorderedImage& image,
   }
 }
 
-STEMVO_INLINE void coarse_sums(const BorderedImage& image,
-                               float x,
-                               float y,
-                               const CoarseValues& value,
-                               const CoarseValues& gx,
-                               const CoarseValues& gy,
-                               float* sums) {
+STEMVO_INLINE void coarse_sums(
+    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
   const Bilinear at = bilinear(image, x, y);
   std::array<float, kCoarseSide> sum_x{};
   std::array<float, kCoarseSide> sum_y{};
   for (int j = 0; j < kCoarseSide; ++j) {
     const std::uint8_t* top = at.top_left + j * image.stride;
     const std::uint8_t* bottom = top + image.stride;
-    const float* value_row = value.data() + j * kCoarseSide;
-    const float* gx_row = gx.data() + j * kCoarseSide;
-    const float* gy_row = gy.data() + j * kCoarseSide;
+    const float* value_row = patch.value.data() + j * kCoarseSide;
+    const float* gx_row = patch.gx.data() + j * kCoarseSide;
+    const float* gy_row = patch.gy.data() + j * kCoarseSide;
     for (int i = 0; i < kCoarseSide; ++i) {
       const float error = value_at(at, top, bottom, i) - value_row[i];
       sum_x[static_cast<std::size_t>(i)] += gx_row[i] * error;
@@ -88,7 +83,7 @@ STEMVO_INLINE void catmull_rom(float t, float* w) {
 }
 
 STEMVO_INLINE void fine_sums(const FineValues& values,
-                             const std::array<FineValues, 4>& columns,
+                             const FineColumns& columns,
                              const FineValues& value,
                              float* sums) {
   constexpr std::size_t kSide = kFineSide;
@@ -144,17 +139,12 @@ void sample_fine_portable(const BorderedImage& image, const Similarity& warp, Fi
 void sample_coarse_portable(const BorderedImage& image, float x, float y, CoarseValues& values) {
   sample_coarse(image, x, y, values);
 }
-void coarse_sums_portable(const BorderedImage& image,
-                          float x,
-                          float y,
-                          const CoarseValues& value,
-                          const CoarseValues& gx,
-                          const CoarseValues& gy,
-                          float* sums) {
-  coarse_sums(image, x, y, value, gx, gy, sums);
+void coarse_sums_portable(
+    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
+  coarse_sums(image, x, y, patch, sums);
 }
 void fine_sums_portable(const FineValues& values,
-                        const std::array<FineValues, 4>& columns,
+                        const FineColumns& columns,
                         const FineValues& value,
                         float* sums) {
   fine_sums(values, columns, value, sums);
@@ -172,17 +162,12 @@ STEMVO_AVX2 void sample_coarse_avx2(const BorderedImage& image,
                                     CoarseValues& values) {
   sample_coarse(image, x, y, values);
 }
-STEMVO_AVX2 void coarse_sums_avx2(const BorderedImage& image,
-                                  float x,
-                                  float y,
-                                  const CoarseValues& value,
-                                  const CoarseValues& gx,
-                                  const CoarseValues& gy,
-                                  float* sums) {
-  coarse_sums(image, x, y, value, gx, gy, sums);
+STEMVO_AVX2 void coarse_sums_avx2(
+    const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums) {
+  coarse_sums(image, x, y, patch, sums);
 }
 STEMVO_AVX2 void fine_sums_avx2(const FineValues& values,
-                                const std::array<FineValues, 4>& columns,
+                                const FineColumns& columns,
                                 const FineValues& value,
                                 float* sums) {
   fine_sums(values, columns, value, sums);

@@ -27,25 +27,29 @@ inline constexpr int kCoarseSide = 8;
 inline constexpr int kFineSide = 8;
 using CoarseValues = std::array<float, kCoarseSide * kCoarseSide>;
 using FineValues = std::array<float, kFineSide * kFineSide>;
+using FineColumns = std::array<FineValues, 4>;
+
+/// Values and their gradient.
+struct CoarsePatch {
+  CoarseValues value;
+  CoarseValues gx;
+  CoarseValues gy;
+};
 
 /// What the inner loops of alignment are made of, for one instruction set. The values of two sets
 /// differ in their last digits.
 struct PatchKernels {
   /// Bilinear samples at (x + i, y + j), i and j from 0 to 7.
   void (*sample_coarse)(const BorderedImage& image, float x, float y, CoarseValues& values);
-  /// sums[0] = sum of gx e and sums[1] = of gy e, where e = sample - value, at (x + i, y + j).
-  void (*coarse_sums)(const BorderedImage& image,
-                      float x,
-                      float y,
-                      const CoarseValues& value,
-                      const CoarseValues& gx,
-                      const CoarseValues& gy,
-                      float* sums);
+  /// sums[0] = sum of gx e and sums[1] = of gy e, where e = sample - value, samples as above.
+  void (*coarse_sums)(
+      const BorderedImage& image, float x, float y, const CoarsePatch& patch, float* sums);
   /// Catmull-Rom samples at the similarity's images of (i - 3.5, j - 3.5), i and j from 0 to 7.
   void (*sample_fine)(const BorderedImage& image, const Similarity& warp, FineValues& values);
-  /// sums[k] = sum of columns[k] values; sums[4] of values; [5] of values^2; [6] of values value.
-  void (*fine_sums)(const FineValues& values,
-                    const std::array<FineValues, 4>& columns,
+  /// sums[k] = sum of columns[k] samples; sums[4] of samples; [5] of samples^2; [6] of samples
+  /// value.
+  void (*fine_sums)(const FineValues& samples,
+                    const FineColumns& columns,
                     const FineValues& value,
                     float* sums);
 };

@@ -11,6 +11,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "geometry/cauchy_loss.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -22,6 +24,61 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 constexpr double kMinDepth = 1e-6;
 constexpr int kCamera = 5;  ///< unknowns of the camera
 using Matrix25 = Eigen::Matrix<double, 2, kCamera>;
+
+/// Where a pose sees a point, and how far from its observation.
+struct Reprojection {
+  Reprojection(const Bundle& bundle,
+               const Bundle::Observation& observation,
+               const Eigen::Matrix3d& rotation)
+      : camera(bundle.camera), radial(bundle.radial) {
+    x = rotation * bundle.points[static_cast<std::size_t>(observation.point)] +
+        bundle.camera_from_world[static_cast<std::size_t>(observation.pose)].translation;
+    u = x.x() / x.z();
+    v = x.y() / x.z();
+    r_sq = u * u + v * v;
+    stretch = 1.0 + r_sq * (radial[0] + radial[1] * r_sq);
+    error = Eigen::Vector2d(camera.fx_px * u * stretch + camera.cx_px,
+                            camera.fy_px * v * stretch + camera.cy_px) -
+            observation.uv;
+  }
+  [[nodiscard]] Matrix23 by_x() const;
+  [[nodiscard]] Matrix25 by_camera() const;
+
+  const Camera& camera;
+  const Eigen::Vector2d& radial;
+  Eigen::Vector3d x;  ///< the point in the camera
+  double u = 0.0;     ///< its ray
+  double v = 0.0;
+  double r_sq = 0.0;
+  double stretch = 1.0;   ///< of the ray, by the radial distortion
+  Eigen::Vector2d error;  ///< px
+};
+
+Matrix23 Reprojection::by_x() const {
+  const double bend = 2.0 * (radial[0] + 2.0 * radial[1] * r_sq);
+  Eigen::Matrix2d by_ray;
+  by_ray << camera.fx_px * (stretch + bend * u * u), camera.fx_px * bend * u * v,
+      camera.fy_px * bend * u * v, camera.fy_px * (stretch + bend * v * v);
+  Matrix23 ray_by_x;
+  ray_by_x << 1.0, 0.0, -u, 0.0, 1.0, -v;
+  return by_ray * ray_by_x / x.z();
+}
+
+Matrix25 Reprojection::by_camera() const {
+  Matrix25 result;
+  result << 1.0, 0.0, camera.fx_px * u * stretch, camera.fx_px * u * r_sq,
+      camera.fx_px * u * r_sq * r_sq,  //
+      0.0, 1.0, camera.fy_px * v * stretch, camera.fy_px * v * r_sq, camera.fy_px * v * r_sq * r_sq;
+  return result;
+}
+
+std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
+  std::vector<Eigen::Matrix3d> rotations;
+  for (const Rigid3& pose : bundle.camera_from_world) {
+    rotations.push_back(pose.rotation_matrix());
+  }
+  return rotations;
+}
 
 /// The normal equations in blocks. A point's part is damped and eliminated at once.
 class NormalEquations {
@@ -51,6 +108,8 @@ class NormalEquations {
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     Eigen::Matrix<double, kCamera, 3> by_camera = Eigen::Matrix<double, kCamera, 3>::Zero();
   };
+  /// An observation of a pose with this rotation.
+  void add(const Bundle& bundle, std::size_t i, const Eigen::Matrix3d& rotation);
   void eliminate(const Bundle& bundle, std::size_t begin, std::size_t end, double damping);
   [[nodiscard]] int row_of(const Bundle::Observation& observation) const {
     return num_camera_ + 6 * (observation.pose - options_.num_fixed_poses);
@@ -91,68 +150,46 @@ void for_each_point(const Bundle& bundle, const Use& use) {
 void NormalEquations::linearize(const Bundle& bundle, double damping) {
   reduced_.setZero();
   gradient_.setZero();
-  const Camera& camera = bundle.camera;
-  const double k1 = bundle.radial[0];
-  const double k2 = bundle.radial[1];
-  std::vector<Eigen::Matrix3d> rotations;
-  for (const Rigid3& pose : bundle.camera_from_world) {
-    rotations.push_back(pose.rotation_matrix());
-  }
-  const double inverse_scale_sq = 1.0 / (options_.loss_scale_px * options_.loss_scale_px);
-  for (PointBlock& point : points_) {
-    point = {};
-  }
+  std::fill(points_.begin(), points_.end(), PointBlock());
+  const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
   for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
-    const Bundle::Observation& observation = bundle.observations[i];
-    const auto pose = static_cast<std::size_t>(observation.pose);
-    const auto index = static_cast<std::size_t>(observation.point);
-    const Eigen::Vector3d x =
-        rotations[pose] * bundle.points[index] + bundle.camera_from_world[pose].translation;
-    const double inverse_z = 1.0 / x.z();
-    const double u = x.x() * inverse_z;
-    const double v = x.y() * inverse_z;
-    const double r_sq = u * u + v * v;
-    const double stretch = 1.0 + r_sq * (k1 + k2 * r_sq);
-    const Eigen::Vector2d error(camera.fx_px * u * stretch + camera.cx_px - observation.uv.x(),
-                                camera.fy_px * v * stretch + camera.cy_px - observation.uv.y());
-    const double weight = 1.0 / (1.0 + error.squaredNorm() * inverse_scale_sq);
-    const double bend = 2.0 * (k1 + 2.0 * k2 * r_sq);
-    Eigen::Matrix2d by_ray;
-    by_ray << camera.fx_px * (stretch + bend * u * u), camera.fx_px * bend * u * v,
-        camera.fy_px * bend * u * v, camera.fy_px * (stretch + bend * v * v);
-    Matrix23 ray_by_x;
-    ray_by_x << inverse_z, 0.0, -u * inverse_z, 0.0, inverse_z, -v * inverse_z;
-    const Matrix23 by_x = by_ray * ray_by_x;
-    const Matrix23 by_point = by_x * rotations[pose];
-    PointBlock& point = points_[index];
-    point.inverse += weight * by_point.transpose() * by_point;
-    point.gradient += weight * by_point.transpose() * error;
-    Matrix25 by_camera;
-    if (num_camera_ > 0) {
-      by_camera << 1.0, 0.0, camera.fx_px * u * stretch, camera.fx_px * u * r_sq,
-          camera.fx_px * u * r_sq * r_sq,  //
-          0.0, 1.0, camera.fy_px * v * stretch, camera.fy_px * v * r_sq,
-          camera.fy_px * v * r_sq * r_sq;
-      point.by_camera += weight * by_camera.transpose() * by_point;
-      reduced_.topLeftCorner<kCamera, kCamera>() += weight * by_camera.transpose() * by_camera;
-      gradient_.head<kCamera>() += weight * by_camera.transpose() * error;
-    }
-    if (observation.pose < options_.num_fixed_poses) {
-      continue;
-    }
-    Matrix26 by_pose;  // x' = exp(w) x + t
-    by_pose << -by_x * skew(x), by_x;
-    const int row = row_of(observation);
-    by_pose_[i] = weight * by_pose.transpose() * by_point;
-    reduced_.block<6, 6>(row, row) += weight * by_pose.transpose() * by_pose;
-    gradient_.segment<6>(row) += weight * by_pose.transpose() * error;
-    if (num_camera_ > 0) {
-      reduced_.block<kCamera, 6>(0, row) += weight * by_camera.transpose() * by_pose;
-    }
+    const auto pose = static_cast<std::size_t>(bundle.observations[i].pose);
+    add(bundle, i, rotations[pose]);
   }
   diagonal_ = reduced_.diagonal();
   for_each_point(
       bundle, [&](std::size_t begin, std::size_t end) { eliminate(bundle, begin, end, damping); });
+}
+
+void NormalEquations::add(const Bundle& bundle, std::size_t i, const Eigen::Matrix3d& rotation) {
+  const Bundle::Observation& observation = bundle.observations[i];
+  const Reprojection at(bundle, observation, rotation);
+  const double weight =
+      1.0 / (1.0 + at.error.squaredNorm() / (options_.loss_scale_px * options_.loss_scale_px));
+  const Matrix23 by_x = at.by_x();
+  const Matrix23 by_point = by_x * rotation;
+  PointBlock& point = points_[static_cast<std::size_t>(observation.point)];
+  point.inverse += weight * by_point.transpose() * by_point;
+  point.gradient += weight * by_point.transpose() * at.error;
+  Matrix25 by_camera;
+  if (num_camera_ > 0) {
+    by_camera = at.by_camera();
+    point.by_camera += weight * by_camera.transpose() * by_point;
+    reduced_.topLeftCorner<kCamera, kCamera>() += weight * by_camera.transpose() * by_camera;
+    gradient_.head<kCamera>() += weight * by_camera.transpose() * at.error;
+  }
+  if (observation.pose < options_.num_fixed_poses) {
+    return;
+  }
+  Matrix26 by_pose;  // x' = exp(w) x + t
+  by_pose << -by_x * skew(at.x), by_x;
+  const int row = row_of(observation);
+  by_pose_[i] = weight * by_pose.transpose() * by_point;
+  reduced_.block<6, 6>(row, row) += weight * by_pose.transpose() * by_pose;
+  gradient_.segment<6>(row) += weight * by_pose.transpose() * at.error;
+  if (num_camera_ > 0) {
+    reduced_.block<kCamera, 6>(0, row) += weight * by_camera.transpose() * by_pose;
+  }
 }
 
 void NormalEquations::eliminate(const Bundle& bundle,
@@ -247,29 +284,17 @@ CameraInformation NormalEquations::camera_information() const {
 
 /// Infinite where a point is behind a pose that sees it.
 double cost_of(const Bundle& bundle, double loss_scale_px) {
-  std::vector<Eigen::Matrix3d> rotations;
-  for (const Rigid3& pose : bundle.camera_from_world) {
-    rotations.push_back(pose.rotation_matrix());
-  }
-  const double scale_sq = loss_scale_px * loss_scale_px;
-  double cost = 0.0;
+  const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
+  CauchyLoss loss(loss_scale_px);
   for (const Bundle::Observation& observation : bundle.observations) {
-    const auto pose = static_cast<std::size_t>(observation.pose);
-    const Eigen::Vector3d x =
-        rotations[pose] * bundle.points[static_cast<std::size_t>(observation.point)] +
-        bundle.camera_from_world[pose].translation;
-    if (!(x.z() > kMinDepth)) {
+    const Reprojection at(bundle, observation,
+                          rotations[static_cast<std::size_t>(observation.pose)]);
+    if (!(at.x.z() > kMinDepth)) {
       return std::numeric_limits<double>::infinity();
     }
-    const Eigen::Vector2d ray = x.hnormalized();
-    const double r_sq = ray.squaredNorm();
-    const double stretch = 1.0 + r_sq * (bundle.radial[0] + bundle.radial[1] * r_sq);
-    const Eigen::Vector2d uv(bundle.camera.fx_px * stretch * ray.x() + bundle.camera.cx_px,
-                             bundle.camera.fy_px * stretch * ray.y() + bundle.camera.cy_px);
-    const double error_sq = (uv - observation.uv).squaredNorm();
-    cost += scale_sq * std::log1p(error_sq / scale_sq);
+    loss.add(at.error.squaredNorm());
   }
-  return cost;
+  return loss.sum();
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ struct BundleOptions {
 };
 
 struct BundleResult {
-  bool is_usable = false;  ///< the cost fell or stayed; else the bundle is unchanged
+  bool is_usable = false;  ///< the cost fell; else the bundle is unchanged
   double cost = 0.0;       ///< sum of the robust loss, px^2
   CameraChange camera_change = CameraChange::Zero();
   /// Of the camera without its prior, all else left free: inverse of its covariance for

@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "geometry/cauchy_loss.hpp"
 #include "internal_check.hpp"
 #include "sampson.hpp"
 
@@ -20,30 +21,6 @@ constexpr double kPoseTolerance = 1e-9;
 constexpr double kMinDepth = 1e-6;
 /// What a point behind the camera costs, so that no step gains by pushing points behind it.
 constexpr double kBehindErrorPx = 1e3;
-
-/// Cauchy loss rho(r^2) = s^2 log(1 + r^2 / s^2) and its sum. One logarithm serves many terms: the
-/// sum of logarithms is the logarithm of the product.
-class CauchyLoss {
- public:
-  explicit CauchyLoss(double scale) : squared_scale_(scale * scale) {}
-
-  /// Adds a term; returns its weight rho'(r^2) in the normal equations.
-  double add(double squared_residual) {
-    const double argument = 1.0 + squared_residual / squared_scale_;
-    product_ *= argument;
-    if (!(product_ < 1e150)) {
-      log_sum_ += std::log(product_ / argument) + std::log(argument);
-      product_ = 1.0;
-    }
-    return 1.0 / argument;
-  }
-  [[nodiscard]] double sum() const { return squared_scale_ * (log_sum_ + std::log(product_)); }
-
- private:
-  double squared_scale_;
-  double product_ = 1.0;
-  double log_sum_ = 0.0;
-};
 
 /// Second-order model of a cost around a state; the constant factor 1/2 is left out.
 template <int N>

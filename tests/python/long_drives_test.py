@@ -84,8 +84,10 @@ class WatchedRuns(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             frames = pathlib.Path(folder) / "frames.csv"
             process = subprocess.Popen([sys.executable, "-c", script, str(frames)])
-            first, second, _ = watched_run.watch(process, frames, 40).memory_mb
+            watched = watched_run.watch(process, frames, 40)
+        first, second, _ = watched.memory_mb
         self.assertGreater(second - first, 20.0)  # of 40 MB
+        self.assertGreater(watched.memory_ratio, 1.2)
 
     def test_lengths_by_quarter(self):
         with tempfile.TemporaryDirectory() as folder:

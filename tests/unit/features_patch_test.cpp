@@ -217,10 +217,9 @@ TEST(PatchKernels, EveryInstructionSetGivesThePlainValues) {
                             0.75 * image.origin[31 * image.stride + 21]),
                 1e-3);
     float sums[2];
-    const CoarseValues zero{};
-    CoarseValues ones;
-    ones.fill(1.0F);
-    kernels->coarse_sums(image, 20.25F, 30.75F, zero, ones, coarse, sums);
+    CoarsePatch patch{{}, {}, coarse};
+    patch.gx.fill(1.0F);
+    kernels->coarse_sums(image, 20.25F, 30.75F, patch, sums);
     double sum = 0.0;
     double squares = 0.0;
     for (const float value : coarse) {

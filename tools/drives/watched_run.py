@@ -5,6 +5,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import statistics
 import subprocess
 import time
 
@@ -19,12 +20,9 @@ class RunError(Exception):
 class Result:
     metrics: dict  # metrics.json
     memory_mb: tuple  # largest resident set in the first half of the frames, in the second, and after the last
+    memory_ratio: float  # median of the resident set in the second half over that in the first: peaks come and go
     quarters_ms: list  # mean time per frame of each quarter, by the clock
     quarters_cpu_ms: list  # mean processor time per frame of each quarter, of all threads
-
-    @property
-    def memory_ratio(self):
-        return self.memory_mb[1] / self.memory_mb[0]
 
 
 def resident_mb(pid):
@@ -73,14 +71,23 @@ class RowCounter:
 class Watched:
     """Samples of a running process."""
 
-    memory_mb: list = dataclasses.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    memory_samples_mb: tuple = dataclasses.field(default_factory=lambda: ([], [], []))
     marks: list = dataclasses.field(default_factory=list)  # (frames, seconds, processor seconds) at the quarters
 
     def add(self, pid, rows, num_frames):
         part = 2 if rows >= num_frames else 1 if 2 * rows >= num_frames else 0
-        self.memory_mb[part] = max(self.memory_mb[part], resident_mb(pid))
+        self.memory_samples_mb[part].append(resident_mb(pid))
         if len(self.marks) < 5 and (rows > 0 or self.marks) and 4 * rows >= len(self.marks) * num_frames:
             self.marks.append((rows, time.monotonic(), processor_s(pid)))
+
+    @property
+    def memory_mb(self):
+        return tuple(max(samples, default=0.0) for samples in self.memory_samples_mb)
+
+    @property
+    def memory_ratio(self):
+        first, second = map(statistics.median, self.memory_samples_mb[:2])
+        return second / first
 
     def quarters_ms(self, clock):
         """Per frame; `clock` 1: of the wall, 2: of the processor. None where the run was too short to tell."""
@@ -121,7 +128,7 @@ def run(program, sequence, out, num_frames, options):
     if not watched.memory_mb[0] or not watched.memory_mb[1]:
         raise RunError(f"{out}: the run was too short to sample its memory")
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
-    return Result(metrics, tuple(watched.memory_mb), watched.quarters_ms(1), watched.quarters_ms(2))
+    return Result(metrics, watched.memory_mb, watched.memory_ratio, watched.quarters_ms(1), watched.quarters_ms(2))
 
 
 def lengths_ratio(estimate, truth):
