@@ -13,16 +13,22 @@
 
 namespace stemvo {
 
-/// Learns the camera from windows that share no keyframe, one after the other: principal point,
-/// focal length and the radial distortion that is left, each with a prior. The given camera is left
-/// only where the data insist.
+/// Learns the camera from runs of keyframes, one after the other: principal point, focal length and
+/// the radial distortion that is left, each with a prior. The given camera is left only where the
+/// data insist.
 class SelfCalibration {
  public:
   SelfCalibration(const Camera& given, CameraRefinement refinement);
 
-  /// A window of full length, after each refinement; for measuring, one that shares a keyframe with
-  /// the last one that was used is left out.
-  void observe(const Window& window, const BundleAdjustmentOptions& options);
+  /// The next keyframe, its pose refined. A run that is long enough is measured, and the next one
+  /// begun.
+  void observe(const Keyframe& keyframe, const BundleAdjustmentOptions& options);
+  /// As of a window.
+  void rescale(double factor, const Eigen::Vector3d& center) {
+    stemvo::rescale(run_, factor, center);
+  }
+  /// The keyframes that come are of another map.
+  void restart() { run_ = {}; }
 
   /// The given one, or on its way to what the data insist on.
   [[nodiscard]] const Camera& camera() const { return camera_; }
@@ -30,6 +36,7 @@ class SelfCalibration {
   [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 
  private:
+  void measure(const BundleAdjustmentOptions& options);
   void approach_believed();
   [[nodiscard]] CameraChange applied() const;
   [[nodiscard]] CameraChange sigma() const;
@@ -40,7 +47,7 @@ class SelfCalibration {
   CameraChange believed_ = CameraChange::Zero();  ///< what the data insist on; camera_ goes there
   CameraChange mean_ = CameraChange::Zero();      ///< less the given camera
   CameraInformation information_;
-  int newest_used_ = -1;  ///< frame of the newest keyframe that was used
+  Window run_;  ///< the keyframes since the last measurement
 };
 
 }  // namespace stemvo

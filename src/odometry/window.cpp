@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -11,6 +13,11 @@
 
 namespace stemvo {
 namespace {
+
+/// Tracks that the oldest keyframe and the one that comes must share for it to stay.
+constexpr int kMinConnection = 20;
+/// The last keyframes, which stay, the coming one among them.
+constexpr std::size_t kNumRecent = 4;
 
 struct Observation {
   const Keyframe* keyframe;
@@ -59,13 +66,50 @@ std::optional<Eigen::Vector3d> triangulate_track(const std::vector<Observation>&
              : std::nullopt;
 }
 
+/// Frames that a keyframe between others leaves behind are told from the one before it.
+void drop(Window& window, std::size_t i) {
+  if (i > 0) {
+    Keyframe& before = window.keyframes[i - 1];
+    const Keyframe& leaving = window.keyframes[i];
+    const Rigid3 before_from_leaving =
+        before.world_from_camera.inverse() * leaving.world_from_camera;
+    before.followers.push_back({leaving.frame, before_from_leaving});
+    for (const FrameBetween& follower : leaving.followers) {
+      before.followers.push_back(
+          {follower.frame, before_from_leaving * follower.keyframe_from_camera});
+    }
+  }
+  window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(i));
+}
+
 }  // namespace
 
-void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
-  window.keyframes.push_back(std::move(keyframe));
-  while (static_cast<int>(window.keyframes.size()) > options.num_keyframes) {
-    window.keyframes.pop_front();
+std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
+  const std::deque<Keyframe>& keyframes = window.keyframes;
+  if (common_points(keyframes.front().points, coming.points).size() < kMinConnection) {
+    return 0;
   }
+  const auto position = [&](std::size_t i) -> const Eigen::Vector3d& {
+    return keyframes[i].world_from_camera.translation;
+  };
+  std::size_t leaving = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + kNumRecent <= keyframes.size(); ++i) {
+    const double gap = (position(i + 1) - position(i - 1)).norm();
+    const double age = (coming.world_from_camera.translation - position(i)).norm();
+    if (gap < least * age) {
+      least = gap / age;
+      leaving = i;
+    }
+  }
+  return leaving;
+}
+
+void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
+  if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
+    drop(window, leaving_keyframe(window, keyframe));
+  }
+  window.keyframes.push_back(std::move(keyframe));
   std::erase_if(window.landmarks, [&](const auto& landmark) {
     return std::none_of(window.keyframes.rbegin(), window.keyframes.rend(),
                         [&](const Keyframe& seen_from) {

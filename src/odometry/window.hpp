@@ -24,7 +24,7 @@ struct Keyframe {
   int frame = 0;
   Rigid3 world_from_camera;
   TrackPoints points;
-  std::vector<FrameBetween> followers;  ///< frames after it, until the next keyframe
+  std::vector<FrameBetween> followers;  ///< frames after it, until the next keyframe; in order
 };
 
 /// The last keyframes and the landmarks they see, connected by track ids. Everything is in units of
@@ -52,8 +52,13 @@ struct WindowOptions {
   return point.z() > 0.0 && (camera.project(point) - uv).norm() <= bound_px;
 }
 
-/// Appends the keyframe, drops the oldest beyond the window's length, and landmarks that no
-/// keyframe sees any more.
+/// The keyframe that leaves a full window for the one that comes: the oldest once the two share too
+/// few tracks to hold each other, else the one that adds the least between its neighbours. So the
+/// window is as long a way as one view lasts, whether the camera drives or is held in the hand.
+[[nodiscard]] std::size_t leaving_keyframe(const Window& window, const Keyframe& coming);
+
+/// Appends the keyframe to the window. A full one first drops its leaving keyframe, which becomes a
+/// follower of the one before it, and landmarks that no keyframe sees any more.
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);
 
 /// Triangulates the tracks of the newest keyframe that are no landmarks yet, from the first and the

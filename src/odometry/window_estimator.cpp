@@ -193,6 +193,7 @@ bool WindowEstimator::open_window(View view) {
   window_ = std::move(*window);
   const View& road_view = reference.road != nullptr ? reference : view;
   scale_.restart(road_view.road.get());
+  calibration_.restart();
   road_pose_ = road_view.world_from_camera;
   is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
@@ -258,7 +259,7 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   Keyframe keyframe{frame.number, world_from_camera_, anchor_.points, {}};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
-    history_.leave(window_, keyframe);
+    history_.leave(window_, leaving_keyframe(window_, keyframe), keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
   triangulate_landmarks(window_, camera_, window_options_);
@@ -271,10 +272,8 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
     anchor_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera_, window_options_);
-  if (window_.keyframes.size() >= length) {
-    calibration_.observe(window_, refinement_);
-    camera_ = calibration_.camera();
-  }
+  calibration_.observe(window_.keyframes.back(), refinement_);
+  camera_ = calibration_.camera();
   history_.observe(window_, frame.image);
 }
 
@@ -294,6 +293,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
+      calibration_.rescale(factor, center);
       for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);
       }

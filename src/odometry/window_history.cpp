@@ -78,16 +78,17 @@ void WindowHistory::keep_motions(const Keyframe& prev, const Keyframe& cur) {
       {prev.frame, cur.frame, prev.world_from_camera.inverse() * cur.world_from_camera});
 }
 
-void WindowHistory::leave(const Window& window, const Keyframe& coming) {
-  const Keyframe& oldest = window.keyframes.front();
-  const Keyframe& next = window.keyframes.size() > 1 ? window.keyframes[1] : coming;
-  keep_motions(oldest, next);
-  for (const TrackPoint& observation : oldest.points) {
-    const auto sees = [&](const Keyframe& keyframe) {
-      return find_point(keyframe.points, observation.track_id) != nullptr;
+void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyframe& coming) {
+  const Keyframe& keyframe = window.keyframes[leaving];
+  if (leaving == 0) {
+    keep_motions(keyframe, window.keyframes.size() > 1 ? window.keyframes[1] : coming);
+  }
+  for (const TrackPoint& observation : keyframe.points) {
+    const auto sees = [&](const Keyframe& other) {
+      return &other != &keyframe && find_point(other.points, observation.track_id) != nullptr;
     };
-    if (!sees(coming) && std::none_of(window.keyframes.begin() + 1, window.keyframes.end(), sees)) {
-      keep(window, oldest, observation.track_id);
+    if (!sees(coming) && std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
+      keep(window, keyframe, observation.track_id);
     }
   }
 }

@@ -30,8 +30,8 @@ class WindowHistory {
   /// The newest keyframe of the window saw this image (the input, gray or RGB).
   void observe(const Window& window, const cv::Mat& image);
 
-  /// The oldest keyframe is about to leave the window for the one that comes.
-  void leave(const Window& window, const Keyframe& coming);
+  /// A keyframe is about to leave the window for the one that comes.
+  void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
   /// The whole window is about to be dropped; nothing will connect with it.
   void close(const Window& window);
 

@@ -54,6 +54,21 @@ class DriveTracks {
     return path;
   }
 
+  /// From this frame on every second track has another id (that of its point, plus the number of
+  /// points): its corner was lost and is new.
+  void renew_tracks(int frame, int remainder) {
+    for (int i = frame; i < num_frames(); ++i) {
+      auto& seen = observations[static_cast<std::size_t>(i)];
+      const auto before = seen;
+      for (const auto& [id, uv] : before) {
+        if (id % 2 == remainder && id < static_cast<int>(points.size())) {
+          seen.erase(id);
+          seen.emplace(id + static_cast<int>(points.size()), uv);
+        }
+      }
+    }
+  }
+
   [[nodiscard]] int num_frames() const { return static_cast<int>(world_from_camera.size()); }
   [[nodiscard]] const Rigid3& pose(int i) const {
     return world_from_camera[static_cast<std::size_t>(i)];

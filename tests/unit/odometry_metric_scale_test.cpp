@@ -111,7 +111,9 @@ INSTANTIATE_TEST_SUITE_P(Modes,
 TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
   const int num_frames = 44;
   const int first_road = 32;
-  const RoadDrive drive(num_frames);
+  RoadDrive drive(num_frames);
+  drive.tracks.renew_tracks(12, 0);  // so that a keyframe leaves
+  drive.tracks.renew_tracks(16, 1);
   WindowEstimator estimator(metric_config(), drive.scene.camera);
   EstimatorRun run(estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, i >= first_road); };

@@ -11,12 +11,14 @@ namespace {
 
 using testing::DriveTracks;
 
-/// Windows of a drive with turns, seen by `drive`'s camera and refined with the calibration's.
-void drive_windows(const Camera& true_camera, SelfCalibration& calibration) {
-  BundleAdjustmentOptions options;
+/// Runs of a drive with turns, seen by the true camera and refined with the calibration's.
+void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
+  constexpr int kLength = 16;
+  const BundleAdjustmentOptions options;
+  const WindowOptions window_options{.num_keyframes = kLength};
   for (int k = 0; k < 12; ++k) {
     std::vector<Rigid3> path(1);
-    for (int i = 1; i < 8; ++i) {
+    for (int i = 1; i < kLength; ++i) {
       path.push_back(
           path.back() *
           Rigid3(so3_exp({0.004 * (i % 3 - 1), k % 2 == 0 ? 0.05 : -0.04, 0.0}), {0.0, 0.0, 0.9}));
@@ -25,16 +27,14 @@ void drive_windows(const Camera& true_camera, SelfCalibration& calibration) {
                             static_cast<std::uint64_t>(k), true_camera);
     Window window;
     for (int i = 0; i < drive.num_frames(); ++i) {
-      Keyframe keyframe{8 * k + i, drive.pose(i), {}, {}};
+      Keyframe keyframe{kLength * k + i, drive.pose(i), {}, {}};
       for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
         keyframe.points.push_back({id, uv});
       }
-      add_keyframe(window, std::move(keyframe), {});
-      triangulate_landmarks(window, calibration.camera(), {});
+      add_keyframe(window, std::move(keyframe), window_options);
+      triangulate_landmarks(window, calibration.camera(), window_options);
       refine_window(window, calibration.camera(), options);
-    }
-    for (int i = 0; i < 20; ++i) {  // measured once, approached 20 times
-      calibration.observe(window, options);
+      calibration.observe(window.keyframes.back(), options);
     }
   }
 }
@@ -45,7 +45,7 @@ TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
   given.cx_px += 3.0;
   given.cy_px -= 2.0;
   SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
-  drive_windows(truth, calibration);
+  drive_runs(truth, calibration);
   EXPECT_NEAR(calibration.camera().cx_px, truth.cx_px, 0.5);
   EXPECT_NEAR(calibration.camera().cy_px, truth.cy_px, 0.5);
   EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
@@ -55,7 +55,7 @@ TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
 TEST(SelfCalibration, ARightCameraIsKept) {
   const Camera truth = testing::kitti_camera();
   SelfCalibration calibration(truth, CameraRefinement::kAll);
-  drive_windows(truth, calibration);
+  drive_runs(truth, calibration);
   EXPECT_EQ(calibration.camera().cx_px, truth.cx_px);
   EXPECT_EQ(calibration.camera().cy_px, truth.cy_px);
   EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
@@ -66,7 +66,7 @@ TEST(SelfCalibration, OffMeansOff) {
   Camera given = truth;
   given.cx_px += 3.0;
   SelfCalibration calibration(given, CameraRefinement::kOff);
-  drive_windows(truth, calibration);
+  drive_runs(truth, calibration);
   EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
   EXPECT_FALSE(calibration.principal_point_sigma_px().has_value());
 }

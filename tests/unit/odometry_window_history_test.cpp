@@ -56,7 +56,7 @@ TEST(WindowHistory, WhatHasLeftIsNotRescaledWithTheWindow) {
   window.keyframes.push_back(keyframe_at(2, step(1.0)));
   WindowHistory history;
   const Keyframe coming = keyframe_at(4, step(1.0) * step(1.0));
-  history.leave(window, coming);
+  history.leave(window, 0, coming);
   window.keyframes.pop_front();
   window.keyframes.push_back(coming);
   rescale(window, 3.0, coming.world_from_camera.translation);
@@ -106,7 +106,7 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   const double unit_m = 1.0 / testing::length_ratio(refined, drive.world_from_camera, 0, 39);
   std::vector<double> errors;
   for (const MapLandmark& landmark : estimator.landmarks()) {
-    ASSERT_GE(landmark.frame, 1);
+    ASSERT_GE(landmark.frame, 0);
     ASSERT_LT(landmark.frame, drive.num_frames());
     // In the camera: where the trajectory went is not asked here.
     const Eigen::Vector3d place =
@@ -116,8 +116,9 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
       nearest = std::min(nearest, (point - place).norm());
     }
     errors.push_back(nearest);
-    EXPECT_EQ(landmark.rgb[0], landmark.frame);  // of the last keyframe that saw it
-    EXPECT_EQ(landmark.rgb[2], 3 * landmark.frame);
+    EXPECT_GE(landmark.rgb[0], landmark.frame);  // of the last keyframe that saw it
+    EXPECT_LT(landmark.rgb[0], landmark.frame + 30);
+    EXPECT_EQ(landmark.rgb[2], 3 * landmark.rgb[0]);
   }
   ASSERT_GT(errors.size(), 300U);
   std::sort(errors.begin(), errors.end());

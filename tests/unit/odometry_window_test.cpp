@@ -25,16 +25,63 @@ Window window_of(const DriveTracks& drive, const WindowOptions& options) {
   return window;
 }
 
+/// `i` metres along, with tracks `first_id` to `first_id` + 29.
+Keyframe keyframe_along(int i, int first_id) {
+  Keyframe keyframe{i, Rigid3(Eigen::Quaterniond::Identity(), {0.0, 0.0, i * 1.0}), {}, {}};
+  for (int id = first_id; id < first_id + 30; ++id) {
+    keyframe.points.push_back({id, {100.0, 100.0}});
+  }
+  return keyframe;
+}
+
+TEST(Window, TheOldestKeyframeLeavesOnceFewTracksConnectIt) {
+  Window window;
+  for (int i = 0; i < 8; ++i) {
+    add_keyframe(window, keyframe_along(i, 2 * i), {});
+  }
+  EXPECT_EQ(leaving_keyframe(window, keyframe_along(8, 11)), 0U);  // 19 in common
+  EXPECT_NE(leaving_keyframe(window, keyframe_along(8, 10)), 0U);  // 20
+}
+
+TEST(Window, OneViewIsKeptFromItsFirstKeyframeOn) {
+  Window window;
+  for (int i = 0; i < 30; ++i) {
+    add_keyframe(window, keyframe_along(i, 0), {});
+  }
+  ASSERT_EQ(window.keyframes.size(), 8U);
+  EXPECT_EQ(window.keyframes.front().frame, 0);
+  int next = 0;
+  for (const Keyframe& keyframe : window.keyframes) {
+    EXPECT_EQ(keyframe.frame, next++);
+    for (const FrameBetween& follower : keyframe.followers) {
+      EXPECT_EQ(follower.frame, next++);
+      EXPECT_NEAR((keyframe.world_from_camera * follower.keyframe_from_camera).translation.z(),
+                  follower.frame, 1e-9);
+    }
+  }
+  EXPECT_EQ(next, 30);
+  for (int i = 0; i < 4; ++i) {  // the last ones stay, as they were seen last
+    EXPECT_EQ(window.keyframes[static_cast<std::size_t>(7 - i)].frame, 29 - i);
+  }
+  for (std::size_t i = 2; i < 4; ++i) {  // the older, the farther apart
+    EXPECT_GE(window.keyframes[i - 1].frame - window.keyframes[i - 2].frame,
+              window.keyframes[i + 1].frame - window.keyframes[i].frame);
+  }
+}
+
 TEST(Window, TheWindowForgetsOldKeyframesAndTheirLandmarks) {
   WindowOptions options;
   options.num_keyframes = 5;
-  const DriveTracks drive(12, 0.0, 1);
+  DriveTracks drive(14, 0.0, 1);
+  drive.renew_tracks(4, 0);
+  drive.renew_tracks(7, 1);
   const Window window = window_of(drive, options);
   ASSERT_EQ(window.keyframes.size(), 5U);
-  EXPECT_EQ(window.keyframes.front().frame, 7);
+  EXPECT_GT(window.keyframes.front().frame, 0);
   ASSERT_GT(window.landmarks.size(), 100U);
   for (const auto& [id, point] : window.landmarks) {
-    EXPECT_LE((point - drive.points[static_cast<std::size_t>(id)]).norm(), 1e-6);
+    EXPECT_LE((point - drive.points[static_cast<std::size_t>(id) % drive.points.size()]).norm(),
+              1e-6);
     bool is_seen = false;
     for (const Keyframe& keyframe : window.keyframes) {
       is_seen = is_seen || find_point(keyframe.points, id) != nullptr;
