@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -17,9 +16,9 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(Follows points through the drive and asks under which focal length and principal point they fit
-together best. Turns tell of both, a straight road of neither: a number that the drive does not
-determine stays as given and is marked. Ground truth is not read. Nothing uses FILE unless it is
+    R"(Runs the odometry with camera.refine: all and writes down the camera it has learnt by the end.
+Turns tell of it, a straight road does not: a number that the drive does not determine stays as
+given and is marked. Ground truth is not read. Nothing uses FILE unless it is
 given to a run.
 
 Examples:
@@ -70,18 +69,9 @@ int calibrate(Arguments& arguments) {
   if (!arguments.calibration.empty()) {
     request.calibration = arguments.calibration;
   }
-  Progress tracking("frames", arguments.is_quiet);
-  std::optional<Progress> solving;
-  const Expected<CalibrationReport> result =
-      calibrate_sequence(request, [&](CalibrationStage stage, std::size_t done, std::size_t total) {
-        if (stage == CalibrationStage::kTracking) {
-          return tracking.update(done, total);
-        }
-        if (!solving) {  // its clock starts with the stage
-          solving.emplace("solver steps", arguments.is_quiet);
-        }
-        return solving->update(done, total);
-      });
+  Progress progress("frames", arguments.is_quiet);
+  const Expected<CalibrationReport> result = calibrate_sequence(
+      request, [&](std::size_t done, std::size_t total) { return progress.update(done, total); });
   if (!result) {
     print_error(result.error().message);
     return kExitFailed;

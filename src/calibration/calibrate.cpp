@@ -8,13 +8,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
-#include "calibration/refine_camera.hpp"
-#include "calibration/segments.hpp"
 #include "dataset/kitti_text.hpp"
 #include "odometry/phased_odometry.hpp"
-#include "options/option_fields.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
@@ -23,12 +19,12 @@ namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
-using calibration::Segment;
 
-constexpr int kTrackWindow = 15;  ///< of KLT, px
-constexpr int kNumTracks = 1000;
-/// Fewer do not tell how well they agree.
-constexpr std::size_t kMinSegments = 3;
+/// A number less certain than this is not determined: px, and a share of the focal length.
+constexpr double kMaxSigma_px = 2.0;
+constexpr double kMaxSigmaOfFocal = 0.01;
+/// .. but for a change by so many sigmas.
+constexpr double kInsists = 3.0;
 
 fs::path calibration_file(const CalibrationRequest& request) {
   return request.calibration.value_or(request.sequence_dir / "calib.txt");
@@ -39,13 +35,6 @@ Status check_request(const CalibrationRequest& request) {
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  const FeatureMethod method = request.config.features.method;
-  if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
-    return fail(
-        fmt::format("features.method: expected patch or klt, whose tracks calibration needs, "
-                    "found '{}'",
-                    options::to_string(method)));
-  }
   std::error_code code;
   if (fs::equivalent(request.out_file, calibration_file(request), code)) {
     return fail(fmt::format("{}: expected another file than the calibration to start from",
@@ -54,53 +43,59 @@ Status check_request(const CalibrationRequest& request) {
   return check_can_replace(request.out_file);
 }
 
-cv::Mat to_gray(const cv::Mat& frame) {
-  cv::Mat gray = frame;
-  if (frame.channels() == 3) {
-    cv::cvtColor(frame, gray, cv::COLOR_RGB2GRAY);
-  }
-  return gray;
-}
-
-/// Runs the odometry over the sequence.
-std::vector<Segment> track(const KittiSequence& sequence,
-                           PhasedOdometry& odometry,
-                           const CalibrationProgress& progress,
-                           CalibrationReport& report) {
-  calibration::SegmentBuilder builder(sequence.camera());
-  const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
-    const std::size_t number = sequence.range().begin + i;
-    calibration::TrackedFrame tracked;
-    if (frame) {
-      if (!result.problem.empty()) {
-        report.warnings.push_back(fmt::format("frame {}: {}", number, result.problem));
-      }
-      tracked = {to_gray(*frame), result.world_from_camera,
-                 is_measured(result.state) && result.state != FrameState::kFirst,
-                 odometry.frames().matches(), odometry.frames().inlier_mask()};
-    } else {
-      report.warnings.push_back(frame.error().message);
-      tracked.world_from_camera = result.world_from_camera;
-    }
-    builder.add(tracked);
-    report.interrupted = progress && !progress(CalibrationStage::kTracking, i + 1, sequence.size());
-    return !report.interrupted;
-  };
-  pipeline::run_frames(sequence, odometry, visit);
-  return builder.complete();
-}
-
 Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
   Config config = request.config;
   config.odometry.mode = OdometryMode::kMap;
   config.scale.source = ScaleSource::kConstant;
-  config.camera.refine = CameraRefinement::kOff;
-  // Long tracks count here, and their bias does not: every observation is aligned anew.
-  config.features.method = FeatureMethod::kKlt;
-  config.features.klt_window = std::max(config.features.klt_window, kTrackWindow);
-  config.features.max_features = std::max(config.features.max_features, kNumTracks);
-  config.stem.upsample = Upsample::kBicubic;
+  config.camera.refine = CameraRefinement::kAll;
   return pipeline::create_odometry(config, camera, request.models_dir);
+}
+
+/// Runs the odometry over the sequence.
+void drive(const KittiSequence& sequence,
+           PhasedOdometry& odometry,
+           const CalibrationProgress& progress,
+           CalibrationReport& report) {
+  const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
+    if (!frame) {
+      report.warnings.push_back(frame.error().message);
+    } else if (!result.problem.empty()) {
+      report.warnings.push_back(
+          fmt::format("frame {}: {}", sequence.range().begin + i, result.problem));
+    }
+    report.interrupted = progress && !progress(i + 1, sequence.size());
+    return !report.interrupted;
+  };
+  pipeline::run_frames(sequence, odometry, visit);
+}
+
+void read_estimate(const Camera& given, const CameraEstimate& estimate, CalibrationReport& report) {
+  const auto parameter = [&](const char* name, double value, int i, double unit, double max_sigma) {
+    const double sigma = unit * estimate.sigma[i];
+    const double change = unit * estimate.change[i];
+    const bool is_determined = sigma <= max_sigma || std::abs(change) > kInsists * sigma;
+    return CalibratedParameter{name,  value,     is_determined ? value + change : value,
+                               sigma, max_sigma, is_determined};
+  };
+  const double f = given.fx_px;
+  report.num_runs = estimate.num_bundles;
+  report.parameters = {parameter("focal length", f, 2, f, kMaxSigmaOfFocal * f),
+                       parameter("principal point x", given.cx_px, 0, 1.0, kMaxSigma_px),
+                       parameter("principal point y", given.cy_px, 1, 1.0, kMaxSigma_px),
+                       parameter("k1", 0.0, 3, 1.0, 1.0), parameter("k2", 0.0, 4, 1.0, 1.0)};
+  report.refined = given;
+  report.refined.fx_px = report.parameters[0].refined;
+  report.refined.fy_px *= report.refined.fx_px / f;
+  report.refined.cx_px = report.parameters[1].refined;
+  report.refined.cy_px = report.parameters[2].refined;
+}
+
+Status write_calibration(const CalibrationRequest& request,
+                         const Camera& given,
+                         const Camera& refined) {
+  const Expected<std::string> text =
+      dataset::replace_kitti_camera(calibration_file(request), given, refined);
+  return text ? replace_text_file(request.out_file, *text) : Status(text.error());
 }
 
 }  // namespace
@@ -121,65 +116,49 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
     return odometry.error();
   }
   CalibrationReport report;
-  report.given = report.refined = sequence->camera();
-  std::vector<Segment> segments = track(*sequence, *odometry, progress, report);
+  drive(*sequence, *odometry, progress, report);
   if (report.interrupted) {
     return report;
   }
-  if (segments.size() < kMinSegments) {
-    return fail(fmt::format(
-        "{}: expected frames for at least {} stretches of 5 keyframes or more that move and share "
-        "tracks, found {} in {} frames",
-        request.sequence_dir.string(), kMinSegments, segments.size(), sequence->size()));
+  read_estimate(sequence->camera(), odometry->frames().estimator().camera_estimate().value(),
+                report);
+  if (report.num_runs == 0) {
+    return fail(
+        fmt::format("{}: expected frames that move for at least one run of 16 keyframes, found "
+                    "none in {} frames",
+                    request.sequence_dir.string(), sequence->size()));
   }
-  std::vector<std::string> warnings = std::move(report.warnings);
-  report = calibration::refine_camera(
-      segments, sequence->camera(), [&progress](std::size_t done, std::size_t total) {
-        return !progress || progress(CalibrationStage::kSolving, done, total);
-      });
-  report.warnings = std::move(warnings);
-  report.num_segments = segments.size();
-  const bool is_any_determined = std::any_of(report.parameters.begin(), report.parameters.end(),
-                                             std::mem_fn(&CalibratedParameter::is_determined));
-  if (report.interrupted || !is_any_determined) {
-    return report;
+  if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
+                  std::mem_fn(&CalibratedParameter::is_determined))) {
+    if (const Status status = write_calibration(request, sequence->camera(), report.refined);
+        !status) {
+      return status.error();
+    }
+    report.written = true;
   }
-  const Expected<std::string> text =
-      dataset::replace_kitti_camera(calibration_file(request), report.given, report.refined);
-  if (!text) {
-    return text.error();
-  }
-  if (const Status status = replace_text_file(request.out_file, *text); !status) {
-    return status.error();
-  }
-  report.written = true;
   return report;
 }
 
 std::string format_calibration_table(const CalibrationReport& report) {
-  const auto& [f, cx, cy, k1, k2] = report.parameters;
   TextTable table("lrrrl");
-  table.add({"px", "given", "refined", "deviation", "change"});
+  table.add({"px", "given", "refined", "sigma", "change"});
   table.rule();
-  for (const CalibratedParameter* number : {&f, &cx, &cy}) {
-    table.add(
-        {number->name, fmt::format("{:.2f}", number->given), fmt::format("{:.2f}", number->refined),
-         std::isfinite(number->deviation) ? fmt::format("{:.2f}", number->deviation) : "unknown",
-         number->is_determined ? fmt::format("{:+.2f} ({:+.2f} %)", number->refined - number->given,
-                                             100.0 * (number->refined / number->given - 1.0))
-                               : fmt::format("undetermined (deviation above {:.2f}): as given",
-                                             number->max_deviation)});
+  for (std::size_t i = 0; i < 3; ++i) {
+    const CalibratedParameter& number = report.parameters[i];
+    table.add({number.name, fmt::format("{:.2f}", number.given),
+               fmt::format("{:.2f}", number.refined), fmt::format("{:.2f}", number.sigma),
+               number.is_determined
+                   ? fmt::format("{:+.2f} ({:+.2f} %)", number.refined - number.given,
+                                 100.0 * (number.refined / number.given - 1.0))
+                   : fmt::format("undetermined (sigma above {:.2f}): as given", number.max_sigma)});
   }
-  table.rule();
-  table.add({"reprojection error", fmt::format("{:.4f}", report.given_error_px),
-             fmt::format("{:.4f}", report.refined_error_px)});
+  const CalibratedParameter& k1 = report.parameters[3];
+  const CalibratedParameter& k2 = report.parameters[4];
   return table.str() +
          fmt::format(
-             "from {} observations of {} landmarks in {} stretches that turn {:.0f} degrees in "
-             "all\nradial distortion left in the frames, which calib.txt cannot hold: k1 {:+.4f} "
-             "+- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
-             report.num_observations, report.num_landmarks, report.num_segments, report.turned_deg,
-             k1.refined, k1.deviation, k2.refined, k2.deviation);
+             "from {} runs of 16 keyframes\nradial distortion left in the frames, which calib.txt "
+             "cannot hold: k1 {:+.4f} +- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
+             report.num_runs, k1.refined, k1.sigma, k2.refined, k2.sigma);
 }
 
 }  // namespace stemvo

@@ -21,7 +21,7 @@ struct CalibrationRequest {
   std::filesystem::path sequence_dir;
   std::filesystem::path out_file;
   std::filesystem::path models_dir;
-  Config config;  ///< of the odometry that finds the tracks; features.method must be klt
+  Config config;                                     ///< of the odometry that learns the camera
   std::optional<FrameRangeRequest> frames;           ///< else all
   std::optional<std::filesystem::path> calibration;  ///< to start from; else the folder's calib.txt
 };
@@ -30,46 +30,37 @@ struct CalibrationRequest {
 struct CalibratedParameter {
   std::string name;
   double given = 0.0;
-  double refined = 0.0;        ///< as given where it is not determined
-  double deviation = 0.0;      ///< standard deviation; infinite: nothing is known
-  double max_deviation = 0.0;  ///< more: not determined
+  double refined = 0.0;    ///< as given where it is not determined
+  double sigma = 0.0;      ///< standard deviation
+  double max_sigma = 0.0;  ///< more: not determined, unless the change is far beyond it
   bool is_determined = false;
 };
 
 /// What a drive tells of its camera.
 struct CalibrationReport {
-  Camera given;
   Camera refined;
   /// Focal length, principal point x and y (px); k1 and k2, the radial distortion
   /// 1 + k1 r^2 + k2 r^4 (r on the plane z = 1) that the rectification left. The latter are
   /// estimated so that they do not end up in the focal length; calib.txt cannot hold them.
   std::array<CalibratedParameter, 5> parameters;
-  std::size_t num_segments = 0;
-  std::size_t num_landmarks = 0;
-  std::size_t num_observations = 0;
-  double turned_deg = 0.0;            ///< summed over the segments
-  double given_error_px = 0.0;        ///< root mean square per coordinate, given calibration
-  double refined_error_px = 0.0;      ///< same observations, refined
+  int num_runs = 0;                   ///< of keyframes
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
   bool interrupted = false;           ///< no file is written
   bool written = false;               ///< false also where nothing is determined
 };
 
-enum class CalibrationStage { kTracking, kSolving };
-/// After each frame, then after each step of the solver: done, in all; false stops.
-using CalibrationProgress = std::function<bool(CalibrationStage, std::size_t, std::size_t)>;
+/// After each frame: done, in all; false stops.
+using CalibrationProgress = std::function<bool(std::size_t, std::size_t)>;
 
-/// Refines focal length and principal point over a sequence: tracks of the odometry, aligned anew
-/// on the gray frames, bundle adjustment of many stretches of the drive that share the intrinsics.
-/// Ground truth is never read. Writes out_file in KITTI's calib.txt format: rows of cameras that
-/// share the refined camera's intrinsics get the new ones, their baselines stay, other lines are
-/// kept. Same input, same bytes. Errors: those of the sequence and the model, features.method other
-/// than klt, a principal point outside the image, out_file that cannot be written or is the
-/// calibration itself, too few frames that move.
+/// Focal length and principal point as the odometry learns them over a sequence
+/// (`camera.refine: all`). Ground truth is never read. Writes out_file in KITTI's calib.txt format:
+/// rows of cameras that share the refined camera's intrinsics get the new ones, their baselines
+/// stay, other lines are kept. Same input, same bytes. Errors: those of the sequence and the model,
+/// out_file that cannot be written or is the calibration itself, too few frames that move.
 [[nodiscard]] Expected<CalibrationReport> calibrate_sequence(
     const CalibrationRequest& request, const CalibrationProgress& progress = {});
 
-/// Given, refined, standard deviation; reprojection error before and after; what they rest on.
+/// Given, refined, standard deviation; what they rest on.
 [[nodiscard]] std::string format_calibration_table(const CalibrationReport& report);
 
 }  // namespace stemvo

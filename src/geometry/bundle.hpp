@@ -30,6 +30,13 @@ struct Bundle {
 using CameraChange = Eigen::Matrix<double, 5, 1>;
 using CameraInformation = Eigen::Matrix<double, 5, 5>;
 
+/// What several bundles tell of the camera they share.
+struct CameraEstimate {
+  CameraChange change = CameraChange::Zero();
+  CameraChange sigma = CameraChange::Zero();  ///< standard deviations
+  int num_bundles = 0;
+};
+
 /// What is known of a bundle's camera beforehand.
 struct CameraPrior {
   CameraChange mean;              ///< less the bundle's camera

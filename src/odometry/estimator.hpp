@@ -2,11 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
+#include "geometry/bundle.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
@@ -44,6 +46,10 @@ class Estimator {
   [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;
   /// The same with look-ahead, where something is refined.
   [[nodiscard]] virtual std::vector<Rigid3> refined_trajectory() const = 0;
+  /// What was learnt of the camera; less the given one. nullopt: nothing is learnt.
+  [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
+    return std::nullopt;
+  }
   /// See Odometry::landmarks().
   [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
 };

@@ -12,11 +12,13 @@ namespace {
 
 /// Of the given camera: principal point (px), focal length (share), k1, k2.
 constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
+/// Of one whose focal length is asked for as well: it may be another camera's.
+constexpr double kWeakPriorSigma[] = {30.0, 30.0, 0.03, 0.02, 0.01};
 /// Errors of a track's points are alike: a run tells less than as many independent ones would.
 constexpr double kSigmaFactor = 2.0;
 /// An unknown is believed under this sigma, px, ..
 constexpr double kMaxSigma_px = 1.5;
-constexpr double kMaxSigmaOfFocal = 0.0015;
+constexpr double kMaxSigmaOfFocal = 0.01;
 /// .. where it leaves the given value by more than so many sigmas.
 constexpr double kMinSigmas = 2.0;
 /// The camera moves by this at a keyframe: the window can follow.
@@ -37,17 +39,19 @@ bool is_plausible(const CameraMeasurement& found) {
 
 SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinement)
     : given_(given), camera_(given), refinement_(refinement) {
-  const Eigen::Map<const CameraChange> sigma(kPriorSigma);
+  const Eigen::Map<const CameraChange> sigma(refinement == CameraRefinement::kAll ? kWeakPriorSigma
+                                                                                  : kPriorSigma);
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-CameraChange SelfCalibration::sigma() const {
-  return information_.inverse().diagonal().cwiseSqrt();
+CameraEstimate SelfCalibration::estimate() const {
+  return {mean_, information_.inverse().diagonal().cwiseSqrt(), num_runs_};
 }
 
 std::optional<Eigen::Vector2d> SelfCalibration::principal_point_sigma_px() const {
-  return refinement_ == CameraRefinement::kOff ? std::nullopt
-                                               : std::optional<Eigen::Vector2d>(sigma().head<2>());
+  return refinement_ == CameraRefinement::kOff
+             ? std::nullopt
+             : std::optional<Eigen::Vector2d>(estimate().sigma.head<2>());
 }
 
 CameraChange SelfCalibration::applied() const {
@@ -82,7 +86,8 @@ void SelfCalibration::measure(const BundleAdjustmentOptions& options) {
   }
   mean_ = before + found->change;
   information_ += found->information / factor_sq;
-  const CameraChange sigma = this->sigma();
+  ++num_runs_;
+  const CameraChange sigma = estimate().sigma;
   const auto insists = [&](int i, double max) {
     return sigma[i] < max && std::abs(mean_[i]) > kMinSigmas * sigma[i];
   };

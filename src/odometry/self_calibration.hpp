@@ -32,6 +32,8 @@ class SelfCalibration {
 
   /// The given one, or on its way to what the data insist on.
   [[nodiscard]] const Camera& camera() const { return camera_; }
+  /// What all runs say, whether the data insist on it or not.
+  [[nodiscard]] CameraEstimate estimate() const;
   /// Of the estimate; nullopt: nothing is refined.
   [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 
@@ -39,7 +41,6 @@ class SelfCalibration {
   void measure(const BundleAdjustmentOptions& options);
   void approach_believed();
   [[nodiscard]] CameraChange applied() const;
-  [[nodiscard]] CameraChange sigma() const;
 
   Camera given_;
   Camera camera_;
@@ -47,7 +48,8 @@ class SelfCalibration {
   CameraChange believed_ = CameraChange::Zero();  ///< what the data insist on; camera_ goes there
   CameraChange mean_ = CameraChange::Zero();      ///< less the given camera
   CameraInformation information_;
-  Window run_;  ///< the keyframes since the last measurement
+  int num_runs_ = 0;  ///< measured
+  Window run_;        ///< the keyframes since the last measurement
 };
 
 }  // namespace stemvo

@@ -33,6 +33,10 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override;
   [[nodiscard]] std::vector<MapLandmark> landmarks() const override;
 
+  [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
+    return calibration_.estimate();
+  }
+
   [[nodiscard]] const Window& window() const { return window_; }
 
  private:
