@@ -2,12 +2,13 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build demo test bench test-frameworks cluster format check-format lint clean
+.PHONY: help setup build demo test test-all test-long bench test-frameworks cluster format check-format lint clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
-	@echo "make test          install what is missing, build, run all tests"
+	@echo "make test          install what is missing, build, run the tests"
+	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
 	@echo "make cluster       install Ray, for tools/search_cluster.py (make test does too)"
 	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
@@ -32,8 +33,14 @@ test: build
 	@tools/setup.sh peers || echo "==> Without OpenCV's Python package: the test of what the benchmark compares with is skipped"
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
-	@echo "==> Running all tests"
+	@echo "==> Running the tests"
 	@ctest --preset release --parallel $(JOBS)
+
+test-all: test test-long
+
+test-long:
+	@echo "==> Running the long tests"
+	@ctest --preset long --parallel $(JOBS)
 
 SEQUENCE ?=
 BENCH ?=

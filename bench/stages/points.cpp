@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Points from picture to picture: detection, patches, KLT, ORB.
+// Points from image to image: detection, patches, KLT, ORB.
 #include <array>
 #include <utility>
 
@@ -14,7 +14,7 @@ namespace stemvo::bench {
 namespace {
 
 using benchmark::State;
-using Prepared = std::shared_ptr<const PreparedPicture>;
+using Prepared = std::shared_ptr<const PreparedImage>;
 
 FeatureOptions options_of(FeatureMethod method) {
   FeatureOptions options = chain().config.features;
@@ -22,16 +22,16 @@ FeatureOptions options_of(FeatureMethod method) {
   return options;
 }
 
-/// All pictures, prepared; then over and over from the first to the last, as in a drive.
-class Pictures {
+/// All images, prepared; then over and over from the first to the last, as in a drive.
+class Images {
  public:
-  explicit Pictures(FeatureMethod method)
+  explicit Images(FeatureMethod method)
       : method_(method), front_end_(create_front_end(options_of(method))) {
     for (const ChannelImage& image : chain().images) {
       prepared_.push_back(front_end_->prepare(image));
     }
   }
-  /// To the next picture; from the last one, to the second by way of the first (not measured).
+  /// To the next image; from the last one, to the second by way of the first (not measured).
   template <typename Measured>
   void advance(const Measured& measured) {
     if (next_ == 0 || next_ == prepared_.size()) {
@@ -52,10 +52,10 @@ class Pictures {
 };
 
 void run_tracker(State& state, FeatureMethod method, Stage stage) {
-  Pictures pictures(method);
+  Images images(method);
   run_stage(state, stage, [&] {
-    pictures.advance([](FrontEnd& front_end, const Prepared& picture) {
-      benchmark::DoNotOptimize(front_end.process(picture, 0));
+    images.advance([](FrontEnd& front_end, const Prepared& image) {
+      benchmark::DoNotOptimize(front_end.process(image, 0));
     });
   });
 }
@@ -100,15 +100,15 @@ void orb_detect_and_describe(State& state) {
 }
 
 void orb_match(State& state) {
-  Pictures pictures(FeatureMethod::kOrb);
+  Images images(FeatureMethod::kOrb);
   std::size_t i = 0;
   run_stage(state, Stage::kTracking, [&] {
     if (i == 0) {
-      static_cast<void>(pictures.front_end().process(pictures.prepared().front(), 0));
+      static_cast<void>(images.front_end().process(images.prepared().front(), 0));
     }
     ++i;
     benchmark::DoNotOptimize(
-        pictures.front_end().process(pictures.prepared()[i % pictures.prepared().size()], 0));
+        images.front_end().process(images.prepared()[i % images.prepared().size()], 0));
   });
 }
 

@@ -36,13 +36,13 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 DescriptorFrontEnd::DescriptorFrontEnd(const FeatureOptions& options)
     : options_(options), feature_(create_feature(options)) {}
 
-std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
-    const ChannelImage& image) const {
-  auto described = std::make_shared<Described>(image);
+std::shared_ptr<const PreparedImage> DescriptorFrontEnd::prepare(
+    const ChannelImage& channel) const {
+  auto described = std::make_shared<Described>(channel);
   std::vector<cv::KeyPoint> found;
-  timed(Stage::kDetection, [&] { feature_->detect(image.pixels, found); });
+  timed(Stage::kDetection, [&] { feature_->detect(channel.pixels, found); });
   std::sort(found.begin(), found.end(), is_stronger);
-  GridQuota quota(options_, image.pixels.size());
+  GridQuota quota(options_, channel.pixels.size());
   std::vector<cv::KeyPoint> kept;
   for (const cv::KeyPoint& keypoint : found) {
     if (quota.take(keypoint.pt)) {
@@ -53,22 +53,22 @@ std::shared_ptr<const PreparedPicture> DescriptorFrontEnd::prepare(
     return described;
   }
   timed(Stage::kDescription,
-        [&] { feature_->compute(image.pixels, kept, described->descriptors); });
+        [&] { feature_->compute(channel.pixels, kept, described->descriptors); });
   described->uv.reserve(kept.size());
   for (const cv::KeyPoint& keypoint : kept) {
-    described->uv.push_back(image.map.to_input({keypoint.pt.x, keypoint.pt.y}));
+    described->uv.push_back(channel.map.to_input({keypoint.pt.x, keypoint.pt.y}));
   }
   return described;
 }
 
-Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
+Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, int frame) {
   auto current = std::dynamic_pointer_cast<const Described>(std::move(prepared));
-  STEMVO_CHECK(current != nullptr, "a picture prepared by this front end");
+  STEMVO_CHECK(current != nullptr, "an image prepared by this front end");
   Matches matches;
   matches.num_keypoints = static_cast<int>(current->uv.size());
   std::vector<int> track_ids(current->uv.size(), -1);
   matched_.clear();
-  if (last_ != nullptr && last_->image.pixels.size() == current->image.pixels.size()) {
+  if (last_ != nullptr && last_->channel.pixels.size() == current->channel.pixels.size()) {
     for (const cv::DMatch& pair : match(*last_, *current)) {
       const auto from = static_cast<std::size_t>(pair.queryIdx);
       const auto to = static_cast<std::size_t>(pair.trainIdx);

@@ -17,14 +17,14 @@ class DescriptorFrontEnd : public FrontEnd {
   explicit DescriptorFrontEnd(const FeatureOptions& options);
 
   using FrontEnd::process;
-  [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
-      const ChannelImage& image) const override;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture, int frame) override;
+  [[nodiscard]] std::shared_ptr<const PreparedImage> prepare(
+      const ChannelImage& channel) const override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
-  struct Described : PreparedPicture {
-    using PreparedPicture::PreparedPicture;
+  struct Described : PreparedImage {
+    using PreparedImage::PreparedImage;
     std::vector<Eigen::Vector2d> uv;  ///< input pixels
     cv::Mat descriptors;              ///< one row per keypoint
   };

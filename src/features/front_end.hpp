@@ -21,27 +21,26 @@ struct Matches {
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
-/// What a front end makes of a picture on its own, without those before it.
-struct PreparedPicture {
-  explicit PreparedPicture(ChannelImage channel_image) : image(std::move(channel_image)) {}
-  virtual ~PreparedPicture() = default;
-  ChannelImage image;
+/// What a front end makes of an image on its own, without those before it.
+struct PreparedImage {
+  explicit PreparedImage(ChannelImage seen) : channel(std::move(seen)) {}
+  virtual ~PreparedImage() = default;
+  ChannelImage channel;
 };
 
-/// Finds correspondences between the last picture it was given and the next one. Stateful (it holds
-/// the last picture); the same pictures give the same matches, whatever the number of threads.
+/// Finds correspondences between the last image it was given and the next one. Stateful (it holds
+/// the last image); the same images give the same matches, whatever the number of threads.
 class FrontEnd {
  public:
   virtual ~FrontEnd() = default;
-  /// The part of process() that needs only the picture: it may run ahead, in another thread than
+  /// The part of process() that needs only the image: it may run ahead, in another thread than
   /// the rest, one call at a time.
-  [[nodiscard]] virtual std::shared_ptr<const PreparedPicture> prepare(
-      const ChannelImage& image) const = 0;
-  /// Matches from the previous picture (none on the first). A picture of another size starts over.
-  /// `picture` was prepared by this front end.
-  /// `frame` is the picture's number for Matches::prev_frame.
-  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedPicture> picture,
-                                        int frame) = 0;
+  [[nodiscard]] virtual std::shared_ptr<const PreparedImage> prepare(
+      const ChannelImage& channel) const = 0;
+  /// Matches from the previous image (none on the first). An image of another size starts over.
+  /// `image` was prepared by this front end.
+  /// `frame` is the image's number for Matches::prev_frame.
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedImage> image, int frame) = 0;
   [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
     return process(prepare(image), frame);
   }

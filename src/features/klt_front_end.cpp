@@ -12,14 +12,14 @@ namespace {
 
 constexpr int kBackLevels = 2;
 constexpr int kMaxIterations = 15;       ///< per level
-constexpr double kConverged_px = 0.015;  ///< an iteration's step, picture pixels
+constexpr double kConverged_px = 0.015;  ///< an iteration's step, image pixels
 /// Windows of 5x5 pixels lose the road: t_rel 0.85 for 0.31 on a rendered drive, whatever their
 /// size in the input.
 constexpr int kMinReach_px = 3;
 /// In a pyramid each level is followed by its derivatives.
 constexpr std::size_t kNextLevel = 2;
 
-/// Distance in input pixels between two points of one picture.
+/// Distance in input pixels between two points of one image.
 double input_distance_px(const PixelMap& map, const cv::Point2f& a, const cv::Point2f& b) {
   const Eigen::Vector2d difference(a.x - b.x, a.y - b.y);
   return map.scale.cwiseProduct(difference).norm();
@@ -32,31 +32,31 @@ bool is_inside(const cv::Point2f& uv, cv::Size size) {
 
 }  // namespace
 
-struct KltFrontEnd::KltPicture : Picture {
-  using Picture::Picture;
+struct KltFrontEnd::KltImage : TrackingImage {
+  using TrackingImage::TrackingImage;
   [[nodiscard]] int last_level() const { return static_cast<int>(pyramid.size() / kNextLevel) - 1; }
   std::vector<cv::Mat> pyramid;
   cv::Size window;
 };
 
-std::shared_ptr<const PreparedPicture> KltFrontEnd::prepare(const ChannelImage& image) const {
+std::shared_ptr<const PreparedImage> KltFrontEnd::prepare(const ChannelImage& channel) const {
   const StageTimer timer(Stage::kPyramid);
-  auto picture = std::make_shared<KltPicture>(image);
-  const double scale = image.map.scale.minCoeff();
+  auto image = std::make_shared<KltImage>(channel);
+  const double scale = channel.map.scale.minCoeff();
   const int reach = std::max(kMinReach_px, static_cast<int>(options().klt_window / 2 / scale));
-  picture->window = cv::Size(2 * reach + 1, 2 * reach + 1);
-  cv::buildOpticalFlowPyramid(image.pixels, picture->pyramid, picture->window,
-                              num_levels(scale) - 1, /*withDerivatives=*/true);
-  const bool is_halved = picture->last_level() > 0;
-  picture->corner_pixels = picture->pyramid[is_halved ? kNextLevel : 0];
-  picture->corner_scale = is_halved ? 2.0F : 1.0F;
-  return picture;
+  image->window = cv::Size(2 * reach + 1, 2 * reach + 1);
+  cv::buildOpticalFlowPyramid(channel.pixels, image->pyramid, image->window, num_levels(scale) - 1,
+                              /*withDerivatives=*/true);
+  const bool is_halved = image->last_level() > 0;
+  image->corner_pixels = image->pyramid[is_halved ? kNextLevel : 0];
+  image->corner_scale = is_halved ? 2.0F : 1.0F;
+  return image;
 }
 
 std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& from,
                                                                   const View& to) {
-  const auto& prev = static_cast<const KltPicture&>(*from.picture);
-  const auto& cur = static_cast<const KltPicture&>(*to.picture);
+  const auto& prev = static_cast<const KltImage&>(*from.image);
+  const auto& cur = static_cast<const KltImage&>(*to.image);
   std::vector<std::optional<cv::Point2f>> result(from.points.size());
   if (from.points.empty()) {
     return result;
@@ -81,8 +81,8 @@ std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& fr
 
   for (std::size_t i = 0; i < result.size(); ++i) {
     const bool is_good = found[i] != 0 && found_back[i] != 0 &&
-                         is_inside(cur_uv[i], cur.image.pixels.size()) &&
-                         input_distance_px(prev.image.map, prev_uv[i], back_uv[i]) <=
+                         is_inside(cur_uv[i], cur.channel.pixels.size()) &&
+                         input_distance_px(prev.channel.map, prev_uv[i], back_uv[i]) <=
                              options().max_forward_backward_px;
     if (is_good) {
       result[i] = cur_uv[i];

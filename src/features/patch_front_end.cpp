@@ -63,17 +63,17 @@ cv::Point2f Motions::near(const cv::Point2f& uv) const {
 
 }  // namespace
 
-struct PatchFrontEnd::PatchPicture : Picture {
-  using Picture::Picture;
+struct PatchFrontEnd::PatchImage : TrackingImage {
+  using TrackingImage::TrackingImage;
   std::vector<cv::Mat> bordered;  ///< what the pyramid's levels are part of
   std::vector<BorderedImage> pyramid;
 };
 
-std::shared_ptr<const PreparedPicture> PatchFrontEnd::prepare(const ChannelImage& image) const {
+std::shared_ptr<const PreparedImage> PatchFrontEnd::prepare(const ChannelImage& channel) const {
   const StageTimer timer(Stage::kPyramid);
-  auto picture = std::make_shared<PatchPicture>(image);
-  cv::Mat level = image.pixels;
-  for (int i = 0; i < num_levels(image.map.scale.minCoeff()); ++i) {
+  auto image = std::make_shared<PatchImage>(channel);
+  cv::Mat level = channel.pixels;
+  for (int i = 0; i < num_levels(channel.map.scale.minCoeff()); ++i) {
     if (i > 0) {
       cv::Mat half;
       cv::pyrDown(level, half);
@@ -84,28 +84,28 @@ std::shared_ptr<const PreparedPicture> PatchFrontEnd::prepare(const ChannelImage
     cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
     level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
     if (i < 2) {
-      picture->corner_pixels = level;
-      picture->corner_scale = static_cast<float>(i + 1);
+      image->corner_pixels = level;
+      image->corner_scale = static_cast<float>(i + 1);
     }
-    picture->pyramid.push_back(
+    image->pyramid.push_back(
         {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
-    picture->bordered.push_back(std::move(bordered));
+    image->bordered.push_back(std::move(bordered));
   }
-  return picture;
+  return image;
 }
 
-bool PatchFrontEnd::begin_track(const Picture& picture, const Point& point) {
+bool PatchFrontEnd::begin_track(const TrackingImage& image, const Point& point) {
   Track track;
   track.warp = {point.uv.x, point.uv.y};
-  const Pyramid pyramid = static_cast<const PatchPicture&>(picture).pyramid;
+  const Pyramid pyramid = static_cast<const PatchImage&>(image).pyramid;
   return cut_patch(pyramid, point.uv.x, point.uv.y, track.patch) &&
          tracks_.emplace(point.id, track).second;
 }
 
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
                                                                     const View& to) {
-  const auto& picture = static_cast<const PatchPicture&>(*to.picture);
-  const Pyramid pyramid = picture.pyramid;
+  const auto& image = static_cast<const PatchImage&>(*to.image);
+  const Pyramid pyramid = image.pyramid;
   const int top = static_cast<int>(pyramid.size()) - 1;
   Motions motions;
   const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
@@ -138,18 +138,15 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
         found[i] = align(point, motion, top);
       }
     }
-    if (accept(found[i], picture, to.frame, point, track)) {
+    if (accept(found[i], image, to.frame, point, track)) {
       result[i] = cv::Point2f(track.warp.x, track.warp.y);
     }
   }
   return result;
 }
 
-bool PatchFrontEnd::accept(const Alignment& found,
-                           const PatchPicture& picture,
-                           int frame,
-                           const Point& from,
-                           Track& track) {
+bool PatchFrontEnd::accept(
+    const Alignment& found, const PatchImage& image, int frame, const Point& from, Track& track) {
   if (found.correlation < kMinCorrelation) {
     return false;
   }
@@ -162,7 +159,7 @@ bool PatchFrontEnd::accept(const Alignment& found,
     return true;
   }
   track.warp = {found.warp.x, found.warp.y};
-  return cut_patch(picture.pyramid, found.warp.x, found.warp.y, track.patch);
+  return cut_patch(image.pyramid, found.warp.x, found.warp.y, track.patch);
 }
 
 void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,

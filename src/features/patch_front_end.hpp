@@ -19,11 +19,11 @@ class PatchFrontEnd final : public PointFrontEnd {
  public:
   explicit PatchFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
 
-  [[nodiscard]] std::shared_ptr<const PreparedPicture> prepare(
-      const ChannelImage& image) const override;
+  [[nodiscard]] std::shared_ptr<const PreparedImage> prepare(
+      const ChannelImage& channel) const override;
 
  private:
-  struct PatchPicture;
+  struct PatchImage;
   struct Track {
     Patch patch;
     Similarity warp;     ///< from the patch to the last image it was found in
@@ -31,15 +31,12 @@ class PatchFrontEnd final : public PointFrontEnd {
     int frame = -1;      ///< the number of that image; -1: it is new
   };
 
-  [[nodiscard]] bool begin_track(const Picture& picture, const Point& point) override;
+  [[nodiscard]] bool begin_track(const TrackingImage& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
   void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) override;
-  [[nodiscard]] static bool accept(const Alignment& found,
-                                   const PatchPicture& picture,
-                                   int frame,
-                                   const Point& from,
-                                   Track& track);
+  [[nodiscard]] static bool accept(
+      const Alignment& found, const PatchImage& image, int frame, const Point& from, Track& track);
 
   std::map<int, Track> tracks_;  ///< by id
 };

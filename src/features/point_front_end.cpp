@@ -27,20 +27,20 @@ int PointFrontEnd::num_levels(double scale) const {
   return std::max(1, options_.klt_levels - std::ilogb(scale));
 }
 
-Matches PointFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, int frame) {
-  auto picture = std::dynamic_pointer_cast<const Picture>(std::move(prepared));
-  STEMVO_CHECK(picture != nullptr, "a picture prepared by this front end");
-  if (last_.picture != nullptr &&
-      last_.picture->image.pixels.size() != picture->image.pixels.size()) {
+Matches PointFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, int frame) {
+  auto image = std::dynamic_pointer_cast<const TrackingImage>(std::move(prepared));
+  STEMVO_CHECK(image != nullptr, "an image prepared by this front end");
+  if (last_.image != nullptr &&
+      last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
     last_good_ = {};
   }
   Matches matches;
-  View now{std::move(picture), {}, frame};
-  if (last_.picture != nullptr) {
+  View now{std::move(image), {}, frame};
+  if (last_.image != nullptr) {
     replenish(last_);
     matches = track(last_, now);
-    if (is_lost(matches, last_good_.picture != nullptr ? last_good_ : last_)) {
+    if (is_lost(matches, last_good_.image != nullptr ? last_good_ : last_)) {
       track_from_last_good(now, matches);
     } else {
       last_good_ = {};
@@ -54,14 +54,14 @@ Matches PointFrontEnd::process(std::shared_ptr<const PreparedPicture> prepared, 
 /// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
 /// tells more than the last one, its tracks go on.
 void PointFrontEnd::track_from_last_good(View& now, Matches& matches) {
-  if (last_good_.picture == nullptr && !last_.points.empty()) {
+  if (last_good_.image == nullptr && !last_.points.empty()) {
     last_good_ = std::move(last_);
     return;
   }
-  if (last_good_.picture == nullptr) {
+  if (last_good_.image == nullptr) {
     return;
   }
-  View again{now.picture, {}, now.frame};
+  View again{now.image, {}, now.frame};
   Matches found = track(last_good_, again);
   if (!is_lost(found, last_good_)) {
     now = std::move(again);
@@ -102,8 +102,8 @@ Matches PointFrontEnd::track(const View& from, View& to) {
     }
     const Point& point = from.points[i];
     to.points.push_back({*found[i], point.id});
-    matches.prev_uv.push_back(to_input(from.picture->image.map, point.uv));
-    matches.cur_uv.push_back(to_input(to.picture->image.map, *found[i]));
+    matches.prev_uv.push_back(to_input(from.image->channel.map, point.uv));
+    matches.cur_uv.push_back(to_input(to.image->channel.map, *found[i]));
     matches.track_ids.push_back(point.id);
   }
   return matches;
@@ -113,12 +113,12 @@ Matches PointFrontEnd::track(const View& from, View& to) {
 /// several pixels wide, and any pixel of a corner will do.
 void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
-  const Picture& picture = *view.picture;
-  const cv::Mat& pixels = picture.corner_pixels;
-  const float to_pixels = picture.corner_scale;
+  const TrackingImage& image = *view.image;
+  const cv::Mat& pixels = image.corner_pixels;
+  const float to_pixels = image.corner_scale;
   const double min_distance =
-      options_.min_distance_px / (picture.image.map.scale.minCoeff() * to_pixels);
-  GridQuota quota(options_, picture.image.pixels.size());
+      options_.min_distance_px / (image.channel.map.scale.minCoeff() * to_pixels);
+  GridQuota quota(options_, image.channel.pixels.size());
   cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
   std::vector<Point> kept;
   kept.reserve(view.points.size());
@@ -139,7 +139,7 @@ void PointFrontEnd::replenish(View& view) {
                           mask, /*blockSize=*/3);
   for (const cv::Point2f& corner : corners) {  // strongest first
     const Point point{corner * to_pixels, next_id_};
-    if (quota.take(point.uv) && begin_track(picture, point)) {
+    if (quota.take(point.uv) && begin_track(image, point)) {
       view.points.push_back(point);
       ++next_id_;
     }

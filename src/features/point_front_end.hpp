@@ -16,13 +16,13 @@ namespace stemvo {
 class PointFrontEnd : public FrontEnd {
  public:
   using FrontEnd::process;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedPicture> picture, int frame) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
 
  protected:
   /// With the pyramid that the derived class tracks on.
-  struct Picture : PreparedPicture {
-    using PreparedPicture::PreparedPicture;
+  struct TrackingImage : PreparedImage {
+    using PreparedImage::PreparedImage;
     cv::Mat corner_pixels;      ///< where corners are looked for
     float corner_scale = 1.0F;  ///< pixels of the image per pixel of it
   };
@@ -32,7 +32,7 @@ class PointFrontEnd : public FrontEnd {
     int id = -1;
   };
   struct View {
-    std::shared_ptr<const Picture> picture;
+    std::shared_ptr<const TrackingImage> image;
     std::vector<Point> points;  ///< ordered by id
     int frame = -1;
   };
@@ -46,7 +46,7 @@ class PointFrontEnd : public FrontEnd {
 
  private:
   /// A new corner; false: it cannot be tracked.
-  [[nodiscard]] virtual bool begin_track(const Picture& picture, const Point& point) = 0;
+  [[nodiscard]] virtual bool begin_track(const TrackingImage& image, const Point& point) = 0;
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              const View& to) = 0;

@@ -164,8 +164,7 @@ void NormalEquations::linearize(const Bundle& bundle, double damping) {
 void NormalEquations::add(const Bundle& bundle, std::size_t i, const Eigen::Matrix3d& rotation) {
   const Bundle::Observation& observation = bundle.observations[i];
   const Reprojection at(bundle, observation, rotation);
-  const double weight =
-      1.0 / (1.0 + at.error.squaredNorm() / (options_.loss_scale_px * options_.loss_scale_px));
+  const double weight = CauchyLoss(options_.loss_scale_px).weight(at.error.squaredNorm());
   const Matrix23 by_x = at.by_x();
   const Matrix23 by_point = by_x * rotation;
   PointBlock& point = points_[static_cast<std::size_t>(observation.point)];
@@ -319,7 +318,7 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
     const CameraChange from_prior =
         options.camera ? CameraChange(result.camera_change - options.camera->mean) : change;
     const bool is_solved = equations.step(damping, from_prior, trial, change);
-    change += result.camera_change;
+    change = composed(result.camera_change, change);
     const double cost = is_solved ? cost_of(trial, options.loss_scale_px) + prior_cost(change)
                                   : std::numeric_limits<double>::infinity();
     if (!(cost < result.cost)) {

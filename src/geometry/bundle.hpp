@@ -28,6 +28,18 @@ struct Bundle {
 
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.
 using CameraChange = Eigen::Matrix<double, 5, 1>;
+/// One change, then another: the focal lengths' factors multiply.
+[[nodiscard]] inline CameraChange composed(const CameraChange& first, const CameraChange& then) {
+  CameraChange total = first + then;
+  total[2] += first[2] * then[2];
+  return total;
+}
+/// What is left of a change after its first part.
+[[nodiscard]] inline CameraChange rest_of(const CameraChange& total, const CameraChange& first) {
+  CameraChange rest = total - first;
+  rest[2] /= 1.0 + first[2];
+  return rest;
+}
 using CameraInformation = Eigen::Matrix<double, 5, 5>;
 
 /// What several bundles tell of the camera they share.

@@ -11,7 +11,11 @@ class CauchyLoss {
  public:
   explicit CauchyLoss(double scale) : squared_scale_(scale * scale) {}
 
-  /// Adds a term; returns its weight rho'(r^2) in the normal equations.
+  /// rho'(r^2): of a term in the normal equations.
+  [[nodiscard]] double weight(double squared_residual) const {
+    return 1.0 / (1.0 + squared_residual / squared_scale_);
+  }
+  /// Adds a term; returns its weight.
   double add(double squared_residual) {
     const double argument = 1.0 + squared_residual / squared_scale_;
     product_ *= argument;

@@ -150,8 +150,7 @@ std::optional<CameraMeasurement> measure_camera(const Window& window,
   if (!result.is_usable) {
     return std::nullopt;
   }
-  return CameraMeasurement{result.camera_change, result.information / (sigma_px * sigma_px),
-                           sigma_px};
+  return CameraMeasurement{result.camera_change, result.information / (sigma_px * sigma_px)};
 }
 
 }  // namespace stemvo

@@ -33,7 +33,6 @@ bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentO
 struct CameraMeasurement {
   CameraChange change;            ///< of `camera`
   CameraInformation information;  ///< of it alone, without the prior
-  double sigma_px = 0.0;
 };
 [[nodiscard]] std::optional<CameraMeasurement> measure_camera(
     const Window& window,

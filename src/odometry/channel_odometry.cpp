@@ -45,7 +45,7 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   Stopwatch watch;
   const ChannelImage image = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
   prepared.stem_ms = watch.lap_ms();
-  prepared.picture = front_end_->prepare(image);
+  prepared.image = front_end_->prepare(image);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
     prepared.road = std::make_shared<RoadImage>(make_road_image(image, camera_));
@@ -58,12 +58,12 @@ void ChannelOdometry::track(PreparedFrame frame) {
   STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
   FrameInWork& work = tracked_.emplace();
   work.tracked.number = num_tracked_++;
-  work.picture = std::move(frame.picture);
+  work.image = std::move(frame.image);
   work.problem = std::move(frame.problem);
-  if (work.picture != nullptr) {
+  if (work.image != nullptr) {
     Stopwatch watch;
     work.tracked.has_image = true;
-    work.tracked.matches = front_end_->process(work.picture, work.tracked.number);
+    work.tracked.matches = front_end_->process(work.image, work.tracked.number);
     work.tracked.image = std::move(frame.pixels);
     work.tracked.road = std::move(frame.road);
     work.times.stem_ms = frame.stem_ms;
@@ -93,7 +93,7 @@ FrameResult ChannelOdometry::optimize() {
   if (work.tracked.has_image) {
     work.times.pose_ms += watch.lap_ms();
   } else {  // what is drawn goes on showing the last image there was
-    work.picture = optimized_.picture;
+    work.image = optimized_.image;
   }
   FrameResult& result = work.localized.result;
   result.times = work.times;
@@ -104,7 +104,7 @@ FrameResult ChannelOdometry::optimize() {
 
 const ChannelImage& ChannelOdometry::image() const {
   static const ChannelImage no_image;
-  return optimized_.picture != nullptr ? optimized_.picture->image : no_image;
+  return optimized_.image != nullptr ? optimized_.image->channel : no_image;
 }
 
 }  // namespace stemvo

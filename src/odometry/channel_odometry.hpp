@@ -21,10 +21,10 @@ namespace stemvo {
 /// A frame as far as it can be made without a pose: seen through the channel. Without an image it
 /// stands for a frame that could not be read.
 struct PreparedFrame {
-  cv::Mat pixels;                                  ///< as given
-  std::shared_ptr<const PreparedPicture> picture;  ///< null: could not be read, or see problem
-  std::shared_ptr<const RoadImage> road;           ///< null: no road is measured
-  std::string problem;                             ///< why the stem gave no channel, else empty
+  cv::Mat pixels;                              ///< as given
+  std::shared_ptr<const PreparedImage> image;  ///< null: could not be read, or see problem
+  std::shared_ptr<const RoadImage> road;       ///< null: no road is measured
+  std::string problem;                         ///< why the stem gave no channel, else empty
   double stem_ms = 0.0;
 };
 
@@ -59,7 +59,7 @@ class ChannelOdometry {
  private:
   /// A frame on its way: first tracked, then localized, at last optimized.
   struct FrameInWork {
-    std::shared_ptr<const PreparedPicture> picture;
+    std::shared_ptr<const PreparedImage> image;
     TrackedFrame tracked;
     StageTimes times;
     std::string problem;

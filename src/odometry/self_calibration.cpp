@@ -44,14 +44,16 @@ SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinemen
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-CameraEstimate SelfCalibration::estimate() const {
-  return {mean_, information_.inverse().diagonal().cwiseSqrt(), num_runs_};
+std::optional<CameraEstimate> SelfCalibration::estimate() const {
+  if (refinement_ == CameraRefinement::kOff) {
+    return std::nullopt;
+  }
+  return CameraEstimate{mean_, information_.inverse().diagonal().cwiseSqrt(), num_runs_};
 }
 
 std::optional<Eigen::Vector2d> SelfCalibration::principal_point_sigma_px() const {
-  return refinement_ == CameraRefinement::kOff
-             ? std::nullopt
-             : std::optional<Eigen::Vector2d>(estimate().sigma.head<2>());
+  const std::optional<CameraEstimate> known = estimate();
+  return known ? std::optional<Eigen::Vector2d>(known->sigma.head<2>()) : std::nullopt;
 }
 
 CameraChange SelfCalibration::applied() const {
@@ -80,14 +82,14 @@ void SelfCalibration::measure(const BundleAdjustmentOptions& options) {
   constexpr double factor_sq = kSigmaFactor * kSigmaFactor;
   const CameraChange before = applied();
   const auto found =
-      measure_camera(run_, camera_, {mean_ - before, factor_sq * information_}, options);
+      measure_camera(run_, camera_, {rest_of(mean_, before), factor_sq * information_}, options);
   if (!found.has_value() || !is_plausible(*found)) {
     return;
   }
-  mean_ = before + found->change;
+  mean_ = composed(before, found->change);
   information_ += found->information / factor_sq;
   ++num_runs_;
-  const CameraChange sigma = estimate().sigma;
+  const CameraChange sigma = estimate()->sigma;
   const auto insists = [&](int i, double max) {
     return sigma[i] < max && std::abs(mean_[i]) > kMinSigmas * sigma[i];
   };

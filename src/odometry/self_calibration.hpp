@@ -32,8 +32,8 @@ class SelfCalibration {
 
   /// The given one, or on its way to what the data insist on.
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// What all runs say, whether the data insist on it or not.
-  [[nodiscard]] CameraEstimate estimate() const;
+  /// What all runs say, whether the data insist on it or not; nullopt: nothing is refined.
+  [[nodiscard]] std::optional<CameraEstimate> estimate() const;
   /// Of the estimate; nullopt: nothing is refined.
   [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 

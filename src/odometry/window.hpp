@@ -13,7 +13,7 @@
 
 namespace stemvo {
 
-/// A frame between two keyframes, where it was localized against the earlier one's landmarks.
+/// A frame between two keyframes, told from the earlier one.
 struct FrameBetween {
   int frame = 0;
   Rigid3 keyframe_from_camera;
@@ -27,8 +27,8 @@ struct Keyframe {
   std::vector<FrameBetween> followers;  ///< frames after it, until the next keyframe; in order
 };
 
-/// The last keyframes and the landmarks they see, connected by track ids. Everything is in units of
-/// the map; the owner says what one is in metres.
+/// Keyframes of one view and the landmarks they see, connected by track ids. Everything is in units
+/// of the map; the owner says what one is in metres.
 struct Window {
   std::deque<Keyframe> keyframes;            ///< oldest first
   std::map<int, Eigen::Vector3d> landmarks;  ///< track id -> point in the world
@@ -55,6 +55,7 @@ struct WindowOptions {
 /// The keyframe that leaves a full window for the one that comes: the oldest once the two share too
 /// few tracks to hold each other, else the one that adds the least between its neighbours. So the
 /// window is as long a way as one view lasts, whether the camera drives or is held in the hand.
+/// (One of less than 5 keyframes always drops the oldest.)
 [[nodiscard]] std::size_t leaving_keyframe(const Window& window, const Keyframe& coming);
 
 /// Appends the keyframe to the window. A full one first drops its leaving keyframe, which becomes a

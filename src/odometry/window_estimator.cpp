@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "odometry/tracks.hpp"
@@ -272,7 +273,8 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
     anchor_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera_, window_options_);
-  calibration_.observe(window_.keyframes.back(), refinement_);
+  // The newest keyframe but one: it has its new corners.
+  calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
   camera_ = calibration_.camera();
   history_.observe(window_, frame.image);
 }
@@ -293,6 +295,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
+      history_.rescale(window_, factor);
       calibration_.rescale(factor, center);
       for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);

@@ -93,6 +93,14 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
   }
 }
 
+void WindowHistory::rescale(const Window& window, double factor) {
+  for (MapLandmark& landmark : landmarks_) {
+    if (!window.keyframes.empty() && landmark.frame >= window.keyframes.front().frame) {
+      landmark.position *= static_cast<float>(factor);
+    }
+  }
+}
+
 void WindowHistory::close(const Window& window) {
   for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
     keep_motions(window.keyframes[i - 1], window.keyframes[i]);

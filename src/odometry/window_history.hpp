@@ -32,6 +32,8 @@ class WindowHistory {
 
   /// A keyframe is about to leave the window for the one that comes.
   void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
+  /// The window is rescaled, and with it what left from between its keyframes.
+  void rescale(const Window& window, double factor);
   /// The whole window is about to be dropped; nothing will connect with it.
   void close(const Window& window);
 

@@ -103,7 +103,7 @@ class FilterDrive {
       return "no matches: a channel without contrast";
     }
     constexpr std::array<const char*, kMeasured> kReasons = {"too few matches", "too few inliers",
-                                                             "not a forward motion", "no picture"};
+                                                             "not a forward motion", "no image"};
     const auto most = std::max_element(outcomes_.begin(), outcomes_.begin() + kMeasured);
     return fmt::format("{} in {} of {} frames",
                        kReasons[static_cast<std::size_t>(most - outcomes_.begin())], *most,

@@ -203,6 +203,19 @@ using ShownFilters = std::vector<std::pair<const char*, const FilterRow*>>;
 [[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
                                        const std::vector<FilterRow>& rows);
 
+/// What is written to a folder, and where named models are found.
+struct Results {
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+  SearchIdentity identity;
+  Config config;  ///< of all rows
+  std::vector<FilterRow> rows;
+};
+/// sheet.png: the input and the channels of the filters of choose_rows on the middle frame of the
+/// first sequence, above their trajectories (trajectories.png), and where they were stopped.
+/// Nothing where there is none. Error: the sequence or the model is not where it was.
+[[nodiscard]] Status write_contact_sheet(const Results& results);
+
 void to_json(nlohmann::ordered_json& json, const FilterKey& key);
 void to_json(nlohmann::ordered_json& json, const DriveScore& score);
 void to_json(nlohmann::ordered_json& json, const Rung& rung);

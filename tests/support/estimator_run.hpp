@@ -40,7 +40,7 @@ inline FrameResult add_frame(Estimator& estimator, const TrackedFrame& frame) {
 class EstimatorRun {
  public:
   EstimatorRun(Estimator& estimator, const DriveTracks& drive)
-      : picture(drive.camera.height_px, drive.camera.width_px, CV_8UC1, cv::Scalar(127)),
+      : image(drive.camera.height_px, drive.camera.width_px, CV_8UC1, cv::Scalar(127)),
         estimator_(estimator),
         drive_(drive) {}
 
@@ -60,7 +60,7 @@ class EstimatorRun {
     TrackedFrame frame;
     frame.number = static_cast<int>(results.size());
     frame.has_image = true;
-    frame.image = picture;
+    frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.matches = std::move(matches);
     frame.matches.prev_frame = last_number_;
@@ -96,7 +96,7 @@ class EstimatorRun {
     return number;
   }
 
-  cv::Mat picture;                                            ///< of the next frame
+  cv::Mat image;                                              ///< of the next frame
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::vector<FrameResult> results;
   std::vector<char> inlier_mask;  ///< of the last frame

@@ -13,21 +13,21 @@ namespace stemvo {
 namespace {
 
 /// A smooth random texture seen from `shift` further to the right and below.
-cv::Mat textured_picture(cv::Size size, cv::Point2d shift) {
+cv::Mat textured_image(cv::Size size, cv::Point2d shift) {
   cv::RNG random(7);
   cv::Mat noise(size.height + 64, size.width + 64, CV_32F);
   random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
   cv::GaussianBlur(noise, noise, {}, 1.5);
   cv::normalize(noise, noise, 0.0, 255.0, cv::NORM_MINMAX);
-  cv::Mat picture;
+  cv::Mat image;
   const cv::Matx23d crop(1.0, 0.0, 32.0 + shift.x, 0.0, 1.0, 32.0 + shift.y);
-  cv::warpAffine(noise, picture, crop, size, cv::INTER_CUBIC | cv::WARP_INVERSE_MAP);
-  picture.convertTo(picture, CV_8U);
-  return picture;
+  cv::warpAffine(noise, image, crop, size, cv::INTER_CUBIC | cv::WARP_INVERSE_MAP);
+  image.convertTo(image, CV_8U);
+  return image;
 }
 
-ChannelImage image_of(const cv::Mat& picture, double scale = 1.0, double offset_px = 0.0) {
-  return {picture, {Eigen::Vector2d::Constant(scale), Eigen::Vector2d::Constant(offset_px)}};
+ChannelImage image_of(const cv::Mat& image, double scale = 1.0, double offset_px = 0.0) {
+  return {image, {Eigen::Vector2d::Constant(scale), Eigen::Vector2d::Constant(offset_px)}};
 }
 
 double median_error_px(const Matches& matches, const Eigen::Vector2d& expected_flow) {
@@ -51,10 +51,10 @@ class FrontEndTest : public testing::TestWithParam<FeatureMethod> {
 
 TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
   const cv::Size size(480, 200);
-  const Matches none = front_end_->process(image_of(textured_picture(size, {0.0, 0.0}), 2.0, 1.5));
+  const Matches none = front_end_->process(image_of(textured_image(size, {0.0, 0.0}), 2.0, 1.5));
   EXPECT_TRUE(none.cur_uv.empty());
   const Matches matches =
-      front_end_->process(image_of(textured_picture(size, {3.25, -1.75}), 2.0, 1.5));
+      front_end_->process(image_of(textured_image(size, {3.25, -1.75}), 2.0, 1.5));
   EXPECT_GT(matches.cur_uv.size(), 150U);
   EXPECT_LE(median_error_px(matches, {-6.5, 3.5}),
             GetParam() == FeatureMethod::kPatch || GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
@@ -66,8 +66,8 @@ TEST_P(FrontEndTest, GivesTheSameMatchesForAnyNumberOfThreads) {
     cv::setNumThreads(num_threads);
     SetUp();
     const cv::Size size(320, 160);
-    static_cast<void>(front_end_->process(image_of(textured_picture(size, {0.0, 0.0}))));
-    const Matches matches = front_end_->process(image_of(textured_picture(size, {2.0, 1.0})));
+    static_cast<void>(front_end_->process(image_of(textured_image(size, {0.0, 0.0}))));
+    const Matches matches = front_end_->process(image_of(textured_image(size, {2.0, 1.0})));
     if (reference.empty()) {
       reference = matches.cur_uv;
     }
@@ -76,12 +76,11 @@ TEST_P(FrontEndTest, GivesTheSameMatchesForAnyNumberOfThreads) {
   cv::setNumThreads(-1);
 }
 
-TEST_P(FrontEndTest, ABlankOrResizedPictureStartsOver) {
+TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {
   const cv::Mat blank(160, 320, CV_8U, cv::Scalar(90));
-  static_cast<void>(front_end_->process(image_of(textured_picture({320, 160}, {0.0, 0.0}))));
+  static_cast<void>(front_end_->process(image_of(textured_image({320, 160}, {0.0, 0.0}))));
   EXPECT_LT(front_end_->process(image_of(blank)).cur_uv.size(), 20U);
-  EXPECT_TRUE(
-      front_end_->process(image_of(textured_picture({200, 100}, {0.0, 0.0}))).cur_uv.empty());
+  EXPECT_TRUE(front_end_->process(image_of(textured_image({200, 100}, {0.0, 0.0}))).cur_uv.empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods,
@@ -96,13 +95,13 @@ TEST(KltFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const cv::Size size(480, 200);
   Matches first;
   for (int i = 0; i < 2; ++i) {
-    first = front_end->process(image_of(textured_picture(size, {1.0 * i, 0.0})));
+    first = front_end->process(image_of(textured_image(size, {1.0 * i, 0.0})));
   }
   std::vector<char> is_good(first.track_ids.size(), 1);
   ASSERT_GT(is_good.size(), 10U);
   is_good[3] = 0;
   front_end->keep(is_good);
-  const Matches second = front_end->process(image_of(textured_picture(size, {2.0, 0.0})));
+  const Matches second = front_end->process(image_of(textured_image(size, {2.0, 0.0})));
   std::map<int, Eigen::Vector2d> second_prev;
   for (std::size_t i = 0; i < second.track_ids.size(); ++i) {
     second_prev[second.track_ids[i]] = second.prev_uv[i];

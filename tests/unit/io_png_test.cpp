@@ -169,7 +169,7 @@ TEST_P(PlainPng, EveryDamagedByteIsNoticed) {
   }
 }
 
-TEST_P(PlainPng, WrongContentsUnderRightChecksumsAreNoPicture) {
+TEST_P(PlainPng, WrongContentsUnderRightChecksumsAreNoImage) {
   const cv::Mat image = test_image(GetParam());
   const bool is_color = image.channels() == 3;
   Png png = png_of(image, {1});

@@ -134,7 +134,7 @@ TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
   const cv::Mat sky(130, 660, CV_8U, cv::Scalar(200));
   const RoadImage above = make_road_image({sky, {}}, RoadScene{}.camera);
   EXPECT_EQ(measure_dense({above, above, road.cur_from_prev, near(1.0), options}).reason,
-            "the picture ends above the road");
+            "the image ends above the road");
 }
 
 TEST(RoadDense, AnImageOfHalfTheSizeGivesTheSameScale) {

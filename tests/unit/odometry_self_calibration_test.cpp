@@ -56,9 +56,39 @@ TEST(SelfCalibration, ARightCameraIsKept) {
   const Camera truth = testing::kitti_camera();
   SelfCalibration calibration(truth, CameraRefinement::kAll);
   drive_runs(truth, calibration);
+  EXPECT_EQ(calibration.estimate()->num_bundles, 12);
   EXPECT_EQ(calibration.camera().cx_px, truth.cx_px);
   EXPECT_EQ(calibration.camera().cy_px, truth.cy_px);
   EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
+}
+
+TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
+  const DriveTracks drive(16, 0.1, 5);
+  const auto keyframe_of = [&](int i, double unit) {
+    Keyframe keyframe{i, drive.pose(i), {}, {}};
+    keyframe.world_from_camera.translation *= unit;
+    for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
+      keyframe.points.push_back({id, uv});
+    }
+    return keyframe;
+  };
+  const Camera camera = drive.camera;
+  SelfCalibration plain(camera, CameraRefinement::kAll);
+  SelfCalibration rescaled(camera, CameraRefinement::kAll);
+  SelfCalibration restarted(camera, CameraRefinement::kAll);
+  for (int i = 0; i < 16; ++i) {
+    plain.observe(keyframe_of(i, 1.0), {});
+    if (i == 8) {
+      rescaled.rescale(3.0, Eigen::Vector3d::Zero());
+      restarted.restart();
+    }
+    rescaled.observe(keyframe_of(i, i < 8 ? 1.0 : 3.0), {});
+    restarted.observe(keyframe_of(i, 1.0), {});
+    EXPECT_EQ(plain.estimate()->num_bundles, i < 15 ? 0 : 1);
+  }
+  EXPECT_EQ(restarted.estimate()->num_bundles, 0);
+  ASSERT_EQ(rescaled.estimate()->num_bundles, 1);
+  EXPECT_LT((rescaled.estimate()->change - plain.estimate()->change).norm(), 0.01);
 }
 
 TEST(SelfCalibration, OffMeansOff) {

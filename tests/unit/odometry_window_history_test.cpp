@@ -70,6 +70,28 @@ TEST(WindowHistory, WhatHasLeftIsNotRescaledWithTheWindow) {
   }
 }
 
+TEST(WindowHistory, WhatLeavesTheMiddleIsRescaledWithTheWindow) {
+  Window window;
+  WindowHistory history;
+  const cv::Mat image(200, 200, CV_8UC1, cv::Scalar(7));
+  for (int i = 0; i < 3; ++i) {  // 1 m apart; the last two see a landmark 4 m from the first
+    Keyframe keyframe{i, Rigid3(Eigen::Quaterniond::Identity(), {1.0 * i, 0.0, 0.0}), {}, {}};
+    keyframe.points.push_back({7, {100.0, 100.0}});
+    window.keyframes.push_back(keyframe);
+    window.landmarks[7] = {0.0, 0.0, 4.0};
+    history.observe(window, image);
+  }
+  window.keyframes[0].points.clear();
+  window.keyframes[2].points.clear();
+  const Keyframe coming{3, Rigid3(Eigen::Quaterniond::Identity(), {3.0, 0.0, 0.0}), {}, {}};
+  history.leave(window, 1, coming);
+  ASSERT_EQ(history.landmarks().size(), 1U);
+  rescale(window, 2.0, Eigen::Vector3d::Zero());
+  history.rescale(window, 2.0);
+  EXPECT_NEAR(history.landmarks().front().position.z(), 8.0, 1e-6);
+  EXPECT_NEAR(history.landmarks().front().position.x(), -2.0, 1e-6);
+}
+
 double rms_step_error(const std::vector<Rigid3>& poses, const DriveTracks& drive, double unit_m) {
   double sum = 0.0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
@@ -98,8 +120,8 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   WindowEstimator estimator(testing::config_without_scale(), drive.camera);
   EstimatorRun run(estimator, drive);
   for (int i = 0; i < drive.num_frames(); ++i) {
-    run.picture = cv::Mat(drive.camera.height_px, drive.camera.width_px, CV_8UC3,
-                          cv::Scalar(i, 2 * i, 3 * i));
+    run.image = cv::Mat(drive.camera.height_px, drive.camera.width_px, CV_8UC3,
+                        cv::Scalar(i, 2 * i, 3 * i));
     run.add(i);
   }
   const std::vector<Rigid3> refined = estimator.refined_trajectory();

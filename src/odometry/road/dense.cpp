@@ -246,7 +246,7 @@ RoadMeasurement refine(const RoadStep& step, const LevelSamples& samples, RoadWa
   }
   RoadMeasurement result = read_road(warp, covariance, step.options.camera_height_m);
   result.is_valid = correlation > kMinCorrelation && result.sigma < kMaxSigma;
-  result.reason = result.is_valid ? "" : "the pictures of the road hardly agree";
+  result.reason = result.is_valid ? "" : "the images of the road hardly agree";
   return result;
 }
 
@@ -261,7 +261,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     return no_road("no motion");
   }
   if (!has_values(step.prev) || !has_values(step.cur)) {
-    return no_road("the picture ends above the road");
+    return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
   // A scale that is known well starts within a pixel: half size is for the search.

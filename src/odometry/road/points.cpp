@@ -222,7 +222,7 @@ RoadMeasurement measure_points(const RoadStep& step) {
     return no_road("no motion");
   }
   if (step.cur.levels[0].values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {
-    return no_road("the picture ends above the road");
+    return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
   const Strip strip = find_strip(step.cur, region, step.options);
