@@ -11,11 +11,9 @@ namespace {
 
 using testing::DriveTracks;
 
-/// Runs of a drive with turns, seen by the true camera and refined with the calibration's.
+/// Runs of a drive with turns, seen by the true camera.
 void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
   constexpr int kLength = 16;
-  const BundleAdjustmentOptions options;
-  const WindowOptions window_options{.num_keyframes = kLength};
   for (int k = 0; k < 12; ++k) {
     std::vector<Rigid3> path(1);
     for (int i = 1; i < kLength; ++i) {
@@ -25,16 +23,12 @@ void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
     }
     const DriveTracks drive(path, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points, 0.1,
                             static_cast<std::uint64_t>(k), true_camera);
-    Window window;
     for (int i = 0; i < drive.num_frames(); ++i) {
       Keyframe keyframe{kLength * k + i, drive.pose(i), {}, {}};
       for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
         keyframe.points.push_back({id, uv});
       }
-      add_keyframe(window, std::move(keyframe), window_options);
-      triangulate_landmarks(window, calibration.camera(), window_options);
-      refine_window(window, calibration.camera(), options);
-      calibration.observe(window.keyframes.back(), options);
+      calibration.observe(keyframe, {});
     }
   }
 }
