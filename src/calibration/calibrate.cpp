@@ -11,6 +11,7 @@
 
 #include "dataset/kitti_text.hpp"
 #include "odometry/phased_odometry.hpp"
+#include "odometry/self_calibration.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
@@ -124,9 +125,10 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
                 report);
   if (report.num_runs == 0) {
     return fail(
-        fmt::format("{}: expected frames that move for at least one run of 16 keyframes, found "
+        fmt::format("{}: expected frames that move for at least one run of {} keyframes, found "
                     "none in {} frames",
-                    request.sequence_dir.string(), sequence->size()));
+                    request.sequence_dir.string(), SelfCalibration::kNumKeyframes,
+                    sequence->size()));
   }
   if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
                   std::mem_fn(&CalibratedParameter::is_determined))) {
@@ -156,9 +158,9 @@ std::string format_calibration_table(const CalibrationReport& report) {
   const CalibratedParameter& k2 = report.parameters[4];
   return table.str() +
          fmt::format(
-             "from {} runs of 16 keyframes\nradial distortion left in the frames, which calib.txt "
+             "from {} runs of {} keyframes\nradial distortion left in the frames, which calib.txt "
              "cannot hold: k1 {:+.4f} +- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
-             report.num_runs, k1.refined, k1.sigma, k2.refined, k2.sigma);
+             report.num_runs, SelfCalibration::kNumKeyframes, k1.refined, k1.sigma, k2.refined, k2.sigma);
 }
 
 }  // namespace stemvo

@@ -23,9 +23,6 @@ constexpr double kMaxSigmaOfFocal = 0.01;
 constexpr double kMinSigmas = 2.0;
 /// The camera moves by this at a keyframe: the window can follow.
 constexpr double kMaxStep_px = 0.25;
-/// Of a run. Fewer do not tell the principal point from the distortion: 6 find -8 px on a clip
-/// where 8 and 12 find -3 px +- 1.1, and 16 -2.8 +- 0.8.
-constexpr std::size_t kNumKeyframes = 16;
 
 /// Finite, and nowhere less than nothing.
 bool is_plausible(const CameraMeasurement& found) {
@@ -69,10 +66,10 @@ void SelfCalibration::observe(const Keyframe& keyframe, const BundleAdjustmentOp
     return;
   }
   approach_believed();
-  const WindowOptions window_options{.num_keyframes = static_cast<int>(kNumKeyframes)};
+  const WindowOptions window_options{.num_keyframes = kNumKeyframes};
   add_keyframe(run_, keyframe, window_options);
   triangulate_landmarks(run_, camera_, window_options);
-  if (run_.keyframes.size() == kNumKeyframes) {
+  if (static_cast<int>(run_.keyframes.size()) == kNumKeyframes) {
     measure(options);
     run_ = {};
   }

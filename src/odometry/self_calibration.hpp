@@ -18,6 +18,10 @@ namespace stemvo {
 /// data insist.
 class SelfCalibration {
  public:
+  /// Of a run. Fewer do not tell the principal point from the distortion: 6 find -8 px on a clip
+  /// where 8 and 12 find -3 px +- 1.1, and 16 -2.8 +- 0.8.
+  static constexpr int kNumKeyframes = 16;
+
   SelfCalibration(const Camera& given, CameraRefinement refinement);
 
   /// The next keyframe, its pose refined. A run that is long enough is measured, and the next one

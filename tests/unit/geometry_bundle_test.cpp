@@ -129,6 +129,16 @@ TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
 }
 
 /// Turns tell the camera: planted changes are found within their sigmas, and those are small.
+TEST(CameraChange, ItsPartsMakeItUp) {
+  CameraChange total;
+  CameraChange first;
+  total << 3.0, -2.0, 0.1, 0.01, -0.004;
+  first << 1.0, 4.0, -0.05, 0.002, 0.001;
+  const CameraChange rest = rest_of(total, first);
+  EXPECT_LT((composed(first, rest) - total).norm(), 1e-12);
+  EXPECT_NEAR((1.0 + first[2]) * (1.0 + rest[2]), 1.1, 1e-12);
+}
+
 TEST(Bundle, FindsAPlantedCamera) {
   std::vector<Rigid3> path(1);
   for (int i = 1; i < 14; ++i) {
@@ -139,6 +149,7 @@ TEST(Bundle, FindsAPlantedCamera) {
   Bundle bundle = bundle_of(drive, 0.3);
   bundle.camera.cx_px += 3.0;
   bundle.camera.cy_px -= 2.0;
+  const Camera given = bundle.camera;
   BundleOptions options;
   options.num_fixed_poses = 1;
   options.max_iterations = 50;
@@ -151,6 +162,8 @@ TEST(Bundle, FindsAPlantedCamera) {
                   kNoiseSq * sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
   const BundleResult result = adjust_bundle(bundle, options);
   ASSERT_TRUE(result.is_usable);
+  EXPECT_NEAR(given.cx_px + result.camera_change[0], bundle.camera.cx_px, 1e-9);
+  EXPECT_NEAR(given.fx_px * (1.0 + result.camera_change[2]), bundle.camera.fx_px, 1e-9);
   EXPECT_NEAR(bundle.camera.cx_px, drive.camera.cx_px, 0.3);
   EXPECT_NEAR(bundle.camera.cy_px, drive.camera.cy_px, 0.3);
   const CameraInformation information =

@@ -13,7 +13,7 @@ using testing::DriveTracks;
 
 /// Runs of a drive with turns, seen by the true camera.
 void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
-  constexpr int kLength = 16;
+  constexpr int kLength = SelfCalibration::kNumKeyframes;
   for (int k = 0; k < 12; ++k) {
     std::vector<Rigid3> path(1);
     for (int i = 1; i < kLength; ++i) {
@@ -57,7 +57,8 @@ TEST(SelfCalibration, ARightCameraIsKept) {
 }
 
 TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
-  const DriveTracks drive(16, 0.1, 5);
+  constexpr int kLength = SelfCalibration::kNumKeyframes;
+  const DriveTracks drive(kLength, 0.1, 5);
   const auto keyframe_of = [&](int i, double unit) {
     Keyframe keyframe{i, drive.pose(i), {}, {}};
     keyframe.world_from_camera.translation *= unit;
@@ -70,7 +71,7 @@ TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   SelfCalibration plain(camera, CameraRefinement::kAll);
   SelfCalibration rescaled(camera, CameraRefinement::kAll);
   SelfCalibration restarted(camera, CameraRefinement::kAll);
-  for (int i = 0; i < 16; ++i) {
+  for (int i = 0; i < kLength; ++i) {
     plain.observe(keyframe_of(i, 1.0), {});
     if (i == 8) {
       rescaled.rescale(3.0, Eigen::Vector3d::Zero());
@@ -78,7 +79,7 @@ TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
     }
     rescaled.observe(keyframe_of(i, i < 8 ? 1.0 : 3.0), {});
     restarted.observe(keyframe_of(i, 1.0), {});
-    EXPECT_EQ(plain.estimate()->num_bundles, i < 15 ? 0 : 1);
+    EXPECT_EQ(plain.estimate()->num_bundles, i + 1 < kLength ? 0 : 1);
   }
   EXPECT_EQ(restarted.estimate()->num_bundles, 0);
   ASSERT_EQ(rescaled.estimate()->num_bundles, 1);

@@ -25,9 +25,10 @@ Window window_of(const DriveTracks& drive, const WindowOptions& options) {
   return window;
 }
 
-/// `i` metres along, with tracks `first_id` to `first_id` + 29.
+/// `i` metres along, turning, with tracks `first_id` to `first_id` + 29.
+Rigid3 pose_along(int i) { return {so3_exp({0.0, 0.05 * i, 0.02 * i}), {0.0, 0.1 * i, 1.0 * i}}; }
 Keyframe keyframe_along(int i, int first_id) {
-  Keyframe keyframe{i, Rigid3(Eigen::Quaterniond::Identity(), {0.0, 0.0, i * 1.0}), {}, {}};
+  Keyframe keyframe{i, pose_along(i), {}, {}};
   for (int id = first_id; id < first_id + 30; ++id) {
     keyframe.points.push_back({id, {100.0, 100.0}});
   }
@@ -55,8 +56,10 @@ TEST(Window, OneViewIsKeptFromItsFirstKeyframeOn) {
     EXPECT_EQ(keyframe.frame, next++);
     for (const FrameBetween& follower : keyframe.followers) {
       EXPECT_EQ(follower.frame, next++);
-      EXPECT_NEAR((keyframe.world_from_camera * follower.keyframe_from_camera).translation.z(),
-                  follower.frame, 1e-9);
+      const Rigid3 pose = keyframe.world_from_camera * follower.keyframe_from_camera;
+      const Rigid3 truth = pose_along(follower.frame);
+      EXPECT_LT((pose.translation - truth.translation).norm(), 1e-9);
+      EXPECT_LT(pose.rotation.angularDistance(truth.rotation), 1e-7);
     }
   }
   EXPECT_EQ(next, 30);
