@@ -124,11 +124,10 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
   read_estimate(sequence->camera(), odometry->frames().estimator().camera_estimate().value(),
                 report);
   if (report.num_runs == 0) {
-    return fail(
-        fmt::format("{}: expected frames that move for at least one run of {} keyframes, found "
-                    "none in {} frames",
-                    request.sequence_dir.string(), SelfCalibration::kNumKeyframes,
-                    sequence->size()));
+    return fail(fmt::format(
+        "{}: expected frames that move for at least one run of {} keyframes, found "
+        "none in {} frames",
+        request.sequence_dir.string(), SelfCalibration::kNumKeyframes, sequence->size()));
   }
   if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
                   std::mem_fn(&CalibratedParameter::is_determined))) {
@@ -160,7 +159,8 @@ std::string format_calibration_table(const CalibrationReport& report) {
          fmt::format(
              "from {} runs of {} keyframes\nradial distortion left in the frames, which calib.txt "
              "cannot hold: k1 {:+.4f} +- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
-             report.num_runs, SelfCalibration::kNumKeyframes, k1.refined, k1.sigma, k2.refined, k2.sigma);
+             report.num_runs, SelfCalibration::kNumKeyframes, k1.refined, k1.sigma, k2.refined,
+             k2.sigma);
 }
 
 }  // namespace stemvo
