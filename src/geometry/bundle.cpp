@@ -16,59 +16,64 @@
 namespace stemvo {
 namespace {
 
-using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix32 = Eigen::Matrix<double, 3, 2>;
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
+using Matrix62 = Eigen::Matrix<double, 6, 2>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kMinDepth = 1e-6;
 constexpr int kCamera = 5;  ///< unknowns of the camera
-using Matrix25 = Eigen::Matrix<double, 2, kCamera>;
+using Matrix52 = Eigen::Matrix<double, kCamera, 2>;
 
 /// Where a pose sees a point, and how far from its observation.
 struct Reprojection {
   Reprojection(const Bundle& bundle,
                const Bundle::Observation& observation,
-               const Eigen::Matrix3d& rotation)
-      : camera(bundle.camera), radial(bundle.radial) {
+               const Eigen::Matrix3d& rotation) {
     x = rotation * bundle.points[static_cast<std::size_t>(observation.point)] +
         bundle.camera_from_world[static_cast<std::size_t>(observation.pose)].translation;
-    u = x.x() / x.z();
-    v = x.y() / x.z();
+    inverse_z = 1.0 / x.z();
+    u = x.x() * inverse_z;
+    v = x.y() * inverse_z;
     r_sq = u * u + v * v;
-    stretch = 1.0 + r_sq * (radial[0] + radial[1] * r_sq);
-    error = Eigen::Vector2d(camera.fx_px * u * stretch + camera.cx_px,
-                            camera.fy_px * v * stretch + camera.cy_px) -
+    stretch = 1.0 + r_sq * (bundle.radial[0] + bundle.radial[1] * r_sq);
+    error = Eigen::Vector2d(bundle.camera.fx_px * u * stretch + bundle.camera.cx_px,
+                            bundle.camera.fy_px * v * stretch + bundle.camera.cy_px) -
             observation.uv;
   }
-  [[nodiscard]] Matrix23 by_x() const;
-  [[nodiscard]] Matrix25 by_camera() const;
+  /// Transposed Jacobians.
+  [[nodiscard]] Matrix32 by_x(const Bundle& bundle) const;
+  [[nodiscard]] Matrix52 by_camera(const Camera& camera) const;
 
-  const Camera& camera;
-  const Eigen::Vector2d& radial;
   Eigen::Vector3d x;  ///< the point in the camera
-  double u = 0.0;     ///< its ray
+  double inverse_z = 0.0;
+  double u = 0.0;  ///< its ray
   double v = 0.0;
   double r_sq = 0.0;
   double stretch = 1.0;   ///< of the ray, by the radial distortion
   Eigen::Vector2d error;  ///< px
+  double weight = 1.0;    ///< of the robust loss
 };
 
-Matrix23 Reprojection::by_x() const {
+Matrix32 Reprojection::by_x(const Bundle& bundle) const {
+  const Eigen::Vector2d& radial = bundle.radial;
   const double bend = 2.0 * (radial[0] + 2.0 * radial[1] * r_sq);
-  Eigen::Matrix2d by_ray;
-  by_ray << camera.fx_px * (stretch + bend * u * u), camera.fx_px * bend * u * v,
-      camera.fy_px * bend * u * v, camera.fy_px * (stretch + bend * v * v);
-  Matrix23 ray_by_x;
-  ray_by_x << 1.0, 0.0, -u, 0.0, 1.0, -v;
-  return by_ray * ray_by_x / x.z();
+  const double fx = bundle.camera.fx_px * inverse_z;
+  const double fy = bundle.camera.fy_px * inverse_z;
+  const double uu = stretch + bend * u * u;
+  const double uv = bend * u * v;
+  const double vv = stretch + bend * v * v;
+  Matrix32 result;
+  result << fx * uu, fy * uv, fx * uv, fy * vv, -fx * (uu * u + uv * v), -fy * (uv * u + vv * v);
+  return result;
 }
 
-Matrix25 Reprojection::by_camera() const {
-  Matrix25 result;
-  result << 1.0, 0.0, camera.fx_px * u * stretch, camera.fx_px * u * r_sq,
-      camera.fx_px * u * r_sq * r_sq,  //
-      0.0, 1.0, camera.fy_px * v * stretch, camera.fy_px * v * r_sq, camera.fy_px * v * r_sq * r_sq;
+Matrix52 Reprojection::by_camera(const Camera& camera) const {
+  const double fu = camera.fx_px * u;
+  const double fv = camera.fy_px * v;
+  Matrix52 result;
+  result << 1.0, 0.0, 0.0, 1.0, fu * stretch, fv * stretch, fu * r_sq, fv * r_sq, fu * r_sq * r_sq,
+      fv * r_sq * r_sq;
   return result;
 }
 
@@ -94,7 +99,7 @@ class NormalEquations {
         by_pose_(bundle.observations.size()) {}
 
   /// Around the bundle, with the points' blocks damped.
-  void linearize(const Bundle& bundle, double damping);
+  void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
   /// Moves `bundle` by the solution; false where there is none.
   [[nodiscard]] bool step(double damping,
                           const CameraChange& from_prior,
@@ -109,8 +114,13 @@ class NormalEquations {
     Eigen::Matrix<double, kCamera, 3> by_camera = Eigen::Matrix<double, kCamera, 3>::Zero();
   };
   /// An observation of a pose with this rotation.
-  void add(const Bundle& bundle, std::size_t i, const Eigen::Matrix3d& rotation);
-  void eliminate(const Bundle& bundle, std::size_t begin, std::size_t end, double damping);
+  void add(const Bundle& bundle,
+           std::size_t i,
+           const Reprojection& at,
+           const Eigen::Matrix3d& rotation,
+           PointBlock& point);
+  void eliminate(
+      const Bundle& bundle, std::size_t begin, std::size_t end, double damping, PointBlock& point);
   [[nodiscard]] int row_of(const Bundle::Observation& observation) const {
     return num_camera_ + 6 * (observation.pose - options_.num_fixed_poses);
   }
@@ -147,77 +157,84 @@ void for_each_point(const Bundle& bundle, const Use& use) {
   }
 }
 
-void NormalEquations::linearize(const Bundle& bundle, double damping) {
+void NormalEquations::linearize(const Bundle& bundle,
+                                const std::vector<Reprojection>& at,
+                                double damping) {
   reduced_.setZero();
   gradient_.setZero();
-  std::fill(points_.begin(), points_.end(), PointBlock());
+  diagonal_.setZero(size_);
   const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
-  for (std::size_t i = 0; i < bundle.observations.size(); ++i) {
-    const auto pose = static_cast<std::size_t>(bundle.observations[i].pose);
-    add(bundle, i, rotations[pose]);
-  }
-  diagonal_ = reduced_.diagonal();
-  for_each_point(
-      bundle, [&](std::size_t begin, std::size_t end) { eliminate(bundle, begin, end, damping); });
+  for_each_point(bundle, [&](std::size_t begin, std::size_t end) {
+    PointBlock& point = points_[static_cast<std::size_t>(bundle.observations[begin].point)];
+    point = PointBlock();
+    for (std::size_t i = begin; i < end; ++i) {
+      add(bundle, i, at[i], rotations[static_cast<std::size_t>(bundle.observations[i].pose)],
+          point);
+    }
+    eliminate(bundle, begin, end, damping, point);
+  });
 }
 
-void NormalEquations::add(const Bundle& bundle, std::size_t i, const Eigen::Matrix3d& rotation) {
+void NormalEquations::add(const Bundle& bundle,
+                          std::size_t i,
+                          const Reprojection& at,
+                          const Eigen::Matrix3d& rotation,
+                          PointBlock& point) {
   const Bundle::Observation& observation = bundle.observations[i];
-  const Reprojection at(bundle, observation, rotation);
-  const double weight = CauchyLoss(options_.loss_scale_px).weight(at.error.squaredNorm());
-  const Matrix23 by_x = at.by_x();
-  const Matrix23 by_point = by_x * rotation;
-  PointBlock& point = points_[static_cast<std::size_t>(observation.point)];
-  point.inverse += weight * by_point.transpose() * by_point;
-  point.gradient += weight * by_point.transpose() * at.error;
-  Matrix25 by_camera;
-  if (num_camera_ > 0) {
-    by_camera = at.by_camera();
-    point.by_camera += weight * by_camera.transpose() * by_point;
-    reduced_.topLeftCorner<kCamera, kCamera>() += weight * by_camera.transpose() * by_camera;
-    gradient_.head<kCamera>() += weight * by_camera.transpose() * at.error;
+  const double weight = at.weight;
+  const Matrix32 by_x = at.by_x(bundle);
+  const Matrix32 by_point = rotation.transpose() * by_x;
+  const Matrix32 weighted = weight * by_point;
+  point.inverse.noalias() += weighted * by_point.transpose();
+  point.gradient.noalias() += weighted * at.error;
+  const bool is_free = observation.pose >= options_.num_fixed_poses;
+  Matrix62 by_pose;  // x' = exp(w) x + t
+  if (is_free) {
+    by_pose << at.x.cross(by_x.col(0)), at.x.cross(by_x.col(1)), by_x;
+    const int row = row_of(observation);
+    by_pose_[i].noalias() = by_pose * weighted.transpose();
+    const Matrix62 weighted_pose = weight * by_pose;
+    reduced_.block<6, 6>(row, row).noalias() += weighted_pose * by_pose.transpose();
+    diagonal_.segment<6>(row) += weighted_pose.cwiseProduct(by_pose).rowwise().sum();
+    gradient_.segment<6>(row).noalias() += weighted_pose * at.error;
   }
-  if (observation.pose < options_.num_fixed_poses) {
-    return;
-  }
-  Matrix26 by_pose;  // x' = exp(w) x + t
-  by_pose << -by_x * skew(at.x), by_x;
-  const int row = row_of(observation);
-  by_pose_[i] = weight * by_pose.transpose() * by_point;
-  reduced_.block<6, 6>(row, row) += weight * by_pose.transpose() * by_pose;
-  gradient_.segment<6>(row) += weight * by_pose.transpose() * at.error;
   if (num_camera_ > 0) {
-    reduced_.block<kCamera, 6>(0, row) += weight * by_camera.transpose() * by_pose;
+    const Matrix52 by_camera = at.by_camera(bundle.camera);
+    const Matrix52 weighted_camera = weight * by_camera;
+    point.by_camera.noalias() += weighted_camera * by_point.transpose();
+    reduced_.topLeftCorner<kCamera, kCamera>().noalias() += weighted_camera * by_camera.transpose();
+    diagonal_.head<kCamera>() += weighted_camera.cwiseProduct(by_camera).rowwise().sum();
+    gradient_.head<kCamera>().noalias() += weighted_camera * at.error;
+    if (is_free) {
+      reduced_.block<kCamera, 6>(0, row_of(observation)).noalias() +=
+          weighted_camera * by_pose.transpose();
+    }
   }
 }
 
-void NormalEquations::eliminate(const Bundle& bundle,
-                                std::size_t begin,
-                                std::size_t end,
-                                double damping) {
-  PointBlock& point = points_[static_cast<std::size_t>(bundle.observations[begin].point)];
+void NormalEquations::eliminate(
+    const Bundle& bundle, std::size_t begin, std::size_t end, double damping, PointBlock& point) {
   point.inverse.diagonal() *= 1.0 + damping;
   point.inverse = point.inverse.inverse().eval();
   if (num_camera_ > 0) {
     const Eigen::Matrix<double, kCamera, 3> scaled = point.by_camera * point.inverse;
-    reduced_.topLeftCorner<kCamera, kCamera>() -= scaled * point.by_camera.transpose();
-    gradient_.head<kCamera>() -= scaled * point.gradient;
+    reduced_.topLeftCorner<kCamera, kCamera>().noalias() -= scaled * point.by_camera.transpose();
+    gradient_.head<kCamera>().noalias() -= scaled * point.gradient;
   }
   for (std::size_t i = begin; i < end; ++i) {
     if (bundle.observations[i].pose < options_.num_fixed_poses) {
       continue;
     }
     const int row = row_of(bundle.observations[i]);
-    const Matrix63 scaled = by_pose_[i] * point.inverse;
-    gradient_.segment<6>(row) -= scaled * point.gradient;
+    Matrix63 scaled;
+    scaled.noalias() = by_pose_[i] * point.inverse;
+    gradient_.segment<6>(row).noalias() -= scaled * point.gradient;
     if (num_camera_ > 0) {
-      reduced_.block<kCamera, 6>(0, row) -= point.by_camera * scaled.transpose();
+      reduced_.block<kCamera, 6>(0, row).noalias() -= point.by_camera * scaled.transpose();
     }
-    for (std::size_t j = begin; j < end; ++j) {
-      if (bundle.observations[j].pose >= bundle.observations[i].pose) {
-        reduced_.block<6, 6>(row, row_of(bundle.observations[j])) -=
-            scaled * by_pose_[j].transpose();
-      }
+    for (std::size_t j = i; j < end; ++j) {
+      reduced_.block<6, 6>(row, row_of(bundle.observations[j])).noalias() -=
+          scaled * by_pose_[j].transpose();
     }
   }
 }
@@ -281,17 +298,19 @@ CameraInformation NormalEquations::camera_information() const {
   return 0.5 * (information + information.transpose());
 }
 
-/// Infinite where a point is behind a pose that sees it.
-double cost_of(const Bundle& bundle, double loss_scale_px) {
+/// Every observation under the bundle, and the robust cost: infinite where a point is behind a pose
+/// that sees it.
+double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reprojection>& result) {
   const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
+  result.clear();
   CauchyLoss loss(loss_scale_px);
   for (const Bundle::Observation& observation : bundle.observations) {
-    const Reprojection at(bundle, observation,
-                          rotations[static_cast<std::size_t>(observation.pose)]);
+    Reprojection& at = result.emplace_back(bundle, observation,
+                                           rotations[static_cast<std::size_t>(observation.pose)]);
     if (!(at.x.z() > kMinDepth)) {
       return std::numeric_limits<double>::infinity();
     }
-    loss.add(at.error.squaredNorm());
+    at.weight = loss.add(at.error.squaredNorm());
   }
   return loss.sum();
 }
@@ -304,29 +323,36 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
     const CameraChange off = options.camera ? CameraChange(change - options.camera->mean) : change;
     return options.camera ? off.dot(options.camera->information * off) : 0.0;
   };
-  result.cost = cost_of(bundle, options.loss_scale_px) + prior_cost(result.camera_change);
+  std::vector<Reprojection> at;
+  at.reserve(bundle.observations.size());
+  result.cost = reproject(bundle, options.loss_scale_px, at) + prior_cost(result.camera_change);
   if (static_cast<int>(bundle.camera_from_world.size()) <= options.num_fixed_poses ||
       !std::isfinite(result.cost)) {
     return result;
   }
   NormalEquations equations(bundle, options);
+  std::vector<Reprojection> trial_at;
+  trial_at.reserve(at.size());
+  BundleState before;
   double damping = 1e-4;
   for (int i = 0; i < options.max_iterations && damping < 1e4; ++i) {
-    equations.linearize(bundle, damping);
-    Bundle trial = bundle;
+    equations.linearize(bundle, at, damping);
+    before = static_cast<const BundleState&>(bundle);
     CameraChange change = CameraChange::Zero();
     const CameraChange from_prior =
         options.camera ? CameraChange(result.camera_change - options.camera->mean) : change;
-    const bool is_solved = equations.step(damping, from_prior, trial, change);
+    const bool is_solved = equations.step(damping, from_prior, bundle, change);
     change = composed(result.camera_change, change);
-    const double cost = is_solved ? cost_of(trial, options.loss_scale_px) + prior_cost(change)
-                                  : std::numeric_limits<double>::infinity();
+    const double cost =
+        is_solved ? reproject(bundle, options.loss_scale_px, trial_at) + prior_cost(change)
+                  : std::numeric_limits<double>::infinity();
     if (!(cost < result.cost)) {
+      static_cast<BundleState&>(bundle) = before;
       damping *= 10.0;
       continue;
     }
     const double decrease = result.cost - cost;
-    bundle = std::move(trial);
+    at.swap(trial_at);
     result.is_usable = true;
     result.cost = cost;
     result.camera_change = change;
@@ -336,7 +362,7 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
     }
   }
   if (options.camera) {
-    equations.linearize(bundle, 1e-9);  // so that a point far away still has an inverse
+    equations.linearize(bundle, at, 1e-9);  // so that a point far away still has an inverse
     result.information = equations.camera_information();
   }
   return result;

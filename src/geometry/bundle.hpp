@@ -11,19 +11,23 @@
 
 namespace stemvo {
 
-/// Poses and points that see each other, in any one unit of length.
-struct Bundle {
+/// What a bundle adjustment moves, in any one unit of length.
+struct BundleState {
+  std::vector<Rigid3> camera_from_world;
+  std::vector<Eigen::Vector3d> points;
+  Camera camera;
+  /// What the camera lacks: x' = x (1 + k1 r^2 + k2 r^4) of normalized coordinates.
+  Eigen::Vector2d radial = Eigen::Vector2d::Zero();
+};
+
+/// Poses and points that see each other.
+struct Bundle : BundleState {
   struct Observation {
     int pose = 0;
     int point = 0;
     Eigen::Vector2d uv;
   };
-  std::vector<Rigid3> camera_from_world;
-  std::vector<Eigen::Vector3d> points;
   std::vector<Observation> observations;  ///< ordered by point
-  Camera camera;
-  /// What the camera lacks: x' = x (1 + k1 r^2 + k2 r^4) of normalized coordinates.
-  Eigen::Vector2d radial = Eigen::Vector2d::Zero();
 };
 
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.

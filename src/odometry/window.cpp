@@ -107,15 +107,21 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
 
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
   if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
-    drop(window, leaving_keyframe(window, keyframe));
+    const std::size_t leaving = leaving_keyframe(window, keyframe);
+    const TrackPoints lost = std::move(window.keyframes[leaving].points);
+    drop(window, leaving);
+    for (const TrackPoint& point : lost) {
+      const auto sees = [&](const Keyframe& other) {
+        return find_point(other.points, point.track_id) != nullptr;
+      };
+      const auto landmark = window.landmarks.find(point.track_id);
+      if (landmark != window.landmarks.end() && !sees(keyframe) &&
+          std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
+        window.landmarks.erase(landmark);
+      }
+    }
   }
   window.keyframes.push_back(std::move(keyframe));
-  std::erase_if(window.landmarks, [&](const auto& landmark) {
-    return std::none_of(window.keyframes.rbegin(), window.keyframes.rend(),
-                        [&](const Keyframe& seen_from) {
-                          return find_point(seen_from.points, landmark.first) != nullptr;
-                        });
-  });
 }
 
 void triangulate_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {

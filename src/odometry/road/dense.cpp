@@ -21,7 +21,8 @@ constexpr double kMaxSigma = 0.2;
 constexpr std::size_t kMinSamples = 600;
 /// Fewer than this at every second pixel: take every pixel.
 constexpr std::size_t kFewSamples = 2400;
-constexpr int kMaxIterations = 5;  ///< per level
+constexpr int kMaxIterations = 5;  ///< per grid
+constexpr double kCoarse = 5.0;    ///< times the last grid's bound of convergence
 /// Of a tile's mean square residual, in normalised images.
 constexpr double kNoiseFloor = 0.05;
 constexpr double kSearchSigma = 0.05;  ///< prior knowledge of log_scale worse than this: search
@@ -197,10 +198,14 @@ double total_correlation(const Tiles& tiles) {
   return sum.correlation();
 }
 
-using LevelSamples = std::array<std::vector<RoadRegion::Sample>, 2>;
+/// Where the images are compared: at half size, at every second pixel, at all that are needed.
+struct Grid {
+  std::size_t level;
+  std::vector<RoadRegion::Sample> samples;
+};
 
 /// The plane of the prior, at the scale with the best correlation at half size.
-Eigen::Vector3d search_plane(const RoadStep& step, const LevelSamples& samples, RoadWarp warp) {
+Eigen::Vector3d search_plane(const RoadStep& step, const Grid& half, RoadWarp warp) {
   const RoadPrior& prior = step.prior;
   const int reach =
       static_cast<int>(std::min(kMaxSearch, 2.5 * prior.log_scale_sigma) / kSearchStep);
@@ -211,8 +216,8 @@ Eigen::Vector3d search_plane(const RoadStep& step, const LevelSamples& samples, 
   Eigen::Vector3d best_plane = plane_at(prior.log_scale);
   for (int i = -reach; i <= reach; ++i) {
     warp.plane = plane_at(prior.log_scale + kSearchStep * i);
-    const double correlation =
-        correlate_road(step.prev.levels[1], step.cur.levels[1], samples[1], warp);
+    const double correlation = correlate_road(step.prev.levels[half.level],
+                                              step.cur.levels[half.level], half.samples, warp);
     if (correlation > best) {
       best = correlation;
       best_plane = warp.plane;
@@ -221,14 +226,14 @@ Eigen::Vector3d search_plane(const RoadStep& step, const LevelSamples& samples, 
   return best_plane;
 }
 
-/// Gauss-Newton at half size where there are samples, then at full size.
-RoadMeasurement refine(const RoadStep& step, const LevelSamples& samples, RoadWarp warp) {
+/// Gauss-Newton on one grid after the other, the coarsest first.
+RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, RoadWarp warp) {
   RoadMatrix covariance = RoadMatrix::Zero();
   double correlation = 0.0;
-  for (const std::size_t level : {std::size_t{1}, std::size_t{0}}) {
-    for (int iteration = 0; !samples[level].empty() && iteration < kMaxIterations; ++iteration) {
+  for (const Grid& grid : grids) {
+    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       const Tiles tiles =
-          align_road(step.prev.levels[level], step.cur.levels[level], samples[level], warp);
+          align_road(step.prev.levels[grid.level], step.cur.levels[grid.level], grid.samples, warp);
       RoadNormal normal;
       if (join(tiles, normal) < kMinTiles) {
         return no_road("nothing moves like a road");
@@ -239,7 +244,8 @@ RoadMeasurement refine(const RoadStep& step, const LevelSamples& samples, RoadWa
       }
       correlation = total_correlation(tiles);
       covariance = normal.covariance;
-      if (normal.relative_change < (level == 1 ? 5.0 : 1.0) * step.options.convergence) {
+      const double bound = (&grid == &grids.back() ? 1.0 : kCoarse) * step.options.convergence;
+      if (normal.relative_change < bound) {
         break;
       }
     }
@@ -264,24 +270,31 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
+  const auto grid = [&](std::size_t level, int every) {
+    const RoadImage::Level& image = step.cur.levels[level];
+    return Grid{level, region.samples(image.camera, image.first_row, every)};
+  };
+  std::vector<Grid> grids;
+  RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
   // A scale that is known well starts within a pixel: half size is for the search.
-  const bool is_searched = step.prior.log_scale_sigma > kSearchSigma;
-  LevelSamples samples;
-  for (std::size_t k = 0; k < (is_searched ? 2 : 1); ++k) {
-    const RoadImage::Level& level = step.cur.levels[k];
-    samples[k] = region.samples(level.camera, level.first_row, 2);
-    if (samples[k].size() < kFewSamples) {
-      samples[k] = region.samples(level.camera, level.first_row, 1);
+  if (step.prior.log_scale_sigma > kSearchSigma) {
+    Grid half = grid(1, 2);
+    if (half.samples.size() < kFewSamples) {
+      half = grid(1, 1);
+    }
+    warp.plane = search_plane(step, half, warp);
+    if (!half.samples.empty()) {
+      grids.push_back(std::move(half));
     }
   }
-  if (samples[0].size() < kMinSamples) {
+  grids.push_back(grid(0, 2));
+  if (grids.back().samples.size() < kFewSamples) {
+    grids.push_back(grid(0, 1));
+  }
+  if (grids.back().samples.size() < kMinSamples) {
     return no_road("too little road in sight");
   }
-  RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
-  if (is_searched) {
-    warp.plane = search_plane(step, samples, warp);
-  }
-  return refine(step, samples, warp);
+  return refine(step, grids, warp);
 }
 
 }  // namespace stemvo
