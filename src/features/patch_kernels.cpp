@@ -108,7 +108,47 @@ STEMVO_INLINE void fine_sums(const FineValues& values,
   }
 }
 
+/// Neither turned nor scaled: one set of weights for all samples, rows first.
+STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
+                                       float center_x,
+                                       float center_y,
+                                       FineValues& values) {
+  constexpr int kTaps = 4;
+  const float x = center_x - 0.5F * (kFineSide - 1);
+  const float y = center_y - 0.5F * (kFineSide - 1);
+  const float column = std::floor(x);
+  const float row = std::floor(y);
+  float wx[kTaps];
+  float wy[kTaps];
+  catmull_rom(x - column, wx);
+  catmull_rom(y - row, wy);
+  const std::uint8_t* pixel = image.origin + (static_cast<std::ptrdiff_t>(row) - 1) * image.stride +
+                              static_cast<std::ptrdiff_t>(column) - 1;
+  float rows[kFineSide + kTaps - 1][kFineSide];
+  for (auto& in_row : rows) {
+    for (int i = 0; i < kFineSide; ++i) {
+      in_row[i] =
+          wx[0] * static_cast<float>(pixel[i]) + wx[1] * static_cast<float>(pixel[i + 1]) +
+          wx[2] * static_cast<float>(pixel[i + 2]) + wx[3] * static_cast<float>(pixel[i + 3]);
+    }
+    pixel += image.stride;
+  }
+  for (int j = 0; j < kFineSide; ++j) {
+    for (int i = 0; i < kFineSide; ++i) {
+      values[static_cast<std::size_t>(j * kFineSide + i)] =
+          wy[0] * rows[j][i] + wy[1] * rows[j + 1][i] + wy[2] * rows[j + 2][i] +
+          wy[3] * rows[j + 3][i];
+    }
+  }
+}
+
+STEMVO_INLINE bool is_upright(const Similarity& warp) { return warp.a == 1.0F && warp.b == 0.0F; }
+
 void sample_fine_portable(const BorderedImage& image, const Similarity& warp, FineValues& values) {
+  if (is_upright(warp)) {
+    sample_fine_upright(image, warp.x, warp.y, values);
+    return;
+  }
   constexpr float kCenter = 0.5F * (kFineSide - 1);
   for (int j = 0; j < kFineSide; ++j) {
     for (int i = 0; i < kFineSide; ++i) {
@@ -189,6 +229,10 @@ STEMVO_AVX2 STEMVO_INLINE void catmull_rom(__m256 t, __m256* w) {
 STEMVO_AVX2 void sample_fine_avx2(const BorderedImage& image,
                                   const Similarity& warp,
                                   FineValues& values) {
+  if (is_upright(warp)) {
+    sample_fine_upright(image, warp.x, warp.y, values);
+    return;
+  }
   constexpr float kCenter = 0.5F * (kFineSide - 1);
   const __m256 dx = _mm256_setr_ps(-3.5F, -2.5F, -1.5F, -0.5F, 0.5F, 1.5F, 2.5F, 3.5F);
   const __m256 ax = _mm256_fmadd_ps(_mm256_set1_ps(warp.a), dx, _mm256_set1_ps(warp.x));
