@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -27,6 +28,7 @@ constexpr int kPredictedLevel = 1;
 class Motions {
  public:
   [[nodiscard]] bool empty() const { return known_.empty(); }
+  [[nodiscard]] int size() const { return static_cast<int>(known_.size()); }
   void add(const cv::Point2f& from, const cv::Point2f& motion) { known_.push_back({from, motion}); }
   /// Median of the nearest; none: 0.
   [[nodiscard]] cv::Point2f near(const cv::Point2f& uv) const;
@@ -40,22 +42,30 @@ class Motions {
 };
 
 cv::Point2f Motions::near(const cv::Point2f& uv) const {
+  struct Near {
+    float distance_sq = std::numeric_limits<float>::infinity();
+    cv::Point2f motion;
+  };
+  std::array<Near, kNumNeighbours> nearest;  // the nearest first
+  for (const Known& known : known_) {
+    const cv::Point2f to = known.from - uv;
+    const float distance_sq = to.dot(to);
+    if (distance_sq < nearest.back().distance_sq) {
+      std::size_t i = kNumNeighbours - 1;
+      for (; i > 0 && distance_sq < nearest[i - 1].distance_sq; --i) {
+        nearest[i] = nearest[i - 1];
+      }
+      nearest[i] = {distance_sq, known.motion};
+    }
+  }
   const std::size_t count = std::min(kNumNeighbours, known_.size());
   if (count == 0) {
     return {};
   }
-  std::array<Known, kNumNeighbours> nearest;
-  const auto end = std::partial_sort_copy(known_.begin(), known_.end(), nearest.begin(),
-                                          nearest.end(), [&](const Known& a, const Known& b) {
-                                            const cv::Point2f to_a = a.from - uv;
-                                            const cv::Point2f to_b = b.from - uv;
-                                            return to_a.dot(to_a) < to_b.dot(to_b);
-                                          });
   const auto median = [&](float cv::Point2f::* axis) {
     const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(nearest.begin(), middle, end, [&](const Known& a, const Known& b) {
-      return a.motion.*axis < b.motion.*axis;
-    });
+    std::nth_element(nearest.begin(), middle, nearest.begin() + static_cast<std::ptrdiff_t>(count),
+                     [&](const Near& a, const Near& b) { return a.motion.*axis < b.motion.*axis; });
     return middle->motion.*axis;
   };
   return {median(&cv::Point2f::x), median(&cv::Point2f::y)};
@@ -132,9 +142,11 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     Track& track = tracks_.at(point.id);
     if (found[i].correlation < kMinCorrelation) {
       const cv::Point2f motion = motions.near(point.uv);
-      const bool is_predicted = track.frame != from.frame && !motions.empty();
+      const bool is_predicted =
+          getenv("V1") ? !motions.empty() : track.frame != from.frame && !motions.empty();
       found[i] = align(point, motion, is_predicted ? kPredictedLevel : top);
-      if (found[i].correlation < kMinCorrelation && is_predicted) {
+      if (found[i].correlation < kMinCorrelation && is_predicted &&
+          (!getenv("V2") || motions.size() < atoi(getenv("V2")))) {
         found[i] = align(point, motion, top);
       }
     }

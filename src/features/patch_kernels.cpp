@@ -127,9 +127,9 @@ STEMVO_INLINE void sample_fine_upright(const BorderedImage& image,
   float rows[kFineSide + kTaps - 1][kFineSide];
   for (auto& in_row : rows) {
     for (int i = 0; i < kFineSide; ++i) {
-      in_row[i] =
-          wx[0] * static_cast<float>(pixel[i]) + wx[1] * static_cast<float>(pixel[i + 1]) +
-          wx[2] * static_cast<float>(pixel[i + 2]) + wx[3] * static_cast<float>(pixel[i + 3]);
+      in_row[i] = wx[0] * static_cast<float>(pixel[i]) + wx[1] * static_cast<float>(pixel[i + 1]) +
+                  wx[2] * static_cast<float>(pixel[i + 2]) +
+                  wx[3] * static_cast<float>(pixel[i + 3]);
     }
     pixel += image.stride;
   }

@@ -17,7 +17,7 @@ namespace {
 
 /// A shorter step ends the minimization: rad, and units of length.
 constexpr double kMotionTolerance = 1e-10;
-constexpr double kPoseTolerance = 1e-9;
+constexpr double kPoseTolerance = 1e-7;
 constexpr double kMinDepth = 1e-6;
 /// What a point behind the camera costs, so that no step gains by pushing points behind it.
 constexpr double kBehindErrorPx = 1e3;
@@ -161,16 +161,17 @@ NormalEquations<6> linearize_pose(const Rigid3& camera_from_world,
       continue;
     }
     const double inverse_z = 1.0 / x.z();
-    Eigen::Matrix<double, 2, 3> projection;
-    projection << camera.fx_px * inverse_z, 0.0, -camera.fx_px * x.x() * inverse_z * inverse_z,  //
-        0.0, camera.fy_px * inverse_z, -camera.fy_px * x.y() * inverse_z * inverse_z;
-    const Eigen::Vector2d error = camera.project(x) - uv[i];
-    Eigen::Matrix<double, 2, 6> jacobian;
-    jacobian.leftCols<3>() = -projection * skew(x);
-    jacobian.rightCols<3>() = projection;
-    const double weight = loss.add(error.squaredNorm());
-    equations.hessian += weight * jacobian.transpose() * jacobian;
-    equations.gradient += weight * jacobian.transpose() * error;
+    const double u = x.x() * inverse_z;
+    const double v = x.y() * inverse_z;
+    const Eigen::Vector2d error =
+        Eigen::Vector2d(camera.fx_px * u + camera.cx_px, camera.fy_px * v + camera.cy_px) - uv[i];
+    const Eigen::Vector3d u_by_x = camera.fx_px * inverse_z * Eigen::Vector3d(1.0, 0.0, -u);
+    const Eigen::Vector3d v_by_x = camera.fy_px * inverse_z * Eigen::Vector3d(0.0, 1.0, -v);
+    Eigen::Matrix<double, 6, 2> jacobian;  // transposed
+    jacobian << x.cross(u_by_x), x.cross(v_by_x), u_by_x, v_by_x;
+    const Eigen::Matrix<double, 6, 2> weighted = loss.add(error.squaredNorm()) * jacobian;
+    equations.hessian.noalias() += weighted * jacobian.transpose();
+    equations.gradient.noalias() += weighted * error;
   }
   equations.cost = loss.sum();
   return equations;

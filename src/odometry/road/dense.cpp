@@ -38,15 +38,18 @@ double correlation_of(double cc, double pp, double cp) {
 
 /// Sums over the samples of one tile of the strip, of the residual r = prev(warp) - cur.
 struct Tile {
-  /// Sum of a a^T with Huber weights, a = (J, r): J^T J and J^T r at once. Single precision is
-  /// enough for the few hundred samples of a tile, and four times as fast.
+  /// Upper triangle of the sum of a a^T with Huber weights, a = (J, r): J^T J and J^T r. Single
+  /// precision is enough for the few hundred samples of a tile, and four times as fast.
   Eigen::Matrix<float, 8, 8> sums = Eigen::Matrix<float, 8, 8>::Zero();
   float cur_cur = 0.0F;
   float prev_prev = 0.0F;
   float cur_prev = 0.0F;
   int num_samples = 0;
 
-  RoadMatrix information() const { return sums.topLeftCorner<7, 7>().cast<double>(); }
+  RoadMatrix information() const {
+    const RoadMatrix upper = sums.topLeftCorner<7, 7>().cast<double>();
+    return upper.selfadjointView<Eigen::Upper>();
+  }
   RoadVector gradient() const { return sums.topRightCorner<7, 1>().cast<double>(); }
   /// Normalised cross-correlation, 0 where the tile is too small.
   double correlation() const {
@@ -57,7 +60,18 @@ struct Tile {
 };
 using Tiles = std::array<Tile, RoadRegion::kTiles>;
 
-/// Walks over the samples; `visit(sample, ray, point in prev, interpolated prev, cur value)`.
+/// A sample of the current image, seen through the warp.
+struct Match {
+  const RoadRegion::Sample& sample;
+  const Eigen::Vector3f& ray;
+  float inverse_flat;        ///< 1 / (plane . ray)
+  const Eigen::Vector3f& p;  ///< in the previous camera
+  float inverse_z;           ///< of p
+  const Eigen::Array4f& prev;
+  float cur;
+};
+
+/// Calls `visit` for each that falls into the previous image.
 template <typename Visit>
 void for_each_match(const RoadImage::Level& prev,
                     const RoadImage::Level& cur,
@@ -82,14 +96,16 @@ void for_each_match(const RoadImage::Level& prev,
     const Eigen::Vector3f ray((static_cast<float>(sample.u) - cx) / fx,
                               (static_cast<float>(sample.v) - cy) / fy, 1.0F);
     const float flat = plane.dot(ray);
-    const float root = 1.0F - bend / (flat * flat);
+    const float inverse_flat = 1.0F / flat;
+    const float root = 1.0F - bend * inverse_flat * inverse_flat;
     if (!(flat > 0.0F && root > static_cast<float>(kMinRoadRoot))) {
       continue;  // behind a crest
     }
     const Eigen::Vector3f p =
         rotation * ray + (0.5F * flat * (1.0F + std::sqrt(root))) * translation;
-    const float u = fx * p.x() / p.z() + cx;
-    const float v = fy * p.y() / p.z() + cy - first_row;
+    const float inverse_z = 1.0F / p.z();
+    const float u = fx * p.x() * inverse_z + cx;
+    const float v = fy * p.y() * inverse_z + cy - first_row;
     if (!(p.z() > 1e-3F && u >= 1.0F && v >= 1.0F && u < last_u && v < last_v)) {
       continue;
     }
@@ -103,9 +119,9 @@ void for_each_match(const RoadImage::Level& prev,
     const Eigen::Array4f lower =
         Map(top + stride) + a * (Map(top + stride + 4) - Map(top + stride));
     const Eigen::Array4f value = upper + b * (lower - upper);
-    visit(
-        sample, ray, p, value,
-        cur.values.ptr<float>(sample.v - cur.first_row)[4 * static_cast<std::ptrdiff_t>(sample.u)]);
+    visit({sample, ray, inverse_flat, p, inverse_z, value,
+           cur.values.ptr<float>(sample.v -
+                                 cur.first_row)[4 * static_cast<std::ptrdiff_t>(sample.u)]});
   }
 }
 
@@ -115,32 +131,32 @@ Tiles align_road(const RoadImage::Level& prev,
                  const RoadWarp& warp) {
   Tiles tiles;
   const Eigen::Vector3f t = warp.translation.cast<float>();
-  const Eigen::Vector3f plane = warp.plane.cast<float>();
   const auto bend_unit = static_cast<float>(warp.plane.squaredNorm());
   const auto fx = static_cast<float>(cur.camera.fx_px);
   const auto fy = static_cast<float>(cur.camera.fy_px);
-  for_each_match(prev, cur, samples, warp,
-                 [&](const RoadRegion::Sample& sample, const Eigen::Vector3f& ray,
-                     const Eigen::Vector3f& p, const Eigen::Array4f& value, float cur_value) {
-                   Tile& tile = tiles[static_cast<std::size_t>(sample.tile)];
-                   tile.cur_cur += cur_value * cur_value;
-                   tile.prev_prev += value[0] * value[0];
-                   tile.cur_prev += cur_value * value[0];
-                   ++tile.num_samples;
-                   // Gradient of the previous image along the point p: g = grad . dpi/dp.
-                   const float gx = value[1] * fx / p.z();
-                   const float gy = value[2] * fy / p.z();
-                   const Eigen::Vector3f g(gx, gy, -(gx * p.x() + gy * p.y()) / p.z());
-                   const float along = g.dot(t);
-                   Eigen::Matrix<float, 8, 1> a;
-                   a.head<3>() = along * ray;
-                   a[3] = -along * bend_unit / plane.dot(ray);
-                   a.segment<3>(4) = p.cross(g);  // of exp(w) p
-                   a[7] = value[0] - cur_value;
-                   const float size = std::abs(a[7]);
-                   const float weight = size <= kHuber ? 1.0F : kHuber / size;
-                   tile.sums.noalias() += (weight * a) * a.transpose();
-                 });
+  for_each_match(prev, cur, samples, warp, [&](const Match& match) {
+    Tile& tile = tiles[static_cast<std::size_t>(match.sample.tile)];
+    const float value = match.prev[0];
+    tile.cur_cur += match.cur * match.cur;
+    tile.prev_prev += value * value;
+    tile.cur_prev += match.cur * value;
+    ++tile.num_samples;
+    // Gradient of the previous image along the point p: g = grad . dpi/dp.
+    const Eigen::Vector3f& p = match.p;
+    const float gx = match.prev[1] * fx * match.inverse_z;
+    const float gy = match.prev[2] * fy * match.inverse_z;
+    const Eigen::Vector3f g(gx, gy, -(gx * p.x() + gy * p.y()) * match.inverse_z);
+    const float along = g.dot(t);
+    Eigen::Matrix<float, 8, 1> a;
+    a.head<3>() = along * match.ray;
+    a[3] = -along * bend_unit * match.inverse_flat;
+    a.segment<3>(4) = p.cross(g);  // of exp(w) p
+    a[7] = value - match.cur;
+    const float size = std::abs(a[7]);
+    const Eigen::Matrix<float, 8, 1> weighted = (size <= kHuber ? 1.0F : kHuber / size) * a;
+    tile.sums.topRows<4>().noalias() += a.head<4>() * weighted.transpose();
+    tile.sums.bottomRightCorner<4, 4>().noalias() += a.tail<4>() * weighted.tail<4>().transpose();
+  });
   return tiles;
 }
 
@@ -152,14 +168,12 @@ double correlate_road(const RoadImage::Level& prev,
   double pp = 0.0;
   double cp = 0.0;
   std::size_t count = 0;
-  for_each_match(prev, cur, samples, warp,
-                 [&](const RoadRegion::Sample&, const Eigen::Vector3f&, const Eigen::Vector3f&,
-                     const Eigen::Array4f& value, float cur_value) {
-                   cc += cur_value * cur_value;
-                   pp += value[0] * value[0];
-                   cp += cur_value * value[0];
-                   ++count;
-                 });
+  for_each_match(prev, cur, samples, warp, [&](const Match& match) {
+    cc += match.cur * match.cur;
+    pp += match.prev[0] * match.prev[0];
+    cp += match.cur * match.prev[0];
+    ++count;
+  });
   // A warp that leaves the image with all but a few samples has proven nothing.
   return 2 * count < samples.size() ? 0.0 : correlation_of(cc, pp, cp);
 }
