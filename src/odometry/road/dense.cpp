@@ -212,13 +212,14 @@ double total_correlation(const Tiles& tiles) {
   return sum.correlation();
 }
 
-/// Where the images are compared: at half size, at every second pixel, at all that are needed.
+/// Where the images are compared, the coarsest first: at half size, at every second pixel, at all.
 struct Grid {
-  std::size_t level;
+  const RoadImage::Level& prev;
+  const RoadImage::Level& cur;
   std::vector<RoadRegion::Sample> samples;
 };
 
-/// The plane of the prior, at the scale with the best correlation at half size.
+/// The plane of the prior, at the scale with the best correlation.
 Eigen::Vector3d search_plane(const RoadStep& step, const Grid& half, RoadWarp warp) {
   const RoadPrior& prior = step.prior;
   const int reach =
@@ -230,8 +231,7 @@ Eigen::Vector3d search_plane(const RoadStep& step, const Grid& half, RoadWarp wa
   Eigen::Vector3d best_plane = plane_at(prior.log_scale);
   for (int i = -reach; i <= reach; ++i) {
     warp.plane = plane_at(prior.log_scale + kSearchStep * i);
-    const double correlation = correlate_road(step.prev.levels[half.level],
-                                              step.cur.levels[half.level], half.samples, warp);
+    const double correlation = correlate_road(half.prev, half.cur, half.samples, warp);
     if (correlation > best) {
       best = correlation;
       best_plane = warp.plane;
@@ -245,9 +245,11 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
   RoadMatrix covariance = RoadMatrix::Zero();
   double correlation = 0.0;
   for (const Grid& grid : grids) {
+    if (grid.samples.empty()) {
+      continue;
+    }
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-      const Tiles tiles =
-          align_road(step.prev.levels[grid.level], step.cur.levels[grid.level], grid.samples, warp);
+      const Tiles tiles = align_road(grid.prev, grid.cur, grid.samples, warp);
       RoadNormal normal;
       if (join(tiles, normal) < kMinTiles) {
         return no_road("nothing moves like a road");
@@ -270,40 +272,37 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
   return result;
 }
 
-bool has_values(const RoadImage& image) {
-  return !image.levels[0].values.empty() && !image.levels[1].values.empty();
-}
-
 }  // namespace
 
 RoadMeasurement measure_dense(const RoadStep& step) {
   if (!is_motion(step.cur_from_prev)) {
     return no_road("no motion");
   }
-  if (!has_values(step.prev) || !has_values(step.cur)) {
+  if (step.prev.full.values.empty() || step.cur.full.values.empty()) {
     return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
-  const auto grid = [&](std::size_t level, int every) {
-    const RoadImage::Level& image = step.cur.levels[level];
-    return Grid{level, region.samples(image.camera, image.first_row, every)};
+  const auto grid = [&](const RoadImage::Level& prev, const RoadImage::Level& cur, int every) {
+    return Grid{prev, cur, region.samples(cur.camera, cur.first_row, every)};
   };
   std::vector<Grid> grids;
   RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
+  RoadImage::Level half_prev;
+  RoadImage::Level half_cur;
   // A scale that is known well starts within a pixel: half size is for the search.
   if (step.prior.log_scale_sigma > kSearchSigma) {
-    Grid half = grid(1, 2);
-    if (half.samples.size() < kFewSamples) {
-      half = grid(1, 1);
+    half_prev = make_half_level(step.prev);
+    half_cur = make_half_level(step.cur);
+    if (half_prev.values.empty() || half_cur.values.empty()) {
+      return no_road("the image ends above the road");
     }
-    warp.plane = search_plane(step, half, warp);
-    if (!half.samples.empty()) {
-      grids.push_back(std::move(half));
-    }
+    const Grid sparse = grid(half_prev, half_cur, 2);
+    grids.push_back(sparse.samples.size() < kFewSamples ? grid(half_prev, half_cur, 1) : sparse);
+    warp.plane = search_plane(step, grids.back(), warp);
   }
-  grids.push_back(grid(0, 2));
+  grids.push_back(grid(step.prev.full, step.cur.full, 2));
   if (grids.back().samples.size() < kFewSamples) {
-    grids.push_back(grid(0, 1));
+    grids.push_back(grid(step.prev.full, step.cur.full, 1));
   }
   if (grids.back().samples.size() < kMinSamples) {
     return no_road("too little road in sight");

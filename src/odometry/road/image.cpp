@@ -10,7 +10,7 @@ namespace stemvo {
 
 namespace {
 
-/// Reach of the local contrast, input pixels (level 1: its own, twice as wide).
+/// Reach of the local contrast, input pixels (at half size: its own, twice as wide).
 constexpr double kContrast_px = 8.0;
 /// The centre of a pixel of half size lies between two of full size.
 const PixelMap kHalf{{2.0, 2.0}, {0.5, 0.5}};
@@ -26,22 +26,20 @@ Camera camera_in(const Camera& camera, const PixelMap& map, const cv::Size& size
           size.height};
 }
 
-/// Values, their gradient (central differences) and the contrast, pixel by pixel.
-cv::Mat interleave(const cv::Mat& values, const cv::Mat& contrast) {
+/// Values and their gradient (central differences), pixel by pixel.
+cv::Mat with_gradient(const cv::Mat& values) {
   cv::Mat result(values.size(), CV_32FC4);
   for (int v = 0; v < values.rows; ++v) {
     const auto* here = values.ptr<float>(v);
     const auto* above = values.ptr<float>(std::max(v - 1, 0));
     const auto* below = values.ptr<float>(std::min(v + 1, values.rows - 1));
-    const auto* strength = contrast.ptr<float>(v);
     auto* out = result.ptr<cv::Vec4f>(v);
     for (int u = 1; u + 1 < values.cols; ++u) {
-      out[u] = {here[u], 0.5F * (here[u + 1] - here[u - 1]), 0.5F * (below[u] - above[u]),
-                strength[u]};
+      out[u] = {here[u], 0.5F * (here[u + 1] - here[u - 1]), 0.5F * (below[u] - above[u]), 0.0F};
     }
-    out[0] = {here[0], 0.0F, 0.0F, strength[0]};
+    out[0] = {here[0], 0.0F, 0.0F, 0.0F};
     const int last = values.cols - 1;
-    out[last] = {here[last], 0.0F, 0.0F, strength[last]};
+    out[last] = {here[last], 0.0F, 0.0F, 0.0F};
   }
   return result;
 }
@@ -65,34 +63,34 @@ RoadImage::Level make_level(const cv::Mat& pixels, const Camera& camera, int con
   cv::sqrt(contrast, contrast);
   // Half a gray value: the noise of a plain surface is not blown up to the size of texture.
   values /= contrast + 0.5;
-  level.values = interleave(values, contrast);
+  level.values = with_gradient(values);
   return level;
+}
+
+int contrast_reach(const RoadImage& road) {
+  return std::max(4, cvRound(kContrast_px / road.map.scale.x()));
 }
 
 }  // namespace
 
 RoadImage make_road_image(const ChannelImage& image, const Camera& camera) {
-  RoadImage road;
-  road.pixels = image.pixels;
-  road.map = image.map;
-  road.camera = camera_in(camera, image.map, image.pixels.size());
-  if (std::min(image.pixels.rows, image.pixels.cols) < 2) {
-    return road;
+  RoadImage road{image.pixels, image.map, {}};
+  road.full.camera = camera_in(camera, image.map, image.pixels.size());
+  if (std::min(image.pixels.rows, image.pixels.cols) >= 2) {
+    road.full = make_level(image.pixels, road.full.camera, contrast_reach(road));
   }
-  const int contrast_px = std::max(4, cvRound(kContrast_px / road.map.scale.x()));
-  cv::Mat half;
-  cv::resize(image.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  road.levels = {make_level(image.pixels, road.camera, contrast_px),
-                 make_level(half, camera_in(road.camera, kHalf, half.size()), contrast_px)};
   return road;
+}
+
+RoadImage::Level make_half_level(const RoadImage& road) {
+  cv::Mat half;
+  cv::resize(road.pixels, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  return make_level(half, camera_in(road.full.camera, kHalf, half.size()), contrast_reach(road));
 }
 
 RoadImage seen_by(const RoadImage& road, const Camera& camera) {
   RoadImage result = road;
-  result.camera = camera_in(camera, road.map, road.pixels.size());
-  const Camera& half = road.levels[1].camera;
-  result.levels[0].camera = result.camera;
-  result.levels[1].camera = camera_in(result.camera, kHalf, {half.width_px, half.height_px});
+  result.full.camera = camera_in(camera, road.map, road.pixels.size());
   return result;
 }
 

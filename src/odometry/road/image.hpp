@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
-
 #include <opencv2/core.hpp>
 
 #include "stem/channel.hpp"
@@ -11,20 +9,22 @@
 namespace stemvo {
 
 /// The part of an image below the horizon, made comparable between frames: band-passed, divided by
-/// the local contrast, with its gradient. Level 1 has half the size of level 0.
+/// the local contrast, with its gradient.
 struct RoadImage {
   struct Level {
     Camera camera;  ///< in pixels of this level, whole image
     int first_row = 0;
-    cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, local contrast; row 0 is `first_row`
+    cv::Mat values;  ///< CV_32FC4: value, d/du, d/dv, 0; row 0 is `first_row`
   };
-  cv::Mat pixels;               ///< CV_8U, the image itself
-  PixelMap map;                 ///< to input pixels
-  Camera camera;                ///< in its pixels
-  std::array<Level, 2> levels;  ///< without values where too little is below the horizon
+  cv::Mat pixels;  ///< CV_8U, the image itself
+  PixelMap map;    ///< to input pixels
+  Level full;      ///< without values where too little is below the horizon
 };
 
 [[nodiscard]] RoadImage make_road_image(const ChannelImage& image, const Camera& camera);
+
+/// At half the size; without values as above.
+[[nodiscard]] RoadImage::Level make_half_level(const RoadImage& road);
 
 /// The same image (pixels are shared), by a camera that is known better.
 [[nodiscard]] RoadImage seen_by(const RoadImage& road, const Camera& camera);

@@ -47,7 +47,7 @@ struct Strip {
 Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptions& options) {
   Strip strip;
   const std::vector<RoadRegion::Sample> samples =
-      region.samples(cur.camera, cur.levels[0].first_row, 4);
+      region.samples(cur.full.camera, cur.full.first_row, 4);
   cv::Mat mask = cv::Mat::zeros(cur.pixels.size(), CV_8U);
   cv::Point low(cur.pixels.cols, cur.pixels.rows);
   cv::Point high(0, 0);
@@ -122,7 +122,7 @@ cv::Matx33d strip_homography(const Camera& camera, const Strip& strip, const Roa
 /// Tracks from the current image into the previous one, seen through the predicted plane.
 std::vector<Track> track_corners(const RoadStep& step, const Strip& strip, const RoadWarp& warp) {
   const RoadImage& cur = step.cur;
-  const cv::Matx33d map = strip_homography(cur.camera, strip, warp);
+  const cv::Matx33d map = strip_homography(cur.full.camera, strip, warp);
   cv::Mat warped;
   cv::warpPerspective(step.prev.pixels, warped, map, strip.box.size(),
                       cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
@@ -152,11 +152,11 @@ std::vector<Track> track_corners(const RoadStep& step, const Strip& strip, const
       continue;
     }
     const Track candidate{
-        cur.camera.normalize({corner.x + strip.box.x, corner.y + strip.box.y}).homogeneous(),
+        cur.full.camera.normalize({corner.x + strip.box.x, corner.y + strip.box.y}).homogeneous(),
         {in_prev[0] / in_prev[2], in_prev[1] / in_prev[2]},
         static_cast<int>(corner.y) / cell.height * kCellsAcross +
             static_cast<int>(corner.x) / cell.width};
-    const Residual residual = residual_of(candidate, warp, cur.camera);
+    const Residual residual = residual_of(candidate, warp, cur.full.camera);
     if (residual.is_valid &&
         std::abs(residual.across_px) <= step.options.max_off_line_px / cur.map.scale.x()) {
       tracks.push_back(candidate);
@@ -179,7 +179,7 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
   std::vector<double> sizes(tracks.size());
   for (int iteration = 0; iteration < kFitIterations; ++iteration) {
     for (std::size_t i = 0; i < tracks.size(); ++i) {
-      residuals[i] = residual_of(tracks[i], warp, step.cur.camera);
+      residuals[i] = residual_of(tracks[i], warp, step.cur.full.camera);
       sizes[i] = residuals[i].is_valid ? std::abs(residuals[i].along_px) : 1e6;
     }
     const double noise_px = std::max(kMinNoise_px / step.cur.map.scale.x(), 1.4826 * median(sizes));
@@ -221,7 +221,7 @@ RoadMeasurement measure_points(const RoadStep& step) {
   if (!is_motion(step.cur_from_prev)) {
     return no_road("no motion");
   }
-  if (step.cur.levels[0].values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {
+  if (step.cur.full.values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {
     return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
