@@ -28,7 +28,6 @@ constexpr int kPredictedLevel = 1;
 class Motions {
  public:
   [[nodiscard]] bool empty() const { return known_.empty(); }
-  [[nodiscard]] int size() const { return static_cast<int>(known_.size()); }
   void add(const cv::Point2f& from, const cv::Point2f& motion) { known_.push_back({from, motion}); }
   /// Median of the nearest; none: 0.
   [[nodiscard]] cv::Point2f near(const cv::Point2f& uv) const;
@@ -142,11 +141,9 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     Track& track = tracks_.at(point.id);
     if (found[i].correlation < kMinCorrelation) {
       const cv::Point2f motion = motions.near(point.uv);
-      const bool is_predicted =
-          getenv("V1") ? !motions.empty() : track.frame != from.frame && !motions.empty();
+      const bool is_predicted = track.frame != from.frame && !motions.empty();
       found[i] = align(point, motion, is_predicted ? kPredictedLevel : top);
-      if (found[i].correlation < kMinCorrelation && is_predicted &&
-          (!getenv("V2") || motions.size() < atoi(getenv("V2")))) {
+      if (found[i].correlation < kMinCorrelation && is_predicted) {
         found[i] = align(point, motion, top);
       }
     }
