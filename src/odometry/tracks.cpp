@@ -65,6 +65,9 @@ void add_begun_points(const Matches& matches,
 }
 
 const TrackPoint* find_point(const TrackPoints& points, int track_id) {
+  if (points.empty() || track_id < points.front().track_id || track_id > points.back().track_id) {
+    return nullptr;  // most are: tracks are young or old
+  }
   const auto found =
       std::lower_bound(points.begin(), points.end(), TrackPoint{track_id, {}}, is_before);
   return found != points.end() && found->track_id == track_id ? &*found : nullptr;
