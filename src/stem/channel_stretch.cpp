@@ -16,6 +16,8 @@ constexpr int kSamplesWanted = 20000;
 // Of the larger limit's magnitude: below it, the spread is rounding.
 constexpr double kLeastContrast = 1e-5;
 constexpr double kMiddleGray = 128.0;
+// Of the limits' distance: the next frame's lie no further from this one's, nearly always.
+constexpr double kMargin = 0.1;
 
 /// Finite values on a grid of the channel, the same pixels in every frame.
 std::vector<float> sample(const cv::Mat& values) {
@@ -34,12 +36,18 @@ std::vector<float> sample(const cv::Mat& values) {
   return samples;
 }
 
-/// `samples` is reordered.
-double percentile(std::vector<float>& samples, double percent) {
+/// `samples` is reordered. Fast where few of them lie on the percentile's side of `bound`.
+double percentile(std::vector<float>& samples, double percent, double bound) {
   const double last = static_cast<double>(samples.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(std::lround(last * percent / 100.0));
   const auto at = samples.begin() + std::clamp<std::ptrdiff_t>(rank, 0, std::ssize(samples) - 1);
-  std::nth_element(samples.begin(), at, samples.end());
+  const auto split =
+      std::partition(samples.begin(), samples.end(), [&](float value) { return value < bound; });
+  if (at < split) {
+    std::nth_element(samples.begin(), at, split);
+  } else {
+    std::nth_element(split, at, samples.end());
+  }
   return *at;
 }
 
@@ -64,8 +72,9 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
                "a channel is one plane of floats");
   std::vector<float> samples = sample(channel.values);
   if (!samples.empty()) {
-    const double low = percentile(samples, options_.stretch_low_percent);
-    const double high = percentile(samples, options_.stretch_high_percent);
+    const double margin = kMargin * (high_ - low_);
+    const double low = percentile(samples, options_.stretch_low_percent, low_ + margin);
+    const double high = percentile(samples, options_.stretch_high_percent, high_ - margin);
     if (has_contrast(low, high)) {
       const double memory = has_limits_ ? options_.stretch_memory : 0.0;
       low_ = memory * low_ + (1.0 - memory) * low;
