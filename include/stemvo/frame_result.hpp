@@ -68,8 +68,8 @@ struct FrameResult {
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty
 };
 
-/// A landmark of the window of keyframes, where it was seen last: in the camera of that frame, in
-/// units of the trajectory. refined_trajectory()[frame] * position is its place in the world.
+/// A landmark that a window of keyframes held, in the camera of one of them that saw it, in units
+/// of the trajectory. refined_trajectory()[frame] * position is its place in the world.
 struct MapLandmark {
   int frame = 0;  ///< counted from the first one given
   Eigen::Vector3f position = Eigen::Vector3f::Zero();

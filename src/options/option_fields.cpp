@@ -97,7 +97,7 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
   return {
       {"odometry", "mode", enum_value(&o.mode), Rule::one_of({"two_frame", "map"}),
        "two_frame: motions of pairs of frames are chained; map: each frame is localized "
-       "against landmarks of the last keyframes, which are refined together"},
+       "against the landmarks of a window of keyframes, which are refined together"},
       {"odometry", "composition", enum_value(&o.composition), Rule::one_of({"right", "paper"}),
        "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)"},
       {"odometry", "gate", enum_value(&o.gate), Rule::one_of({"translation", "paper", "off"}),

@@ -86,6 +86,23 @@ std::string format_metrics_table(const MetricsReport& report) {
   return head(report) + '\n' + error_table(report);
 }
 
+/// The first count is of all tracks.
+static std::string format_tracks(const TimingReport& report) {
+  if (report.tracks.empty()) {
+    return "";
+  }
+  TextTable table("lrr");
+  table.add({"tracks, frame to frame", "a frame", "share %"});
+  table.rule();
+  for (const TrackCount& track : report.tracks) {
+    const auto count = static_cast<double>(track.count);
+    table.add(
+        {track.name, fmt::format("{:.1f}", count / static_cast<double>(report.num_frames)),
+         fmt::format("{:.1f}", 100.0 * count / static_cast<double>(report.tracks.front().count))});
+  }
+  return '\n' + table.str();
+}
+
 std::string format_timing_table(const TimingReport& report) {
   const auto num_frames = static_cast<double>(report.num_frames);
   const auto ms_per_frame = [&](double cpu_s) {
@@ -121,7 +138,7 @@ std::string format_timing_table(const TimingReport& report) {
   whole.add(
       {"speed, loop over frames", fmt::format("{:.1f} frames/s", num_frames / report.loop_s)});
   whole.add({"peak memory", fmt::format("{:.0f} MiB", report.peak_memory_mib)});
-  return table.str() + '\n' + whole.str();
+  return table.str() + '\n' + whole.str() + format_tracks(report);
 }
 
 }  // namespace stemvo

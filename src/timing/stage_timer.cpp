@@ -21,6 +21,10 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "two-view refinement", "localization", "window refinement", "road scale", "frame files",
     "result files"};
 
+constexpr std::array<std::string_view, kNumFates> kFates = {
+    "looked for", "out of view",           "not found",
+    "merged",     "off the epipolar line", "off the projection"};
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double read_ms(clockid_t clock) {
@@ -91,6 +95,17 @@ void StageRecorder::add_frame(std::chrono::steady_clock::time_point started) {
   last_frame_ = now;
 }
 
+void StageRecorder::add_tracks(TrackFate fate, std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  tracks_[static_cast<std::size_t>(fate)] += count;
+}
+
+void count_tracks(TrackFate fate, std::size_t count) {
+  if (StageRecorder* recorder = StageRecorder::active(); recorder != nullptr && count > 0) {
+    recorder->add_tracks(fate, count);
+  }
+}
+
 double StageRecorder::cpu_ms(Stage stage) const {
   const std::lock_guard lock(mutex_);
   return stages_[static_cast<std::size_t>(stage)].cpu_ms;
@@ -119,6 +134,9 @@ TimingReport StageRecorder::report() const {
   report.interval = summarize_ms(intervals_ms_);
   report.latency = summarize_ms(latencies_ms_);
   report.peak_memory_mib = peak_memory_mib();
+  for (std::size_t i = 0; tracks_.front() > 0 && i < tracks_.size(); ++i) {
+    report.tracks.push_back({std::string(kFates[i]), tracks_[i]});
+  }
   return report;
 }
 
