@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,54 +23,27 @@ struct WindowBundle {
   std::vector<int> track_ids;  ///< of its points
 };
 
-struct Sighting {
-  int pose;
-  Eigen::Vector2d uv;
-};
-
-/// Where a landmark is seen, oldest keyframe first. Tracks of a keyframe are ordered by id, and so
-/// are landmarks: `next` is where each keyframe's tracks were left.
-std::vector<Sighting> sightings_of(const Window& window,
-                                   int track_id,
-                                   std::vector<TrackPoints::const_iterator>& next) {
-  std::vector<Sighting> sightings;
-  for (std::size_t i = 0; i < next.size(); ++i) {
-    const TrackPoints& points = window.keyframes[i].points;
-    while (next[i] != points.end() && next[i]->track_id < track_id) {
-      ++next[i];
-    }
-    if (next[i] != points.end() && next[i]->track_id == track_id) {
-      sightings.push_back({static_cast<int>(i), next[i]->uv});
-    }
-  }
-  return sightings;
-}
-
 WindowBundle read_window(const Window& window,
                          const Camera& camera,
                          const BundleAdjustmentOptions& options) {
   WindowBundle read;
   Bundle& bundle = read.bundle;
   bundle.camera = camera;
-  std::vector<TrackPoints::const_iterator> next;
-  for (const Keyframe& keyframe : window.keyframes) {
-    bundle.camera_from_world.push_back(keyframe.world_from_camera.inverse());
-    next.push_back(keyframe.points.begin());
-  }
+  bundle.camera_from_world = poses_of(window);
+  SightingWalk walk(window);
   for (const auto& [track_id, point] : window.landmarks) {
-    const std::vector<Sighting> sightings = sightings_of(window, track_id, next);
+    const std::span<const Sighting> sightings = walk.seek(track_id);
     const bool is_in_front =
         std::all_of(sightings.begin(), sightings.end(), [&, &at = point](const Sighting& sighting) {
-          const auto pose = static_cast<std::size_t>(sighting.pose);
-          return (bundle.camera_from_world[pose] * at).z() > kMinDepth;
+          return (bundle.camera_from_world[sighting.keyframe] * at).z() > kMinDepth;
         });
     if (static_cast<int>(sightings.size()) < options.min_observations || !is_in_front ||
-        sightings.back().pose < options.num_fixed_keyframes) {  // it moves no pose
+        static_cast<int>(sightings.back().keyframe) < options.num_fixed_keyframes) {  // moves none
       continue;
     }
     for (const Sighting& sighting : sightings) {
-      bundle.observations.push_back(
-          {sighting.pose, static_cast<int>(bundle.points.size()), sighting.uv});
+      bundle.observations.push_back({static_cast<int>(sighting.keyframe),
+                                     static_cast<int>(bundle.points.size()), sighting.uv});
     }
     bundle.points.push_back(point);
     read.track_ids.push_back(track_id);

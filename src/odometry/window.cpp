@@ -19,49 +19,36 @@ constexpr int kMinConnection = 20;
 /// The last keyframes, which stay, the coming one among them.
 constexpr std::size_t kNumRecent = 4;
 
-struct Observation {
-  const Keyframe* keyframe;
-  const Eigen::Vector2d* uv;
-};
-
-std::vector<Observation> observations_of(const Window& window, int track_id) {
-  std::vector<Observation> observations;
-  for (const Keyframe& keyframe : window.keyframes) {
-    if (const TrackPoint* point = find_point(keyframe.points, track_id)) {
-      observations.push_back({&keyframe, &point->uv});
-    }
-  }
-  return observations;
-}
-
 bool is_seen_well(const Eigen::Vector3d& point_in_world,
-                  const std::vector<Observation>& observations,
+                  std::span<const Sighting> sightings,
+                  const std::vector<Rigid3>& poses,
                   const Camera& camera,
                   double bound_px) {
-  return std::all_of(observations.begin(), observations.end(), [&](const Observation& seen) {
-    return is_near(seen.keyframe->world_from_camera.inverse(), point_in_world, *seen.uv, camera,
-                   bound_px);
+  return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& seen) {
+    return is_near(poses[seen.keyframe], point_in_world, seen.uv, camera, bound_px);
   });
 }
 
-std::optional<Eigen::Vector3d> triangulate_track(const std::vector<Observation>& observations,
+std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
+                                                 std::span<const Sighting> sightings,
+                                                 const std::vector<Rigid3>& poses,
                                                  const Camera& camera,
                                                  const WindowOptions& options) {
-  if (observations.size() < 2) {
+  if (sightings.size() < 2) {
     return std::nullopt;
   }
-  const Observation& first = observations.front();
-  const Observation& last = observations.back();
-  const Rigid3 last_from_first =
-      last.keyframe->world_from_camera.inverse() * first.keyframe->world_from_camera;
+  const Sighting& first = sightings.front();
+  const Sighting& last = sightings.back();
+  const Rigid3& world_from_first = window.keyframes[first.keyframe].world_from_camera;
   const TriangulatedPoint point =
-      triangulate(last_from_first, camera.normalize(*first.uv), camera.normalize(*last.uv));
+      triangulate(poses[last.keyframe] * world_from_first, camera.normalize(first.uv),
+                  camera.normalize(last.uv));
   const double max_cos = std::cos(options.min_parallax_deg * std::numbers::pi / 180.0);
   if (!point.finite || !(point.cos_parallax < max_cos)) {
     return std::nullopt;
   }
-  const Eigen::Vector3d in_world = first.keyframe->world_from_camera * point.in_prev;
-  return is_seen_well(in_world, observations, camera, options.max_reprojection_error_px)
+  const Eigen::Vector3d in_world = world_from_first * point.in_prev;
+  return is_seen_well(in_world, sightings, poses, camera, options.max_reprojection_error_px)
              ? std::optional(in_world)
              : std::nullopt;
 }
@@ -83,6 +70,35 @@ void drop(Window& window, std::size_t i) {
 }
 
 }  // namespace
+
+SightingWalk::SightingWalk(const Window& window) : window_(window) {
+  for (const Keyframe& keyframe : window.keyframes) {
+    next_.push_back(keyframe.points.begin());
+  }
+}
+
+std::span<const Sighting> SightingWalk::seek(int track_id) {
+  found_.clear();
+  for (std::size_t i = 0; i < next_.size(); ++i) {
+    const TrackPoints& points = window_.keyframes[i].points;
+    while (next_[i] != points.end() && next_[i]->track_id < track_id) {
+      ++next_[i];
+    }
+    if (next_[i] != points.end() && next_[i]->track_id == track_id) {
+      found_.push_back({i, next_[i]->uv});
+    }
+  }
+  return found_;
+}
+
+std::vector<Rigid3> poses_of(const Window& window) {
+  std::vector<Rigid3> poses;
+  poses.reserve(window.keyframes.size());
+  for (const Keyframe& keyframe : window.keyframes) {
+    poses.push_back(keyframe.world_from_camera.inverse());
+  }
+  return poses;
+}
 
 std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
   const std::deque<Keyframe>& keyframes = window.keyframes;
@@ -128,21 +144,25 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
   if (window.keyframes.size() < 2) {
     return;
   }
+  const std::vector<Rigid3> poses = poses_of(window);
+  SightingWalk walk(window);
   for (const TrackPoint& point : window.keyframes.back().points) {
     if (window.landmarks.contains(point.track_id)) {
       continue;
     }
     if (const auto landmark =
-            triangulate_track(observations_of(window, point.track_id), camera, options)) {
+            triangulate_track(window, walk.seek(point.track_id), poses, camera, options)) {
       window.landmarks.emplace(point.track_id, *landmark);
     }
   }
 }
 
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
+  const std::vector<Rigid3> poses = poses_of(window);
+  SightingWalk walk(window);
   std::erase_if(window.landmarks, [&](const auto& landmark) {
     const auto& [track_id, point_in_world] = landmark;
-    return !is_seen_well(point_in_world, observations_of(window, track_id), camera,
+    return !is_seen_well(point_in_world, walk.seek(track_id), poses, camera,
                          options.max_reprojection_error_px);
   });
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <map>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,6 +43,29 @@ struct WindowOptions {
   double min_parallax_deg = 0.1;
   double max_reprojection_error_px = 4.0;  ///< of a landmark in any keyframe
 };
+
+/// A keyframe's view of a track.
+struct Sighting {
+  std::size_t keyframe;  ///< its place in the window
+  Eigen::Vector2d uv;
+};
+
+/// Looks tracks up in all keyframes of a window, in the order of their ids: every keyframe's points
+/// are walked over once.
+class SightingWalk {
+ public:
+  explicit SightingWalk(const Window& window);
+  /// Oldest keyframe first; valid until the next call, whose id is higher.
+  [[nodiscard]] std::span<const Sighting> seek(int track_id);
+
+ private:
+  const Window& window_;
+  std::vector<TrackPoints::const_iterator> next_;  ///< of each keyframe
+  std::vector<Sighting> found_;
+};
+
+/// camera_from_world of the keyframes.
+[[nodiscard]] std::vector<Rigid3> poses_of(const Window& window);
 
 /// A landmark is where the camera sees it: in front of it and within `bound_px` of `uv`.
 [[nodiscard]] inline bool is_near(const Rigid3& camera_from_world,
