@@ -92,11 +92,11 @@ void PointFrontEnd::keep(const std::vector<char>& is_good) {
 }
 
 Matches PointFrontEnd::track(const View& from, View& to) {
-  const StageTimer timer(Stage::kTracking);
   Matches matches;
   matches.prev_frame = from.frame;
   matches.num_keypoints = static_cast<int>(from.points.size());
-  const std::vector<std::optional<cv::Point2f>> found = track_points(from, to);
+  const std::vector<std::optional<cv::Point2f>> found =
+      timed(Stage::kTracking, [&] { return track_points(from, to); });
   if (StageRecorder::active() != nullptr) {
     count_lost(from, found);
   }

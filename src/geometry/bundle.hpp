@@ -27,7 +27,7 @@ struct Bundle : BundleState {
     int point = 0;
     Eigen::Vector2d uv;
   };
-  std::vector<Observation> observations;  ///< ordered by point
+  std::vector<Observation> observations;  ///< ordered by point, then by pose: one of each
 };
 
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.

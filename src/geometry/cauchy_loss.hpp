@@ -11,11 +11,7 @@ class CauchyLoss {
  public:
   explicit CauchyLoss(double scale) : squared_scale_(scale * scale) {}
 
-  /// rho'(r^2): of a term in the normal equations.
-  [[nodiscard]] double weight(double squared_residual) const {
-    return 1.0 / (1.0 + squared_residual / squared_scale_);
-  }
-  /// Adds a term; returns its weight.
+  /// Adds a term; returns rho'(r^2), its weight in the normal equations.
   double add(double squared_residual) {
     const double argument = 1.0 + squared_residual / squared_scale_;
     product_ *= argument;

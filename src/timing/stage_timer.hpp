@@ -36,8 +36,8 @@ inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;
 
 /// What becomes of a track from one frame to the next.
 enum class TrackFate {
-  kLookedFor,      ///< all of them
-  kOutOfView,      ///< its neighbours left the image there
+  kLookedFor,      ///< all of them; again, where the last good image is tried
+  kOutOfView,      ///< its nearest neighbour's motion takes it out of the image
   kNotFound,       ///< the image is not like the patch
   kMerged,         ///< ran into an older one
   kOffEpipolar,    ///< a point that is no landmark yet, off its epipolar line

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -196,6 +197,7 @@ TEST(PatchKernels, EveryInstructionSetGivesThePlainValues) {
   for (const PatchKernels* kernels : {&portable_patch_kernels(), &patch_kernels()}) {
     for (const Similarity& warp : {Similarity{60.3F, 70.8F, 1.1F, 0.2F},
                                    {0.0F, 0.0F, 1.0F, 0.0F},
+                                   {60.3F, 70.9F, 1.0F, 0.0F},
                                    {319.0F, 239.0F, 0.8F, -0.3F}}) {
       FineValues values;
       kernels->sample_fine(image, warp, values);
@@ -228,6 +230,18 @@ TEST(PatchKernels, EveryInstructionSetGivesThePlainValues) {
     }
     EXPECT_NEAR(sums[0], sum, 1e-5 * sum);
     EXPECT_NEAR(sums[1], squares, 1e-5 * squares);
+    FineColumns columns{};
+    columns[2] = coarse;
+    FineValues ramp;
+    std::iota(ramp.begin(), ramp.end(), 0.0F);
+    float fine[7];
+    kernels->fine_sums(coarse, columns, ramp, fine);
+    EXPECT_EQ(fine[0], 0.0F);
+    EXPECT_NEAR(fine[2], squares, 1e-5 * squares);
+    EXPECT_NEAR(fine[4], sum, 1e-5 * sum);
+    EXPECT_NEAR(fine[5], squares, 1e-5 * squares);
+    const double product = std::inner_product(coarse.begin(), coarse.end(), ramp.begin(), 0.0);
+    EXPECT_NEAR(fine[6], product, 1e-5 * product);
   }
 }
 

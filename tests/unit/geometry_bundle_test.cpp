@@ -128,7 +128,6 @@ TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
   EXPECT_EQ(bundle.camera_from_world[4].translation, before.camera_from_world[4].translation);
 }
 
-/// Turns tell the camera: planted changes are found within their sigmas, and those are small.
 TEST(CameraChange, ItsPartsMakeItUp) {
   CameraChange total;
   CameraChange first;
@@ -139,6 +138,7 @@ TEST(CameraChange, ItsPartsMakeItUp) {
   EXPECT_NEAR((1.0 + first[2]) * (1.0 + rest[2]), 1.1, 1e-12);
 }
 
+/// Turns tell the camera: planted changes are found within their sigmas, and those are small.
 TEST(Bundle, FindsAPlantedCamera) {
   std::vector<Rigid3> path(1);
   for (int i = 1; i < 14; ++i) {

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "odometry/road/estimators.hpp"
+#include "odometry/road/region.hpp"
 #include "support/road_scene.hpp"
 
 namespace stemvo {
@@ -135,6 +136,24 @@ TEST(RoadDense, SaysWhyThereIsNoMeasurement) {
   const RoadImage above = make_road_image({sky, {}}, RoadScene{}.camera);
   EXPECT_EQ(measure_dense({above, above, road.cur_from_prev, near(1.0), options}).reason,
             "the image ends above the road");
+}
+
+/// Too few for the coarse grid: that must not be the end.
+TEST(RoadDense, ANarrowStripIsEnoughWhereTheScaleIsKnown) {
+  RoadOptions options;
+  options.half_width_m = 0.1;
+  const RoadPair pair = render_pair(RoadScene{}, 0.8);
+  const RoadPrior prior = near(1.02);
+  const RoadImage::Level& level = pair.cur.full;
+  const std::size_t num_pixels = RoadRegion(pair.cur_from_prev, prior, options)
+                                     .samples(level.camera, level.first_row, 1, 1)
+                                     .size();
+  ASSERT_GT(num_pixels, 600U);
+  ASSERT_LT(num_pixels, 2400U);
+  const RoadMeasurement road =
+      measure_dense({pair.prev, pair.cur, pair.cur_from_prev, prior, options});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.03);
 }
 
 TEST(RoadDense, AnImageOfHalfTheSizeGivesTheSameScale) {

@@ -19,7 +19,7 @@ constexpr int kMinTiles = 6;
 constexpr double kMinCorrelation = 0.25;
 constexpr double kMaxSigma = 0.2;
 constexpr std::size_t kMinSamples = 600;
-/// Fewer than this at every second pixel: take every pixel.
+/// Fewer than this where pixels are left out: take every pixel.
 constexpr std::size_t kFewSamples = 2400;
 constexpr int kMaxIterations = 5;  ///< per grid
 constexpr double kCoarse = 5.0;    ///< times the last grid's bound of convergence
@@ -212,10 +212,10 @@ double total_correlation(const Tiles& tiles) {
   return sum.correlation();
 }
 
-/// Where the images are compared, the coarsest first: at half size, at every second pixel, at all.
+/// Where the images are compared, the coarsest first.
 struct Grid {
-  const RoadImage::Level& prev;
-  const RoadImage::Level& cur;
+  RoadImage::Level prev;
+  RoadImage::Level cur;
   std::vector<RoadRegion::Sample> samples;
 };
 
@@ -245,23 +245,23 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
   RoadMatrix covariance = RoadMatrix::Zero();
   double correlation = 0.0;
   for (const Grid& grid : grids) {
-    if (grid.samples.empty()) {
-      continue;
-    }
+    const bool is_last = &grid == &grids.back();
+    const RoadWarp before = warp;
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       const Tiles tiles = align_road(grid.prev, grid.cur, grid.samples, warp);
       RoadNormal normal;
-      if (join(tiles, normal) < kMinTiles) {
-        return no_road("nothing moves like a road");
-      }
+      const bool has_tiles = join(tiles, normal) >= kMinTiles;
       normal.add_prior(warp, step.prior, step.options.rotation_sigma_rad);
-      if (!normal.step(warp)) {
-        return no_road("the alignment diverged");
+      if (!has_tiles || !normal.step(warp)) {
+        if (is_last) {
+          return no_road(has_tiles ? "the alignment diverged" : "nothing moves like a road");
+        }
+        warp = before;  // too few samples, perhaps: the next grid has more
+        break;
       }
       correlation = total_correlation(tiles);
       covariance = normal.covariance;
-      const double bound = (&grid == &grids.back() ? 1.0 : kCoarse) * step.options.convergence;
-      if (normal.relative_change < bound) {
+      if (normal.relative_change < (is_last ? 1.0 : kCoarse) * step.options.convergence) {
         break;
       }
     }
@@ -282,27 +282,28 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     return no_road("the image ends above the road");
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
-  const auto grid = [&](const RoadImage::Level& prev, const RoadImage::Level& cur, int every) {
-    return Grid{prev, cur, region.samples(cur.camera, cur.first_row, every)};
+  const auto grid = [&](const RoadImage::Level& prev, const RoadImage::Level& cur, int step_u,
+                        int step_v) {
+    return Grid{prev, cur, region.samples(cur.camera, cur.first_row, step_u, step_v)};
   };
   std::vector<Grid> grids;
   RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
-  RoadImage::Level half_prev;
-  RoadImage::Level half_cur;
   // A scale that is known well starts within a pixel: half size is for the search.
   if (step.prior.log_scale_sigma > kSearchSigma) {
-    half_prev = make_half_level(step.prev);
-    half_cur = make_half_level(step.cur);
+    const RoadImage::Level half_prev = make_half_level(step.prev);
+    const RoadImage::Level half_cur = make_half_level(step.cur);
     if (half_prev.values.empty() || half_cur.values.empty()) {
       return no_road("the image ends above the road");
     }
-    const Grid sparse = grid(half_prev, half_cur, 2);
-    grids.push_back(sparse.samples.size() < kFewSamples ? grid(half_prev, half_cur, 1) : sparse);
+    const Grid sparse = grid(half_prev, half_cur, 2, 2);
+    grids.push_back(sparse.samples.size() < kFewSamples ? grid(half_prev, half_cur, 1, 1) : sparse);
     warp.plane = search_plane(step, grids.back(), warp);
   }
-  grids.push_back(grid(step.prev.full, step.cur.full, 2));
+  grids.push_back(grid(step.prev.full, step.cur.full, 4, 2));
+  // Texture is stretched across the image: rows tell more than columns.
+  grids.push_back(grid(step.prev.full, step.cur.full, 2, 1));
   if (grids.back().samples.size() < kFewSamples) {
-    grids.push_back(grid(step.prev.full, step.cur.full, 1));
+    grids.back() = grid(step.prev.full, step.cur.full, 1, 1);
   }
   if (grids.back().samples.size() < kMinSamples) {
     return no_road("too little road in sight");

@@ -47,7 +47,7 @@ struct Strip {
 Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptions& options) {
   Strip strip;
   const std::vector<RoadRegion::Sample> samples =
-      region.samples(cur.full.camera, cur.full.first_row, 4);
+      region.samples(cur.full.camera, cur.full.first_row, 4, 4);
   cv::Mat mask = cv::Mat::zeros(cur.pixels.size(), CV_8U);
   cv::Point low(cur.pixels.cols, cur.pixels.rows);
   cv::Point high(0, 0);

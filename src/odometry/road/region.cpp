@@ -63,7 +63,8 @@ Eigen::Vector2d RoadRegion::on_ground(const Eigen::Vector2d& xy) const {
 
 std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
                                                     int first_row,
-                                                    int step) const {
+                                                    int step_u,
+                                                    int step_v) const {
   std::vector<Sample> result;
   const int last_row = camera.height_px - kBorder_px;
   const double far_row = camera.cy_px + camera.fy_px * (1.0 / far_m_ - plane_.z()) / plane_.y();
@@ -72,20 +73,20 @@ std::vector<RoadRegion::Sample> RoadRegion::samples(const Camera& camera,
   }
   const int row0 = std::max(first_row + kBorder_px, static_cast<int>(far_row));
   const int tile_rows = kTiles / kTileColumns;
-  for (int v = row0; v < last_row; v += step) {
+  for (int v = row0; v < last_row; v += step_v) {
     const int tile_row = tile_rows * (v - row0) / std::max(1, last_row - row0);
     const auto ground_at = [&](int u) { return on_ground(camera.normalize({u, v})); };
     int first = camera.width_px;
     int last = -1;
-    for (int u = kBorder_px; u < camera.width_px - kBorder_px; u += kCoarse * step) {
+    for (int u = kBorder_px; u < camera.width_px - kBorder_px; u += kCoarse * step_u) {
       if (contains(ground_at(u))) {
         first = std::min(first, u);
         last = u;
       }
     }
-    first = std::max(kBorder_px, first - kCoarse * step);
-    last = std::min(camera.width_px - kBorder_px, last + kCoarse * step);
-    for (int u = first; u < last; u += step) {
+    first = std::max(kBorder_px, first - kCoarse * step_u);
+    last = std::min(camera.width_px - kBorder_px, last + kCoarse * step_u);
+    for (int u = first; u < last; u += step_u) {
       const Eigen::Vector2d ground = ground_at(u);
       if (!contains(ground)) {
         continue;

@@ -22,8 +22,12 @@ class RoadRegion {
     int v = 0;
     int tile = 0;
   };
-  /// Every `step`-th pixel of the strip, at rows >= first_row; tiles are cells of the strip.
-  [[nodiscard]] std::vector<Sample> samples(const Camera& camera, int first_row, int step) const;
+  /// Every `step_u`-th pixel of every `step_v`-th row of the strip, at rows >= first_row; tiles are
+  /// cells of the strip.
+  [[nodiscard]] std::vector<Sample> samples(const Camera& camera,
+                                            int first_row,
+                                            int step_u,
+                                            int step_v) const;
   static constexpr int kTiles = 48;
   static constexpr int kTileColumns = 4;
 
