@@ -56,6 +56,13 @@ TEST(SelfCalibration, ARightCameraIsKept) {
   EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
 }
 
+/// Drives miss it by more than their runs' sigmas.
+TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) {
+  const SelfCalibration calibration(testing::kitti_camera(), CameraRefinement::kAll);
+  EXPECT_NEAR(calibration.estimate()->sigma[2], 3.0 * 0.03, 1e-12);  // of the prior
+  EXPECT_NEAR(calibration.estimate()->sigma[0], 30.0, 1e-9);
+}
+
 TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   constexpr int kLength = SelfCalibration::kNumKeyframes;
   const DriveTracks drive(kLength, 0.1, 5);
