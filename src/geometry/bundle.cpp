@@ -12,6 +12,7 @@
 #include <Eigen/LU>
 
 #include "geometry/cauchy_loss.hpp"
+#include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
@@ -321,6 +322,12 @@ double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reproje
 }  // namespace
 
 BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
+  const auto place = [](const Bundle::Observation& observation) {
+    return std::pair(observation.point, observation.pose);
+  };
+  STEMVO_CHECK(std::ranges::adjacent_find(bundle.observations, std::ranges::greater_equal{},
+                                          place) == bundle.observations.end(),
+               "observations are ordered by point, then by pose, and none comes twice");
   BundleResult result;
   const auto prior_cost = [&](const CameraChange& change) {
     const CameraChange off = options.camera ? CameraChange(change - options.camera->mean) : change;

@@ -121,21 +121,27 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
   return leaving;
 }
 
+std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Keyframe& coming) {
+  const Keyframe& keyframe = window.keyframes[leaving];
+  std::vector<int> lost;
+  for (const TrackPoint& point : keyframe.points) {
+    const auto sees = [&](const Keyframe& other) {
+      return &other != &keyframe && find_point(other.points, point.track_id) != nullptr;
+    };
+    if (!sees(coming) && std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
+      lost.push_back(point.track_id);
+    }
+  }
+  return lost;
+}
+
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options) {
   if (static_cast<int>(window.keyframes.size()) >= options.num_keyframes) {
     const std::size_t leaving = leaving_keyframe(window, keyframe);
-    const TrackPoints lost = std::move(window.keyframes[leaving].points);
-    drop(window, leaving);
-    for (const TrackPoint& point : lost) {
-      const auto sees = [&](const Keyframe& other) {
-        return find_point(other.points, point.track_id) != nullptr;
-      };
-      const auto landmark = window.landmarks.find(point.track_id);
-      if (landmark != window.landmarks.end() && !sees(keyframe) &&
-          std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
-        window.landmarks.erase(landmark);
-      }
+    for (const int track_id : lost_tracks(window, leaving, keyframe)) {
+      window.landmarks.erase(track_id);
     }
+    drop(window, leaving);
   }
   window.keyframes.push_back(std::move(keyframe));
 }

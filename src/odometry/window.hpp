@@ -83,6 +83,11 @@ class SightingWalk {
 /// (One of less than 5 keyframes always drops the oldest.)
 [[nodiscard]] std::size_t leaving_keyframe(const Window& window, const Keyframe& coming);
 
+/// Tracks of the leaving keyframe that neither another one nor the coming one sees.
+[[nodiscard]] std::vector<int> lost_tracks(const Window& window,
+                                           std::size_t leaving,
+                                           const Keyframe& coming);
+
 /// Appends the keyframe to the window. A full one first drops its leaving keyframe, which becomes a
 /// follower of the one before it, and landmarks that no keyframe sees any more.
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);

@@ -83,13 +83,8 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
   if (leaving == 0) {
     keep_motions(keyframe, window.keyframes.size() > 1 ? window.keyframes[1] : coming);
   }
-  for (const TrackPoint& observation : keyframe.points) {
-    const auto sees = [&](const Keyframe& other) {
-      return &other != &keyframe && find_point(other.points, observation.track_id) != nullptr;
-    };
-    if (!sees(coming) && std::none_of(window.keyframes.begin(), window.keyframes.end(), sees)) {
-      keep(window, keyframe, observation.track_id);
-    }
+  for (const int track_id : lost_tracks(window, leaving, coming)) {
+    keep(window, keyframe, track_id);
   }
 }
 

@@ -77,17 +77,8 @@ std::string error_table(const MetricsReport& report) {
   return table.str();
 }
 
-}  // namespace
-
-std::string format_metrics_table(const MetricsReport& report) {
-  if (!report.metrics) {
-    return head(report) + "\nNo ground truth: the errors are not known.\n";
-  }
-  return head(report) + '\n' + error_table(report);
-}
-
 /// The first count is of all tracks.
-static std::string format_tracks(const TimingReport& report) {
+std::string format_tracks(const TimingReport& report) {
   if (report.tracks.empty()) {
     return "";
   }
@@ -101,6 +92,15 @@ static std::string format_tracks(const TimingReport& report) {
          fmt::format("{:.1f}", 100.0 * count / static_cast<double>(report.tracks.front().count))});
   }
   return '\n' + table.str();
+}
+
+}  // namespace
+
+std::string format_metrics_table(const MetricsReport& report) {
+  if (!report.metrics) {
+    return head(report) + "\nNo ground truth: the errors are not known.\n";
+  }
+  return head(report) + '\n' + error_table(report);
 }
 
 std::string format_timing_table(const TimingReport& report) {

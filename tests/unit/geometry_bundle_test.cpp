@@ -128,6 +128,13 @@ TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
   EXPECT_EQ(bundle.camera_from_world[4].translation, before.camera_from_world[4].translation);
 }
 
+TEST(Bundle, ObservationsOutOfOrderAreRefused) {
+  const DriveTracks drive(6, 0.0, 7);
+  Bundle bundle = bundle_of(drive, 1.0);
+  std::swap(bundle.observations[0], bundle.observations[1]);
+  EXPECT_ANY_THROW(adjust_bundle(bundle, {}));
+}
+
 TEST(CameraChange, ItsPartsMakeItUp) {
   CameraChange total;
   CameraChange first;
@@ -160,8 +167,13 @@ TEST(Bundle, FindsAPlantedCamera) {
   options.camera =
       CameraPrior{CameraChange::Zero(),
                   kNoiseSq * sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
+  Bundle soon = bundle;
   const BundleResult result = adjust_bundle(bundle, options);
   ASSERT_TRUE(result.is_usable);
+  options.max_iterations = 6;  // enough, though the data hardly pull at the camera
+  ASSERT_TRUE(adjust_bundle(soon, options).is_usable);
+  EXPECT_NEAR(soon.camera.cx_px, bundle.camera.cx_px, 0.005);
+  EXPECT_NEAR(soon.camera.cy_px, bundle.camera.cy_px, 0.005);
   EXPECT_NEAR(given.cx_px + result.camera_change[0], bundle.camera.cx_px, 1e-9);
   EXPECT_NEAR(given.fx_px * (1.0 + result.camera_change[2]), bundle.camera.fx_px, 1e-9);
   EXPECT_NEAR(bundle.camera.cx_px, drive.camera.cx_px, 0.3);

@@ -20,7 +20,7 @@ class RunError(Exception):
 class Result:
     metrics: dict  # metrics.json
     memory_mb: tuple  # largest resident set in the first half of the frames, in the second, and after the last
-    memory_ratio: float  # median of the resident set in the second half over that in the first: peaks come and go
+    memory_ratio: float  # median of the resident set in the second half over that in the second quarter: peaks come and go
     quarters_ms: list  # mean time per frame of each quarter, by the clock
     quarters_cpu_ms: list  # mean processor time per frame of each quarter, of all threads
 
@@ -72,11 +72,15 @@ class Watched:
     """Samples of a running process."""
 
     memory_samples_mb: tuple = dataclasses.field(default_factory=lambda: ([], [], []))
+    second_quarter_mb: list = dataclasses.field(default_factory=list)  # the program has started, the queues are full
     marks: list = dataclasses.field(default_factory=list)  # (frames, seconds, processor seconds) at the quarters
 
     def add(self, pid, rows, num_frames):
         part = 2 if rows >= num_frames else 1 if 2 * rows >= num_frames else 0
-        self.memory_samples_mb[part].append(resident_mb(pid))
+        memory_mb = resident_mb(pid)
+        self.memory_samples_mb[part].append(memory_mb)
+        if part == 0 and 4 * rows >= num_frames:
+            self.second_quarter_mb.append(memory_mb)
         if len(self.marks) < 5 and (rows > 0 or self.marks) and 4 * rows >= len(self.marks) * num_frames:
             self.marks.append((rows, time.monotonic(), processor_s(pid)))
 
@@ -86,8 +90,7 @@ class Watched:
 
     @property
     def memory_ratio(self):
-        first, second = map(statistics.median, self.memory_samples_mb[:2])
-        return second / first
+        return statistics.median(self.memory_samples_mb[1]) / statistics.median(self.second_quarter_mb)
 
     def quarters_ms(self, clock):
         """Per frame; `clock` 1: of the wall, 2: of the processor. None where the run was too short to tell."""
@@ -125,7 +128,7 @@ def run(program, sequence, out, num_frames, options):
         text = " ".join(messages.read().split())
     if process.returncode != 0:
         raise RunError(text or f"{program}: exit code {process.returncode}")
-    if not watched.memory_mb[0] or not watched.memory_mb[1]:
+    if not watched.second_quarter_mb or not watched.memory_mb[1]:
         raise RunError(f"{out}: the run was too short to sample its memory")
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     return Result(metrics, watched.memory_mb, watched.memory_ratio, watched.quarters_ms(1), watched.quarters_ms(2))
