@@ -24,6 +24,11 @@ void catch_interrupts() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction before = {};
+  sigaction(SIGHUP, nullptr, &before);
+  if (before.sa_handler != SIG_IGN) {     // as nohup asks for
+    sigaction(SIGHUP, &action, nullptr);  // a connection that is lost
+  }
 }
 
 bool is_interrupted() { return interrupted; }

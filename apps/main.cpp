@@ -63,7 +63,7 @@ int run_program(int argc, char** argv) {
       },
       "Print the default configuration, every key explained");
   for (const auto add : {add_run, add_evaluate, add_channel, add_synth, add_calibrate, add_check,
-                         add_models, add_benchmark, add_search}) {
+                         add_models, add_benchmark, add_robustness, add_search}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
   }
@@ -75,8 +75,8 @@ int run_program(int argc, char** argv) {
   }
   if (!action) {
     print_error(
-        "expected a command: run, evaluate, channel, synth, calibrate, check, models, benchmark or "
-        "search (see 'stemvo --help')");
+        "expected a command: run, evaluate, channel, synth, calibrate, check, models, benchmark, "
+        "robustness or search (see 'stemvo --help')");
     return kExitUsage;
   }
   const Expected<int> exit_code = action();

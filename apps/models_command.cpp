@@ -15,7 +15,8 @@ namespace {
 
 constexpr const char* kFooter =
     R"(A model is chosen by its name (--set stem.model=NAME) or by the path of an .onnx file with a
-manifest.yaml beside it. Two need no file: gray, and input_layer (filters 0, 1, 2 = R, G, B).)";
+manifest.yaml beside it. Four need no file, to compare with: gray, input_layer (filters 0, 1, 2 =
+R, G, B), log (Laplacian of Gaussian) and census (gray levels against their surroundings').)";
 
 std::string describe(const ModelEntry& entry, const Status& status) {
   std::string text = fmt::format("{}: {}\n", entry.name, status ? "sound" : "NOT SOUND");

@@ -44,14 +44,16 @@ struct StemNetwork {
 enum class Upsample {
   kAuto,
   kBicubic,  ///< the input's
-  kHalf,     ///< half the input's, where the channel is coarser than that; else the channel's
+  kHalf,     ///< half the input's; the channel's where its sampling is odd and above 1
   kNative,   ///< the channel's
 };
 
 /// Keys `stem.*`: the filter channel a frame is seen through.
 struct StemOptions {
-  /// `default` (built in), `gray` or `input_layer` (filters 0, 1, 2 = R, G, B). Any other name, or
-  /// path, needs `network`, which the program takes from a manifest; `default` may have one.
+  /// `default` (built in), or one made by hand, to compare with: `gray`, `input_layer` (filters 0,
+  /// 1, 2 = R, G, B), `log` (Laplacian of Gaussian), `census` (gray levels against their
+  /// surroundings'). Any other name, or path, needs `network`, which the program takes from a
+  /// manifest; `default` may have one.
   std::string model = "default";
   std::string layer = "first";  ///< of a model that has several in its manifest
   std::optional<StemNetwork> network;

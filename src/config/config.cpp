@@ -25,7 +25,7 @@ std::vector<Field> fields_of(Config& config) {
   fields.insert(
       fields.end() - 1,  // the seed is last
       {"evaluation", "segment_lengths_m", &config.evaluation.segment_lengths_m,
-       options::Rule::above(0.0),
+       options::Rule::between(0.01, 1e6),
        "of t_rel and r_rel; []: 100, 200, .. 800, or 10, 20, .. 50 where the path is under "
        "100 m"});
   return fields;

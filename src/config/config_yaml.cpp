@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <sstream>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/eventhandler.h>
 
 namespace stemvo::config {
 namespace {
@@ -259,14 +261,48 @@ std::string read_value(const YAML::Node& node, const Field& field) {
   return problem.empty() ? violation_of(field) : problem;
 }
 
+namespace {
+
+/// Where documents begin.
+class DocumentMarks final : public YAML::EventHandler {
+ public:
+  std::vector<int> lines;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&,
+                const std::string&,
+                YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&,
+                       const std::string&,
+                       YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&,
+                  const std::string&,
+                  YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+}  // namespace
+
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) {
-      return fail(fmt::format("{}:{}: expected one YAML document, found {}", source,
-                              line_of(documents[1]), documents.size()));
+    // YAML::LoadAll does not end where a comma stands behind the document.
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    DocumentMarks marks;
+    while (marks.lines.size() < 2 && parser.HandleNextDocument(marks)) {
     }
-    return documents.empty() ? YAML::Node() : documents.front();
+    if (marks.lines.size() > 1) {
+      return fail(fmt::format("{}:{}: not YAML: expected one document, found more behind it",
+                              source, marks.lines[1]));
+    }
+    return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     return fail(fmt::format("{}:{}: not YAML: {}", source, error.mark.line + 1, error.msg));
   }

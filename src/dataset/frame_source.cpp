@@ -44,7 +44,7 @@ Error refuse(const fs::path& path) {
 
 Expected<cv::Mat> FrameSource::read(std::size_t index) const {
   STEMVO_CHECK(index < size(), "frame index inside the range");
-  return frames_.read(frames_.files[index]);
+  return frames_.read(index);
 }
 
 Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {

@@ -42,8 +42,8 @@ struct FrameList {
   /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
-  /// File -> frame; several threads may call it.
-  std::function<Expected<cv::Mat>(const std::filesystem::path&)> read;
+  /// Index in `files` -> frame; several threads may call it.
+  std::function<Expected<cv::Mat>(std::size_t)> read;
 };
 
 /// Frames of one camera, in order; what is known of them as in FrameList.
@@ -71,6 +71,7 @@ class FrameSource {
   [[nodiscard]] const std::filesystem::path& file(std::size_t index) const {
     return frames_.files[index];
   }
+  [[nodiscard]] const FrameList& frames() const { return frames_; }
 
   /// Frame `index` in [0, size()): CV_8UC1, or CV_8UC3 in RGB order, of the camera's size; all
   /// frames of a source alike. May be called by several threads at a time. Error (file named):

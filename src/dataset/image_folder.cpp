@@ -92,7 +92,9 @@ Expected<FrameSource> open_image_folder(const FrameSourceRequest& request) {
   frames->given_calibration = request.camera_file;
   frames->camera = undistortion->camera();
   frames->camera_height_m = camera_file->camera_height_m;
-  frames->read = [is_color = *is_color, undistortion = *undistortion](const fs::path& file) {
+  frames->read = [files = frames->files, is_color = *is_color,
+                  undistortion = *undistortion](std::size_t index) {
+    const fs::path& file = files[index];
     return check_size(file, io::read_image(file, is_color), undistortion.camera())
         .map([&](const cv::Mat& image) { return undistortion.apply(image); });
   };

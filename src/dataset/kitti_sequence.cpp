@@ -139,8 +139,8 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                               status.error().message));
     }
   }
-  frames.read = [is_color, sized = frames.camera](const fs::path& file) {
-    return dataset::check_size(file, io::read_png(file, is_color), sized);
+  frames.read = [files = frames.files, is_color, sized = frames.camera](std::size_t index) {
+    return dataset::check_size(files[index], io::read_png(files[index], is_color), sized);
   };
   return KittiSequence(std::move(frames));
 }

@@ -92,24 +92,18 @@ void add_segment_errors(std::span<const Rigid3> estimate,
                         std::span<const Rigid3> ground_truth,
                         std::size_t first_frame_step,
                         Metrics& metrics) {
-  const std::vector<double> distances = distances_m(ground_truth);
-  double t_sum = 0.0;
-  double r_sum_rad_per_m = 0.0;
-  for (std::size_t first = 0; first < ground_truth.size(); first += first_frame_step) {
-    for (const double length_m : metrics.segment_lengths_m) {
-      const std::size_t last = segment_end(distances, first, length_m);
-      if (last == distances.size()) {
-        continue;
-      }
-      const Rigid3 error = motion_error(estimate, ground_truth, first, last);
-      t_sum += error.translation.norm() / length_m;
-      r_sum_rad_per_m += error.angle_rad() / length_m;
-      ++metrics.num_segments;
+  const std::vector<SegmentError> segments =
+      segment_errors(estimate, ground_truth, metrics.segment_lengths_m, first_frame_step);
+  metrics.num_segments = static_cast<int>(segments.size());
+  if (!segments.empty()) {
+    double t_sum = 0.0;
+    double r_sum = 0.0;
+    for (const SegmentError& segment : segments) {
+      t_sum += segment.t_percent;
+      r_sum += segment.r_deg_per_100m;
     }
-  }
-  if (metrics.num_segments > 0) {
-    metrics.t_rel_percent = 100.0 * t_sum / metrics.num_segments;
-    metrics.r_rel_deg_per_100m = 100.0 * kDegPerRad * r_sum_rad_per_m / metrics.num_segments;
+    metrics.t_rel_percent = t_sum / metrics.num_segments;
+    metrics.r_rel_deg_per_100m = r_sum / metrics.num_segments;
   }
 }
 
@@ -124,6 +118,27 @@ std::vector<double> segment_lengths(const EvaluationOptions& options, double pat
 }
 
 }  // namespace
+
+std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
+                                         std::span<const Rigid3> ground_truth,
+                                         std::span<const double> lengths_m,
+                                         std::size_t first_frame_step) {
+  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
+  const std::vector<double> distances = distances_m(ground_truth);
+  std::vector<SegmentError> errors;
+  for (std::size_t first = 0; first < ground_truth.size(); first += first_frame_step) {
+    for (const double length_m : lengths_m) {
+      const std::size_t last = segment_end(distances, first, length_m);
+      if (last == distances.size()) {
+        continue;
+      }
+      const Rigid3 error = motion_error(estimate, ground_truth, first, last);
+      errors.push_back({first, last, length_m, 100.0 * error.translation.norm() / length_m,
+                        100.0 * kDegPerRad * error.angle_rad() / length_m});
+    }
+  }
+  return errors;
+}
 
 double average_offset_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
   STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");

@@ -52,6 +52,21 @@ struct Metrics {
                                std::span<const Rigid3> ground_truth,
                                const EvaluationOptions& options = {});
 
+/// Error of one segment, first frame to the first one more than `length_m` behind it.
+struct SegmentError {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  double length_m = 0.0;
+  double t_percent = 0.0;
+  double r_deg_per_100m = 0.0;
+};
+/// The devkit's, one from every `first_frame_step`-th frame on, as far as they fit. Same length
+/// (checked).
+[[nodiscard]] std::vector<SegmentError> segment_errors(std::span<const Rigid3> estimate,
+                                                       std::span<const Rigid3> ground_truth,
+                                                       std::span<const double> lengths_m,
+                                                       std::size_t first_frame_step);
+
 /// t_rel of a path that may be too short for the devkit's: segments of these shares of its length,
 /// one from every frame on. nullopt: none fits (a path of length zero). Same length, at least one
 /// pose (checked).

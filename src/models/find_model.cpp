@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "models/manifest.hpp"
+#include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
 
 namespace stemvo {
@@ -59,7 +60,8 @@ Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
     return fail(fmt::format("{}: expected an entry with 'file: {}', found none", manifest->string(),
                             file_name.string()));
   }
-  known.insert(known.end(), {"gray", "input_layer", "the path of an .onnx"});
+  known.insert(known.end(), std::begin(kHandMadeModels), std::end(kHandMadeModels));
+  known.emplace_back("the path of an .onnx");
   return fail(fmt::format("{}: stem.model: expected one of {}, found '{}'", manifest->string(),
                           fmt::join(known, ", "), model));
 }
@@ -83,7 +85,7 @@ Expected<ModelEntry> find_model(const std::string& model,
 }
 
 Expected<StemOptions> with_network(StemOptions options, const fs::path& models_dir) {
-  if (options.model == "gray" || options.model == "input_layer") {
+  if (is_hand_made(options.model)) {
     return options;
   }
   auto found = find_model(options.model, options.layer, models_dir);

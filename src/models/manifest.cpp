@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
+#include "stem/hand_made.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
@@ -139,7 +140,7 @@ class EntryReader {
 
   [[nodiscard]] Status check_names() const {
     const std::string& name = entry_.name;
-    if (name == "gray" || name == "input_layer" || name.ends_with(".onnx")) {
+    if (is_hand_made(name) || name.ends_with(".onnx")) {
       return refuse("name", fmt::format("'{}' means something else in stem.model", name));
     }
     if (entry_.layer == "first") {

@@ -25,7 +25,7 @@ struct ModelEntry : StemNetwork {
 [[nodiscard]] Expected<std::vector<ModelEntry>> load_manifest(const std::filesystem::path& file);
 
 /// The layers of a model, in the manifest's order, for StemOptions::layer; `model` as in
-/// StemOptions (not gray or input_layer). Errors: no manifest, unknown name (lists the known ones),
+/// StemOptions (not one made by hand). Errors: no manifest, unknown name (lists the known ones),
 /// a file the manifest does not list. The model's file is not opened.
 [[nodiscard]] Expected<std::vector<ModelEntry>> find_layers(
     const std::string& model, const std::filesystem::path& models_dir);

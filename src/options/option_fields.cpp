@@ -12,28 +12,33 @@
 namespace stemvo::options {
 namespace {
 
+/// Of what is measured in pixels and must not be zero.
+const Rule kPixels = Rule::between(1e-3, 1000);
+
 std::vector<Field> stem_fields(StemOptions& o) {
   return {
       {"stem",
        "model",
        &o.model,
        {},
-       "name in models/manifest.yaml, path of an .onnx, gray, or input_layer (filters 0-2 = R, G, "
+       "name in models/manifest.yaml, path of an .onnx, or made by hand, to compare with: gray, "
+       "log "
+       "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, "
        "B)"},
       {"stem",
        "layer",
        &o.layer,
        {},
        "of a model that has several layers (stemvo models MODEL lists them), or first"},
-      {"stem", "filter", &o.filter, Rule::at_least(-1),
+      {"stem", "filter", &o.filter, Rule::between(-1, 1000000),
        "the one filter whose response is the image; -1: the default_filter of the manifest"},
-      {"stem", "sampling_px", &o.sampling_px, Rule::at_least(0),
+      {"stem", "sampling_px", &o.sampling_px, Rule::between(0, 4096),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
       {"stem", "upsample", enum_value(&o.upsample),
        Rule::one_of({"auto", "bicubic", "half", "native"}),
-       "size of the image to track on: bicubic (the input's), half (of the input's where the "
-       "channel is coarser, else the channel's), native (the channel's), or auto: half for "
+       "size of the image to track on: bicubic (the input's), half (of the input's), "
+       "native (the channel's), or auto: half for "
        "patch and klt where the focal length is 500 px or more, else bicubic"},
       {"stem", "stretch_low_percent", &o.stretch_low_percent, Rule::between(0, 100),
        "percentile of the response that becomes black"},
@@ -56,15 +61,15 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
       {"features", "grid_columns", &o.grid_columns, Rule::between(1, 1000),
        "cells across the image, each with its share of the keypoints"},
       {"features", "grid_rows", &o.grid_rows, Rule::between(1, 1000), "cells down the image"},
-      {"features", "corner_quality", &o.corner_quality, Rule::between(0, 1),
+      {"features", "corner_quality", &o.corner_quality, Rule::between(1e-6, 1),
        "patch, klt: least corner response, as a share of the strongest"},
-      {"features", "min_distance_px", &o.min_distance_px, Rule::at_least(0),
+      {"features", "min_distance_px", &o.min_distance_px, Rule::between(0, 1000),
        "patch, klt: between keypoints, input pixels"},
       {"features", "klt_window", &o.klt_window, Rule::odd_between(3, 201),
        "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked image"},
       {"features", "klt_levels", &o.klt_levels, Rule::between(1, 10),
        "patch, klt: levels of the pyramid, from the input's size on"},
-      {"features", "max_forward_backward_px", &o.max_forward_backward_px, Rule::above(0),
+      {"features", "max_forward_backward_px", &o.max_forward_backward_px, kPixels,
        "klt: a point tracked there and back must return this close, input pixels"},
       {"features", "fast_threshold", &o.fast_threshold, Rule::between(1, 254),
        "orb: least step of gray value of a corner"},
@@ -75,20 +80,20 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
 
 std::vector<Field> two_view_fields(TwoViewOptions& o) {
   return {
-      {"two_view", "sigma_px", &o.sigma_px, Rule::above(0),
+      {"two_view", "sigma_px", &o.sigma_px, kPixels,
        "noise in the scores S_H and S_F of eq. (5), input pixels"},
       {"two_view", "homography_ratio", &o.homography_ratio, Rule::between(0, 1),
        "R_H of eq. (7) above it: the initial pose comes from the homography"},
       {"two_view", "estimator", enum_value(&o.estimator), Rule::one_of({"magsac", "ransac"}),
        "robust estimator"},
-      {"two_view", "inlier_threshold_px", &o.inlier_threshold_px, Rule::above(0),
+      {"two_view", "inlier_threshold_px", &o.inlier_threshold_px, kPixels,
        "of the robust estimator, input pixels"},
       {"two_view", "confidence", &o.confidence, Rule::between(0.5, 0.999999999),
        "of the robust estimator: probability that a good sample was drawn"},
       {"two_view", "max_iterations", &o.max_iterations, Rule::between(1, 10000000),
        "of the robust estimator"},
       {"two_view", "refine", &o.refine, {}, "nonlinear refinement of the motion on the inliers"},
-      {"two_view", "refine_loss_px", &o.refine_loss_px, Rule::above(0),
+      {"two_view", "refine_loss_px", &o.refine_loss_px, kPixels,
        "epipolar distance from which the refinement mistrusts a match, input pixels"},
   };
 }
@@ -104,10 +109,11 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
        "two_frame: what a step that does not go forward loses: its translation, paper: its "
        "rotation "
        "too; off: nothing"},
-      {"odometry", "min_inliers", &o.min_inliers, Rule::at_least(5), "fewer: the frame is lost"},
-      {"odometry", "stationary_flow_px", &o.stationary_flow_px, Rule::at_least(0),
+      {"odometry", "min_inliers", &o.min_inliers, Rule::between(5, 100000),
+       "fewer: the frame is lost"},
+      {"odometry", "stationary_flow_px", &o.stationary_flow_px, Rule::between(0, 1000),
        "median flow below it: stationary, input pixels"},
-      {"odometry", "min_parallax_px", &o.min_parallax_px, Rule::at_least(0),
+      {"odometry", "min_parallax_px", &o.min_parallax_px, Rule::between(0, 1000),
        "median flow without the rotation's below it: low parallax, too little to see a direction, "
        "input pixels"},
   };
@@ -115,11 +121,11 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
 
 std::vector<Field> refine_fields(RefineOptions& o) {
   return {
-      {"refine", "every", &o.every, Rule::at_least(0),
+      {"refine", "every", &o.every, Rule::between(0, 1000000),
        "keyframes between refinements of the map, the paper's m; 0: never"},
       {"refine", "window", &o.window, Rule::between(3, 100), "keyframes refined together"},
       {"refine", "max_iterations", &o.max_iterations, Rule::between(1, 1000), "of one refinement"},
-      {"refine", "loss_px", &o.loss_px, Rule::above(0),
+      {"refine", "loss_px", &o.loss_px, kPixels,
        "reprojection error from which an observation is mistrusted, input pixels"},
   };
 }
@@ -139,8 +145,9 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
        "length of a step: none, up to scale (1 unit; mode map: the first one); constant, the same "
        "in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
        "paper's protocol; needs the pose file)"},
-      {"scale", "constant_m", &o.constant_m, Rule::above(0), "metres per frame when constant"},
-      {"scale", "camera_height_m", &o.camera_height_m, Rule::above(0),
+      {"scale", "constant_m", &o.constant_m, Rule::between(1e-6, 1e6),
+       "metres per frame when constant"},
+      {"scale", "camera_height_m", &o.camera_height_m, Rule::between(0.01, 1000),
        "above the road, for camera_height"},
       {"scale", "estimators", enum_value(&o.estimators), Rule::one_of({"both", "dense", "points"}),
        "camera_height: what measures the road: dense (its image aligned), points (tracked "
@@ -159,18 +166,13 @@ std::string describe(const Rule& rule, bool is_whole) {
   if (std::isfinite(rule.min) && std::isfinite(rule.max)) {
     return fmt::format("{} {}from {} to {}", kind, odd, rule.min, rule.max);
   }
-  if (std::isfinite(rule.min)) {
-    return fmt::format("{} {}{} {}", kind, odd, rule.exclusive_min ? "above" : "of at least",
-                       rule.min);
-  }
   return std::string(kind);
 }
 
 /// Written so that NaN fails.
 bool is_inside(const Rule& rule, double value) {
-  const bool above_min = rule.exclusive_min ? value > rule.min : value >= rule.min;
   const bool is_odd = !rule.odd || std::fmod(std::abs(value), 2.0) == 1.0;
-  return std::isfinite(value) && above_min && value <= rule.max && is_odd;
+  return std::isfinite(value) && value >= rule.min && value <= rule.max && is_odd;
 }
 
 std::string number_violation(const Rule& rule, double value, bool is_whole) {

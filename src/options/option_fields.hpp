@@ -21,16 +21,13 @@ struct Rule {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double min = -kInfinity;
   double max = kInfinity;
-  bool exclusive_min = false;
   bool odd = false;
   std::vector<std::string_view> choices;  ///< of a text (empty: any but none) or enumerators
 
-  static Rule at_least(double min) { return between(min, kInfinity); }
-  static Rule above(double min) { return {min, kInfinity, true, false, {}}; }
-  static Rule between(double min, double max) { return {min, max, false, false, {}}; }
-  static Rule odd_between(double min, double max) { return {min, max, false, true, {}}; }
+  static Rule between(double min, double max) { return {min, max, false, {}}; }
+  static Rule odd_between(double min, double max) { return {min, max, true, {}}; }
   static Rule one_of(std::vector<std::string_view> choices) {
-    return {-kInfinity, kInfinity, false, false, std::move(choices)};
+    return {-kInfinity, kInfinity, false, std::move(choices)};
   }
 };
 

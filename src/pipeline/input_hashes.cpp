@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "models/manifest.hpp"
+#include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
@@ -65,7 +66,7 @@ Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
 
 Expected<std::string> hash_model(const Config& config, const fs::path& models_dir) {
   const std::string& model = config.stem.model;
-  if (model == "gray" || model == "input_layer") {
+  if (is_hand_made(model)) {
     return sha256_hex(model);
   }
   return find_model(model, config.stem.layer, models_dir).map([](const ModelEntry& entry) {

@@ -11,6 +11,7 @@
 #include "options/option_fields.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "search/race.hpp"
+#include "stem/hand_made.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -24,10 +25,8 @@ constexpr int kMinSide_px = 16;
 /// weights and layers of the network.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
 
-/// What the layer of gray and input_layer is called in tables.
+/// What the layer of a channel made by hand is called in tables.
 constexpr const char* kInputLayer = "input";
-
-bool is_input(const std::string& model) { return model == "gray" || model == "input_layer"; }
 
 /// 0: half the stride; shifted passes of a coarse layer cost more than more of them tell.
 int sampling_of(int asked, const ModelEntry& entry) {
@@ -50,7 +49,7 @@ Expected<std::vector<LayerIdentity>> model_layers(const SearchRequest& request) 
       .features = std::string(options::to_string(request.config.features.method)),
       .sampling_px = request.config.stem.sampling_px,
       .stem_model = model.ends_with(".onnx") ? from_anywhere(model) : model};
-  if (is_input(model)) {
+  if (is_hand_made(model)) {
     if (!request.layers.empty()) {
       return fail(fmt::format("--layers: expected none for {}, found '{}'", model,
                               fmt::join(request.layers, ",")));
@@ -103,7 +102,7 @@ Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan&
   layer.hash = *hash;
   layer.sampling_px = info.sampling_px;
   // Gray and R, G, B take no pass: one for all.
-  const std::size_t pass = is_input(layer.model) ? SIZE_MAX : plan.layers.size();
+  const std::size_t pass = is_hand_made(layer.model) ? SIZE_MAX : plan.layers.size();
   plan.layers.push_back({config, std::move(*stem), pass});
   plan.identity.layers.push_back(std::move(layer));
   return {};
@@ -231,9 +230,10 @@ std::string fit_layer(const SearchRequest& request,
   const cv::Size size = channels->front().values.size();
   const Upsample upsample =
       choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera);
-  const int factor = enlargement(upsample, identity.sampling_px);
+  const double factor =
+      static_cast<double>(identity.sampling_px) / image_sampling_px(upsample, identity.sampling_px);
   const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
-  const std::size_t bytes = bytes_in_flight(size, size * factor, num_run);
+  const std::size_t bytes = bytes_in_flight(size, cv::Size2d(size) * factor, num_run);
   layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);
   const bool is_small = std::min(size.width, size.height) < kMinSide_px;
   return is_small ? fmt::format("channel {}x{}", size.width, size.height) : std::string();
@@ -302,7 +302,7 @@ void add_race(bool exhaustive, SearchPlan& plan) {
 
 Config config_of(Config common, const LayerIdentity& layer, int filter) {
   common.stem.model = layer.stem_model;
-  common.stem.layer = is_input(layer.model) ? StemOptions().layer : layer.layer;
+  common.stem.layer = is_hand_made(layer.model) ? StemOptions().layer : layer.layer;
   common.stem.filter = filter;
   common.stem.sampling_px = layer.sampling_px;
   common.features.method = options::feature_method(layer.features);

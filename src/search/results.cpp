@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
-#include <iomanip>
 #include <iterator>
 #include <set>
 #include <span>
-#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -111,13 +109,6 @@ std::string format_table(const std::vector<FilterRow>& rows) {
     table.add(cells);
   }
   return table.str();
-}
-
-/// RFC 4180: quoted where it must be.
-std::string csv_cell(const std::string& text) {
-  std::ostringstream quoted;
-  quoted << std::quoted(text, '"', '"');
-  return text.find_first_of(",\"\n\r") == std::string::npos ? text : quoted.str();
 }
 
 /// A column's name, and what the row has there.

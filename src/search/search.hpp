@@ -26,7 +26,7 @@ struct SearchRequest {
   std::optional<FrameRangeRequest> held_out_frames;   ///< of the held-out one
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
-  std::string model = "default";             ///< as StemOptions::model; gray and input_layer too
+  std::string model = "default";             ///< as StemOptions::model; made by hand too
   std::vector<std::string> layers;           ///< of the model; empty: all it has
   std::optional<FrameRangeRequest> filters;  ///< of each layer, half open; else all
   bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
+#include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
 #include "stem/network_layer.hpp"
 
@@ -19,30 +19,6 @@ namespace stemvo {
 namespace {
 
 using internal::FilterBank;
-
-/// One filter: 0.299 R + 0.587 G + 0.114 B, not rounded.
-Expected<std::vector<Channel>> gray_channel(const cv::Mat& frame, int /*first*/, int /*last*/) {
-  std::vector<Channel> channels(1);
-  cv::Mat& values = channels.front().values;
-  frame.convertTo(values, CV_32F);  // first, so that gray is not rounded to 8 bit
-  if (frame.channels() == 3) {
-    cv::cvtColor(values.clone(), values, cv::COLOR_RGB2GRAY);
-  }
-  return channels;
-}
-
-/// Three filters: R, G, B as they are.
-Expected<std::vector<Channel>> input_channels(const cv::Mat& frame, int first, int last) {
-  std::vector<Channel> channels;
-  for (int filter = first; filter < last; ++filter) {
-    cv::Mat plane = frame;  // a gray frame has three equal colours
-    if (frame.channels() == 3) {
-      cv::extractChannel(frame, plane, filter);
-    }
-    plane.convertTo(channels.emplace_back().values, CV_32F);
-  }
-  return channels;
-}
 
 /// -1 stands for the default. Error: outside the layer.
 Expected<int> choose_filter(int asked, const std::string& of, int num_filters, int default_filter) {
@@ -106,18 +82,16 @@ Status check_network(const StemNetwork& network) {
   return {};
 }
 
-bool is_identity(const std::string& model) { return model == "gray" || model == "input_layer"; }
-
 /// Error: a name of no layer of our own, without a network, or a network that is none.
 Expected<StemNetwork> network_of(const StemOptions& options) {
-  if (is_identity(options.model)) {
+  if (const auto bank = internal::hand_made_bank(options.model)) {
     if (options.layer != "first") {
       return fail(fmt::format("stem.layer: expected none for {}, found '{}'", options.model,
                               options.layer));
     }
     StemNetwork network;
     network.name = options.model;
-    network.num_filters = options.model == "gray" ? 1 : 3;
+    network.num_filters = bank->num_filters;
     network.stride_px = 1;
     return network;
   }
@@ -129,7 +103,8 @@ Expected<StemNetwork> network_of(const StemOptions& options) {
     return internal::built_in_network();
   }
   return fail(fmt::format(
-      "stem.model: expected default, gray, input_layer or a network beside it, found '{}'",
+      "stem.model: expected default, gray, input_layer, log, census or a network beside it, found "
+      "'{}'",
       options.model));
 }
 
@@ -178,8 +153,8 @@ Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
                          .filter = *filter,
                          .num_filters = network->num_filters,
                          .sampling_px = *sampling};
-  if (is_identity(options.model)) {
-    return Stem(info, options.model == "gray" ? gray_channel : input_channels, true);
+  if (auto hand_made = internal::hand_made_bank(options.model)) {
+    return Stem(info, std::move(hand_made->bank), true);
   }
   const bool has_all = all_filters || !network->folded || network->folded->filter != *filter ||
                        network->folded->sampling_px != *sampling;

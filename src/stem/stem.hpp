@@ -75,15 +75,14 @@ class Stem {
 /// degree (a focal length of 500 px and more in the input), else kBicubic.
 [[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera);
 
-/// How many times larger than its channel an image is; `sampling`: input pixels per pixel of the
-/// channel.
-[[nodiscard]] int enlargement(Upsample upsample, int sampling_px);
+/// Input pixels per pixel of the image made from a channel of `sampling_px`.
+[[nodiscard]] int image_sampling_px(Upsample upsample, int sampling_px);
 
 /// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
 /// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
-/// brings it to the input's size, or half of it (PixelMap is adjusted; no resampling between
-/// pixels). A channel without contrast becomes one gray and leaves the limits as they were; NaN
-/// becomes 0 (upsampled: its surroundings too).
+/// brings it to the input's size, or half of it, or the mean of 2x2 pixels where it is twice as
+/// fine (PixelMap is adjusted; no resampling between pixels). A channel without contrast becomes
+/// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
 class ChannelStretch {
  public:
   /// Of `options.upsample`, kAuto stands for kBicubic: see choose_upsample.
@@ -95,7 +94,7 @@ class ChannelStretch {
   bool has_limits_ = false;
   double low_ = 0.0;
   double high_ = 1.0;
-  cv::Mat upsampled_;  ///< buffer
+  cv::Mat resized_;  ///< buffer
 };
 
 }  // namespace stemvo

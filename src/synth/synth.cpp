@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <set>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -22,33 +24,79 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// OUT/sequences/NAME and OUT/poses in KITTI's layout. Every Error names the file.
-struct Output {
-  std::filesystem::path sequence_dir;
-  std::filesystem::path pose_file;
+/// Says in a folder that it holds nothing but what was rendered.
+constexpr const char* kMark = "rendered_by_stemvo";
 
-  /// Makes the folders and removes the frames and the camera file of an earlier drive: a longer one
-  /// would leave images without times and poses behind.
+Error cannot(const char* what, const fs::path& path, const std::error_code& code) {
+  return fail(fmt::format("{}: cannot {}: {}", path.string(), what, code.message()));
+}
+
+/// A user may have put results or masks beside it.
+bool holds_only_a_drive(const fs::path& folder) {
+  const std::set<std::string> known = {kMark,       "image_2",   "depth",
+                                       "calib.txt", "times.txt", "camera.yaml"};
+  std::error_code code;
+  return std::all_of(
+      fs::directory_iterator(folder, code), fs::directory_iterator(),
+      [&](const auto& entry) { return known.contains(entry.path().filename().string()); });
+}
+
+/// OUT/sequences/NAME and OUT/poses in KITTI's layout. Everything is made beside them, and takes
+/// their names when it is whole. Every Error names the file.
+struct Output {
+  fs::path sequence_dir;  ///< while it is made: NAME.unfinished
+  fs::path pose_file;     ///< the same
+
+  Output(const fs::path& out_dir, const std::string& name)
+      : sequence_dir(out_dir / "sequences" / (name + ".unfinished")),
+        pose_file(out_dir / "poses" / (name + ".txt.unfinished")),
+        final_dir_(out_dir / "sequences" / name),
+        final_poses_(out_dir / "poses" / (name + ".txt")) {}
+
+  /// Makes the folders. Error: what is there was not rendered.
   [[nodiscard]] Status prepare(bool with_depth) const {
-    const fs::path images = sequence_dir / "image_2";
-    const fs::path depth = sequence_dir / "depth";
-    for (const fs::path& folder : {images, pose_file.parent_path(), depth}) {
-      if (with_depth || folder != depth) {
+    std::error_code code;
+    const bool is_ours = fs::exists(final_dir_ / kMark, code) && holds_only_a_drive(final_dir_);
+    for (const fs::path& path : {final_dir_, final_poses_}) {
+      const bool is_empty = fs::is_directory(path, code) && fs::is_empty(path, code);
+      if (!is_ours && fs::exists(path, code) && !is_empty) {
+        return fail(
+            fmt::format("{}: expected a drive that stemvo rendered, which a new one may replace, "
+                        "or none, found "
+                        "something else (--name gives another name)",
+                        path.string()));
+      }
+    }
+    fs::remove_all(sequence_dir, code);
+    if (code) {
+      return cannot("remove the unfinished drive", sequence_dir, code);
+    }
+    for (const fs::path& folder :
+         {sequence_dir / "image_2", pose_file.parent_path(), sequence_dir / "depth"}) {
+      if (with_depth || folder.filename() != "depth") {
         if (const Status made = pipeline::create_out_folder(folder); !made) {
           return made;
         }
       }
     }
+    return write_text_file(sequence_dir / kMark, "");
+  }
+
+  /// In place of an earlier drive.
+  [[nodiscard]] Status finish() const {
     std::error_code code;
-    const fs::path camera_file = sequence_dir / "camera.yaml";
-    fs::remove(camera_file, code);
-    if (code) {
-      return fail(
-          fmt::format("{}: cannot replace the file: {}", camera_file.string(), code.message()));
+    fs::remove_all(final_dir_, code);
+    if (!code) {
+      fs::remove(final_poses_, code);
     }
-    return pipeline::remove_old_frames(images, ".png").and_then([&] {
-      return pipeline::remove_old_frames(depth, ".npy");
-    });
+    if (!code) {
+      fs::rename(sequence_dir, final_dir_, code);
+    }
+    if (code) {
+      return cannot("replace the drive", final_dir_, code);
+    }
+    fs::rename(pose_file, final_poses_, code);
+    return code ? Status(cannot("replace the poses", final_poses_, code)) : Status();
   }
 
   /// image_2/%06d.png. May be called from several threads for different frames.
@@ -116,6 +164,10 @@ struct Output {
       return write_text_file(pose_file, poses);
     });
   }
+
+ private:
+  fs::path final_dir_;
+  fs::path final_poses_;
 };
 
 /// What the options leave open is set here.
@@ -225,8 +277,7 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
   if (!path) {
     return path.error();
   }
-  const Output output{out_dir / "sequences" / options.name,
-                      out_dir / "poses" / (options.name + ".txt")};
+  const Output output(out_dir, options.name);
   Status status = output.prepare(options.write_depth).and_then([&] {
     return output.write_calibration(camera);
   });
@@ -250,7 +301,9 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
     done = frames.end;
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
-  return output.write_truth(std::span(poses).first(static_cast<std::size_t>(done)), pace.rate_hz);
+  const auto rendered = std::span(poses).first(static_cast<std::size_t>(done));
+  status = output.write_truth(rendered, pace.rate_hz);
+  return status ? output.finish() : status;
 }
 
 }  // namespace stemvo

@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <system_error>
 
@@ -14,6 +15,8 @@ namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30U;
 
 std::string last_system_error() { return std::generic_category().message(errno); }
 
@@ -35,10 +38,18 @@ Expected<std::string> read_text_file(const fs::path& file) {
   if (fs::is_directory(file, ignored)) {
     return fail(fmt::format("{}: expected a file, found a folder", file.string()));
   }
+  // Pipes and devices may never end.
+  if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) {
+    return fail(fmt::format("{}: expected a file, found a pipe or device", file.string()));
+  }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   std::string text;
   if (const auto size = fs::file_size(file, ignored); !ignored) {
+    if (size > kMaxFileBytes) {
+      return fail(fmt::format("{}: expected at most {} bytes, found {}", file.string(),
+                              kMaxFileBytes, size));
+    }
     text.reserve(size);
   }
   std::array<char, 1 << 16> buffer;

@@ -2,6 +2,8 @@
 #include "text/text_table.hpp"
 
 #include <algorithm>
+#include <iomanip>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -52,6 +54,12 @@ std::string TextTable::str() const {
 
 std::string number_or_dash(const std::optional<double>& value, int decimals) {
   return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
+}
+
+std::string csv_cell(const std::string& text) {
+  std::ostringstream quoted;
+  quoted << std::quoted(text, '"', '"');
+  return text.find_first_of(",\"\n\r") == std::string::npos ? text : quoted.str();
 }
 
 std::string length_range(const std::vector<double>& lengths_m) {

@@ -26,6 +26,9 @@ class TextTable {
 
 [[nodiscard]] std::string number_or_dash(const std::optional<double>& value, int decimals);
 
+/// Of a CSV file: quoted where it must be (RFC 4180).
+[[nodiscard]] std::string csv_cell(const std::string& text);
+
 /// "100..800 m": first and last of the lengths.
 [[nodiscard]] std::string length_range(const std::vector<double>& lengths_m);
 

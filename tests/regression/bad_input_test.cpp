@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "support/program_test.hpp"
 
@@ -48,6 +49,25 @@ TEST_F(BadInput, MissingSequence) {
   const std::string none = folder_ / "none";
   expect_error(run_stemvo({"run", none, "--out", out_}), 1, {none, "expected", "found none"});
   EXPECT_FALSE(fs::exists(out_));
+}
+
+/// yaml-cpp's LoadAll never ends here.
+TEST_F(BadInput, MoreBehindTheDocument) {
+  for (const char* text : {"{stem: {filter: 3}},\n", "seed: 1\n---\nseed: 2\n"}) {
+    expect_error(run_with_config(text), 1, {"my.yaml:", "not YAML", "more behind it"});
+  }
+  expect_error(run({"--set", "evaluation.segment_lengths_m=[100,200],"}), 1,
+               {"evaluation.segment_lengths_m", "more behind it"});
+}
+
+TEST_F(BadInput, PipesAndDevicesAreNoFiles) {
+  const std::string pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& file : {pipe, std::string("/dev/zero")}) {
+    for (const char* option : {"--config", "--gt", "--calib"}) {
+      expect_error(run({option, file}), 1, {file, "expected a file", "pipe or device"});
+    }
+  }
 }
 
 TEST_F(BadInput, NoImages) {

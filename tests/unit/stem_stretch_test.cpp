@@ -51,11 +51,24 @@ TEST(ChannelStretch, LimitsFollowSlowly) {
   options.stretch_memory = 0.75;
   ChannelStretch stretch(options);
   (void)stretch.apply(ramp(0.0F, 100.0F));
-  // White moves from 100 to 0.75 * 100 + 0.25 * 200 = 125.
-  const ChannelImage second = stretch.apply(ramp(0.0F, 200.0F));
-  EXPECT_NEAR(second.pixels.at<unsigned char>(25, 0), 50.0 / 125.0 * 255.0, 1.0);
-  const ChannelImage third = stretch.apply(ramp(0.0F, 200.0F));
-  EXPECT_NEAR(third.pixels.at<unsigned char>(25, 0), 50.0 / 143.75 * 255.0, 1.0);
+  // White moves from 100 to 0.75 * 100 + 0.25 * 116 = 104.
+  const ChannelImage second = stretch.apply(ramp(0.0F, 116.0F));
+  EXPECT_NEAR(second.pixels.at<unsigned char>(25, 0), 29.0 / 104.0 * 255.0, 1.0);
+  const ChannelImage third = stretch.apply(ramp(0.0F, 116.0F));
+  EXPECT_NEAR(third.pixels.at<unsigned char>(25, 0), 29.0 / 107.0 * 255.0, 1.0);
+}
+
+/// A lamp goes on, a tunnel ends: nothing of the new image is cut off or lost in a few gray values.
+TEST(ChannelStretch, LimitsJumpWithTheLight) {
+  StemOptions options;
+  options.stretch_low_percent = 0.0;
+  options.stretch_high_percent = 100.0;
+  ChannelStretch stretch(options);
+  const cv::Mat before = stretch.apply(ramp(0.0F, 100.0F)).pixels;
+  for (const float white : {200.0F, 20.0F}) {
+    const cv::Mat after = stretch.apply(ramp(0.0F, white)).pixels;
+    EXPECT_LE(cv::norm(before, after, cv::NORM_INF), 1.0) << white;
+  }
 }
 
 TEST(ChannelStretch, NoContrastIsOneGrayAndForgotten) {
@@ -93,9 +106,8 @@ TEST(ChannelStretch, NotANumberHarmsNobodyElse) {
   EXPECT_EQ(dirty.apply(nothing).pixels.size(), cv::Size(10, 10));
 }
 
-/// As before there was `half`: the default's channels are what they were.
-TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsFineEnough) {
-  for (const double sampling : {1.0, 2.0}) {
+TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsOfThatSize) {
+  for (const double sampling : {2.0, 3.0}) {  // no whole factor leads from 3 to 2
     Channel channel = ramp(0.0F, 1.0F);
     channel.map.scale = Eigen::Vector2d::Constant(sampling);
     channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
@@ -108,6 +120,24 @@ TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsFineEnough) {
     EXPECT_EQ(native.map.scale, half.map.scale);
     EXPECT_EQ(native.map.offset_px, half.map.offset_px);
   }
+}
+
+/// Gray and the input's colours: half the size for every channel, or comparisons are not fair.
+TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
+  Channel channel;
+  channel.values.create(37, 51, CV_32F);
+  cv::theRNG().state = 1;
+  cv::randu(channel.values, 0.0, 255.0);
+  StemOptions options;
+  options.upsample = Upsample::kHalf;
+  options.stretch_low_percent = 0.0;
+  options.stretch_high_percent = 100.0;
+  const ChannelImage half = ChannelStretch(options).apply(channel);
+  ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
+  const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
+  EXPECT_EQ(centre, Eigen::Vector2d(14.5, 6.5));
+  const double mean = cv::mean(channel.values({14, 6, 2, 2}))[0];
+  EXPECT_NEAR(half.pixels.at<unsigned char>(3, 7), mean, 1.5);
 }
 
 TEST(ChannelStretch, NativeKeepsTheSize) {
@@ -173,8 +203,9 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
     if (upsample == Upsample::kHalf) {
-      EXPECT_EQ(image.pixels.size(), channel->values.size() * std::max(1, sampling / 2));
-      EXPECT_EQ(image.map.scale, Eigen::Vector2d::Constant(std::min(sampling, 2)));
+      const cv::Size size = channel->values.size();
+      EXPECT_EQ(image.pixels.size(), sampling == 1 ? size / 2 : size * (sampling / 2));
+      EXPECT_EQ(image.map.scale, Eigen::Vector2d(2, 2));
     }
     if (upsample == Upsample::kBicubic) {
       EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);

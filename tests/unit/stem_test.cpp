@@ -198,9 +198,10 @@ class StemErrors : public ::testing::Test {
 TEST_F(StemErrors, NamesAndPaths) {
   EXPECT_EQ(error_of("plain_k4s4"), "no error");
   EXPECT_EQ(error_of((folder / "plain_k4s4.onnx").string()), "no error");
-  EXPECT_EQ(error_of("other"), (folder / "manifest.yaml").string() +
-                                   ": stem.model: expected one of plain_k4s4, gray, input_layer, "
-                                   "the path of an .onnx, found 'other'");
+  EXPECT_EQ(error_of("other"),
+            (folder / "manifest.yaml").string() +
+                ": stem.model: expected one of plain_k4s4, gray, input_layer, log, census, "
+                "the path of an .onnx, found 'other'");
   EXPECT_EQ(error_of("/no/such.onnx"), "/no/such.onnx: no such file");
   std::filesystem::copy_file(folder / "plain_k4s4.onnx", folder / "unlisted.onnx");
   EXPECT_EQ(error_of((folder / "unlisted.onnx").string()),
@@ -246,6 +247,48 @@ TEST_F(StemErrors, SmallFramesAndFixedSizes) {
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
   EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
               HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
+}
+
+Channel hand_made(const std::string& model, const cv::Mat& frame) {
+  StemOptions options;
+  options.model = model;
+  const auto stem = Stem::create(options);
+  EXPECT_TRUE(stem) << stem.error().message;
+  return *stem->apply(frame);
+}
+
+TEST(HandMade, LaplacianOfGaussianSeesBlobsAndNoRamps) {
+  cv::Mat1b ramp(60, 80);
+  for (int u = 0; u < ramp.cols; ++u) {
+    ramp.col(u) = 3 * u;
+  }
+  const cv::Mat inside = hand_made("log", ramp).values({10, 10, 60, 40});
+  EXPECT_LT(cv::norm(inside, cv::NORM_INF), 1e-3);
+  cv::Mat1b blob(60, 80, uchar{50});
+  cv::circle(blob, {40, 30}, 3, 200, cv::FILLED);
+  cv::Point least;
+  const Channel channel = hand_made("log", blob);
+  cv::minMaxLoc(channel.values, nullptr, nullptr, &least);
+  EXPECT_EQ(least, cv::Point(40, 30));
+  EXPECT_EQ(channel.map.scale, Eigen::Vector2d(1.0, 1.0));
+}
+
+TEST(HandMade, CensusKnowsNoOffsetAndHardlyAGain) {
+  cv::Mat1b frame(60, 80);
+  cv::theRNG().state = 1;
+  cv::randu(frame, 40, 100);
+  const cv::Mat plain = hand_made("census", frame).values;
+  EXPECT_LT(cv::norm(plain, hand_made("census", frame + 30).values, cv::NORM_INF), 1e-3);
+  const cv::Mat doubled = hand_made("census", frame * 2).values;
+  EXPECT_LT(cv::norm(plain, doubled, cv::NORM_L2), 0.15 * cv::norm(plain, cv::NORM_L2));
+  EXPECT_GT(cv::norm(plain, doubled, cv::NORM_INF), 0.0);
+}
+
+TEST(HandMade, OneChannelEachOfColourFramesToo) {
+  const cv::Mat color(30, 40, CV_8UC3, cv::Scalar(10, 20, 30));
+  for (const std::string model : {"gray", "log", "census"}) {
+    EXPECT_EQ(hand_made(model, color).values.type(), CV_32FC1) << model;
+  }
 }
 
 }  // namespace

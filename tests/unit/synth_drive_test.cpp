@@ -226,6 +226,45 @@ TEST_F(SyntheticDriveTest, WalkIsASequenceWithACameraFile) {
   EXPECT_FALSE(fs::exists(folder / "camera.yaml")) << "of the walk that was there before";
 }
 
+TEST_F(SyntheticDriveTest, WhatIsNotRenderedStaysAsItIs) {
+  const fs::path folder = root_ / "out" / "sequences" / "00";
+  fs::create_directories(folder / "image_2");
+  std::ofstream(folder / "image_2/000000.png") << "a real image";
+  const Status refused = render_synthetic_drive(root_ / "out", small(2));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr(folder.string()));
+  EXPECT_EQ(bytes_of(folder / "image_2/000000.png"), "a real image");
+
+  fs::remove_all(folder);
+  fs::create_directories(root_ / "out" / "poses");
+  std::ofstream(root_ / "out/poses/00.txt") << "real poses";
+  EXPECT_FALSE(render_synthetic_drive(root_ / "out", small(2)));
+  EXPECT_EQ(bytes_of(root_ / "out/poses/00.txt"), "real poses");
+}
+
+/// Killed or without room: the old drive, whole.
+TEST_F(SyntheticDriveTest, AnEarlierDriveStaysUntilTheNewOneIsWhole) {
+  const fs::path folder = root_ / "out" / "sequences" / "00";
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  const std::string image = bytes_of(folder / "image_2/000002.png");
+  const std::string poses = bytes_of(root_ / "out/poses/00.txt");
+  SyntheticDriveOptions options = small(5);
+  options.seed = 9;
+  const auto look = [&](std::size_t, std::size_t) {
+    EXPECT_EQ(bytes_of(folder / "image_2/000002.png"), image);
+    EXPECT_EQ(bytes_of(root_ / "out/poses/00.txt"), poses);
+    return true;
+  };
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options, look));
+  EXPECT_NE(bytes_of(folder / "image_2/000002.png"), image);
+  std::ofstream(folder / "mask.png") << "a user's";
+  EXPECT_FALSE(render_synthetic_drive(root_ / "out", small(3)));
+  EXPECT_EQ(bytes_of(folder / "mask.png"), "a user's");
+  EXPECT_TRUE(fs::exists(folder / "image_2/000004.png"));
+  EXPECT_FALSE(fs::exists(root_ / "out/sequences/00.unfinished"));
+  EXPECT_FALSE(fs::exists(root_ / "out/poses/00.txt.unfinished"));
+}
+
 TEST_F(SyntheticDriveTest, ContradictionsAreOneLine) {
   const auto message = [&](const SyntheticDriveOptions& options) {
     const Status status = render_synthetic_drive(root_ / "out", options);
