@@ -75,20 +75,24 @@ struct Passing {
 constexpr double kStep_m = test::kDriveStep_m;
 const cv::Size kImage(620, 188);
 
+/// A share of the light left, and the sensor's noise of one gray level.
+std::function<void(int, cv::Mat&)> darkened(double light) {
+  return [light, random = cv::RNG(3)](int, cv::Mat& image) mutable {
+    cv::Mat noise(image.size(), CV_32FC3);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::Mat dark;
+    image.convertTo(dark, CV_32FC3, light);
+    dark += noise;
+    dark.convertTo(image, CV_8UC3);
+  };
+}
+
 TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   const StateDrive drive = test::steady_drive();
   copy("steady", drive);
   const int begin = 30;
   const int end = 34;
-  cv::RNG random(3);
-  change(begin, end, [&](int, cv::Mat& image) {
-    cv::Mat noise(image.size(), CV_32FC3);
-    random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
-    cv::Mat dark;
-    image.convertTo(dark, CV_32FC3, 0.02);
-    dark += noise;
-    dark.convertTo(image, CV_8UC3);
-  });
+  change(begin, end, darkened(0.002));
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   // Two dark frames in a row have the same faint image: tracks between them are no map.
@@ -103,6 +107,19 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
     test::expect_accurate(*poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
     // Over the dark too, by what was known before and after.
     test::expect_accurate(*poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
+  }
+}
+
+// Five gray levels of contrast under noise of one: the stretch makes an image of them.
+TEST_F(Disturbed, AFewDimFramesAreFollowed) {
+  const StateDrive drive = test::steady_drive();
+  copy("steady", drive);
+  change(30, 34, darkened(0.02));
+  const StateRun result = run();
+  ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
+  result.expect_states(30, 60, {"tracking"});
+  for (const Trajectory* poses : result.trajectories()) {
+    test::expect_accurate(*poses, drive, 10, 60, 0.05, 0.3 * kDeg);
   }
 }
 
