@@ -12,6 +12,7 @@
 #include "install_paths.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "robustness/contenders.hpp"
 #include "robustness/disturbance.hpp"
 #include "robustness/robustness.hpp"
 
@@ -25,10 +26,12 @@ differ in nothing but the channel, and orb and sift, matched between pairs of fr
 Every step has its true length (--set scale.source=camera_height: metres from the road instead).
 
 --out receives robustness.csv (a line per disturbance, strength, channel and drive), robustness.json
-(with the verdicts), robustness.txt (the table) and robustness.png. The table shows r_rel in degrees per 100 m, in brackets the
-share of frames with a measured motion where some have none, and how many times as large the
-channel's rotation error is as a control's over segments of an eighth of the path, from every frame on,
-with the 95 % interval; * where the interval leaves out 1, else the two cannot be told apart.
+(with the verdicts), robustness.txt (the tables) and robustness.png, written after every row. The table
+shows r_rel in degrees per 100 m, in brackets the share of frames with a measured motion where some have
+none, and how many times as large the channel's rotation error is as a control's over segments of an
+eighth of the path, from every frame on, with the 95 % interval; * where the interval leaves out 1, else
+the two cannot be told apart; - where there are too few segments for an interval. A second table sums up
+groups of disturbances: geometric means of the ratios, and how many rows are decided for whom.
 
 Examples:
   stemvo robustness kitti/sequences/03 --out result

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -28,11 +29,19 @@ std::optional<double> mean(const std::vector<Outcome>& outcomes,
 }
 
 double mean_tracked(const std::vector<Outcome>& outcomes) {
-  double sum = 0.0;
-  for (const Outcome& one : outcomes) {
-    sum += one.tracked;
-  }
+  const double sum = std::transform_reduce(outcomes.begin(), outcomes.end(), 0.0, std::plus(),
+                                           [](const Outcome& one) { return one.tracked; });
   return sum / static_cast<double>(outcomes.size());
+}
+
+std::optional<std::size_t> longest_recovery(const std::vector<Outcome>& outcomes) {
+  std::optional<std::size_t> longest;
+  for (const Outcome& one : outcomes) {
+    if (one.recovery_frames) {
+      longest = std::max(longest.value_or(0), *one.recovery_frames);
+    }
+  }
+  return longest;
 }
 
 /// "0.31", where frames were not tracked "0.31 (0.97)".
@@ -44,29 +53,76 @@ std::string cell(const std::vector<Outcome>& outcomes) {
 
 /// "0.84 0.75-0.95", with a star where the interval leaves out 1.
 std::string words(const ErrorRatio& ratio) {
+  if (!std::isfinite(ratio.high)) {
+    return fmt::format("{:.2f} -", ratio.ratio);
+  }
   return fmt::format("{}{:.2f} {:.2f}-{:.2f}", ratio.is_decided() ? "*" : "", ratio.ratio,
                      ratio.low, ratio.high);
 }
 
-std::vector<const Row*> all_rows(const RobustnessReport& report) {
-  std::vector<const Row*> rows;
-  for (const Row& row : report.rows) {
-    rows.push_back(&row);
-  }
-  return rows;
-}
-
 Json interval(const ErrorRatio& ratio) {
-  return {{"ratio", ratio.ratio}, {"low", ratio.low}, {"high", ratio.high}};
+  return {{"ratio", ratio.ratio},
+          {"low", ratio.low},
+          {"high", ratio.high},
+          {"decided", ratio.is_decided()}};
 }
 
-}  // namespace
-
-std::optional<double> mean_rotation_error(const std::vector<Outcome>& outcomes) {
-  return mean(outcomes, &Outcome::r_rel_deg_per_100m);
+std::vector<std::string> groups_of(const std::vector<Row>& rows) {
+  std::vector<std::string> groups;
+  for (const Row& row : rows) {
+    if (std::ranges::find(groups, row.group) == groups.end()) {
+      groups.push_back(row.group);
+    }
+  }
+  return groups;
 }
 
-std::string format_table(const RobustnessReport& report) {
+Summary summarize(const std::string& group,
+                  const std::vector<const Row*>& rows,
+                  std::size_t control) {
+  Summary result{group, rows.size()};
+  double rotation = 0.0;
+  double translation = 0.0;
+  for (const Row* row : rows) {
+    const Verdict& verdict = row->verdicts.at(control);
+    rotation += std::log(verdict.rotation.ratio);
+    translation += std::log(verdict.translation.ratio);
+    if (verdict.rotation.is_decided()) {
+      ++(verdict.rotation.ratio < 1.0 ? result.num_for_judged : result.num_for_control);
+    }
+  }
+  const double num = static_cast<double>(std::max<std::size_t>(rows.size(), 1));
+  result.rotation_ratio = std::exp(rotation / num);
+  result.translation_ratio = std::exp(translation / num);
+  return result;
+}
+
+/// Groups of the rows, then all: r_rel's ratio, and how many rows are decided for whom.
+std::string format_summaries(const RobustnessReport& report) {
+  const std::size_t num_controls = report.contenders.size() - 1;
+  TextTable table("lr" + std::string(num_controls, 'r'));
+  std::vector<std::string> head = {"group", "rows"};
+  std::vector<std::vector<Summary>> columns;
+  for (std::size_t i = 0; i < num_controls; ++i) {
+    head.push_back("over " + report.contenders[i + 1]);
+    columns.push_back(summaries(report.rows, i));
+  }
+  table.add(head);
+  table.rule();
+  for (std::size_t line = 0; line < columns.front().size(); ++line) {
+    const Summary& first = columns.front()[line];
+    std::vector<std::string> cells = {first.group, std::to_string(first.num_rows)};
+    for (const auto& column : columns) {
+      const Summary& one = column[line];
+      cells.push_back(fmt::format("{:.2f} ({}, {})", one.rotation_ratio, one.num_for_judged,
+                                  one.num_for_control));
+    }
+    table.add(std::move(cells));
+  }
+  return table.str();
+}
+
+std::string format_rows(const RobustnessReport& report) {
   const std::size_t num = report.contenders.size();
   TextTable table("ll" + std::string(2 * num - 1, 'r'));
   std::vector<std::string> head = {"disturbance", "strength"};
@@ -81,37 +137,59 @@ std::string format_table(const RobustnessReport& report) {
     for (const auto& outcomes : row.outcomes) {
       cells.push_back(cell(outcomes));
     }
-    for (const Verdict& verdict : verdicts(report, {&row})) {
+    for (const Verdict& verdict : row.verdicts) {
       cells.push_back(words(verdict.rotation));
-    }
-    table.add(std::move(cells));
-  }
-  if (!report.rows.empty()) {
-    table.rule();
-    // No interval: the rows are the same frames, disturbed.
-    std::vector<std::string> cells(2 + num);
-    cells.front() = "all";
-    for (const Verdict& verdict : verdicts(report, all_rows(report))) {
-      cells.push_back(fmt::format("{:.2f}", verdict.rotation.ratio));
     }
     table.add(std::move(cells));
   }
   return table.str();
 }
 
+}  // namespace
+
+std::optional<double> mean_rotation_error(const std::vector<Outcome>& outcomes) {
+  return mean(outcomes, &Outcome::r_rel_deg_per_100m);
+}
+
+std::vector<Summary> summaries(const std::vector<Row>& rows, std::size_t control) {
+  std::vector<Summary> result;
+  std::vector<const Row*> all;
+  for (const std::string& group : groups_of(rows)) {
+    std::vector<const Row*> members;
+    for (const Row& row : rows) {
+      if (row.group == group) {
+        members.push_back(&row);
+      }
+    }
+    result.push_back(summarize(group, members, control));
+    all.insert(all.end(), members.begin(), members.end());
+  }
+  result.push_back(summarize("all", all, control));
+  return result;
+}
+
+std::string format_table(const RobustnessReport& report) {
+  std::string text = format_rows(report);
+  if (!report.rows.empty() && report.contenders.size() > 1) {
+    text += "\nTimes a control's rotation error (rows decided for " + report.contenders.front() +
+            ", for the control):\n" + format_summaries(report);
+  }
+  return text;
+}
+
 std::string format_csv(const RobustnessReport& report) {
   std::string text =
       "disturbance,strength,channel,drive,t_rel_percent,r_rel_deg_per_100m,tracked,recovery_frames,"
-      "jumps\n";
+      "recovered,jumps\n";
   const auto number = [](const auto& value) { return value ? fmt::format("{}", *value) : ""; };
   for (const Row& row : report.rows) {
     for (std::size_t i = 0; i < report.contenders.size(); ++i) {
       for (std::size_t drive = 0; drive < report.drives.size(); ++drive) {
         const Outcome& one = row.outcomes[i][drive];
-        text += fmt::format("{},{},{},{},{},{},{},{},{}\n", row.disturbance, row.strength,
-                            report.contenders[i], report.drives[drive], number(one.t_rel_percent),
-                            number(one.r_rel_deg_per_100m), one.tracked,
-                            number(one.recovery_frames), one.jumps);
+        text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", row.disturbance, row.strength,
+                            csv_cell(report.contenders[i]), csv_cell(report.drives[drive]),
+                            number(one.t_rel_percent), number(one.r_rel_deg_per_100m), one.tracked,
+                            number(one.recovery_frames), one.is_recovered, one.jumps);
       }
     }
   }
@@ -122,25 +200,43 @@ std::string format_json(const RobustnessReport& report) {
   Json rows = Json::array();
   for (const Row& row : report.rows) {
     Json channels = Json::array();
-    const std::vector<Verdict> found = verdicts(report, {&row});
     for (std::size_t i = 0; i < report.contenders.size(); ++i) {
       const auto& outcomes = row.outcomes[i];
-      const auto number = [](const std::optional<double>& value) {
-        return value ? Json(*value) : Json();
-      };
-      channels.push_back({{"channel", report.contenders[i]},
-                          {"t_rel_percent", number(mean(outcomes, &Outcome::t_rel_percent))},
-                          {"r_rel_deg_per_100m", number(mean_rotation_error(outcomes))},
-                          {"tracked", mean_tracked(outcomes)}});
+      const auto jumps = [](std::size_t sum, const Outcome& one) { return sum + one.jumps; };
+      channels.push_back(
+          {{"channel", report.contenders[i]},
+           {"t_rel_percent", mean(outcomes, &Outcome::t_rel_percent)},
+           {"r_rel_deg_per_100m", mean_rotation_error(outcomes)},
+           {"tracked", mean_tracked(outcomes)},
+           {"recovery_frames", longest_recovery(outcomes)},
+           {"recovered", std::ranges::all_of(outcomes, &Outcome::is_recovered)},
+           {"jumps", std::accumulate(outcomes.begin(), outcomes.end(), std::size_t{0}, jumps)}});
       if (i > 0) {
-        channels.back()["rotation_ratio"] = interval(found[i - 1].rotation);
-        channels.back()["translation_ratio"] = interval(found[i - 1].translation);
+        channels.back()["rotation_ratio"] = interval(row.verdicts[i - 1].rotation);
+        channels.back()["translation_ratio"] = interval(row.verdicts[i - 1].translation);
       }
     }
-    rows.push_back(
-        {{"disturbance", row.disturbance}, {"strength", row.strength}, {"channels", channels}});
+    rows.push_back({{"disturbance", row.disturbance},
+                    {"group", row.group},
+                    {"strength", row.strength},
+                    {"channels", channels}});
   }
-  return to_text({{"drives", report.drives}, {"interrupted", report.interrupted}, {"rows", rows}});
+  Json groups = Json::array();
+  for (std::size_t i = 1; i < report.contenders.size(); ++i) {
+    for (const Summary& one : summaries(report.rows, i - 1)) {
+      groups.push_back({{"group", one.group},
+                        {"rows", one.num_rows},
+                        {"control", report.contenders[i]},
+                        {"rotation_ratio", one.rotation_ratio},
+                        {"translation_ratio", one.translation_ratio},
+                        {"decided_for_judged", one.num_for_judged},
+                        {"decided_for_control", one.num_for_control}});
+    }
+  }
+  return to_text({{"drives", report.drives},
+                  {"interrupted", report.interrupted},
+                  {"groups", groups},
+                  {"rows", rows}});
 }
 
 }  // namespace stemvo::robustness

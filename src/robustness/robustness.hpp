@@ -13,11 +13,12 @@
 #include "config/config.hpp"
 #include "dataset/sequence.hpp"
 #include "evaluation/paired_ratio.hpp"
+#include "robustness/outcome.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::robustness {
 
-/// The row of the frames as they are.
+/// The row of the frames as they are, and its group.
 inline constexpr const char* kUndisturbed = "none";
 
 struct RobustnessRequest {
@@ -34,57 +35,47 @@ struct RobustnessRequest {
   std::function<bool(std::size_t, std::size_t)> on_frame = {};
 };
 
-/// gray, log, census: hand-made channels, all else alike; red, green, blue: the same where frames
-/// are colour; orb, sift: the paper's pairs of frames on gray. A control may also be MODEL:FILTER,
-/// another filter of a network.
-[[nodiscard]] const std::vector<std::string>& all_controls();
-
-/// One drive under one disturbance through one channel.
-struct Outcome {
-  std::optional<double> t_rel_percent;  ///< KITTI's, steps of the true length
-  std::optional<double> r_rel_deg_per_100m;
-  double tracked = 0.0;  ///< share of frames with a measured motion
-  /// Frames without a measured motion after a disturbed one, the longest such stretch; null where
-  /// no frame is undisturbed after a disturbed one.
-  std::optional<std::size_t> recovery_frames;
-  /// Rotations wrong by more than a degree from one frame to the next, while the state says
-  /// tracked.
-  std::size_t jumps = 0;
-  /// Of segments of an eighth of the path, one from every frame on.
-  std::vector<double> dense_t_percent;
-  std::vector<double> dense_r_deg_per_100m;
-  std::size_t block = 1;  ///< frames of such a segment
-};
-
-/// One disturbance at one strength.
-struct Row {
-  std::string disturbance;  ///< `none`: as the frames are
-  double strength = 0.0;
-  std::vector<std::vector<Outcome>> outcomes;  ///< per contender, per drive
-};
-
-/// The judged channel's errors over those of one control.
+/// The judged channel's errors over those of one control, drives together.
 struct Verdict {
   ErrorRatio rotation;
   ErrorRatio translation;
 };
 
+/// One disturbance at one strength.
+struct Row {
+  std::string disturbance;
+  std::string group;
+  double strength = 0.0;
+  std::vector<std::vector<Outcome>> outcomes;  ///< per contender, per drive
+  std::vector<Verdict> verdicts;               ///< per control
+};
+
 struct RobustnessReport {
   std::vector<std::string> drives;
   std::vector<std::string> contenders;  ///< the judged channel first
-  std::vector<Row> rows;
-  std::vector<std::string> warnings;
-  bool interrupted = false;  ///< rows are those that were finished
+  std::vector<Row> rows;                ///< that were finished
+  std::vector<std::string> warnings;    ///< each once
+  bool interrupted = false;
 };
 
 /// Runs all contenders on all drives under all disturbances, each frame's step having its true
 /// length (unless the configuration says otherwise). OUT gets robustness.csv, .json, .txt and .png,
-/// also when stopped. Errors: no ground truth, an unknown kind or control, whatever a run refuses.
+/// written after every row. A run that is refused leaves its outcome empty, with a warning. Errors:
+/// no ground truth, an unknown kind or control, whatever is refused before the first run.
 [[nodiscard]] Expected<RobustnessReport> run_robustness(const RobustnessRequest& request);
 
-/// Per control, over the drives of some rows (all: the geometric mean).
-[[nodiscard]] std::vector<Verdict> verdicts(const RobustnessReport& report,
-                                            const std::vector<const Row*>& rows);
+/// Rows of one group, or all (`group` "all"), judged against one control.
+struct Summary {
+  std::string group;
+  std::size_t num_rows = 0;
+  /// Geometric means over the rows. No interval: the rows are the same frames.
+  double rotation_ratio = 1.0;
+  double translation_ratio = 1.0;
+  std::size_t num_for_judged = 0;  ///< rows whose rotation is decided
+  std::size_t num_for_control = 0;
+};
+/// Groups in the order of the rows, then all. `control` counts from 0.
+[[nodiscard]] std::vector<Summary> summaries(const std::vector<Row>& rows, std::size_t control);
 
 /// r_rel in degrees per 100 m, the mean over drives; nullopt: one has no segment.
 [[nodiscard]] std::optional<double> mean_rotation_error(const std::vector<Outcome>& outcomes);

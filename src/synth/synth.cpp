@@ -56,14 +56,16 @@ struct Output {
   /// Makes the folders. Error: what is there was not rendered.
   [[nodiscard]] Status prepare(bool with_depth) const {
     std::error_code code;
-    const bool is_ours = fs::exists(final_dir_ / kMark, code) && holds_only_a_drive(final_dir_);
+    // Killed in finish(), only the unfinished folder says whose the poses are.
+    const bool is_ours =
+        has_earlier() ? holds_only_a_drive(final_dir_)
+                      : fs::exists(sequence_dir / kMark, code) && !fs::exists(final_dir_, code);
     for (const fs::path& path : {final_dir_, final_poses_}) {
       const bool is_empty = fs::is_directory(path, code) && fs::is_empty(path, code);
       if (!is_ours && fs::exists(path, code) && !is_empty) {
         return fail(
             fmt::format("{}: expected a drive that stemvo rendered, which a new one may replace, "
-                        "or none, found "
-                        "something else (--name gives another name)",
+                        "or none, found something else (--name gives another name)",
                         path.string()));
       }
     }
@@ -80,6 +82,18 @@ struct Output {
       }
     }
     return write_text_file(sequence_dir / kMark, "");
+  }
+
+  [[nodiscard]] bool has_earlier() const {
+    std::error_code code;
+    return fs::exists(final_dir_ / kMark, code);
+  }
+
+  /// Leaves an earlier drive as it is.
+  [[nodiscard]] Status abandon() const {
+    std::error_code code;
+    fs::remove_all(sequence_dir, code);
+    return code ? Status(cannot("remove the unfinished drive", sequence_dir, code)) : Status();
   }
 
   /// In place of an earlier drive.
@@ -300,6 +314,9 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
     }
     done = frames.end;
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
+  }
+  if (done < total && output.has_earlier()) {
+    return output.abandon();
   }
   const auto rendered = std::span(poses).first(static_cast<std::size_t>(done));
   status = output.write_truth(rendered, pace.rate_hz);

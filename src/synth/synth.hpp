@@ -34,9 +34,10 @@ struct SyntheticDriveOptions {
 using RenderProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Writes OUT/sequences/NAME/{image_2,calib.txt,times.txt} and OUT/poses/NAME.txt; of a walk also
-/// camera.yaml beside calib.txt. They take the place of an earlier drive when they are whole;
-/// stopped, of the frames that were done. The same options give the same bytes, whatever the number
-/// of threads. Error: a sequence of that name is there that was not rendered.
+/// camera.yaml beside calib.txt. They take the place of an earlier drive when they are whole.
+/// Stopped, an earlier drive stays; where there was none, the frames that were done are one. The
+/// same options give the same bytes, whatever the number of threads. Error: a sequence of that name
+/// is there that was not rendered.
 [[nodiscard]] Status render_synthetic_drive(const std::filesystem::path& out_dir,
                                             const SyntheticDriveOptions& options,
                                             const RenderProgress& progress = {});

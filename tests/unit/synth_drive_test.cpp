@@ -120,6 +120,22 @@ TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
   EXPECT_EQ(sequence->ground_truth()->size(), 2U);
 }
 
+TEST_F(SyntheticDriveTest, InterruptedItLeavesAnEarlierDrive) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(40), [](auto...) { return false; }));
+  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 3U);
+  EXPECT_FALSE(fs::exists(root_ / "out" / "sequences" / "00.unfinished"));
+}
+
+TEST_F(SyntheticDriveTest, KilledBetweenTheTwoNamesItGoesOn) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
+  fs::rename(root_ / "out" / "sequences" / "00", root_ / "out" / "sequences" / "00.unfinished");
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
+  EXPECT_EQ(KittiSequence::open(root_ / "out" / "sequences" / "00")->size(), 4U);
+}
+
 TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
