@@ -20,7 +20,9 @@ namespace {
 
 constexpr const char* kFooter =
     R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
-is given an odometry of its own and ranked by t_rel, each step having its true length. Ground truth is
+is given an odometry of its own and ranked by t_rel, each step having its true length. Filters whose
+errors are no worse than the best one's (paired bootstrap over segments, 95 %) are a group of equals, in
+the order of their mean rank over the sequences; --kinds has disturbed ones count too. Ground truth is
 needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
 
 --out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
@@ -29,6 +31,7 @@ best.yaml (for 'stemvo run --config'), sheet.png (best, median and worst) and re
 
 Examples:
   stemvo search kitti/sequences/00 --model stems/efficientnet.onnx --out result
+  stemvo search kitti/sequences/00 kitti/sequences/03 --kinds dusk,motion_blur --out result
   stemvo search kitti/sequences/00 --frames 0:100 --held-out kitti/sequences/03 --out result
   stemvo search kitti/sequences/00 --exhaustive --filters 0:8 --out part0     part of a layer
   stemvo search --merge part0 part1 --out result                              parts to one table)";
@@ -98,6 +101,13 @@ void add_options(CLI::App& command, Arguments& arguments) {
                   "Name in models/manifest.yaml or path of an .onnx; default: default")
       ->type_name("MODEL");
   command.add_option("--layers", request.layers, "Layers of the model, e.g. a,b; default: all")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,..");
+  command
+      .add_option("--kinds", request.kinds,
+                  "Each sequence also under these disturbances, at their middle strength\n"
+                  "(stemvo robustness --help lists them)")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAME,..");

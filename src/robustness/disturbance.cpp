@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 namespace stemvo::robustness {
 
 const std::vector<Disturbance>& disturbances() {
@@ -123,6 +126,19 @@ const std::vector<Disturbance>& disturbances() {
        rs::scaled},
   };
   return kAll;
+}
+
+const Disturbance* find_disturbance(std::string_view name) {
+  const auto found = std::ranges::find(disturbances(), name, &Disturbance::name);
+  return found == disturbances().end() ? nullptr : &*found;
+}
+
+std::string names_of_disturbances() {
+  std::vector<std::string_view> names;
+  for (const Disturbance& one : disturbances()) {
+    names.push_back(one.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 std::size_t num_calm_frames(std::size_t num_frames) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -39,6 +40,11 @@ struct Disturbance {
 
 /// All kinds: light, noise and blur, weather, things in the way, other frames.
 [[nodiscard]] const std::vector<Disturbance>& disturbances();
+
+/// Null: there is none of that name.
+[[nodiscard]] const Disturbance* find_disturbance(std::string_view name);
+/// "dusk, fog, .."
+[[nodiscard]] std::string names_of_disturbances();
 
 /// At the end of a drive effects cease for so many frames, to see how soon the camera is found
 /// again: 30, of short drives an eighth.

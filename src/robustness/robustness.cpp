@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
@@ -28,14 +27,10 @@ struct PlannedRow {
 };
 
 Expected<std::vector<PlannedRow>> plan_rows(const std::vector<std::string>& kinds) {
-  std::vector<std::string_view> known = {kUndisturbed};
-  for (const Disturbance& one : disturbances()) {
-    known.push_back(one.name);
-  }
   for (const std::string& kind : kinds) {
-    if (!is_among(kind, known)) {
-      return fail(
-          fmt::format("--kinds: expected some of {}, found '{}'", fmt::join(known, ", "), kind));
+    if (kind != kUndisturbed && find_disturbance(kind) == nullptr) {
+      return fail(fmt::format("--kinds: expected some of {}, {}, found '{}'", kUndisturbed,
+                              names_of_disturbances(), kind));
     }
   }
   std::vector<PlannedRow> rows;

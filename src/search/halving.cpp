@@ -32,34 +32,7 @@ Schedule schedule_of(std::size_t num_filters, const Shares& shares, std::size_t 
   return schedule;
 }
 
-/// What a mean is taken of.
-constexpr std::optional<double> DriveScore::* kNumbers[] = {
-    &DriveScore::t_rel_percent,    &DriveScore::r_rel_deg_per_100m,
-    &DriveScore::average_offset_m, &DriveScore::E_t_m,
-    &DriveScore::E_r_deg,          &DriveScore::inliers,
-    &DriveScore::tracked,          &DriveScore::early_error_percent};
-
 constexpr double kWorst = std::numeric_limits<double>::infinity();
-/// Early on filters differ by less than chance; then more inliers are better: 10 % more weigh like
-/// 0.5 % of error (docs/search.md).
-constexpr double kInlierPower = 0.05;
-
-/// What unfinished filters are compared by.
-double early_error(const DriveScore& mean) {
-  const double inliers = std::max(1.0, mean.inliers.value_or(1.0));
-  return mean.early_error_percent.value_or(kWorst) * std::pow(inliers, -kInlierPower);
-}
-
-/// Smaller is better, number by number.
-std::tuple<FilterStatus, double, double> order_of(const FilterRow& row) {
-  if (row.status == FilterStatus::kRanked) {
-    return {row.status, row.mean.t_rel_percent.value_or(kWorst),
-            row.mean.r_rel_deg_per_100m.value_or(kWorst)};
-  }
-  const bool is_stopped = row.status == FilterStatus::kStopped;
-  return {row.status, is_stopped ? -static_cast<double>(row.rung) : 0.0,
-          is_stopped ? early_error(row.mean) : 0.0};
-}
 
 /// What survivors are chosen by: first detected or not and the early error; the other numbers tell
 /// whether two filters are one.
@@ -102,44 +75,6 @@ std::size_t frames_at(const Rung& rung, std::size_t num_frames) {
   const auto frames =
       static_cast<std::size_t>(std::floor(rung.frame_share * static_cast<double>(num_frames)));
   return std::clamp<std::size_t>(frames, std::min<std::size_t>(2, num_frames), num_frames);
-}
-
-DriveScore mean_score(const std::vector<DriveScore>& drives) {
-  DriveScore mean;
-  mean.detected = true;
-  const auto count = static_cast<double>(drives.size());
-  for (const auto number : kNumbers) {
-    mean.*number = 0.0;
-    for (const DriveScore& drive : drives) {
-      const bool is_known = mean.*number && drive.*number;
-      mean.*number =
-          is_known ? std::optional(*(mean.*number) + *(drive.*number) / count) : std::nullopt;
-    }
-  }
-  for (const DriveScore& drive : drives) {
-    mean.frames += drive.frames;
-    if (mean.detected && !drive.detected) {
-      mean.detected = false;
-      mean.reason = (drives.size() > 1 ? drive.sequence + ": " : "") + drive.reason;
-    }
-  }
-  return mean;
-}
-
-std::vector<FilterRow> rank_filters(const FilterRecords& records, std::size_t num_rungs) {
-  std::map<FilterKey, FilterRow> last;
-  for (const FilterRecord& record : records) {
-    last[record.key] = {record, {}, mean_score(record.drives)};
-  }
-  std::vector<FilterRow> rows;
-  for (auto& [key, row] : last) {
-    row.status = !row.mean.detected         ? FilterStatus::kNotDetected
-                 : row.rung + 1 < num_rungs ? FilterStatus::kStopped
-                                            : FilterStatus::kRanked;
-    rows.push_back(std::move(row));
-  }
-  std::ranges::stable_sort(rows, {}, order_of);
-  return rows;
 }
 
 std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records) {

@@ -10,6 +10,7 @@
 #include "models/manifest.hpp"
 #include "options/option_fields.hpp"
 #include "pipeline/input_hashes.hpp"
+#include "robustness/disturbance.hpp"
 #include "search/race.hpp"
 #include "stem/hand_made.hpp"
 
@@ -24,6 +25,9 @@ constexpr int kMinSide_px = 16;
 /// What the filters in flight may take by the estimate; the process takes some 0.2 GB more, and the
 /// weights and layers of the network.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
+
+/// Of three.
+constexpr std::size_t kMiddleStrength = 1;
 
 /// What the layer of a channel made by hand is called in tables.
 constexpr const char* kInputLayer = "input";
@@ -137,7 +141,7 @@ Status add_layers(const SearchRequest& request, SearchPlan& plan) {
 }
 
 std::size_t num_sequences(const SearchRequest& request) {
-  return request.sequence_dirs.size() + (request.held_out_dir ? 1 : 0);
+  return request.sequence_dirs.size() * (1 + request.kinds.size()) + (request.held_out_dir ? 1 : 0);
 }
 
 /// What can be said before anything is opened.
@@ -150,6 +154,13 @@ Status check_request(const SearchRequest& request) {
         "scale.source: expected ground_truth for a search, which ranks by t_rel with steps of the "
         "true length, found {}",
         options::to_string(request.config.scale.source)));
+  }
+  for (auto kind = request.kinds.begin(); kind != request.kinds.end(); ++kind) {
+    if (robustness::find_disturbance(*kind) == nullptr ||
+        std::find(request.kinds.begin(), kind, *kind) != kind) {
+      return fail(fmt::format("--kinds: expected some of {}, each once, found '{}'",
+                              robustness::names_of_disturbances(), *kind));
+    }
   }
   if (request.only_sequence && *request.only_sequence >= num_sequences(request)) {
     return fail(fmt::format("--only-sequence: expected 0 to {}, the held-out one last, found {}",
@@ -170,6 +181,9 @@ Status check_request(const SearchRequest& request) {
 
 /// Each sequence ranks once, under a name of its own, and the held-out one has no frame that ranks.
 Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added) {
+  if (before.disturbance != added.disturbance && !added.held_out) {
+    return {};
+  }
   std::error_code code;
   const bool same_folder = before.directory == added.directory ||
                            fs::equivalent(before.directory, added.directory, code);
@@ -239,9 +253,26 @@ std::string fit_layer(const SearchRequest& request,
   return is_small ? fmt::format("channel {}x{}", size.width, size.height) : std::string();
 }
 
+/// "_dusk_0.03": the end of a disturbed sequence's name; empty: as the frames are.
+std::string suffix_of(const robustness::Disturbance* how) {
+  return how == nullptr ? "" : fmt::format("_{}_{}", how->name, how->strengths[kMiddleStrength]);
+}
+
+/// The frames under it, null: as they are.
+FrameSource disturbed(const FrameSource& source,
+                      const robustness::Disturbance* how,
+                      std::uint64_t seed) {
+  FrameList frames =
+      (how == nullptr ? source : robustness::disturb(source, *how, kMiddleStrength, seed)).frames();
+  frames.name += suffix_of(how);
+  return FrameSource(std::move(frames));
+}
+
+/// `kind`: of a disturbance, empty: as the frames are.
 Status add_sequence(const SearchRequest& request,
                     const fs::path& directory,
                     bool is_held_out,
+                    const std::string& kind,
                     SearchPlan& plan) {
   Expected<KittiSequence> sequence = open_sequence(request, directory, is_held_out);
   if (!sequence) {
@@ -255,10 +286,13 @@ Status add_sequence(const SearchRequest& request,
   if (!hashes) {
     return hashes.error();
   }
-  const SequenceIdentity added = {.name = sequence->name(),
+  const robustness::Disturbance* const how = robustness::find_disturbance(kind);
+  const FrameSource source = disturbed(*sequence, how, request.config.seed);
+  const SequenceIdentity added = {.name = source.name(),
                                   .held_out = is_held_out,
+                                  .disturbance = suffix_of(how),
                                   .first_frame = sequence->range().begin,
-                                  .num_frames = sequence->size(),
+                                  .num_frames = source.size(),
                                   .frames = is_run ? hashes->frames : std::string(),
                                   .calibration = hashes->calibration,
                                   .ground_truth = hashes->ground_truth,
@@ -275,9 +309,9 @@ Status add_sequence(const SearchRequest& request,
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
     problems.push_back(
-        fit_layer(request, plan.identity.layers[i], sequence->camera(), plan.layers[i]));
+        fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]));
   }
-  plan.sequences.push_back({std::move(*sequence), is_held_out, std::move(problems)});
+  plan.sequences.push_back({source, is_held_out, std::move(problems)});
   return {};
 }
 
@@ -341,11 +375,15 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   SearchPlan plan;
   plan.block = static_cast<std::size_t>(std::max(0, request.block));
   Status status = check_request(request).and_then([&] { return add_layers(request, plan); });
-  for (const fs::path& directory : request.sequence_dirs) {
-    status = status ? add_sequence(request, directory, false, plan) : status;
+  std::vector<std::string> kinds = {""};  // first as they are: the sheet shows the first of all
+  kinds.insert(kinds.end(), request.kinds.begin(), request.kinds.end());
+  for (const std::string& kind : kinds) {
+    for (const fs::path& directory : request.sequence_dirs) {
+      status = status ? add_sequence(request, directory, false, kind, plan) : status;
+    }
   }
   if (status && request.held_out_dir) {
-    status = add_sequence(request, *request.held_out_dir, true, plan);
+    status = add_sequence(request, *request.held_out_dir, true, "", plan);
   }
   if (!status) {
     return status.error();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -20,6 +21,7 @@ namespace {
 
 constexpr double kMinTracked = 0.5;
 constexpr std::size_t kMaxPathPoints = 400;
+constexpr double kDenseShare = 1.0 / 8.0;  // of the path, as robustness
 /// Of the path so far; chosen among prefixes of clips (docs/search.md).
 constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
 
@@ -95,6 +97,11 @@ class FilterDrive {
     score.E_r_deg = kDegPerRad * rotation_rad / num_steps;
     // A standing start has no segments: nothing is known against the filter.
     score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
+    const double dense_m = kDenseShare * metrics.path_length_m;
+    for (const SegmentError& one : segment_errors(trajectory, truth, {&dense_m, 1}, 1)) {
+      score.dense_t_percent.push_back(std::round(1e4 * one.t_percent) / 1e4);
+      score.block = std::max(score.block, one.last - one.first);
+    }
     score.path_xz_m = path_of(trajectory);
   }
 
@@ -341,7 +348,7 @@ struct Race {
   }
 
   BlockFrame read_frame(std::size_t index, std::size_t frame_index, const Candidates& running) {
-    const KittiSequence& sequence = plan.sequences[index].sequence;
+    const FrameSource& sequence = plan.sequences[index].sequence;
     const Expected<cv::Mat> frame = sequence.read(frame_index);
     if (!frame) {
       warn(frame.error().message);

@@ -29,7 +29,7 @@ struct Candidate {
 
 /// One sequence and what can be said of it before work starts.
 struct PlanSequence {
-  KittiSequence sequence;
+  FrameSource sequence;
   bool is_held_out = false;
   std::vector<std::string> problems;  ///< per layer: why it cannot be run here; empty: it can
 };

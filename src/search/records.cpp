@@ -45,15 +45,24 @@ STEMVO_JSON_MEMBERS(DriveScore,
                      inliers,
                      tracked,
                      early_error_percent,
+                     dense_t_percent,
+                     block,
                      path_xz_m))
 /// Beside those of its key.
 STEMVO_JSON_MEMBERS(FilterRecord, (rung, filter_frames, held_out_filter_frames, drives, held_out))
 STEMVO_JSON_MEMBERS(Rung, (frame_share, filters))
 STEMVO_JSON_MEMBERS(LayerIdentity,
                     (model, layer, features, first, last, hash, sampling_px, stem_model, baseline))
-STEMVO_JSON_MEMBERS(
-    SequenceIdentity,
-    (name, held_out, first_frame, num_frames, frames, calibration, ground_truth, directory))
+STEMVO_JSON_MEMBERS(SequenceIdentity,
+                    (name,
+                     held_out,
+                     disturbance,
+                     first_frame,
+                     num_frames,
+                     frames,
+                     calibration,
+                     ground_truth,
+                     directory))
 STEMVO_JSON_MEMBERS(
     SearchIdentity,
     (stemvo_search, program, configuration, rungs, layers, sequences, only_sequence))

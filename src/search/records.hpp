@@ -16,6 +16,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "evaluation/paired_ratio.hpp"
 #include "search/search.hpp"
 
 /// records.jsonl: the identity of a search in the first line, then a FilterRecord a line. Members
@@ -52,6 +53,10 @@ struct DriveScore {
   // nullopt: no frame ran.
   std::optional<double> inliers;  ///< mean
   std::optional<double> tracked;  ///< share of the frames after the first: motion measured
+  /// t_rel of segments of an eighth of the path, one from every frame on: what filters are told
+  /// apart by. Neighbours of so many frames (`block`) overlap.
+  std::vector<double> dense_t_percent;
+  std::size_t block = 1;
   /// Metres: at most 400 points, evenly spaced in frames.
   std::vector<std::array<double, 2>> path_xz_m;
   bool operator==(const DriveScore&) const = default;
@@ -102,6 +107,7 @@ struct LayerIdentity {
 struct SequenceIdentity {
   std::string name;
   bool held_out = false;
+  std::string disturbance = {};  ///< "_dusk_0.03", the end of the name; empty: as the frames are
   std::size_t first_frame = 0;
   std::size_t num_frames = 0;
   std::string frames;  ///< hashes, as pipeline::SequenceHashes; empty: not run here
@@ -114,7 +120,7 @@ struct SequenceIdentity {
 
 /// Everything that the records depend on.
 struct SearchIdentity {
-  int stemvo_search = 3;      ///< the format
+  int stemvo_search = 4;      ///< the format
   std::string program;        ///< hash
   std::string configuration;  ///< YAML of every key, without the model
   Schedule rungs;             ///< of the filters; the baselines are outside
@@ -173,14 +179,22 @@ enum class FilterStatus { kRanked, kStopped, kNotDetected };
 struct FilterRow : FilterRecord {
   FilterStatus status = FilterStatus::kRanked;
   DriveScore mean;  ///< of the drives
+  // Of ranked rows:
+  double mean_rank = 0.0;  ///< by t_rel on each of the drives, from 1
+  ErrorRatio over_best;   ///< dense errors over those of the row of the lowest geometric mean t_rel
+  bool is_equal = false;  ///< the interval does not say that it is worse
 };
 
 /// Over the sequences that rank; nullopt where one of them has none, `frames` is the sum, the
 /// reason that of the first sequence whose pose was not detected.
 [[nodiscard]] DriveScore mean_score(const std::vector<DriveScore>& drives);
 
-/// One row per filter from its last rung, ranked: by t_rel, ties by r_rel; then those that were
-/// stopped, the later the better; not detected last.
+/// What unfinished filters are compared by: early errors, near ties by inliers.
+[[nodiscard]] double early_error(const DriveScore& mean);
+
+/// One row per filter from its last rung: those that cannot be told from the best, by their mean
+/// rank over the drives (on one drive: by t_rel); the others by t_rel, ties by r_rel; then those
+/// that were stopped, the later the better; not detected last.
 [[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
                                                   std::size_t num_rungs);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <set>
 #include <span>
@@ -76,13 +77,21 @@ Json work_of(const SearchIdentity& identity, const FilterRecords& records) {
           {"exhaustive_filter_frames", exhaustive}};
 }
 
+/// "1.07 0.95-1.20"; without an interval where the drives are too short for one.
+std::string over_best(const FilterRow& row) {
+  const ErrorRatio& ratio = row.over_best;
+  return std::isfinite(ratio.high)
+             ? fmt::format("{:.2f} {:.2f}-{:.2f}", ratio.ratio, ratio.low, ratio.high)
+             : fmt::format("{:.2f} -", ratio.ratio);
+}
+
 std::string format_table(const std::vector<FilterRow>& rows) {
   const bool has_held_out =
       std::ranges::any_of(rows, [](const FilterRow& row) { return row.held_out.has_value(); });
-  TextTable table("rllrlrrrrrrrrrl");
+  TextTable table("rllrlrrrrrrrrrrl");
   std::vector<std::string> cells = {"", "model", "layer", "filter", "by"};
   std::ranges::transform(kScoreNumbers, std::back_inserter(cells), &ScoreNumber::title);
-  cells.insert(cells.end(), {"frames", has_held_out ? "held out t_rel %" : "", ""});
+  cells.insert(cells.end(), {"over best", "frames", has_held_out ? "held out t_rel %" : "", ""});
   table.add(cells);
   table.rule();
   int rank = 0;
@@ -103,9 +112,10 @@ std::string format_table(const std::vector<FilterRow>& rows) {
       cells.push_back(number_or_dash(mean.*number.value, number.decimals));
     }
     const bool is_known = row.held_out && row.held_out->detected;
-    cells.insert(cells.end(),
-                 {std::to_string(mean.frames),
-                  is_known ? number_or_dash(row.held_out->t_rel_percent, 3) : "", remark});
+    cells.insert(
+        cells.end(),
+        {row.status == FilterStatus::kRanked ? over_best(row) : "", std::to_string(mean.frames),
+         is_known ? number_or_dash(row.held_out->t_rel_percent, 3) : "", remark});
     table.add(cells);
   }
   return table.str();
@@ -127,6 +137,16 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
   for (const ScoreNumber& number : kScoreNumbers) {
     add(number.key, number, row.mean);
   }
+  const bool is_ranked = row.status == FilterStatus::kRanked;
+  const auto if_ranked = [&](const std::string& text) { return is_ranked ? text : ""; };
+  const bool has_interval = std::isfinite(row.over_best.high);
+  columns.emplace_back("mean_rank", if_ranked(fmt::format("{:.2f}", row.mean_rank)));
+  columns.emplace_back("over_best", if_ranked(fmt::format("{:.4f}", row.over_best.ratio)));
+  for (const auto& [name, bound] : {std::pair("over_best_low", row.over_best.low),
+                                    std::pair("over_best_high", row.over_best.high)}) {
+    columns.emplace_back(name, has_interval ? if_ranked(fmt::format("{:.4f}", bound)) : "");
+  }
+  columns.emplace_back("equal", if_ranked(row.is_equal ? "yes" : "no"));
   columns.emplace_back("frames", std::to_string(row.mean.frames));
   const bool has_held_out = identity.sequences.back().held_out;
   const std::size_t num_ranking = identity.sequences.size() - (has_held_out ? 1 : 0);
@@ -149,6 +169,8 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
 Json drive_json(const DriveScore& drive) {
   Json json = drive;
   json.erase("path_xz_m");
+  json.erase("dense_t_percent");
+  json.erase("block");
   if (drive.detected) {
     json.erase("reason");
   }
@@ -160,6 +182,12 @@ Json row_json(const FilterRow& row) {
   json["status"] = word_for(row.status);
   json["t_rel_percent"] = row.mean.t_rel_percent;
   json["r_rel_deg_per_100m"] = row.mean.r_rel_deg_per_100m;
+  if (row.status == FilterStatus::kRanked) {
+    json["mean_rank"] = row.mean_rank;
+    json["over_best"] = {
+        {"ratio", row.over_best.ratio}, {"low", row.over_best.low}, {"high", row.over_best.high}};
+    json["equal"] = row.is_equal;
+  }
   json["rung"] = row.rung;
   json["sequences"] = Json::array();
   std::ranges::transform(row.drives, std::back_inserter(json["sequences"]), drive_json);
@@ -264,9 +292,13 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
   }
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();
+  const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
   report.text = fmt::format(
-      "{}work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
-      format_table(results.rows), num_frames,
+      "{}filters 1 to {} cannot be told from the best (over best: errors over its errors, 95 % "
+      "interval) and are in the order of their mean rank\n"
+      "work: {} filter-frames, {:.1f} % of an exhaustive search; "
+      "baselines: {}\ntable: {}\n",
+      format_table(results.rows), num_equal, num_frames,
       100.0 * static_cast<double>(num_frames) /
           static_cast<double>(std::max<std::size_t>(num_exhaustive, 1)),
       work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string());

@@ -22,8 +22,10 @@ namespace stemvo::search {
 struct SearchRequest {
   std::vector<std::filesystem::path> sequence_dirs;   ///< ranked by the mean over them
   std::optional<std::filesystem::path> held_out_dir;  ///< reported, never ranked by
-  std::optional<FrameRangeRequest> frames;            ///< of each sequence that ranks
-  std::optional<FrameRangeRequest> held_out_frames;   ///< of the held-out one
+  /// Each that ranks also under these disturbances (robustness), at their middle strength.
+  std::vector<std::string> kinds;
+  std::optional<FrameRangeRequest> frames;           ///< of each sequence that ranks
+  std::optional<FrameRangeRequest> held_out_frames;  ///< of the held-out one
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   std::string model = "default";             ///< as StemOptions::model; made by hand too
@@ -32,8 +34,8 @@ struct SearchRequest {
   bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B
   Config config = search_defaults();         ///< stem.model, .layer and .filter are not used
   bool exhaustive = false;                   ///< every filter over every frame; else halving
-  /// Index in sequence_dirs, the held-out one behind them: runs it alone, as a part for
-  /// merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
+  /// Index of a sequence: as they are, then under each of `kinds`, the held-out one last. Runs it
+  /// alone, as a part for merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
   std::optional<std::size_t> only_sequence;
   bool resume = false;  ///< go on from what out_dir holds
   int num_threads = 0;  ///< 0: all cores

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 #include <set>
 #include <string>
 
@@ -10,6 +11,10 @@
 #include "robustness/disturbance.hpp"
 
 namespace stemvo::robustness {
+
+/// For the names of tests.
+void PrintTo(const Disturbance& one, std::ostream* stream) { *stream << one.name; }
+
 namespace {
 
 constexpr std::size_t kNumFrames = 80;

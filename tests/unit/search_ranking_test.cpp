@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <random>
+
 #include <gmock/gmock.h>
 
 #include "search/race.hpp"
@@ -73,6 +75,46 @@ TEST(Ranking, HeldOutAndStandingRankNothing) {
   good.held_out = score(9.0, 9.0);
   good.drives[0].E_t_m = 5.0;  // E_t of `other` is that of a camera that stands
   EXPECT_THAT(filters_of(rank_filters(FilterRecords{other, good}, 1)), ElementsAre(1, 0));
+}
+
+/// Errors of 200 segments that scatter about a mean, ten of them alike.
+DriveScore dense_score(double mean_percent, unsigned seed) {
+  DriveScore result = score(mean_percent, 1.0);
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> factor(0.7, 1.3);
+  for (int i = 0; i < 20; ++i) {
+    result.dense_t_percent.insert(result.dense_t_percent.end(), 10, mean_percent * factor(random));
+  }
+  result.block = 10;
+  return result;
+}
+
+TEST(Ranking, NamesThoseThatCannotBeToldFromTheBest) {
+  const FilterRecords records = {record(0, 0, {dense_score(1.00, 1)}),
+                                 record(1, 0, {dense_score(1.02, 2)}),
+                                 record(2, 0, {dense_score(2.00, 3)})};
+  const auto rows = rank_filters(records, 1);
+  EXPECT_THAT(filters_of(rows), ElementsAre(0, 1, 2));
+  EXPECT_TRUE(rows[0].is_equal);
+  EXPECT_EQ(rows[0].over_best.ratio, 1.0);
+  EXPECT_TRUE(rows[1].is_equal);
+  EXPECT_FALSE(rows[2].is_equal);
+  EXPECT_NEAR(rows[2].over_best.ratio, 2.0, 0.4);
+  EXPECT_GT(rows[2].over_best.low, 1.0);
+}
+
+TEST(Ranking, AmongEqualsGoesByTheMeanRankOverTheDrives) {
+  // Filter 0 has the lowest mean for one good drive; filter 1 is ahead on the other two.
+  const FilterRecords records = {
+      record(0, 0, {dense_score(1.0, 1), dense_score(1.05, 2), dense_score(1.05, 3)}),
+      record(1, 0, {dense_score(1.2, 4), dense_score(1.0, 5), dense_score(1.0, 6)}),
+      record(2, 0, {dense_score(5.0, 7), dense_score(0.9, 8), dense_score(0.9, 9)})};
+  const auto rows = rank_filters(records, 1);
+  EXPECT_THAT(filters_of(rows), ElementsAre(1, 0, 2));
+  EXPECT_NEAR(rows[0].mean_rank, 2.0, 1e-12);
+  EXPECT_NEAR(rows[1].mean_rank, 7.0 / 3.0, 1e-12);
+  EXPECT_FALSE(rows[2].is_equal);  // however well it does on two of three
+  EXPECT_NEAR(rows[2].mean_rank, 5.0 / 3.0, 1e-12);
 }
 
 TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {

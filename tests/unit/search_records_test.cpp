@@ -52,6 +52,8 @@ FilterRecord record(int filter, double t_rel = 1.0) {
   score.detected = true;
   score.t_rel_percent = t_rel;
   score.r_rel_deg_per_100m = 1.0 / 3.0;
+  score.dense_t_percent = {0.5, 0.1234, 2.0};
+  score.block = 2;
   score.path_xz_m = {{0.0, 0.0}, {0.25, 1.5}};
   record.drives = {score};
   return record;
