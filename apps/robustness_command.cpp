@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -30,7 +30,7 @@ Every step has its true length (--set scale.source=camera_height: metres from th
 shows r_rel in degrees per 100 m, in brackets the share of frames with a measured motion where some have
 none, and how many times as large the channel's rotation error is as a control's over segments of an
 eighth of the path, from every frame on, with the 95 % interval; * where the interval leaves out 1, else
-the two cannot be told apart; - where there are too few segments for an interval. A second table sums up
+the two cannot be told apart; - where there are too few segments. A second table sums up
 groups of disturbances: geometric means of the ratios, and how many rows are decided for whom.
 
 Examples:
@@ -54,16 +54,9 @@ int run(Arguments& arguments) {
   }
   request.config = *config;
   request.models_dir = data_folder("models");
-  std::optional<Progress> progress;
-  request.on_run = [&](const std::string& title) {
-    progress.emplace(title + ": frames", arguments.is_quiet);
-    return true;
-  };
-  request.on_frame = [&](std::size_t done, std::size_t total) {
-    return progress->update(done, total);
-  };
+  Progress progress("runs", arguments.is_quiet);
+  request.progress = std::bind_front(&Progress::update, &progress);
   const auto report = robustness::run_robustness(request);
-  progress.reset();
   if (!report) {
     print_error(report.error().message);
     return kExitFailed;

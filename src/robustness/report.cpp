@@ -51,10 +51,10 @@ std::string cell(const std::vector<Outcome>& outcomes) {
   return tracked > 0.995 ? error : fmt::format("{} ({:.2f})", error, tracked);
 }
 
-/// "0.84 0.75-0.95", with a star where the interval leaves out 1.
+/// "0.84 0.75-0.95", with a star where the interval leaves out 1; "-" where there is none.
 std::string words(const ErrorRatio& ratio) {
   if (!std::isfinite(ratio.high)) {
-    return fmt::format("{:.2f} -", ratio.ratio);
+    return "-";
   }
   return fmt::format("{}{:.2f} {:.2f}-{:.2f}", ratio.is_decided() ? "*" : "", ratio.ratio,
                      ratio.low, ratio.high);
@@ -77,23 +77,34 @@ std::vector<std::string> groups_of(const std::vector<Row>& rows) {
   return groups;
 }
 
+std::optional<double> geometric_mean(const std::vector<ErrorRatio>& ratios) {
+  double sum = 0.0;
+  int count = 0;
+  for (const ErrorRatio& one : ratios) {
+    if (std::isfinite(one.high)) {
+      sum += std::log(one.ratio);
+      ++count;
+    }
+  }
+  return count == 0 ? std::nullopt : std::optional(std::exp(sum / count));
+}
+
 Summary summarize(const std::string& group,
                   const std::vector<const Row*>& rows,
                   std::size_t control) {
-  Summary result{group, rows.size()};
-  double rotation = 0.0;
-  double translation = 0.0;
+  Summary result{group, rows.size(), {}, {}, 0, 0};
+  std::vector<ErrorRatio> rotation;
+  std::vector<ErrorRatio> translation;
   for (const Row* row : rows) {
     const Verdict& verdict = row->verdicts.at(control);
-    rotation += std::log(verdict.rotation.ratio);
-    translation += std::log(verdict.translation.ratio);
+    rotation.push_back(verdict.rotation);
+    translation.push_back(verdict.translation);
     if (verdict.rotation.is_decided()) {
       ++(verdict.rotation.ratio < 1.0 ? result.num_for_judged : result.num_for_control);
     }
   }
-  const double num = static_cast<double>(std::max<std::size_t>(rows.size(), 1));
-  result.rotation_ratio = std::exp(rotation / num);
-  result.translation_ratio = std::exp(translation / num);
+  result.rotation_ratio = geometric_mean(rotation);
+  result.translation_ratio = geometric_mean(translation);
   return result;
 }
 
@@ -114,8 +125,8 @@ std::string format_summaries(const RobustnessReport& report) {
     std::vector<std::string> cells = {first.group, std::to_string(first.num_rows)};
     for (const auto& column : columns) {
       const Summary& one = column[line];
-      cells.push_back(fmt::format("{:.2f} ({}, {})", one.rotation_ratio, one.num_for_judged,
-                                  one.num_for_control));
+      cells.push_back(fmt::format("{} ({}, {})", number_or_dash(one.rotation_ratio, 2),
+                                  one.num_for_judged, one.num_for_control));
     }
     table.add(std::move(cells));
   }

@@ -174,13 +174,7 @@ class Robustness {
       for (std::size_t i = 0; i < contenders_.size(); ++i) {
         const std::string what = fmt::format("{}, {} {}, {}", report_.drives[drive],
                                              row.disturbance, row.strength, report_.contenders[i]);
-        ++num_begun_;
-        const bool goes_on =
-            !request_.on_run || request_.on_run(fmt::format(
-                                    "{}/{} {}", num_begun_,
-                                    planned_.size() * sources_.size() * contenders_.size(), what));
-        if (!goes_on ||
-            !run_one(contenders_[i].config, source, planned, what, row.outcomes[i][drive])) {
+        if (!run_one(contenders_[i].config, source, planned, what, row.outcomes[i][drive])) {
           return std::nullopt;
         }
       }
@@ -197,7 +191,8 @@ class Robustness {
     auto odometry = pipeline::create_odometry(config, source.camera(), request_.models_dir);
     if (!odometry) {
       warn(fmt::format("{}: {}", what, odometry.error().message));
-      return true;
+      ++num_done_;
+      return goes_on();
     }
     Trajectory estimate;
     std::vector<FrameState> states;
@@ -212,7 +207,7 @@ class Robustness {
       is_disturbed.push_back(planned.disturbance != nullptr &&
                              planned.disturbance->disturbs(
                                  i, source.size(), planned.disturbance->strengths[planned.index]));
-      is_stopped = request_.on_frame && !request_.on_frame(i + 1, source.size());
+      is_stopped = !goes_on();
       return !is_stopped;
     };
     pipeline::run_frames(source, *odometry, visit);
@@ -224,7 +219,13 @@ class Robustness {
     const bool has_true_steps = config.scale.source == ScaleSource::kGroundTruth;
     add_errors(has_true_steps ? rescale_steps(estimate, truth) : estimate, truth, config.evaluation,
                outcome);
-    return true;
+    ++num_done_;
+    return goes_on();
+  }
+
+  bool goes_on() const {
+    return !request_.progress ||
+           request_.progress(num_done_, planned_.size() * sources_.size() * contenders_.size());
   }
 
   void warn(const std::string& message) {
@@ -237,7 +238,7 @@ class Robustness {
   std::vector<FrameSource> sources_;
   std::vector<Contender> contenders_;
   std::vector<PlannedRow> planned_;
-  std::size_t num_begun_ = 0;
+  std::size_t num_done_ = 0;
   RobustnessReport report_;
 };
 

@@ -30,9 +30,8 @@ struct RobustnessRequest {
   std::vector<std::string> kinds;     ///< of disturbances, and `none`; empty: all
   std::vector<std::string> controls;  ///< what it is judged against; empty: all_controls()
   int num_threads = 0;                ///< 0: all cores
-  /// Before a run, e.g. "12/804 03, gaussian_blur 2, gray"; false stops, here and after a frame.
-  std::function<bool(const std::string& run)> on_run = {};
-  std::function<bool(std::size_t, std::size_t)> on_frame = {};
+  /// After each frame and each run: runs done, runs in all; false stops.
+  std::function<bool(std::size_t, std::size_t)> progress = {};
 };
 
 /// The judged channel's errors over those of one control, drives together.
@@ -68,9 +67,10 @@ struct RobustnessReport {
 struct Summary {
   std::string group;
   std::size_t num_rows = 0;
-  /// Geometric means over the rows. No interval: the rows are the same frames.
-  double rotation_ratio = 1.0;
-  double translation_ratio = 1.0;
+  /// Geometric means over the rows that have an interval. None of their own: the rows are the same
+  /// frames. nullopt: no row has one.
+  std::optional<double> rotation_ratio;
+  std::optional<double> translation_ratio;
   std::size_t num_for_judged = 0;  ///< rows whose rotation is decided
   std::size_t num_for_control = 0;
 };

@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "support/program_test.hpp"
+#include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
@@ -77,6 +78,32 @@ TEST_F(Robustness, SaysWhatItCannotDo) {
   fs::remove(folder_ / "copy/poses/00.txt");
   expect_error(run_stemvo({"robustness", sequence, "--out", folder_ / "out"}), 1,
                {"expected ground truth", "found none"});
+}
+
+/// A model of one frame size is refused where the frames are cropped: that costs its row alone.
+TEST_F(Robustness, ARefusedRunIsAWarning) {
+  const TempFolder models;
+  testing::write_models(models, testing::kFixed4);
+  const std::string drive = folder_ / "tiny";
+  ASSERT_EQ(
+      run_stemvo({"synth", drive, "--frames", "8", "--width", "48", "--height", "32"}).exit_code,
+      0);
+  const std::string control = (models / "fixed_k4s4.onnx").string() + ":0";
+  const ProgramResult result =
+      run_stemvo({"robustness", drive + "/sequences/00", "--kinds", "none,cropped", "--controls",
+                  control, "--out", folder_ / "out"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("00, cropped 0.6, " + control));
+  EXPECT_THAT(result.err, HasSubstr("expected frames of 48x32"));
+  const auto json = nlohmann::json::parse(out("robustness.json"));
+  ASSERT_EQ(json["rows"].size(), 4U);
+  EXPECT_EQ(json["rows"][0]["channels"][1]["t_rel_percent"].is_null(),
+            json["rows"][0]["channels"][0]["t_rel_percent"].is_null());
+  const auto& refused = json["rows"][2]["channels"][1];
+  EXPECT_TRUE(refused["t_rel_percent"].is_null());
+  EXPECT_EQ(refused["tracked"], 0.0);
+  EXPECT_TRUE(refused["rotation_ratio"]["high"].is_null());
+  EXPECT_FALSE(refused["rotation_ratio"]["decided"]);
 }
 
 TEST_F(Robustness, StoppedItWritesTheRowsThatWereFinished) {

@@ -129,13 +129,14 @@ TEST(Summaries, AreGeometricMeansOfGroupsAndOfAll) {
   ASSERT_EQ(found.size(), 3U);
   EXPECT_EQ(found[0].group, "light");
   EXPECT_EQ(found[0].num_rows, 3U);
-  EXPECT_NEAR(found[0].rotation_ratio, 1.0, 1e-12);
-  EXPECT_NEAR(found[0].translation_ratio, 2.0, 1e-12);
+  EXPECT_NEAR(*found[0].rotation_ratio, 1.0, 1e-12);
+  EXPECT_NEAR(*found[0].translation_ratio, 2.0, 1e-12);
   EXPECT_EQ(found[0].num_for_judged, 1U);
   EXPECT_EQ(found[0].num_for_control, 1U);
   EXPECT_EQ(found[1].num_for_control, 0U);  // an interval of everything decides nothing
   EXPECT_EQ(found[2].group, "all");
-  EXPECT_NEAR(found[2].rotation_ratio, std::sqrt(2.0), 1e-12);
+  EXPECT_FALSE(found[1].rotation_ratio);  // and has no ratio to believe in
+  EXPECT_NEAR(*found[2].rotation_ratio, 1.0, 1e-12);
 }
 
 }  // namespace
