@@ -11,7 +11,7 @@ namespace stemvo {
 /// A corner's appearance when it was cut out, with what inverse-compositional alignment needs of it
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
-  static constexpr int kNumCoarse = 3;
+  static constexpr int kNumCoarse = 4;
   struct Coarse : CoarsePatch {            ///< 8x8, moved by a translation
     std::array<float, 3> inverse_hessian;  ///< xx, xy, yy; all 0 where it has no inverse
   };

@@ -23,6 +23,9 @@ constexpr float kMaxScale = 1.4F;
 constexpr std::size_t kNumNeighbours = 5;
 /// Where a motion is known, the level of half the size is coarse enough to begin.
 constexpr int kPredictedLevel = 1;
+/// Where fewer of the points are found, they have moved further than the levels asked for reach:
+/// those that are missing are looked for from one coarser level on.
+constexpr double kFewFound = 0.3;
 
 /// Motions of points between two images.
 class Motions {
@@ -82,7 +85,8 @@ std::shared_ptr<const PreparedImage> PatchFrontEnd::prepare(const ChannelImage& 
   const StageTimer timer(Stage::kPyramid);
   auto image = std::make_shared<PatchImage>(channel);
   cv::Mat level = channel.pixels;
-  for (int i = 0; i < num_levels(channel.map.scale.minCoeff()); ++i) {
+  const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
+  for (int i = 0; i < num; ++i) {
     if (i > 0) {
       cv::Mat half;
       cv::pyrDown(level, half);
@@ -115,7 +119,8 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
                                                                     const View& to) {
   const auto& image = static_cast<const PatchImage&>(*to.image);
   const Pyramid pyramid = image.pyramid;
-  const int top = static_cast<int>(pyramid.size()) - 1;
+  const int coarsest = static_cast<int>(pyramid.size()) - 1;
+  const int top = coarsest - 1;
   Motions motions;
   const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
     const Track& track = tracks_.at(point.id);
@@ -138,13 +143,26 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   std::vector<std::optional<cv::Point2f>> result(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Point& point = from.points[i];
-    Track& track = tracks_.at(point.id);
+    const Track& track = tracks_.at(point.id);
     if (found[i].correlation < kMinCorrelation) {
       const cv::Point2f motion = motions.near(point.uv);
       const bool is_predicted = track.frame != from.frame && !motions.empty();
       found[i] = align(point, motion, is_predicted ? kPredictedLevel : top);
       if (found[i].correlation < kMinCorrelation && is_predicted) {
         found[i] = align(point, motion, top);
+      }
+    }
+  }
+  const auto is_found = [](const Alignment& one) { return one.correlation >= kMinCorrelation; };
+  const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
+  const bool is_far = num_found < kFewFound * static_cast<double>(found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Point& point = from.points[i];
+    Track& track = tracks_.at(point.id);
+    if (is_far && !is_found(found[i])) {
+      found[i] = align(point, motions.near(point.uv), coarsest);
+      if (is_found(found[i])) {
+        motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
       }
     }
     if (accept(found[i], image, to.frame, point, track)) {

@@ -68,7 +68,8 @@ std::vector<Field> feature_fields(FeatureOptions& o) {
       {"features", "klt_window", &o.klt_window, Rule::odd_between(3, 201),
        "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked image"},
       {"features", "klt_levels", &o.klt_levels, Rule::between(1, 10),
-       "patch, klt: levels of the pyramid, from the input's size on"},
+       "patch, klt: levels of the pyramid, from the input's size on; patch: one more where few "
+       "points are found"},
       {"features", "max_forward_backward_px", &o.max_forward_backward_px, kPixels,
        "klt: a point tracked there and back must return this close, input pixels"},
       {"features", "fast_threshold", &o.fast_threshold, Rule::between(1, 254),

@@ -145,6 +145,33 @@ TEST(PatchFrontEnd, WhatLeavesTheImageIsCountedAsOutOfView) {
   EXPECT_GT(counted()[2] - fast[2], looked_for / 2);
 }
 
+/// Texture of several sizes, seen from `shift_px` further to the right.
+cv::Mat wide_texture(int shift_px) {
+  const cv::Size size(960, 320);
+  cv::RNG random(3);
+  cv::Mat sum(size, CV_32F, cv::Scalar(0));
+  for (const double sigma : {1.5, 6.0, 20.0}) {
+    cv::Mat noise(size, CV_32F);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 1.0);
+    cv::GaussianBlur(noise, noise, {}, sigma);
+    sum += 3.5 * sigma * noise;  // about the same contrast at all sizes
+  }
+  cv::normalize(sum, sum, 0.0, 255.0, cv::NORM_MINMAX);
+  cv::Mat image;
+  sum({shift_px, 0, 640, size.height}).convertTo(image, CV_8U);
+  return image;
+}
+
+TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
+  FeatureOptions options;
+  options.klt_levels = 3;
+  const auto front_end = create_front_end(options);
+  static_cast<void>(front_end->process(image_of(wide_texture(0))));
+  const Matches far = front_end->process(image_of(wide_texture(60)));
+  EXPECT_GT(far.cur_uv.size(), 100U);
+  EXPECT_LT(median_error_px(far, {-60.0, 0.0}), 0.05);
+}
+
 TEST(GridQuota, GivesEveryCellItsShare) {
   FeatureOptions options;
   options.max_features = 24;
