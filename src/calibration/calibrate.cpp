@@ -41,7 +41,7 @@ Status check_request(const CalibrationRequest& request) {
     return fail(fmt::format("{}: expected another file than the calibration to start from",
                             request.out_file.string()));
   }
-  return check_can_replace(request.out_file);
+  return check_can_write(request.out_file);
 }
 
 Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
@@ -96,7 +96,7 @@ Status write_calibration(const CalibrationRequest& request,
                          const Camera& refined) {
   const Expected<std::string> text =
       dataset::replace_kitti_camera(calibration_file(request), given, refined);
-  return text ? replace_text_file(request.out_file, *text) : Status(text.error());
+  return text ? write_text_file(request.out_file, *text) : Status(text.error());
 }
 
 }  // namespace

@@ -31,12 +31,11 @@ Status create_out_folder(const fs::path& folder) {
   }
   const fs::path probe = folder / ".stemvo_probe";
   std::ofstream out(probe);
-  if (!(out << "can be written\n") || !out.flush()) {
-    return refuse(std::strerror(errno));
-  }
+  const bool is_written = (out << "can be written\n") && out.flush();
+  const int error = errno;
   out.close();
   fs::remove(probe, code);
-  return {};
+  return is_written ? Status() : Status(refuse(std::strerror(error)));
 }
 
 Status remove_old_frames(const fs::path& folder, const std::string& extension) {

@@ -6,10 +6,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <fstream>
 #include <system_error>
 
 #include <fmt/core.h>
+#include <unistd.h>
 
 namespace stemvo {
 namespace {
@@ -30,6 +32,22 @@ std::optional<double> to_finite(std::string_view word) {
 }
 
 fs::path beside(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
+
+/// On the disk when it returns. Errors name `file`.
+Status write_in_place(const fs::path& file, const fs::path& place, std::string_view text) {
+  const auto failed = [&] {
+    return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
+  };
+  std::FILE* const stream = std::fopen(place.c_str(), "wbe");
+  if (stream == nullptr) {
+    return failed();
+  }
+  const bool is_written =
+      std::fwrite(text.data(), 1, text.size(), stream) == text.size() && std::fflush(stream) == 0 &&
+      (::fsync(::fileno(stream)) == 0 || errno == EINVAL);  // a pipe has no disk
+  const Status status = is_written ? Status() : Status(failed());
+  return std::fclose(stream) == 0 || !status ? status : Status(failed());
+}
 
 }  // namespace
 
@@ -64,39 +82,34 @@ Expected<std::string> read_text_file(const fs::path& file) {
 }
 
 Status write_text_file(const fs::path& file, std::string_view text) {
-  errno = 0;
-  std::ofstream stream(file, std::ios::binary | std::ios::trunc);
-  if (!stream) {
-    return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
-  }
-  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-  stream.close();  // a full disk shows here
-  if (!stream) {
-    return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
-  }
-  return {};
-}
-
-Status check_can_replace(const fs::path& file) {
-  std::error_code ignored;
-  if (fs::is_directory(file, ignored)) {
+  std::error_code code;
+  if (fs::is_directory(file, code)) {
     return fail(fmt::format("{}: expected a file to write, found a folder", file.string()));
   }
-  const Status status = write_text_file(beside(file), "");
-  fs::remove(beside(file), ignored);
-  return status;
-}
-
-Status replace_text_file(const fs::path& file, std::string_view text) {
-  std::error_code code;
-  Status status = write_text_file(beside(file), text);
+  if (fs::exists(file, code) && !fs::is_regular_file(file, code)) {
+    return write_in_place(file, file, text);  // a pipe or a device cannot be replaced
+  }
+  const fs::path target = fs::is_symlink(file, code) ? fs::weakly_canonical(file, code) : file;
+  Status status = write_in_place(file, beside(target), text);
   if (status) {
-    fs::rename(beside(file), file, code);
+    fs::rename(beside(target), target, code);
     if (code) {
       status = fail(fmt::format("{}: cannot write: {}", file.string(), code.message()));
     }
   }
-  fs::remove(beside(file), code);
+  if (!status) {
+    fs::remove(beside(target), code);
+  }
+  return status;
+}
+
+Status check_can_write(const fs::path& file) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) {
+    return fail(fmt::format("{}: expected a file to write, found a folder", file.string()));
+  }
+  const Status status = write_in_place(file, beside(file), "can be written");
+  fs::remove(beside(file), ignored);
   return status;
 }
 

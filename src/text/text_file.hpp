@@ -14,14 +14,12 @@ namespace stemvo {
 
 /// The whole file as it is. Error: missing, a folder, unreadable.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file);
-/// Writes the file anew. Error: it cannot be created, or the disk took less than all of it.
+/// Replaces the file at once: whoever reads it finds the old or the new one, whole, also after a
+/// kill or a full disk. Written beside as NAME.unfinished, synced, renamed; a pipe or device in
+/// place. Error: a folder, it cannot be created, or the disk took less than all of it.
 [[nodiscard]] Status write_text_file(const std::filesystem::path& file, std::string_view text);
-
-/// Replaces the file at once: whoever reads it finds the old or the new one. Errors: it is a
-/// folder, or those of write_text_file.
-[[nodiscard]] Status replace_text_file(const std::filesystem::path& file, std::string_view text);
-/// Proves that the file can be replaced, without touching it.
-[[nodiscard]] Status check_can_replace(const std::filesystem::path& file);
+/// Proves that write_text_file can, without touching the file.
+[[nodiscard]] Status check_can_write(const std::filesystem::path& file);
 
 /// All lines of a file without their ends. Errors: those of read_text_file.
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file);

@@ -75,22 +75,5 @@ TEST(KittiCamera, UnchangedCameraGivesTheSameNumbers) {
                                "-3.500000000000e+02"));
 }
 
-TEST(ReplaceTextFile, WritingFailsWithTheFileNamedAndLeavesNothing) {
-  const TempFolder folder;
-  EXPECT_FALSE(check_can_replace(folder.path()).has_value());
-  const auto nowhere = folder / "none" / "calib.txt";
-  const Status status = check_can_replace(nowhere);
-  ASSERT_FALSE(status.has_value());
-  EXPECT_THAT(status.error().message, HasSubstr(nowhere.string()));
-  EXPECT_FALSE(replace_text_file(nowhere, kText).has_value());
-  EXPECT_FALSE(replace_text_file(folder.path(), kText).has_value());
-  const auto file = folder.file("calib.txt", "old");
-  ASSERT_TRUE(check_can_replace(file).has_value());
-  EXPECT_EQ(read_all(file), "old");
-  ASSERT_TRUE(replace_text_file(file, "new").has_value());
-  EXPECT_EQ(read_all(file), "new");
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
-}
-
 }  // namespace
 }  // namespace stemvo

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+#include "text/text_file.hpp"
+
+#include <csignal>
+#include <filesystem>
+#include <iterator>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using testing::read_all;
+using testing::TempFolder;
+
+std::ptrdiff_t num_files(const TempFolder& folder) {
+  return std::distance(fs::directory_iterator(folder.path()), {});
+}
+
+TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
+  const TempFolder folder;
+  EXPECT_FALSE(check_can_write(folder.path()));
+  EXPECT_FALSE(write_text_file(folder.path(), "new"));
+  const fs::path nowhere = folder / "none" / "calib.txt";
+  for (const Status& status : {check_can_write(nowhere), write_text_file(nowhere, "new")}) {
+    ASSERT_FALSE(status);
+    EXPECT_THAT(status.error().message, HasSubstr(nowhere.string()));
+    EXPECT_THAT(status.error().message, HasSubstr("No such file"));
+  }
+  const fs::path file = folder.file("calib.txt", "old");
+  ASSERT_TRUE(check_can_write(file));
+  EXPECT_EQ(read_all(file), "old");
+  ASSERT_TRUE(write_text_file(file, "new"));
+  EXPECT_EQ(read_all(file), "new");
+  EXPECT_EQ(num_files(folder), 1);
+}
+
+TEST(WriteTextFile, AFullDiskLeavesTheOldFile) {
+  const TempFolder folder;
+  const fs::path file = folder.file("poses.txt", "old");
+  struct rlimit before = {};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const struct rlimit small = {1000, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Status status = write_text_file(file, std::string(5000, 'x'));
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, HasSubstr(file.string() + ": cannot write: File too large"));
+  EXPECT_EQ(read_all(file), "old");
+  EXPECT_EQ(num_files(folder), 1);
+  EXPECT_THAT(write_text_file("/dev/full", "x").error().message, HasSubstr("No space left"));
+}
+
+TEST(WriteTextFile, FollowsALinkToTheFile) {
+  const TempFolder folder;
+  const fs::path file = folder.file("poses.txt", "old");
+  fs::create_symlink(file, folder / "link.txt");
+  ASSERT_TRUE(write_text_file(folder / "link.txt", "new"));
+  EXPECT_TRUE(fs::is_symlink(folder / "link.txt"));
+  EXPECT_EQ(read_all(file), "new");
+}
+
+}  // namespace
+}  // namespace stemvo
