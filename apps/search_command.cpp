@@ -21,9 +21,8 @@ namespace {
 constexpr const char* kFooter =
     R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
 is given an odometry of its own and ranked by t_rel, each step having its true length. Filters whose
-errors are no worse than the best one's (paired bootstrap over segments, 95 %) are a group of equals, in
-the order of their mean rank over the sequences; --kinds has disturbed ones count too. Ground truth is
-needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
+errors are no worse than the best one's (paired bootstrap over segments, 95 %) are a group of equals;
+--kinds has disturbed sequences count too. Ground truth is needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
 
 --out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
 best.yaml (for 'stemvo run --config'), sheet.png (best, median and worst) and records.jsonl, from which

@@ -78,9 +78,11 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
   command->add_option("--name", options.name, "Of the sequence; default 00")
       ->type_name("NAME")
       ->check([](const std::string& text) {
-        const bool is_name =
-            !text.empty() && text != "." && text != ".." && text.find('/') == std::string::npos;
-        return is_name ? std::string() : "expected the name of a folder, found '" + text + "'";
+        const bool is_name = !text.empty() && text != "." && text != ".." &&
+                             text.find('/') == std::string::npos && !text.ends_with(".unfinished");
+        return is_name
+                   ? std::string()
+                   : "expected the name of a folder (not NAME.unfinished), found '" + text + "'";
       });
   command->add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
+#include <utility>
 
 #include "internal_check.hpp"
 
@@ -41,11 +43,14 @@ class BlockSampler {
     return static_cast<double>(size_) / static_cast<double>(block_);
   }
 
-  [[nodiscard]] double draw(std::mt19937_64& random) const {
+  [[nodiscard]] std::size_t num_draws() const { return (size_ + block_ - 1) / block_; }
+
+  /// `starts`: of the blocks, shares of the drive; at least num_draws().
+  [[nodiscard]] double draw(std::span<const double> starts) const {
     double a = 0.0;
     double b = 0.0;
-    for (std::size_t i = 0; i < (size_ + block_ - 1) / block_; ++i) {
-      const std::size_t first = random() % size_;
+    for (const double start : starts.first(num_draws())) {
+      const auto first = static_cast<std::size_t>(start * static_cast<double>(size_));
       a += a_[first + block_] - a_[first];
       b += b_[first + block_] - b_[first];
     }
@@ -63,42 +68,97 @@ class BlockSampler {
   std::size_t block_;
 };
 
+/// Drives that show the same frames.
+struct Road {
+  std::vector<BlockSampler> drives;
+  double num_blocks = 0.0;  ///< of the drive with most
+  std::size_t num_draws = 0;
+
+  void add(const BlockSampler& drive) {
+    num_blocks = std::max(num_blocks, drive.num_blocks());
+    num_draws = std::max(num_draws, drive.num_draws());
+    drives.push_back(drive);
+  }
+};
+
+std::vector<Road> roads_of(std::span<const PairedErrors> drives) {
+  std::map<std::string, Road> named;
+  std::vector<Road> roads;
+  for (const PairedErrors& drive : drives) {
+    if (drive.a.size() < 2 * std::max<std::size_t>(drive.block, 1)) {
+      continue;  // nothing to draw from
+    }
+    if (drive.road.empty()) {
+      roads.emplace_back().add(BlockSampler(drive));
+    } else {
+      named[drive.road].add(BlockSampler(drive));
+    }
+  }
+  for (auto& [name, road] : named) {
+    roads.push_back(std::move(road));
+  }
+  return roads;
+}
+
+/// Geometric mean over all drives; `log_ratios_of`: the sum over a road's.
+double mean_ratio(const std::vector<Road>& roads, const auto& log_ratios_of) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (const Road& road : roads) {
+    sum += log_ratios_of(road);
+    count += road.drives.size();
+  }
+  return std::exp(sum / static_cast<double>(count));
+}
+
+double sum_over(const Road& road, const auto& log_ratio_of) {
+  double sum = 0.0;
+  for (const BlockSampler& drive : road.drives) {
+    sum += log_ratio_of(drive);
+  }
+  return sum;
+}
+
+std::vector<double> sample_ratios(const std::vector<Road>& roads, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<double> starts;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < kNumSamples; ++i) {
+    ratios.push_back(mean_ratio(roads, [&](const Road& road) {
+      starts.clear();
+      for (std::size_t k = 0; k < road.num_draws; ++k) {
+        starts.push_back(static_cast<double>(random() >> 11U) * 0x1p-53);  // [0, 1)
+      }
+      return sum_over(road, [&](const BlockSampler& drive) { return drive.draw(starts); });
+    }));
+  }
+  std::ranges::sort(ratios);
+  return ratios;
+}
+
 }  // namespace
 
 ErrorRatio paired_ratio(std::span<const PairedErrors> drives, std::uint64_t seed) {
-  std::vector<BlockSampler> samplers;
-  for (const PairedErrors& drive : drives) {
-    if (!drive.a.empty()) {
-      samplers.emplace_back(drive);
-    }
-  }
-  if (samplers.empty()) {
+  constexpr double kLeastFreedom = 4.0;
+  const std::vector<Road> roads = roads_of(drives);
+  if (roads.empty()) {
     return {1.0, 0.0, std::numeric_limits<double>::infinity()};
   }
-  const auto mean = [&](auto log_ratio_of) {
-    double sum = 0.0;
-    for (const BlockSampler& sampler : samplers) {
-      sum += log_ratio_of(sampler);
-    }
-    return std::exp(sum / static_cast<double>(samplers.size()));
-  };
-  std::mt19937_64 random(seed);
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < kNumSamples; ++i) {
-    ratios.push_back(mean([&](const BlockSampler& one) { return one.draw(random); }));
+  const double ratio = mean_ratio(roads, [](const Road& road) {
+    return sum_over(road, [](const BlockSampler& drive) { return drive.log_ratio(); });
+  });
+  double num_blocks = 0.0;
+  for (const Road& road : roads) {
+    num_blocks += road.num_blocks;
   }
-  std::ranges::sort(ratios);
-  double freedom = 0.0;
-  for (const BlockSampler& sampler : samplers) {
-    freedom += sampler.num_blocks() - 1.0;
-  }
-  const double ratio = mean([](const BlockSampler& one) { return one.log_ratio(); });
-  if (freedom < 1.0) {
+  const double freedom = num_blocks - static_cast<double>(roads.size());
+  if (freedom < kLeastFreedom) {
     return {ratio, 0.0, std::numeric_limits<double>::infinity()};
   }
-  // Blocks as long as the overlap hold two thirds of the variance of a running mean's sum; few of
-  // them need Student's quantile, here to 2 % of it from 4 degrees of freedom on.
-  const double widen = std::sqrt(1.5) * (1.0 + 1.5 / freedom);
+  // Blocks as long as the overlap hold two thirds of the variance of a running mean's sum; a sample
+  // of n blocks has (n - 1) / n of it; few of them need Student's quantile, here to 5 % of it.
+  const double widen = std::sqrt(1.5 * num_blocks / freedom) * (1.0 + 1.5 / freedom);
+  const std::vector<double> ratios = sample_ratios(roads, seed);
   const auto tail = static_cast<std::size_t>(kTail * kNumSamples);
   return {ratio, ratio * std::pow(ratios[tail] / ratio, widen),
           ratio * std::pow(ratios[kNumSamples - 1 - tail] / ratio, widen)};

@@ -96,7 +96,7 @@ std::shared_ptr<const PreparedImage> PatchFrontEnd::prepare(const ChannelImage& 
     cv::Mat bordered;
     cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
     level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
-    if (i < 2) {
+    if (i < std::min(2, num - 1)) {
       image->corner_pixels = level;
       image->corner_scale = static_cast<float>(i + 1);
     }
@@ -121,6 +121,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   const Pyramid pyramid = image.pyramid;
   const int coarsest = static_cast<int>(pyramid.size()) - 1;
   const int top = coarsest - 1;
+  const int predicted = std::min(kPredictedLevel, top);
   Motions motions;
   const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
     const Track& track = tracks_.at(point.id);
@@ -134,7 +135,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     const Point& point = from.points[i];
     const Track& track = tracks_.at(point.id);
     if (track.frame == from.frame) {
-      found[i] = align(point, track.motion, kPredictedLevel);
+      found[i] = align(point, track.motion, predicted);
       if (found[i].correlation >= kMinCorrelation) {
         motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
       }
@@ -147,7 +148,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     if (found[i].correlation < kMinCorrelation) {
       const cv::Point2f motion = motions.near(point.uv);
       const bool is_predicted = track.frame != from.frame && !motions.empty();
-      found[i] = align(point, motion, is_predicted ? kPredictedLevel : top);
+      found[i] = align(point, motion, is_predicted ? predicted : top);
       if (found[i].correlation < kMinCorrelation && is_predicted) {
         found[i] = align(point, motion, top);
       }
@@ -155,7 +156,8 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   }
   const auto is_found = [](const Alignment& one) { return one.correlation >= kMinCorrelation; };
   const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
-  const bool is_far = num_found < kFewFound * static_cast<double>(found.size());
+  const bool is_far =
+      top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Point& point = from.points[i];
     Track& track = tracks_.at(point.id);

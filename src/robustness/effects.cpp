@@ -67,9 +67,8 @@ cv::Mat texture(cv::Size size, int type, std::uint64_t seed) {
 cv::RNG random_of(std::uint64_t seed, std::uint64_t frame) {
   // SplitMix64 (Steele, Lea, Flood 2014): neighbours' generators have nothing in common.
   std::uint64_t state = seed * 0x9E3779B97F4A7C15U + frame;
-  for (const std::uint64_t factor : {0xBF58476D1CE4E5B9U, 0x94D049BB133111EBU}) {
-    state = (state ^ (state >> 30U)) * factor;
-  }
+  state = (state ^ (state >> 30U)) * 0xBF58476D1CE4E5B9U;
+  state = (state ^ (state >> 27U)) * 0x94D049BB133111EBU;
   return cv::RNG(state ^ (state >> 31U));
 }
 
@@ -190,8 +189,9 @@ void rain(cv::Mat& image, double strength, const EffectContext& context) {
   cv::Mat streaks = cv::Mat::zeros(image.size(), CV_8U);
   const double area = pixels(image, 1.0) * image.rows / 375.0;  // a KITTI frame's is 1
   for (int i = 0; i < static_cast<int>(std::lround(strength * area)); ++i) {
-    const cv::Point2d from(random.uniform(0.0, 1.0 * image.cols),
-                           random.uniform(-20.0, 1.0 * image.rows));
+    const double u = random.uniform(0.0, 1.0 * image.cols);
+    const double v = random.uniform(-20.0, 1.0 * image.rows);
+    const cv::Point2d from(u, v);
     const double length_px = pixels(image, random.uniform(10.0, 40.0));
     const double lean = 0.15 + random.uniform(-0.05, 0.05);
     cv::line(streaks, from, from + length_px * cv::Point2d(lean, 1.0),
@@ -222,8 +222,9 @@ void dirt(cv::Mat& image, double strength, const EffectContext& context) {
   cv::RNG random = random_of(context.seed, kWholeDrive);
   cv::Mat weight(image.size(), CV_32F, cv::Scalar(1.0));
   while (1.0 - cv::mean(weight)[0] < strength) {
-    const cv::Point center(random.uniform(0, image.cols), random.uniform(0, image.rows));
-    cv::circle(weight, center, static_cast<int>(pixels(image, random.uniform(10.0, 45.0))),
+    const int u = random.uniform(0, image.cols);
+    const int v = random.uniform(0, image.rows);
+    cv::circle(weight, {u, v}, static_cast<int>(pixels(image, random.uniform(10.0, 45.0))),
                cv::Scalar(0.0), cv::FILLED);
   }
   cv::GaussianBlur(weight, weight, {}, pixels(image, 5.0));

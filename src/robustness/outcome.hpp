@@ -14,6 +14,7 @@ namespace stemvo::robustness {
 
 /// One drive under one disturbance through one channel.
 struct Outcome {
+  bool is_refused = false;              ///< it did not run: nothing below is known
   std::optional<double> t_rel_percent;  ///< KITTI's, steps of the true length
   std::optional<double> r_rel_deg_per_100m;
   double tracked = 0.0;  ///< share of frames with a measured motion

@@ -28,10 +28,16 @@ std::optional<double> mean(const std::vector<Outcome>& outcomes,
   return sum / static_cast<double>(outcomes.size());
 }
 
-double mean_tracked(const std::vector<Outcome>& outcomes) {
+bool is_refused(const std::vector<Outcome>& outcomes) {
+  return std::ranges::any_of(outcomes, &Outcome::is_refused);
+}
+
+/// nullopt: one was refused.
+std::optional<double> mean_tracked(const std::vector<Outcome>& outcomes) {
   const double sum = std::transform_reduce(outcomes.begin(), outcomes.end(), 0.0, std::plus(),
                                            [](const Outcome& one) { return one.tracked; });
-  return sum / static_cast<double>(outcomes.size());
+  return is_refused(outcomes) ? std::nullopt
+                              : std::optional(sum / static_cast<double>(outcomes.size()));
 }
 
 std::optional<std::size_t> longest_recovery(const std::vector<Outcome>& outcomes) {
@@ -46,9 +52,11 @@ std::optional<std::size_t> longest_recovery(const std::vector<Outcome>& outcomes
 
 /// "0.31", where frames were not tracked "0.31 (0.97)".
 std::string cell(const std::vector<Outcome>& outcomes) {
-  const double tracked = mean_tracked(outcomes);
+  const std::optional<double> tracked = mean_tracked(outcomes);
   const std::string error = number_or_dash(mean_rotation_error(outcomes), 2);
-  return tracked > 0.995 ? error : fmt::format("{} ({:.2f})", error, tracked);
+  return !tracked           ? "refused"
+         : *tracked > 0.995 ? error
+                            : fmt::format("{} ({:.2f})", error, *tracked);
 }
 
 /// "0.84 0.75-0.95", with a star where the interval leaves out 1; "-" where there is none.
@@ -197,10 +205,13 @@ std::string format_csv(const RobustnessReport& report) {
     for (std::size_t i = 0; i < report.contenders.size(); ++i) {
       for (std::size_t drive = 0; drive < report.drives.size(); ++drive) {
         const Outcome& one = row.outcomes[i][drive];
-        text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", row.disturbance, row.strength,
-                            csv_cell(report.contenders[i]), csv_cell(report.drives[drive]),
-                            number(one.t_rel_percent), number(one.r_rel_deg_per_100m), one.tracked,
-                            number(one.recovery_frames), one.is_recovered, one.jumps);
+        text += fmt::format("{},{},{},{},", row.disturbance, row.strength,
+                            csv_cell(report.contenders[i]), csv_cell(report.drives[drive]));
+        text += one.is_refused
+                    ? ",,,,,\n"
+                    : fmt::format("{},{},{},{},{},{}\n", number(one.t_rel_percent),
+                                  number(one.r_rel_deg_per_100m), one.tracked,
+                                  number(one.recovery_frames), one.is_recovered, one.jumps);
       }
     }
   }
@@ -213,6 +224,7 @@ std::string format_json(const RobustnessReport& report) {
     Json channels = Json::array();
     for (std::size_t i = 0; i < report.contenders.size(); ++i) {
       const auto& outcomes = row.outcomes[i];
+      const bool refused = is_refused(outcomes);
       const auto jumps = [](std::size_t sum, const Outcome& one) { return sum + one.jumps; };
       channels.push_back(
           {{"channel", report.contenders[i]},
@@ -220,8 +232,11 @@ std::string format_json(const RobustnessReport& report) {
            {"r_rel_deg_per_100m", mean_rotation_error(outcomes)},
            {"tracked", mean_tracked(outcomes)},
            {"recovery_frames", longest_recovery(outcomes)},
-           {"recovered", std::ranges::all_of(outcomes, &Outcome::is_recovered)},
-           {"jumps", std::accumulate(outcomes.begin(), outcomes.end(), std::size_t{0}, jumps)}});
+           {"recovered",
+            refused ? Json() : Json(std::ranges::all_of(outcomes, &Outcome::is_recovered))},
+           {"jumps", refused ? Json()
+                             : Json(std::accumulate(outcomes.begin(), outcomes.end(),
+                                                    std::size_t{0}, jumps))}});
       if (i > 0) {
         channels.back()["rotation_ratio"] = interval(row.verdicts[i - 1].rotation);
         channels.back()["translation_ratio"] = interval(row.verdicts[i - 1].translation);

@@ -2,6 +2,7 @@
 #include "robustness/robustness.hpp"
 
 #include <algorithm>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -55,10 +56,13 @@ std::vector<Verdict> verdicts_of(const Row& row) {
     for (std::size_t drive = 0; drive < row.outcomes[0].size(); ++drive) {
       const Outcome& ours = row.outcomes[0][drive];
       const Outcome& theirs = row.outcomes[control][drive];
-      if (ours.dense_r_deg_per_100m.size() == theirs.dense_r_deg_per_100m.size()) {
-        rotation.push_back({ours.dense_r_deg_per_100m, theirs.dense_r_deg_per_100m, ours.block});
-        translation.push_back({ours.dense_t_percent, theirs.dense_t_percent, ours.block});
+      if (ours.is_refused || theirs.is_refused) {  // drives that are left would be another row
+        rotation.clear();
+        translation.clear();
+        break;
       }
+      rotation.push_back({ours.dense_r_deg_per_100m, theirs.dense_r_deg_per_100m, ours.block});
+      translation.push_back({ours.dense_t_percent, theirs.dense_t_percent, ours.block});
     }
     result.push_back({paired_ratio(rotation, 1), paired_ratio(translation, 1)});
   }
@@ -130,12 +134,17 @@ class Robustness {
       return fail(fmt::format("{}: expected ground truth (../../poses/NN.txt), found none",
                               folder.string()));
     }
+    std::error_code code;
+    for (const auto& other : opened_) {
+      if (std::filesystem::equivalent(other, folder, code)) {
+        return fail(
+            fmt::format("{}: expected each sequence once, found it twice", folder.string()));
+      }
+    }
+    opened_.push_back(folder);
     // Drives of one number in two data sets are told apart by their folders.
     const bool is_new = !is_among(source->name(), report_.drives);
     report_.drives.push_back(is_new ? source->name() : folder.string());
-    if (std::ranges::count(report_.drives, report_.drives.back()) > 1) {
-      return fail(fmt::format("{}: expected each sequence once, found it twice", folder.string()));
-    }
     const auto first = source->read(0);
     has_color = has_color || (first && first->channels() == 3);
     sources_.push_back(*std::move(source));
@@ -191,6 +200,7 @@ class Robustness {
     auto odometry = pipeline::create_odometry(config, source.camera(), request_.models_dir);
     if (!odometry) {
       warn(fmt::format("{}: {}", what, odometry.error().message));
+      outcome.is_refused = true;
       ++num_done_;
       return goes_on();
     }
@@ -235,6 +245,7 @@ class Robustness {
   }
 
   const RobustnessRequest& request_;
+  std::vector<std::filesystem::path> opened_;
   std::vector<FrameSource> sources_;
   std::vector<Contender> contenders_;
   std::vector<PlannedRow> planned_;

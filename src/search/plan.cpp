@@ -181,12 +181,10 @@ Status check_request(const SearchRequest& request) {
 
 /// Each sequence ranks once, under a name of its own, and the held-out one has no frame that ranks.
 Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added) {
-  if (before.disturbance != added.disturbance && !added.held_out) {
-    return {};
-  }
   std::error_code code;
-  const bool same_folder = before.directory == added.directory ||
-                           fs::equivalent(before.directory, added.directory, code);
+  const bool same_folder = before.disturbance == added.disturbance &&
+                           (before.directory == added.directory ||
+                            fs::equivalent(before.directory, added.directory, code));
   const std::size_t begin = std::max(before.first_frame, added.first_frame);
   const std::size_t end = std::min(before.end_frame(), added.end_frame());
   if (added.held_out && same_folder && begin < end) {
@@ -311,7 +309,7 @@ Status add_sequence(const SearchRequest& request,
     problems.push_back(
         fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]));
   }
-  plan.sequences.push_back({source, is_held_out, std::move(problems)});
+  plan.sequences.push_back({source, sequence->name(), is_held_out, std::move(problems)});
   return {};
 }
 

@@ -21,6 +21,7 @@ namespace {
 
 constexpr double kMinTracked = 0.5;
 constexpr std::size_t kMaxPathPoints = 400;
+constexpr std::size_t kMaxDense = 400;
 constexpr double kDenseShare = 1.0 / 8.0;  // of the path, as robustness
 /// Of the path so far; chosen among prefixes of clips (docs/search.md).
 constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
@@ -41,8 +42,11 @@ std::vector<std::array<double, 2>> path_of(std::span<const Rigid3> trajectory) {
 class FilterDrive {
  public:
   /// The sequence, with ground truth, stays where it is.
-  FilterDrive(const Config& config, const FrameSource& sequence)
-      : odometry_(config, sequence.camera()), config_(&config), sequence_(&sequence) {}
+  FilterDrive(const Config& config, const PlanSequence& planned)
+      : odometry_(config, planned.sequence.camera()),
+        config_(&config),
+        sequence_(&planned.sequence),
+        road_(&planned.road) {}
 
   [[nodiscard]] std::size_t num_frames() const { return odometry_.estimator().trajectory().size(); }
 
@@ -67,6 +71,7 @@ class FilterDrive {
     const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
     DriveScore score;
     score.sequence = sequence_->name();
+    score.road = *road_;
     score.frames = num_frames();
     score.inliers = static_cast<double>(num_inliers_) / num_steps;
     score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
@@ -97,12 +102,21 @@ class FilterDrive {
     score.E_r_deg = kDegPerRad * rotation_rad / num_steps;
     // A standing start has no segments: nothing is known against the filter.
     score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
-    const double dense_m = kDenseShare * metrics.path_length_m;
-    for (const SegmentError& one : segment_errors(trajectory, truth, {&dense_m, 1}, 1)) {
-      score.dense_t_percent.push_back(std::round(1e4 * one.t_percent) / 1e4);
-      score.block = std::max(score.block, one.last - one.first);
+    if (num_frames() == sequence_->size()) {
+      add_dense_errors(trajectory, truth, kDenseShare * metrics.path_length_m, score);
     }
     score.path_xz_m = path_of(trajectory);
+  }
+
+  static void add_dense_errors(const Trajectory& trajectory,
+                               std::span<const Rigid3> truth,
+                               double length_m,
+                               DriveScore& score) {
+    const std::size_t step = (truth.size() + kMaxDense - 1) / kMaxDense;
+    for (const SegmentError& one : segment_errors(trajectory, truth, {&length_m, 1}, step)) {
+      score.dense_t_percent.push_back(std::round(1e4 * one.t_percent) / 1e4);
+      score.block = std::max(score.block, (one.last - one.first + step - 1) / step);
+    }
   }
 
   [[nodiscard]] std::string missing_reason() const {
@@ -120,6 +134,7 @@ class FilterDrive {
   ChannelOdometry odometry_;
   const Config* config_;
   const FrameSource* sequence_;
+  const std::string* road_;
   // Of the frames after the first.
   std::size_t num_matches_ = 0;
   std::size_t num_inliers_ = 0;
@@ -299,7 +314,7 @@ struct Race {
         running.push_back(candidate);
         if (!drive) {
           const Config& config = plan.layers[plan.candidates[candidate].layer].config;
-          drive.emplace(config, planned.sequence);
+          drive.emplace(config, planned);
         }
       }
     }
@@ -312,6 +327,7 @@ struct Race {
       const std::optional<FilterDrive>& drive = drives[block[i]][index];
       DriveScore cannot;
       cannot.sequence = planned.sequence.name();
+      cannot.road = planned.road;
       cannot.reason = problem(block[i], planned);
       done[i].add(drive ? drive->score() : cannot, planned.is_held_out, drive ? end - begin : 0);
     }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <span>
 #include <tuple>
 
@@ -34,17 +35,25 @@ std::tuple<FilterStatus, double, double> order_of(const FilterRow& row) {
           is_stopped ? early_error(row.mean) : 0.0};
 }
 
-/// Over the drives: no drive counts for more because it is hard.
+/// Of the dense errors, as paired_ratio has them; of t_rel where the path is too short for them.
+double mean_error_percent(const DriveScore& drive) {
+  const std::vector<double>& dense = drive.dense_t_percent;
+  return dense.empty()
+             ? drive.t_rel_percent.value_or(kWorst)
+             : std::accumulate(dense.begin(), dense.end(), 0.0) / static_cast<double>(dense.size());
+}
+
+/// Over the drives: none counts for more because it is hard.
 double log_geometric_mean(const FilterRow& row) {
   constexpr double kLeast_percent = 1e-6;
   double sum = 0.0;
   for (const DriveScore& drive : row.drives) {
-    sum += std::log(std::max(drive.t_rel_percent.value_or(kWorst), kLeast_percent));
+    sum += std::log(std::max(mean_error_percent(drive), kLeast_percent));
   }
-  return sum / static_cast<double>(row.drives.size());
+  return sum;
 }
 
-/// Against the row with the lowest geometric mean of t_rel.
+/// Against the row with the lowest geometric mean.
 void compare_with_best(std::span<FilterRow> ranked) {
   const FilterRow& best = *std::ranges::min_element(ranked, {}, log_geometric_mean);
   for (FilterRow& row : ranked) {
@@ -53,24 +62,11 @@ void compare_with_best(std::span<FilterRow> ranked) {
       const DriveScore& ours = row.drives[i];
       const DriveScore& theirs = best.drives[i];
       if (ours.dense_t_percent.size() == theirs.dense_t_percent.size()) {
-        drives.push_back({ours.dense_t_percent, theirs.dense_t_percent, theirs.block});
+        drives.push_back({ours.dense_t_percent, theirs.dense_t_percent, theirs.block, ours.road});
       }
     }
     row.over_best = paired_ratio(drives, 1);
     row.is_equal = !(row.over_best.low > 1.0);
-  }
-}
-
-void add_mean_ranks(std::span<FilterRow> ranked) {
-  for (FilterRow& row : ranked) {
-    for (std::size_t i = 0; i < row.drives.size(); ++i) {
-      const auto is_better = [&](const FilterRow& other) {
-        return other.drives[i].t_rel_percent.value_or(kWorst) <
-               row.drives[i].t_rel_percent.value_or(kWorst);
-      };
-      const auto num_better = static_cast<double>(std::ranges::count_if(ranked, is_better));
-      row.mean_rank += (1.0 + num_better) / static_cast<double>(row.drives.size());
-    }
   }
 }
 
@@ -122,9 +118,8 @@ std::vector<FilterRow> rank_filters(const FilterRecords& records, std::size_t nu
   const auto ranked = std::span(rows).first(static_cast<std::size_t>(num_ranked));
   if (!ranked.empty()) {
     compare_with_best(ranked);
-    add_mean_ranks(ranked);
     std::ranges::stable_sort(ranked, {}, [](const FilterRow& row) {
-      return std::pair(!row.is_equal, row.is_equal ? row.mean_rank : 0.0);
+      return std::pair(!row.is_equal, row.is_equal ? row.over_best.ratio : 0.0);
     });
   }
   return rows;

@@ -34,6 +34,7 @@ namespace stemvo::search {
 STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
 STEMVO_JSON_MEMBERS(DriveScore,
                     (sequence,
+                     road,
                      frames,
                      detected,
                      reason,

@@ -40,6 +40,7 @@ struct FilterKey {
 /// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
 struct DriveScore {
   std::string sequence;
+  std::string road;  ///< the sequence's name without its disturbance
   std::size_t frames = 0;
   bool detected = false;
   std::string reason;  ///< why the pose was not detected, else empty
@@ -53,8 +54,8 @@ struct DriveScore {
   // nullopt: no frame ran.
   std::optional<double> inliers;  ///< mean
   std::optional<double> tracked;  ///< share of the frames after the first: motion measured
-  /// t_rel of segments of an eighth of the path, one from every frame on: what filters are told
-  /// apart by. Neighbours of so many frames (`block`) overlap.
+  /// t_rel of segments of an eighth of the path, at most 400, evenly spaced: what filters that ran
+  /// over all frames are told apart by. So many neighbours (`block`) overlap.
   std::vector<double> dense_t_percent;
   std::size_t block = 1;
   /// Metres: at most 400 points, evenly spaced in frames.
@@ -180,8 +181,8 @@ struct FilterRow : FilterRecord {
   FilterStatus status = FilterStatus::kRanked;
   DriveScore mean;  ///< of the drives
   // Of ranked rows:
-  double mean_rank = 0.0;  ///< by t_rel on each of the drives, from 1
-  ErrorRatio over_best;   ///< dense errors over those of the row of the lowest geometric mean t_rel
+  ErrorRatio over_best;   ///< dense errors over those of the row that has the lowest, drives'
+                          ///< geometric mean
   bool is_equal = false;  ///< the interval does not say that it is worse
 };
 
@@ -192,9 +193,9 @@ struct FilterRow : FilterRecord {
 /// What unfinished filters are compared by: early errors, near ties by inliers.
 [[nodiscard]] double early_error(const DriveScore& mean);
 
-/// One row per filter from its last rung: those that cannot be told from the best, by their mean
-/// rank over the drives (on one drive: by t_rel); the others by t_rel, ties by r_rel; then those
-/// that were stopped, the later the better; not detected last.
+/// One row per filter from its last rung: those that cannot be told from the best, by
+/// over_best; the others by t_rel, ties by r_rel; then those that were stopped, the later the
+/// better; not detected last.
 [[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
                                                   std::size_t num_rungs);
 

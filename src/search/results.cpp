@@ -140,7 +140,6 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
   const bool is_ranked = row.status == FilterStatus::kRanked;
   const auto if_ranked = [&](const std::string& text) { return is_ranked ? text : ""; };
   const bool has_interval = std::isfinite(row.over_best.high);
-  columns.emplace_back("mean_rank", if_ranked(fmt::format("{:.2f}", row.mean_rank)));
   columns.emplace_back("over_best", if_ranked(fmt::format("{:.4f}", row.over_best.ratio)));
   for (const auto& [name, bound] : {std::pair("over_best_low", row.over_best.low),
                                     std::pair("over_best_high", row.over_best.high)}) {
@@ -171,6 +170,7 @@ Json drive_json(const DriveScore& drive) {
   json.erase("path_xz_m");
   json.erase("dense_t_percent");
   json.erase("block");
+  json.erase("road");
   if (drive.detected) {
     json.erase("reason");
   }
@@ -183,7 +183,6 @@ Json row_json(const FilterRow& row) {
   json["t_rel_percent"] = row.mean.t_rel_percent;
   json["r_rel_deg_per_100m"] = row.mean.r_rel_deg_per_100m;
   if (row.status == FilterStatus::kRanked) {
-    json["mean_rank"] = row.mean_rank;
     json["over_best"] = {
         {"ratio", row.over_best.ratio}, {"low", row.over_best.low}, {"high", row.over_best.high}};
     json["equal"] = row.is_equal;
@@ -293,12 +292,16 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();
   const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
-  report.text = fmt::format(
-      "{}filters 1 to {} cannot be told from the best (over best: errors over its errors, 95 % "
-      "interval) and are in the order of their mean rank\n"
-      "work: {} filter-frames, {:.1f} % of an exhaustive search; "
-      "baselines: {}\ntable: {}\n",
-      format_table(results.rows), num_equal, num_frames,
+  report.text = format_table(results.rows);
+  if (num_equal > 1) {
+    report.text += fmt::format(
+        "filters 1 to {} cannot be told from the best (over best: errors over its errors, 95 % "
+        "interval)\n",
+        num_equal);
+  }
+  report.text += fmt::format(
+      "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
+      num_frames,
       100.0 * static_cast<double>(num_frames) /
           static_cast<double>(std::max<std::size_t>(num_exhaustive, 1)),
       work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string());

@@ -69,6 +69,11 @@ struct Output {
                         path.string()));
       }
     }
+    if (fs::exists(sequence_dir, code) &&
+        !(fs::exists(sequence_dir / kMark, code) && holds_only_a_drive(sequence_dir))) {
+      return fail(fmt::format("{}: expected an unfinished drive or none, found something else",
+                              sequence_dir.string()));
+    }
     fs::remove_all(sequence_dir, code);
     if (code) {
       return cannot("remove the unfinished drive", sequence_dir, code);

@@ -68,6 +68,48 @@ TEST(PairedRatio, EqualMethodsAreCalledDifferentSeldom) {
   EXPECT_GT(num_single, kTrials / 3);
 }
 
+/// Of so many blocks each; a share.
+double decided_by_chance(std::size_t num_drives, std::size_t num_blocks) {
+  std::mt19937_64 random(4);
+  constexpr int kTrials = 200;
+  int num_decided = 0;
+  for (int i = 0; i < kTrials; ++i) {
+    std::vector<PairedErrors> drives;
+    for (std::size_t k = 0; k < num_drives; ++k) {
+      drives.push_back(pair_of(num_blocks * kBlock, 1.0, random));
+    }
+    num_decided += paired_ratio(drives, 1).is_decided() ? 1 : 0;
+  }
+  return static_cast<double>(num_decided) / kTrials;
+}
+
+TEST(PairedRatio, FewBlocksDecideSeldomOrNever) {
+  EXPECT_LT(decided_by_chance(4, 7), 0.1);
+  EXPECT_LT(decided_by_chance(2, 4), 0.1);
+  EXPECT_LT(decided_by_chance(4, 2), 0.1);
+  EXPECT_EQ(decided_by_chance(1, 4), 0.0);  // too few to say
+}
+
+TEST(PairedRatio, ADriveOfOneBlockDoesNotDecideForOthers) {
+  std::mt19937_64 random(5);
+  const PairedErrors equal = pair_of(300, 1.0, random);
+  PairedErrors single = pair_of(kBlock, 4.0, random);
+  EXPECT_EQ(paired_ratio(std::vector{equal, single}, 1).ratio,
+            paired_ratio(std::vector{equal}, 1).ratio);
+}
+
+/// A disturbance that changes nothing is no further evidence.
+TEST(PairedRatio, OneRoadSeveralTimesCountsOnce) {
+  std::mt19937_64 random(6);
+  PairedErrors drive = pair_of(300, 0.9, random);
+  const ErrorRatio once = paired_ratio(std::vector{drive}, 1);
+  drive.road = "00";
+  const ErrorRatio thrice = paired_ratio(std::vector{drive, drive, drive}, 1);
+  EXPECT_NEAR(thrice.ratio, once.ratio, 1e-12);
+  EXPECT_NEAR(thrice.low, once.low, 1e-9);
+  EXPECT_NEAR(thrice.high, once.high, 1e-9);
+}
+
 TEST(PairedRatio, DrivesCountAlikeAndThoseWithoutSegmentsNot) {
   const PairedErrors twice{std::vector<double>(100, 2.0), std::vector<double>(100, 1.0), 10};
   const PairedErrors half{std::vector<double>(10, 1.0), std::vector<double>(10, 2.0), 3};
