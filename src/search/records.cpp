@@ -34,7 +34,6 @@ namespace stemvo::search {
 STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
 STEMVO_JSON_MEMBERS(DriveScore,
                     (sequence,
-                     road,
                      frames,
                      detected,
                      reason,
@@ -177,6 +176,12 @@ std::size_t SearchIdentity::count(bool baselines) const {
     sum += layer.baseline == baselines ? layer.size() : 0;
   }
   return sum;
+}
+
+std::string SearchIdentity::road_of(const std::string& sequence) const {
+  const auto found = std::ranges::find(sequences, sequence, &SequenceIdentity::name);
+  return found == sequences.end() ? std::string()
+                                  : sequence.substr(0, sequence.size() - found->disturbance.size());
 }
 
 const LayerIdentity& SearchIdentity::layer_of(const FilterKey& key) const {

@@ -40,7 +40,6 @@ struct FilterKey {
 /// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
 struct DriveScore {
   std::string sequence;
-  std::string road;  ///< the sequence's name without its disturbance
   std::size_t frames = 0;
   bool detected = false;
   std::string reason;  ///< why the pose was not detected, else empty
@@ -132,6 +131,8 @@ struct SearchIdentity {
   /// Filters, or baselines.
   [[nodiscard]] std::size_t count(bool baselines) const;
   [[nodiscard]] std::size_t num_rows() const { return count(false) + count(true); }
+  /// The sequence's name without its disturbance; empty: none of that name.
+  [[nodiscard]] std::string road_of(const std::string& sequence) const;
   /// The layer a row belongs to (checked).
   [[nodiscard]] const LayerIdentity& layer_of(const FilterKey& key) const;
   /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty
@@ -196,8 +197,8 @@ struct FilterRow : FilterRecord {
 /// One row per filter from its last rung: those that cannot be told from the best, by
 /// over_best; the others by t_rel, ties by r_rel; then those that were stopped, the later the
 /// better; not detected last.
-[[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
-                                                  std::size_t num_rungs);
+[[nodiscard]] std::vector<FilterRow> rank_filters(const SearchIdentity& identity,
+                                                  const FilterRecords& records);
 
 /// filters.csv: a header, then the rows by rank; `model,layer,filter` first, no times. Columns per
 /// sequence where there are several, and of the held-out one.
