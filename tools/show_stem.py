@@ -31,7 +31,7 @@ class ShowError(Exception):
 
 
 def read_weights(path):
-    """C x 3 x kh x kw and the stride, of a file that onnx_writer wrote; padded ones are refused."""
+    """C x 3 x kh x kw, the stride and the padding (top, left, bottom, right) of a file that onnx_writer wrote."""
     try:
         graph = onnx.load(path).graph
     except Exception as error:  # protobuf's own types differ between its versions
@@ -41,9 +41,7 @@ def read_weights(path):
     if len(weights) != 1 or len(convolutions) != 1:
         raise ShowError(f"{path}: expected one convolution with `weights`, found {len(convolutions)}")
     attributes = {item.name: list(item.ints) for item in convolutions[0].attribute}
-    if any(attributes["pads"]):
-        raise ShowError(f"{path}: expected a stem without padding, found {attributes['pads']}")
-    return weights[0], attributes["strides"][0]
+    return weights[0], attributes["strides"][0], attributes["pads"]
 
 
 def draw(weights, title, path):
@@ -71,15 +69,17 @@ def read_gray(path):
     return 255.0 * (picture if picture.ndim == 2 else picture[:, :, :3] @ drive.LUMA.astype(np.float32))
 
 
-def correlations(session, weights, stride, images):
+def correlations(session, weights, stride, padding, images):
     """C x frames, and the standard deviation of each channel."""
     rows, columns = weights.shape[2:]
+    top, left, bottom, right = padding
     found, deviations = [], []
     for path in images:
         gray = read_gray(path)
         image = np.tile(gray, (1, weights.shape[1], 1, 1))
         channels = session.run([onnx_writer.OUTPUT], {onnx_writer.INPUT: image})[0][0]
-        patches = np.lib.stride_tricks.sliding_window_view(gray, (rows, columns))[::stride, ::stride]
+        padded = np.pad(gray, ((top, bottom), (left, right)))
+        patches = np.lib.stride_tricks.sliding_window_view(padded, (rows, columns))[::stride, ::stride]
         middle = patches[:, :, (rows - 1) // 2:rows // 2 + 1, (columns - 1) // 2:columns // 2 + 1].mean(axis=(2, 3))
         deviations.append(channels.std(axis=(1, 2)))
         with np.errstate(invalid="ignore"):
@@ -98,7 +98,7 @@ def parse_arguments(arguments):
 
 
 def show(options):
-    weights, stride = read_weights(options.model)
+    weights, stride, padding = read_weights(options.model)
     if options.picture:
         draw(weights, options.model.name, options.picture)
     if options.weights is not None:
@@ -111,7 +111,7 @@ def show(options):
         if not images:
             raise ShowError(f"{options.images}: expected PNG files, found none")
         session = onnxruntime.InferenceSession(str(options.model), providers=["CPUExecutionProvider"])
-        found, deviations = correlations(session, weights, stride, images)
+        found, deviations = correlations(session, weights, stride, padding, images)
         print(f"{options.images}: {len(images)} frames")
         for index, (row, deviation) in enumerate(zip(found, deviations)):
             print(f"filter {index:2d}: correlation with gray {row.mean():6.3f} (from {row.min():.3f} to {row.max():.3f}), "

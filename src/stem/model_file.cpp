@@ -225,8 +225,9 @@ StemNetwork built_in_network() {
   network.file = "default.onnx (built in)";
   network.layer = "stem";
   network.num_filters = 16;
-  network.kernel_px = {4, 4};
-  network.stride_px = 4;
+  network.kernel_px = {8, 8};
+  network.stride_px = 2;
+  network.padding_px = {3, 3, 3, 3};
   network.default_filter = 2;
   network.folded = {2, 2, "default_filter_2.onnx (built in)", ""};
   return network;

@@ -91,6 +91,19 @@ class Correspondences(PlantedDrive):
         difference = drive.patches(frames.gray(1), after, 4) - first
         self.assertTrue(difference.std() < 0.35 * first.std(), (difference.std(), first.std()))
 
+    def test_views_zoom_and_turn_about_the_middle(self):
+        y, x = np.mgrid[:60, :80].astype(np.float64)
+        corners = np.array([[10, 20], [40, 30]] * 500)
+        same = drive.Views(zoom=0, rotation_deg=0).patches(x, corners, 8, np.random.default_rng(0))
+        np.testing.assert_array_equal(same, drive.patches(x, corners, 8))
+        seen_x, seen_y = (drive.Views(0.2, 10).patches(axis, corners, 8, np.random.default_rng(0)).reshape(-1, 8, 8) for axis in (x, y))
+        np.testing.assert_allclose(seen_x.mean(axis=(1, 2)), corners[:, 0] + 3.5)
+        right = seen_x[:, :, 7].mean(axis=1) - seen_x[:, :, 0].mean(axis=1)
+        down = seen_y[:, :, 7].mean(axis=1) - seen_y[:, :, 0].mean(axis=1)
+        zoom, angle = np.hypot(right, down) / 7, np.degrees(np.arctan2(down, right))
+        self.assertAlmostEqual(np.log(zoom).std(), 0.2, delta=0.02)
+        self.assertAlmostEqual(angle.std(), 10, delta=1)
+
     def test_hidden_points_are_left_out(self):
         depth = self.folder / "drive" / "sequences" / "00" / "depth" / "000001.npy"
         np.save(depth, np.full(SIZE, 3.0, np.float32))
@@ -106,14 +119,15 @@ class Learning(PlantedDrive):
         first, second = ((self.folder / out / "default.onnx").read_bytes() for out in ("a", "b"))
         self.assertEqual(first, second)
         entry = yaml.safe_load((self.folder / "a" / "manifest.yaml").read_text())["models"][0]
-        self.assertEqual((entry["filters"], entry["kernel"], entry["stride"]), (16, [4, 4], 4))
+        self.assertEqual((entry["filters"], entry["kernel"], entry["stride"]), (16, [8, 8], 2))
 
     def test_the_layer_norm_is_the_one_of_the_page(self):
         """channel k = z_k / sqrt(mean z^2 + floor^2): z_k unspoiled by the mean over channels."""
-        self.learn("out", "--floor", "3")
+        shape = ("--kernel", "4", "--stride", "4", "--floor", "3")
+        self.learn("out", *shape)
         frames = drive.Drive(self.folder / "drive")
-        options = learn_stem.parse_arguments([str(self.folder / "drive"), "--out", "x", "--pairs", "3000"])
-        stem, ratios = learn_stem.learn(learn_stem.collect(frames, options), discriminant.Nuisance(), 3.0)
+        options = learn_stem.parse_arguments([str(self.folder / "drive"), "--out", "x", "--pairs", "3000", *shape])
+        stem, ratios = learn_stem.learn(learn_stem.collect([frames], options), discriminant.Nuisance(), options)
         self.assertTrue(np.all(np.diff(ratios) < 0))
         gray = frames.gray(1)
         windows = np.lib.stride_tricks.sliding_window_view(gray, (4, 4))[::4, ::4]
@@ -124,12 +138,15 @@ class Learning(PlantedDrive):
         self.assertTrue(np.all(got.std(axis=(1, 2)) > 0.01), "a filter is dead on gray")
 
     def test_the_default_filter_alone_has_the_same_values(self):
-        self.learn("out", "--default-filter", "5")
         gray = drive.Drive(self.folder / "drive").gray(1)
-        alone = self.channels("out", gray, "default_filter_5.onnx")
-        with_others = self.channels("out", gray)
-        self.assertEqual(len(alone), 1)
-        self.assertTrue(np.abs(alone[0][::2, ::2] - with_others[5]).max() <= 1e-6)
+        for shape, step in (((), 1), (("--kernel", "4", "--stride", "4", "--floor", "3"), 2)):
+            with self.subTest(shape=shape):
+                self.learn("out", "--default-filter", "5", *shape)
+                alone = self.channels("out", gray, "default_filter_5.onnx")
+                with_others = self.channels("out", gray)
+                self.assertEqual(len(alone), 1)
+                scale = np.abs(with_others[5]).max()
+                self.assertTrue(np.abs(alone[0][::step, ::step] - with_others[5]).max() <= 1e-6 * scale)
         entry = yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text())["models"][0]
         self.assertEqual((entry["folded"]["filter"], entry["folded"]["sampling"]), (5, 2))
 

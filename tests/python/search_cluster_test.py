@@ -175,7 +175,7 @@ class SearchCluster(unittest.TestCase):
                  (("--layers", "coarse,top"), "; found 'top'"),
                  (("--config", "defualt"), "--config: expected a file or one of default, fast, paper, found 'defualt'"),
                  (("--config", self.folder / "none.yaml"), "--config: expected a file, found nothing at"), (("--filters", "0:5"), "inside 0:4 of"),
-                 (("--model", "nope"), "--model: expected default or the path of an .onnx, found 'nope'"),
+                 (("--model", "nope"), "--model: expected default, paper or the path of an .onnx, found 'nope'"),
                  (("--model", self.folder / "text.onnx"), "expected an entry with 'file: text.onnx'"),
                  (("--program", self.folder / "none"), "expected the program stemvo"),
                  (("--address", "127.0.0.1:1"), "expected a Ray cluster"))

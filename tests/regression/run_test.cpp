@@ -215,7 +215,7 @@ TEST_F(Run, TheMapShowsTheStreetAndLeavesTheDrivenWayFree) {
     num_of_road += nearest < 3.0F && below > 1.4F && below < 1.9F ? 1 : 0;
     num_in_the_way += nearest < 1.0F && std::abs(below) < 1.0F ? 1 : 0;
   }
-  EXPECT_GT(num_of_road, num_points / 20);
+  EXPECT_GT(num_of_road, num_points / 40);
   EXPECT_LE(num_in_the_way, num_points / 200);
   EXPECT_GT(num_colored, num_points / 4);
 }

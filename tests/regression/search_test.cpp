@@ -117,13 +117,13 @@ TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
   const fs::path small =
       test::rendered_drive({.frames = 30, .width_px = 160, .height_px = 48}) / "sequences/00";
   const ProgramResult program =
-      run_stemvo({"search", small.string(), "--exhaustive", "--no-baselines", "--filters", "0:2",
-                  "--set", "stem.sampling_px=4", "--out", folder_ / "small"});
+      run_stemvo({"search", small.string(), "--exhaustive", "--no-baselines", "--model", "paper",
+                  "--filters", "0:2", "--set", "stem.sampling_px=4", "--out", folder_ / "small"});
   ASSERT_EQ(program.exit_code, 0) << program.err;
   EXPECT_THAT(program.out, HasSubstr("pose not detected: channel 40x12"));
   // It never ran, so there are no numbers that could look good.
   EXPECT_THAT(table("small"),
-              HasSubstr("\ndefault,stem,0,patch,not detected,,,,,,,,,,,,0,channel 40x12"));
+              HasSubstr("\npaper,stem,0,patch,not detected,,,,,,,,,,,,0,channel 40x12"));
   const auto drive = result("small")["filters"][0]["sequences"][0];
   for (const char* key : {"t_rel_percent", "r_rel_deg_per_100m", "average_offset_m", "E_t_m",
                           "E_r_deg", "inliers", "tracked", "early_error_percent"}) {

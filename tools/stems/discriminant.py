@@ -19,7 +19,7 @@ class Nuisance:
 
     gain: float = 0.03  # of exposure, relative
     offset: float = 2.0  # gray levels, all pixels alike
-    noise: float = 2.0  # gray levels, each pixel on its own, in each view
+    noise: float = 6.0  # gray levels, each pixel on its own, in each view
 
     def covariance(self, second_moment):
         """second_moment: E[p p'] of the patches."""

@@ -2,6 +2,7 @@
 """A rendered drive (`stemvo synth --depth`): pictures, depth, poses, and patches that show the same
 point of the world in two frames."""
 
+import dataclasses
 import pathlib
 
 import matplotlib.image
@@ -117,6 +118,34 @@ def corresponding_corners(drive, before, after, size, sampling_px, count, rng):
     visible = np.all(np.abs(seen - depth[:, None]) < 2 * _DEPTH_TOLERANCE * depth[:, None], axis=1)
     keep = flat & inside & visible
     return corner[keep], other[keep]
+
+
+@dataclasses.dataclass(frozen=True)
+class Views:
+    """How differently two views show a point beyond what a drive's next frame does: standard deviations."""
+
+    zoom: float = 0.1  # of its logarithm
+    rotation_deg: float = 5.0
+
+    def patches(self, image, corners, size, rng):
+        """As patches(), each zoomed and rotated about its middle: bilinear, the image's border goes on."""
+        if self.zoom == 0 and self.rotation_deg == 0:
+            return patches(image, corners, size)
+        zoom = np.exp(rng.normal(0, self.zoom, len(corners)))
+        angle = np.radians(rng.normal(0, self.rotation_deg, len(corners)))
+        along, across = (zoom * np.cos(angle))[:, None], (zoom * np.sin(angle))[:, None]
+        half = (size - 1) / 2
+        y, x = (axis.ravel() - half for axis in np.mgrid[:size, :size])
+        return _bilinear(image, corners[:, :1] + half + along * x - across * y, corners[:, 1:] + half + across * x + along * y)
+
+
+def _bilinear(image, x, y):
+    height, width = image.shape
+    x, y = np.clip(x, 0, width - 1), np.clip(y, 0, height - 1)
+    left, top = np.minimum(x.astype(int), width - 2), np.minimum(y.astype(int), height - 2)
+    right_share, lower_share = x - left, y - top
+    upper, lower = ((1 - right_share) * image[row, left] + right_share * image[row, left + 1] for row in (top, top + 1))
+    return (1 - lower_share) * upper + lower_share * lower
 
 
 def patches(image, corners, size):
