@@ -348,8 +348,9 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   if (!published) {
     return published.error();
   }
-  if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
-    return made.error();
+  const auto lock = pipeline::open_out_folder(request.out_dir);
+  if (!lock) {
+    return lock.error();
   }
   Benchmark benchmark(request);
   try {
