@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "commands.hpp"
+#include "exceptions.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -30,11 +31,18 @@ void print_line(std::string_view label, std::string_view message) {
   print_note(line);
 }
 
+}  // namespace
+
+namespace {
+
 /// Whatever ends the program says so.
 [[noreturn]] void on_terminate() {
-  constexpr std::string_view kText = "error: internal: an exception was not caught\n";
-  print_note(kText);
-  std::abort();
+  const std::string what = describe(std::current_exception());
+  print_error(what);
+  if (what.starts_with("internal")) {
+    std::abort();
+  }
+  std::_Exit(kExitFailed);
 }
 
 }  // namespace

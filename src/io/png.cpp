@@ -222,7 +222,10 @@ cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags) {
   cv::Mat image;
   try {
     image = cv::imdecode(packed, (as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE) | flags);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) {
+      throw;  // the file is not to blame
+    }
     return {};
   }
   if (as_color && !image.empty()) {
