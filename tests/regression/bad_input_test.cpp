@@ -173,6 +173,17 @@ TEST_F(BadInput, Poses) {
   EXPECT_FALSE(fs::exists(out_ + "/trajectory_kitti.txt"));
 }
 
+/// Poses that cannot be read are not poses that are not there.
+TEST_F(BadInput, PosesBehindALinkToNowhere) {
+  const fs::path poses = folder_.path() / "poses/00.txt";
+  fs::remove(poses);
+  fs::create_symlink("00.txt", poses);
+  expect_error(run(), 1, {"poses/00.txt", "symbolic links"});
+  fs::remove_all(folder_ / "poses");
+  fs::create_symlink("poses", folder_ / "poses");
+  expect_error(run(), 1, {"poses/00.txt", "symbolic links"});
+}
+
 TEST_F(BadInput, OutputFolderThatCannotBeWritten) {
   write_file(folder_ / "file", "");
   out_ = folder_ / "file";
