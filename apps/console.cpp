@@ -4,7 +4,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <string>
 
 #include <fcntl.h>
@@ -12,11 +14,13 @@
 #include <unistd.h>
 
 #include "commands.hpp"
+#include "exceptions.hpp"
 
 namespace stemvo::apps {
 namespace {
 
-int first_failure = 0;  // errno of the first write to standard output that failed
+std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
+int first_failure = 0;        // errno of the first write to standard output that failed
 
 void print_line(std::string_view label, std::string_view message) {
   std::string line = fmt::format("{}: {}", label, message);
@@ -24,7 +28,21 @@ void print_line(std::string_view label, std::string_view message) {
     c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;  // libraries' messages may be many lines
   }
   line += '\n';
-  std::fwrite(line.data(), 1, line.size(), stderr);
+  print_note(line);
+}
+
+}  // namespace
+
+namespace {
+
+/// Whatever ends the program says so.
+[[noreturn]] void on_terminate() {
+  const std::string what = describe(std::current_exception());
+  print_error(what);
+  if (what.starts_with("internal")) {
+    std::abort();
+  }
+  std::_Exit(kExitFailed);
 }
 
 }  // namespace
@@ -39,7 +57,15 @@ void prepare_console() {
     ::close(descriptor);
   }
   std::signal(SIGPIPE, SIG_IGN);
+  std::set_terminate(on_terminate);
+#ifdef __GLIBC__  // where the manual says that the variable may be set
+  if (std::FILE* const nowhere = std::fopen("/dev/null", "we")) {
+    stderr = nowhere;
+  }
+#endif
 }
+
+void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size(), console); }
 
 void print(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && first_failure == 0) {

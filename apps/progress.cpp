@@ -2,12 +2,12 @@
 #include "progress.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "console.hpp"
 #include "interrupt.hpp"
 
 namespace stemvo::apps {
@@ -51,7 +51,7 @@ bool Progress::update(std::size_t done, std::size_t total) {
     // \r and "erase to the end" keep a terminal's cursor on one line until the last.
     const std::string line =
         is_terminal_ ? "\r" + text + "\x1b[K" + (is_last ? "\n" : "") : text + "\n";
-    std::fwrite(line.data(), 1, line.size(), stderr);
+    print_note(line);
     last_ = now;
   }
   return go_on;

@@ -125,7 +125,7 @@ class Reader {
     camera.fy_px = numbers[1];
     camera.cx_px = numbers[2];
     camera.cy_px = numbers[3];
-    if (!(camera.fx_px > 0.0) || !(camera.fy_px > 0.0)) {
+    if (!(camera.fx_px >= 1e-3) || !(camera.fy_px >= 1e-3)) {
       return refuse("intrinsics", fmt::format("expected positive focal lengths, found {} and {}",
                                               camera.fx_px, camera.fy_px));
     }
@@ -160,15 +160,16 @@ class Reader {
   std::vector<Field> fields() {
     const Rule side = Rule::between(1.0, kMaxImageSide_px);
     const Rule distortion = Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
-    return {{"", "image_width", &width_px_, side, ""},
-            {"", "image_height", &height_px_, side, ""},
-            {"", "resolution", &resolution_, side, ""},
-            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
-            {"", "intrinsics", &intrinsics_, {}, ""},
-            {"", "distortion_model", &distortion_model_, distortion, ""},
-            {"", "distortion_coefficients", &distortion_coefficients_, {}, ""},
-            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
-            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
+    return {
+        {"", "image_width", &width_px_, side, ""},
+        {"", "image_height", &height_px_, side, ""},
+        {"", "resolution", &resolution_, side, ""},
+        {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
+        {"", "intrinsics", &intrinsics_, Rule::between(-1e6, 1e6), ""},
+        {"", "distortion_model", &distortion_model_, distortion, ""},
+        {"", "distortion_coefficients", &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
+        {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
+        {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;

@@ -70,15 +70,21 @@ Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
 }
 
 /// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.
-std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::string& name) {
+/// Error: that cannot be told.
+Expected<std::optional<fs::path>> find_ground_truth(const fs::path& absolute,
+                                                    const std::string& name) {
   std::error_code code;
   for (const fs::path& base : {absolute, fs::weakly_canonical(absolute, code)}) {
     fs::path file = base.parent_path().parent_path() / "poses" / (name + ".txt");
-    if (fs::exists(file, code)) {
-      return file;
+    if (fs::exists(fs::symlink_status(file, code))) {  // a link to nowhere is read, and refused
+      return std::optional(file);
+    }
+    if (code && code != std::errc::no_such_file_or_directory &&
+        code != std::errc::not_a_directory) {
+      return fail(fmt::format("{}: cannot be told from none: {}", file.string(), code.message()));
     }
   }
-  return std::nullopt;
+  return std::optional<fs::path>();
 }
 
 }  // namespace
@@ -112,9 +118,13 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   }
   const fs::path absolute = dataset::absolute_folder(directory);
   const std::string name = absolute.filename().string();
-  Expected<FrameList> listed = dataset::list_frames(
-      *range, *images, *times_s,
-      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name), false);
+  const auto ground_truth =
+      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name);
+  if (!ground_truth) {
+    return ground_truth.error();
+  }
+  Expected<FrameList> listed =
+      dataset::list_frames(*range, *images, *times_s, *ground_truth, false);
   if (!listed) {
     return listed.error();
   }

@@ -77,9 +77,9 @@ class ResultWriter {
     if (sequence.ground_truth()) {  // an interrupted run has fewer poses
       truth_ = std::span(*sequence.ground_truth()).first(trajectory_.size());
     }
-    trajectory_ = rescaled(std::move(trajectory_));
+    trajectory_ = as_written(request, sequence, std::move(trajectory_));
     if (request.config.odometry.mode == OdometryMode::kMap) {
-      refined_ = rescaled(odometry.frames().estimator().refined_trajectory());
+      refined_ = as_written(request, sequence, odometry.frames().estimator().refined_trajectory());
     }
   }
 
@@ -102,12 +102,6 @@ class ResultWriter {
   }
 
  private:
-  [[nodiscard]] Trajectory rescaled(Trajectory trajectory) const {
-    return request_.config.scale.source == ScaleSource::kGroundTruth
-               ? rescale_steps(trajectory, *truth_)
-               : trajectory;
-  }
-
   [[nodiscard]] Status write_refined(const std::filesystem::path& file) const {
     if (refined_) {
       return write_kitti_trajectory(file, *refined_);
@@ -225,6 +219,15 @@ void keep_first(Status& first, Status next) {
   if (first && !next) {
     first = std::move(next);
   }
+}
+
+Trajectory as_written(const RunRequest& request,
+                      const FrameSource& sequence,
+                      Trajectory trajectory) {
+  return request.config.scale.source == ScaleSource::kGroundTruth
+             ? rescale_steps(trajectory,
+                             std::span(*sequence.ground_truth()).first(trajectory.size()))
+             : trajectory;
 }
 
 Status write_results(const RunRequest& request,

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "report/metrics_keys.hpp"
+#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -58,6 +59,13 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 }  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
+  if (request.json) {
+    std::vector<std::filesystem::path> inputs = request.estimates;
+    inputs.push_back(request.ground_truth);
+    if (const Status status = check_spares_inputs({*request.json}, inputs); !status) {
+      return status.error();
+    }
+  }
   const Expected<Trajectory> truth = read_poses(request.ground_truth);
   if (!truth) {
     return truth.error();

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +18,7 @@ struct EvaluationRequest {
   std::filesystem::path ground_truth;            ///< KITTI poses
   std::vector<std::filesystem::path> estimates;  ///< KITTI poses, or TUM with as many poses
   Alignment alignment = Alignment::kNone;
+  std::optional<std::filesystem::path> json = std::nullopt;  ///< where the numbers will be written
 };
 
 /// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
@@ -35,7 +37,7 @@ struct EvaluationReport {
 };
 
 /// Both files start at the identity; nothing is matched by time. Errors: those of the readers; an
-/// estimate with another number of poses than the ground truth.
+/// estimate with another number of poses than the ground truth; `json` is one of the files.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
 
 /// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a

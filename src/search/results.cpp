@@ -284,8 +284,8 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
       return status.error();
     }
   }
-  if (const Status status = write_contact_sheet(results); !status) {
-    report.warnings.push_back("no sheet.png: " + status.error().message);
+  if (const Status status = write_contact_sheet(results, report.warnings); !status) {
+    return status.error();
   }
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();

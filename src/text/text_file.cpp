@@ -84,6 +84,10 @@ Expected<std::string> read_text_file(const fs::path& file) {
     text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
   if (!stream.eof()) {  // not opened, or failed in the middle
+    // What runs out is no fault of the file: it ends the program, as a lack of memory does.
+    if (errno == EMFILE || errno == ENFILE || errno == ENOMEM) {
+      throw std::system_error(errno, std::generic_category(), file.string() + ": cannot read");
+    }
     return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
   }
   return text;
