@@ -20,9 +20,10 @@ namespace {
 
 constexpr const char* kFooter =
     R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
-is given an odometry of its own and ranked by t_rel, each step having its true length. Filters whose
-errors are no worse than the best one's (paired bootstrap over segments, 95 %) are a group of equals;
---kinds has disturbed sequences count too. Ground truth is needed. Hopeless filters are stopped early (successive halving); --exhaustive runs all to the end.
+is given an odometry of its own, each step having its true length. First come the filters that cannot
+be told from the best (paired bootstrap over segments, 95 %), a group of equals, then the others by
+t_rel. --kinds has disturbed sequences count too. Ground truth is needed. Hopeless filters are stopped
+early (successive halving); --exhaustive runs all to the end.
 
 --out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
 best.yaml (for 'stemvo run --config'), sheet.png (best, median and worst) and records.jsonl, from which
@@ -92,7 +93,7 @@ void add_options(CLI::App& command, Arguments& arguments) {
   search::SearchRequest& request = arguments.request;
   command
       .add_option("SEQUENCE_DIR", request.sequence_dirs,
-                  "Sequences in KITTI's layout, with ground truth; ranked by the mean")
+                  "Sequences in KITTI's layout, with ground truth; all of them rank")
       ->type_name("");
   add_out_folder(command, request.out_dir);
   command

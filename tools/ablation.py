@@ -33,10 +33,12 @@ PROTOCOLS = {
 class Row:
     heading: str
     settings: tuple = ()  # of --set
+    config: str = "default"  # of --config
     protocols: tuple = tuple(PROTOCOLS)  # the road plays no part with per-step ground-truth scale
 
 
 ROAD = ("camera_height",)
+PAPER = str(ROOT / "config/paper.yaml")
 ROWS = (
     Row("the defaults"),
     Row("gray image instead of the learned channel", ("stem.model=gray",)),
@@ -44,13 +46,16 @@ ROWS = (
     Row("local contrast", ("stem.model=census",)),
     Row("Lucas-Kanade instead of patches", ("features.method=klt",)),
     Row("the camera as given", ("camera.refine=off",)),
+    Row("SIFT and brute force instead of patches", ("features.method=sift",)),
     Row("ORB and brute force instead of patches", ("features.method=orb",)),
     Row("pairs of frames chained instead of the map", ("odometry.mode=two_frame",)),
     Row("pairs of frames, ORB and brute force", ("odometry.mode=two_frame", "features.method=orb")),
     Row("map without refinement", ("refine.every=0",)),
-    Row("road: dense alignment only", ("scale.estimators=dense",), ROAD),
-    Row("road: tracked points only", ("scale.estimators=points",), ROAD),
-    Row("road: no temporal filter", ("scale.temporal_filter=false",), ROAD),
+    Row("the paper's recipe, stand-in stem", config=PAPER),
+    Row("the paper's recipe on the gray image", ("stem.model=gray", "stem.filter=-1", "stem.sampling_px=0"), PAPER),
+    Row("road: dense alignment only", ("scale.estimators=dense",), protocols=ROAD),
+    Row("road: tracked points only", ("scale.estimators=points",), protocols=ROAD),
+    Row("road: no temporal filter", ("scale.temporal_filter=false",), protocols=ROAD),
 )
 
 
@@ -58,9 +63,9 @@ class RunError(Exception):
     """The program's own message."""
 
 
-def metrics_of_run(program, sequence, settings):
+def metrics_of_run(program, sequence, config, settings):
     with tempfile.TemporaryDirectory() as out:
-        command = [program, "run", str(sequence), "--out", out, "--quiet"]
+        command = [program, "run", str(sequence), "--out", out, "--quiet", "--config", config]
         command += [word for setting in settings for word in ("--set", setting)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
@@ -109,7 +114,7 @@ def start_row(pool, arguments, row, protocol):
     def settings(seed):
         return (*arguments.set, *row.settings, f"scale.source={protocol}", f"seed={seed}")
 
-    return [[pool.submit(metrics_of_run, arguments.program, arguments.kitti_root / "sequences" / name, settings(seed))
+    return [[pool.submit(metrics_of_run, arguments.program, arguments.kitti_root / "sequences" / name, row.config, settings(seed))
              for seed in arguments.seeds] for name in arguments.sequences]
 
 
@@ -129,7 +134,8 @@ def table(arguments, protocol, started):
     for row, runs in started:
         found, problem = finish_row(row, runs)
         print(f"{protocol}, {row.heading}: {found[-1]}", file=sys.stderr, flush=True)
-        settings = " ".join(f"`{setting}`" for setting in row.settings)
+        config = () if row.config == "default" else (f"--config {pathlib.Path(row.config).name}",)
+        settings = " ".join(f"`{setting}`" for setting in (*config, *row.settings))
         lines.append(line([f"{row.heading} {settings}".strip(), *found]))
         if problem:
             problems.append(f"Not possible: {problem}")

@@ -20,7 +20,7 @@ namespace stemvo::search {
 
 /// Everything `stemvo search` was asked for.
 struct SearchRequest {
-  std::vector<std::filesystem::path> sequence_dirs;   ///< ranked by the mean over them
+  std::vector<std::filesystem::path> sequence_dirs;   ///< all of them rank the filters
   std::optional<std::filesystem::path> held_out_dir;  ///< reported, never ranked by
   /// Each that ranks also under these disturbances (robustness), at their middle strength.
   std::vector<std::string> kinds;
