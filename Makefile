@@ -39,6 +39,7 @@ test: build
 test-all: test test-long
 
 test-long:
+	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS)
 

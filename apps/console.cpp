@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <fstream>
 #include <string>
 
 #include <fcntl.h>
@@ -86,6 +87,23 @@ int flush_console(int exit_code) {
   }
   print_error(fmt::format("standard output: cannot be written ({})", std::strerror(first_failure)));
   return kExitFailed;
+}
+
+std::string command_line() {
+  std::ifstream words("/proc/self/cmdline");
+  std::string command = "stemvo";
+  std::string word;
+  std::getline(words, word, '\0');  // the program
+  while (std::getline(words, word, '\0')) {
+    constexpr const char* kPlain =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./:,@%";
+    const bool is_plain = !word.empty() && word.find_first_not_of(kPlain) == std::string::npos;
+    for (std::size_t at = 0; (at = word.find('\'', at)) != std::string::npos; at += 4) {
+      word.replace(at, 1, "'\\''");
+    }
+    command += is_plain ? " " + word : " '" + word + "'";
+  }
+  return command;
 }
 
 std::chrono::steady_clock::time_point process_start() {

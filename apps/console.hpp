@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <string>
 #include <string_view>
 
 namespace stemvo::apps {
@@ -23,6 +24,9 @@ void print_note(std::string_view text);
 /// Flushes standard output; the exit code, or 1 with a message when the results could not be
 /// written there (a reader that went away is no failure).
 int flush_console(int exit_code);
+
+/// What the user typed, for a POSIX shell, with `stemvo` for the program.
+std::string command_line();
 
 /// When the process started; the first call sets it.
 std::chrono::steady_clock::time_point process_start();

@@ -33,8 +33,9 @@ EuRoC's sensor.yaml is read as well. Frames are undistorted. Without camera_heig
 scale (scale.source=none).
 
 --out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory_refined_kitti.txt
-(odometry.mode map: the same with look-ahead), trajectory.png and .svg (the path drawn), metrics.json
-(the numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
+(odometry.mode map: the same with look-ahead), report.html (all there is to look at, for a browser),
+trajectory.png and .svg (the path drawn), metrics.json (the numbers), frames.csv (a row per frame),
+config.yaml (what was run) and, with --map, map.ply.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
@@ -59,7 +60,7 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   if (summary.report.timing) {
     print('\n' + format_timing_table(*summary.report.timing) + '\n');
   }
-  print(fmt::format("plot: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+  print(fmt::format("report: {}\n", (arguments.request.out_dir / "report.html").string()));
   if (arguments.request.write_map) {
     print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
   }
@@ -73,6 +74,7 @@ Expected<int> run(Arguments& arguments) {
   RunRequest& request = arguments.request;
   request.config = *config;
   request.models_dir = data_folder("models");
+  request.command = command_line();
   request.started = process_start();
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(

@@ -14,4 +14,4 @@ if [[ ! -f $DATA/stamp || "$(<"$DATA/stamp")" != "$rendered_by" ]]; then
 fi
 echo "==> Running stemvo on it (metres from the road and the camera's height; no ground truth, no alignment)"
 "$PROGRAM" run "$DATA/sequences/00" --out "$OUT" --map
-echo "==> The map of the drive: $PWD/$OUT/trajectory.png (in three dimensions: map.ply beside it)"
+echo "==> To look at, in a browser: $PWD/$OUT/report.html (the map: map.ply beside it)"

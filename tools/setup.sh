@@ -1,17 +1,18 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, a Python environment.
+# Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, plotly.js, a Python environment.
 # Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
-# `setup.sh peers` what `make bench` compares with.
+# `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 readonly LOGS=build/setup
 readonly VENV=build/venv
 readonly ORT_DIR=third_party/onnxruntime/lib
+readonly PLOTLY_DIR=third_party/plotly
 
 # docs/dependencies.md says why each is here.
-readonly PACKAGES=(
+PACKAGES=(
   build-essential cmake ninja-build pkg-config ccache git ca-certificates
   libopencv-dev libeigen3-dev libceres-dev libtbb-dev libyaml-cpp-dev libcli11-dev libfmt-dev
   nlohmann-json3-dev libcairo2-dev libdeflate-dev libturbojpeg0-dev libssl-dev fonts-dejavu-core
@@ -130,33 +131,59 @@ make_venv() {
   echo "$wanted" >"$venv/stamp"
 }
 
+# fetch_wheel NAME VERSION SHA256 PIP_OPTION..: unpacked to $LOGS/NAME
+fetch_wheel() {
+  local name=$1 version=$2 sha256=$3 wheel
+  shift 3
+  rm -rf "${LOGS:?}/$name"
+  mkdir -p "$LOGS/$name"
+  "$VENV/bin/python" -m pip download --disable-pip-version-check --no-input --no-deps --only-binary=:all: "$@" \
+    --dest "$LOGS/$name" "$name==$version" </dev/null >"$LOGS/$name.log" 2>&1 || pip_failed "$name==$version" "$LOGS/$name.log"
+  wheel=$(echo "$LOGS/$name"/*.whl)
+  [[ "$(sha256sum <"$wheel")" == "$sha256  -" ]] ||
+    die "$wheel: expected SHA256 $sha256, found $(sha256sum <"$wheel" | cut -d' ' -f1)"
+  "$VENV/bin/python" -m zipfile -e "$wheel" "$LOGS/$name"
+}
+
+# is_whole STAMP SHA256_OF_WHEEL
+is_whole() {
+  grep -qsF "# wheel $2" "$1" && (cd "$(dirname "$1")" && sha256sum --check --status SHA256SUMS)
+}
+
 # Only the library inside the wheel is used, so one Python tag serves every Python.
 install_onnxruntime() {
-  local version=1.31.1 sha256 stamp=$ORT_DIR/SHA256SUMS wheel
+  local version=1.31.1 sha256 stamp=$ORT_DIR/SHA256SUMS
   case "$(uname -m)" in
     x86_64) sha256=74a6a52994616c4d18b33db1e13c226333a70a6ba07480a5cab9c2a50dff1430 ;;
     aarch64) sha256=dcaedc50333876f3829ab966b242147f0e548229e29c36fe44622ecf748c25ee ;;
   esac
-  if grep -qsF "# wheel $sha256" "$stamp" && (cd "$ORT_DIR" && sha256sum --check --status SHA256SUMS); then
-    return
-  fi
+  is_whole "$stamp" "$sha256" && return
   say "Fetching ONNX Runtime $version to $ORT_DIR (log: $LOGS/onnxruntime.log)"
-  rm -rf "$ORT_DIR" "$LOGS/onnxruntime"
-  mkdir -p "$ORT_DIR" "$LOGS/onnxruntime"
-  "$VENV/bin/python" -m pip download --disable-pip-version-check --no-input --no-deps --only-binary=:all: \
-    --platform "manylinux_2_28_$(uname -m)" --python-version 3.13 --implementation cp --abi cp313 \
-    --dest "$LOGS/onnxruntime" "onnxruntime==$version" </dev/null >"$LOGS/onnxruntime.log" 2>&1 ||
-    pip_failed "onnxruntime==$version" "$LOGS/onnxruntime.log"
-  wheel=$(echo "$LOGS"/onnxruntime/*.whl)
-  [[ "$(sha256sum <"$wheel")" == "$sha256  -" ]] ||
-    die "$wheel: expected SHA256 $sha256, found $(sha256sum <"$wheel" | cut -d' ' -f1)"
-  "$VENV/bin/python" -m zipfile -e "$wheel" "$LOGS/onnxruntime"
+  rm -rf "$ORT_DIR"
+  mkdir -p "$ORT_DIR"
+  fetch_wheel onnxruntime "$version" "$sha256" \
+    --platform "manylinux_2_28_$(uname -m)" --python-version 3.13 --implementation cp --abi cp313
   cp "$LOGS"/onnxruntime/onnxruntime/capi/libonnxruntime.so.* "$ORT_DIR/"
   cp "$LOGS"/onnxruntime/onnxruntime/{LICENSE,ThirdPartyNotices.txt} "$ORT_DIR/"
   ln -sf "libonnxruntime.so.$version" "$ORT_DIR/libonnxruntime.so.1"
   rm -rf "$LOGS/onnxruntime"
   (cd "$ORT_DIR" && { echo "# wheel $sha256"; sha256sum libonnxruntime.so.1 "libonnxruntime.so.$version"; } >SHA256SUMS.new)
   mv "$ORT_DIR/SHA256SUMS.new" "$stamp"
+}
+
+# plotly.js, which report.html draws with: the wheel of plotly.py holds it.
+install_plotly() {
+  local version=6.5.0 sha256=5ac851e100367735250206788a2b1325412aa4a4917a4fe3e6f0bc5aa6f3d90a stamp=$PLOTLY_DIR/SHA256SUMS
+  is_whole "$stamp" "$sha256" && return
+  say "Fetching plotly.js of plotly $version to $PLOTLY_DIR (log: $LOGS/plotly.log)"
+  rm -rf "$PLOTLY_DIR"
+  mkdir -p "$PLOTLY_DIR"
+  fetch_wheel plotly "$version" "$sha256"
+  gzip -9 -n -c "$LOGS/plotly/plotly/package_data/plotly.min.js" >"$PLOTLY_DIR/plotly.min.js.gz"
+  cp "$LOGS/plotly/plotly-$version.dist-info/licenses/LICENSE.txt" "$PLOTLY_DIR/"
+  rm -rf "$LOGS/plotly"
+  (cd "$PLOTLY_DIR" && { echo "# wheel $sha256"; sha256sum plotly.min.js.gz LICENSE.txt; } >SHA256SUMS.new)
+  mv "$PLOTLY_DIR/SHA256SUMS.new" "$stamp"
 }
 
 # Ray, for searches on a cluster and their test: an environment of its own, which nothing else needs.
@@ -172,10 +199,20 @@ if [[ "${1:-}" == peers ]]; then
   exit
 fi
 
-mkdir -p "$LOGS" "$ORT_DIR" 2>/dev/null && [[ -w $LOGS && -w $ORT_DIR ]] ||
-  die "$PWD/build and $PWD/$ORT_DIR must be writable: they may belong to root from an earlier 'sudo make'"
+# Chromium, driven by Playwright, for the test that looks at report.html.
+if [[ "${1:-}" == browser ]]; then
+  mkdir -p "$LOGS"
+  PACKAGES=(chromium)
+  install_packages
+  make_venv build/venv-browser "$LOGS/venv-browser.log" tools/requirements-browser.txt
+  exit
+fi
+
+mkdir -p "$LOGS" "$ORT_DIR" "$PLOTLY_DIR" 2>/dev/null && [[ -w $LOGS && -w $ORT_DIR && -w $PLOTLY_DIR ]] ||
+  die "$PWD/build and $PWD/third_party must be writable: they may belong to root from an earlier 'sudo make'"
 check_system
 install_packages
 check_toolchain
 make_venv "$VENV" "$LOGS/venv.log" tools/requirements.txt tools/requirements-format.txt
 install_onnxruntime
+install_plotly

@@ -14,6 +14,7 @@
 #include "options/option_fields.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/map_ply.hpp"
+#include "report/run_page.hpp"
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
@@ -101,6 +102,14 @@ class ResultWriter {
     return written;
   }
 
+  [[nodiscard]] Status write_page(const MetricsReport& report) const {
+    const TrajectoryPlot plot = make_plot(report);
+    return write_run_page(
+        request_.out_dir / "report.html",
+        {plot.title, plot.subtitle, plot.unit, report, drive_.frames, plot.estimate,
+         plot.ground_truth, drive_.images, config_text(), request_.command});
+  }
+
  private:
   [[nodiscard]] Status write_refined(const std::filesystem::path& file) const {
     if (refined_) {
@@ -130,7 +139,7 @@ class ResultWriter {
     report.fps = num_frames / std::max(elapsed.count(), 1e-9);
     report.scale_source = options::to_string(config.scale.source);
     report.tracked_fraction = static_cast<double>(drive_.num_measured) / num_frames;
-    report.camera = {drive_.last.camera, drive_.last.principal_point_sigma_px};
+    report.camera = {drive_.frames.back().camera, drive_.frames.back().principal_point_sigma_px};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = static_cast<double>(drive_.num_road_measured) / num_frames;
     }
@@ -236,6 +245,14 @@ Status write_results(const RunRequest& request,
                      const Drive& drive,
                      MetricsReport& report) {
   return ResultWriter(request, sequence, odometry, drive).write(report);
+}
+
+Status write_report_page(const RunRequest& request,
+                         const FrameSource& sequence,
+                         const PhasedOdometry& odometry,
+                         const Drive& drive,
+                         const MetricsReport& report) {
+  return ResultWriter(request, sequence, odometry, drive).write_page(report);
 }
 
 }  // namespace stemvo::pipeline

@@ -7,6 +7,7 @@
 
 #include "dataset/frame_source.hpp"
 #include "evaluation/trajectory.hpp"
+#include "html/page.hpp"
 #include "odometry/phased_odometry.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
@@ -21,7 +22,8 @@ struct Drive {
   Trajectory trajectory;  ///< one pose per frame done
   std::size_t num_measured = 0;
   std::size_t num_road_measured = 0;
-  FrameResult last;  ///< of the last frame done
+  std::vector<FrameResult> frames;           ///< of each of them
+  std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images
@@ -43,5 +45,12 @@ struct Drive {
                                    const PhasedOdometry& odometry,
                                    const Drive& drive,
                                    MetricsReport& report);
+
+/// report.html, of the report with everything in it.
+[[nodiscard]] Status write_report_page(const RunRequest& request,
+                                       const FrameSource& sequence,
+                                       const PhasedOdometry& odometry,
+                                       const Drive& drive,
+                                       const MetricsReport& report);
 
 }  // namespace stemvo::pipeline

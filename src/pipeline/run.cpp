@@ -53,18 +53,22 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-Status write_frame_image(const RunRequest& request,
-                         const PhasedOdometry& odometry,
-                         const cv::Mat& frame,
-                         std::size_t number,
-                         const FrameResult& result) {
+/// The frame last done, its channel and tracks.
+cv::Mat draw_frame(const PhasedOdometry& odometry,
+                   const cv::Mat& frame,
+                   std::size_t number,
+                   const FrameResult& result) {
   const std::string caption =
       fmt::format("frame {}: {}, {} of {} matches", number, to_string(result.state),
                   result.num_inliers, result.num_matches);
-  const cv::Mat image =
-      draw_frame_image(frame, odometry.frames().image(), odometry.frames().matches(),
-                       odometry.frames().inlier_mask(), caption);
-  return write_image(request.out_dir / "pictures" / fmt::format("{:06}.png", number), image);
+  return draw_frame_image(frame, odometry.frames().image(), odometry.frames().matches(),
+                          odometry.frames().inlier_mask(), caption);
+}
+
+/// Whether frame i of n is one of the few in report.html, evenly spaced.
+bool is_in_report(std::size_t i, std::size_t n) {
+  constexpr std::size_t kImages = 6;
+  return (i + 1) * kImages / n > i * kImages / n;
 }
 
 pipeline::Drive drive(const RunRequest& request,
@@ -82,15 +86,24 @@ pipeline::Drive drive(const RunRequest& request,
       result.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
     }
     result.trajectory.push_back(pose.world_from_camera);
-    result.last = pose;
+    result.frames.push_back(pose);
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     const StageTimer timer(Stage::kFrameFiles);
     keeper.add(frames_csv_row(number, sequence.timestamps_s()[i], pose), pose.world_from_camera);
-    if (request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0) {
-      pipeline::keep_first(
-          result.written,
-          write_frame_image(request, odometry, frame.value_or(cv::Mat()), number, pose));
+    const bool is_asked_for =
+        request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
+    if (is_asked_for || is_in_report(i, sequence.size())) {
+      const cv::Mat image = draw_frame(odometry, frame.value_or(cv::Mat()), number, pose);
+      if (is_asked_for) {
+        const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
+        pipeline::keep_first(result.written, write_image(file, image));
+      }
+      if (is_in_report(i, sequence.size())) {
+        constexpr int kReportWidth_px = 720;
+        result.images.push_back(
+            {fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
+      }
     }
     result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
     return !result.interrupted;
@@ -118,7 +131,7 @@ bool is_config_of_results(const std::filesystem::path& file) {
 Status check_inputs_are_spared(const RunRequest& request, const FrameSource& sequence) {
   std::vector<std::filesystem::path> results;
   for (const char* name :
-       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt", "report.html",
         "trajectory.png", "trajectory.svg", "frames.csv", "metrics.json", "config.yaml"}) {
     results.push_back(request.out_dir / name);
   }
@@ -173,6 +186,8 @@ Expected<RunSummary> run_source(const RunRequest& request,
     report.timing->num_threads = cv::getNumThreads();
   }
   pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
+  pipeline::keep_first(written,
+                       pipeline::write_report_page(request, sequence, *odometry, done, report));
   return RunSummary{report, std::move(done.warnings), done.interrupted, std::move(written)};
 }
 

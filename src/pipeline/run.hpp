@@ -28,6 +28,7 @@ struct RunRequest : FrameSourceRequest {
   int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
   bool measure_times = false;  ///< RunSummary::report.timing
+  std::string command;         ///< that repeats the run, for report.html; may be empty
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
@@ -46,13 +47,13 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
 /// else an old one is removed, frames.csv, config.yaml, metrics.json,
-/// trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request (configuration,
-/// sequence, ground truth that scale.source needs, model, out_dir that cannot be written) is an
-/// error before work starts. A frame that cannot be read is a warning and gets a pose. When a
-/// result cannot be written the others still are; `written` says so.
-/// One run with measure_times at a time in a process. OpenCV is told, for the whole process, how
-/// many threads it may use, and by whom its loops are run: call nothing of it in another thread
-/// while a run begins or ends.
+/// report.html, trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request
+/// (configuration, sequence, ground truth that scale.source needs, model, out_dir that cannot be
+/// written) is an error before work starts. A frame that cannot be read is a warning and gets a
+/// pose. When a result cannot be written the others still are; `written` says so. One run with
+/// measure_times at a time in a process. OpenCV is told, for the whole process, how many threads it
+/// may use, and by whom its loops are run: call nothing of it in another thread while a run begins
+/// or ends.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

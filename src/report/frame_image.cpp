@@ -276,6 +276,20 @@ cv::Mat draw_channel_sheet(const cv::Mat& frame,
   return sheet;
 }
 
+std::string encode_jpeg(const cv::Mat& image, int width) {
+  cv::Mat bgr;
+  cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
+  if (image.cols > width) {
+    cv::resize(bgr, bgr, {width, std::max(1, cvRound(image.rows * (1.0 * width / image.cols)))}, 0,
+               0, cv::INTER_AREA);
+  }
+  constexpr int kQuality = 80;
+  std::vector<uchar> bytes;
+  STEMVO_CHECK(cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality}),
+               "an image that has pixels");
+  return {bytes.begin(), bytes.end()};
+}
+
 Status write_image(const std::filesystem::path& file, const cv::Mat& image) {
   cv::Mat bgr = image;
   if (image.channels() == 3) {

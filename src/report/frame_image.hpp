@@ -31,6 +31,9 @@ namespace stemvo {
                                          const std::vector<cv::Mat>& channels,
                                          const std::vector<std::string>& captions);
 
+/// An RGB image as a JPEG for a page: its bytes, made at most `width` pixels wide.
+[[nodiscard]] std::string encode_jpeg(const cv::Mat& image, int width);
+
 /// Writes an RGB or gray image as PNG. Error: the file cannot be written.
 [[nodiscard]] Status write_image(const std::filesystem::path& file, const cv::Mat& image);
 

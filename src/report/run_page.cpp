@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: MIT
+#include "report/run_page.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "internal_check.hpp"
+
+namespace stemvo {
+namespace {
+
+using nlohmann::json;
+
+/// The devkit's.
+constexpr std::size_t kFirstFrameStep = 10;
+
+/// JSON has no NaN, and nobody needs a file of digits.
+json rounded(double value) {
+  constexpr double kSteps = 1e5;
+  return std::isfinite(value) ? json(std::round(value * kSteps) / kSteps) : json();
+}
+
+/// One value per element.
+template <typename Range, typename Value>
+json list(const Range& range, const Value& value) {
+  json values = json::array();
+  for (const auto& element : range) {
+    values.push_back(value(element));
+  }
+  return values;
+}
+
+json coordinates(const Trajectory& trajectory, int axis, double sign = 1.0) {
+  return list(trajectory,
+              [&](const Rigid3& pose) { return rounded(sign * pose.translation[axis]); });
+}
+
+/// Whether a homography was scored against a fundamental matrix.
+bool is_scored(const FrameResult& r) { return r.homography_score + r.fundamental_score > 0.0; }
+
+json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
+
+class RunFigures {
+ public:
+  RunFigures(const RunPage& run, html::Page& page)
+      : run_(run), page_(page), numbers_(json::array()) {
+    for (std::size_t i = 0; i < run.frames.size(); ++i) {
+      numbers_.push_back(run.report.first_frame + i);
+    }
+    if (run.ground_truth) {
+      travelled_ = {0.0};
+      const Trajectory& truth = *run.ground_truth;
+      for (std::size_t i = 1; i < truth.size(); ++i) {
+        travelled_.push_back(travelled_.back() +
+                             (truth[i].translation - truth[i - 1].translation).norm());
+      }
+    }
+  }
+
+  /// A line of text per frame.
+  [[nodiscard]] std::vector<std::string> descriptions() const {
+    std::vector<std::string> lines;
+    for (std::size_t i = 0; i < run_.frames.size(); ++i) {
+      const FrameResult& r = run_.frames[i];
+      lines.push_back(fmt::format("frame {}: {}, {} of {} tracks are inliers",
+                                  run_.report.first_frame + i, to_string(r.state), r.num_inliers,
+                                  r.num_matches));
+      if (run_.ground_truth) {
+        const Eigen::Vector3d error =
+            run_.estimate[i].translation - (*run_.ground_truth)[i].translation;
+        lines.back() += fmt::format(", {:.2f} m off after {:.1f} m", error.norm(), travelled_[i]);
+      }
+    }
+    return lines;
+  }
+
+  void add_top_view() const {
+    json traces = json::array();
+    if (run_.ground_truth) {
+      traces.push_back({{"name", "ground truth"},
+                        {"mode", "lines"},
+                        {"line", {{"width", 5}, {"color", "#999999"}}},
+                        {"hoverinfo", "skip"},
+                        {"x", coordinates(*run_.ground_truth, 0)},
+                        {"y", coordinates(*run_.ground_truth, 2)}});
+    }
+    traces.push_back({{"name", "estimate"},
+                      {"mode", "lines+markers"},
+                      {"marker", {{"size", 4}}},
+                      {"text", descriptions()},
+                      {"hoverinfo", "text"},
+                      {"x", coordinates(run_.estimate, 0)},
+                      {"y", coordinates(run_.estimate, 2)}});
+    json layout = {{"large", true},
+                   {"dragmode", "pan"},
+                   {"xaxis", titled("x (right), " + run_.unit)},
+                   {"yaxis", titled("z (forward), " + run_.unit)}};
+    layout["yaxis"]["scaleanchor"] = "x";
+    add({"Path from above", "Drag to move, wheel to zoom, double click to see all.", traces, layout,
+         static_cast<int>(traces.size()) - 1});
+  }
+
+  void add_path_in_space() const {
+    const auto path = [](const char* name, const Trajectory& trajectory) {
+      return json{{"name", name},
+                  {"type", "scatter3d"},
+                  {"mode", "lines"},
+                  {"line", {{"width", 4}}},
+                  {"x", coordinates(trajectory, 0)},
+                  {"y", coordinates(trajectory, 2)},
+                  {"z", coordinates(trajectory, 1, -1.0)}};
+    };
+    json traces = json::array();
+    if (run_.ground_truth) {
+      traces.push_back(path("ground truth", *run_.ground_truth));
+      traces.back()["line"]["color"] = "#999999";
+    }
+    traces.push_back(path("estimate", run_.estimate));
+    const json layout = {{"large", true},
+                         {"scene",
+                          {{"aspectmode", "data"},
+                           {"camera", {{"eye", {{"x", -1.0}, {"y", -2.0}, {"z", 1.0}}}}},
+                           {"xaxis", titled("right, " + run_.unit)},
+                           {"yaxis", titled("forward, " + run_.unit)},
+                           {"zaxis", titled("up, " + run_.unit)}}}};
+    add({"Path in space", "", traces, layout, static_cast<int>(traces.size()) - 1});
+  }
+
+  void add_errors_over_distance() const {
+    json position = json::array();
+    json height = json::array();
+    for (std::size_t i = 0; i < travelled_.size(); ++i) {
+      const Eigen::Vector3d error =
+          run_.estimate[i].translation - (*run_.ground_truth)[i].translation;
+      position.push_back(rounded(error.norm()));
+      height.push_back(rounded(-error.y()));
+    }
+    const json distance = list(travelled_, rounded);
+    const json traces = {{{"name", "position"},
+                          {"mode", "lines"},
+                          {"x", distance},
+                          {"y", position},
+                          {"text", descriptions()},
+                          {"hoverinfo", "text+name"}},
+                         {{"name", "height, too high is above 0"},
+                          {"mode", "lines"},
+                          {"x", distance},
+                          {"y", height}}};
+    add({"Error over distance",
+         "",
+         traces,
+         {{"xaxis", titled("true path, m")}, {"yaxis", titled("error, m")}},
+         0});
+  }
+
+  void add_errors_by_length() const {
+    const auto errors = segment_errors(run_.estimate, *run_.ground_truth,
+                                       run_.report.metrics->segment_lengths_m, kFirstFrameStep);
+    std::set<double> lengths;  // that fit into the drive
+    for (const SegmentError& error : errors) {
+      lengths.insert(error.length_m);
+    }
+    json each = json::array();
+    for (const auto& [name, member, y_axis] :
+         {std::tuple("t_rel", &SegmentError::t_percent, "y"),
+          std::tuple("r_rel", &SegmentError::r_deg_per_100m, "y2")}) {
+      json segments = {
+          {"name", fmt::format("{} of a segment", name)},
+          {"mode", "markers"},
+          {"opacity", 0.4},
+          {"x", list(errors, [](const SegmentError& e) { return e.length_m; })},
+          {"y", list(errors, [&](const SegmentError& e) { return rounded(e.*member); })}};
+      json mean = {
+          {"name", fmt::format("{}, mean", name)},
+          {"mode", "lines+markers"},
+          {"x", lengths},
+          {"y", list(lengths, [&](double length) { return mean_at(errors, length, member); })}};
+      for (json* trace : {&segments, &mean}) {
+        (*trace)["yaxis"] = y_axis;
+        (*trace)["xaxis"] = y_axis == std::string("y") ? "x" : "x2";
+        each.push_back(std::move(*trace));
+      }
+    }
+    json layout = {{"grid", {{"rows", 1}, {"columns", 2}, {"pattern", "independent"}}},
+                   {"xaxis", titled("segment, m")},
+                   {"xaxis2", titled("segment, m")},
+                   {"yaxis", titled("t_rel, %")},
+                   {"yaxis2", titled("r_rel, degrees per 100 m")}};
+    add({"Error by segment length", "KITTI's segments, from every tenth frame.", each, layout});
+  }
+
+  void add_tracks() const {
+    const json traces = {
+        over_frames("tracks", "y3", [](const FrameResult& r) { return r.num_matches; }),
+        over_frames("inliers", "y3", [](const FrameResult& r) { return r.num_inliers; }),
+        over_frames(
+            "R_H", "y2",
+            [](const FrameResult& r) {
+              return is_scored(r) ? rounded(r.homography_ratio) : json();
+            },
+            "lines+markers"),
+        over_frames(
+            "state", "y", [](const FrameResult& r) { return to_string(r.state); }, "markers")};
+    json layout = stacked(3);
+    layout["yaxis3"].update(titled("tracks"));
+    layout["yaxis2"].update(titled("R_H"));
+    layout["yaxis"]["type"] = "category";
+    add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
+         traces, layout, 0});
+  }
+
+  void add_scale_and_camera() const {
+    json steps = json::array({nullptr});
+    for (std::size_t i = 1; i < run_.estimate.size(); ++i) {
+      steps.push_back(
+          rounded((run_.estimate[i].translation - run_.estimate[i - 1].translation).norm()));
+    }
+    json traces = {over_frames("length of a step", "y3", [](const FrameResult&) { return 0; })};
+    traces[0]["y"] = steps;
+    traces.push_back(over_frames("sigma of the scale", "y2", [](const FrameResult& r) {
+      return r.scale_sigma ? rounded(100.0 * *r.scale_sigma) : json();
+    }));
+    for (int axis = 0; axis < 2; ++axis) {
+      traces.push_back(over_frames(
+          axis == 0 ? "principal point, x" : "principal point, y", "y", [&](const FrameResult& r) {
+            return rounded(principal_point(r)[axis] - principal_point(run_.frames.front())[axis]);
+          }));
+      traces.back()["error_y"] = {{"type", "data"},
+                                  {"thickness", 0.5},
+                                  {"width", 0},
+                                  {"array", list(run_.frames, [&](const FrameResult& r) {
+                                     return r.principal_point_sigma_px
+                                                ? rounded((*r.principal_point_sigma_px)[axis])
+                                                : json();
+                                   })}};
+    }
+    json layout = stacked(3);
+    layout["yaxis3"].update(titled("step, " + run_.unit));
+    layout["yaxis2"].update(titled("sigma, %"));
+    layout["yaxis"].update(titled("moved by, px"));
+    add({"Scale and camera", "Bars: one sigma, where the principal point is learnt.", traces,
+         layout, 0});
+  }
+
+  void add_times() const {
+    json traces = json::array();
+    for (const auto& [name, member] :
+         {std::pair("stem", &StageTimes::stem_ms), std::pair("features", &StageTimes::features_ms),
+          std::pair("pose", &StageTimes::pose_ms)}) {
+      traces.push_back(
+          over_frames(name, "y", [&](const FrameResult& r) { return rounded(r.times.*member); }));
+    }
+    add({"Time per stage",
+         "Stages of different frames overlap: they do not add up to a frame's time.",
+         traces,
+         {{"xaxis", titled("frame")}, {"yaxis", titled("ms")}, {"hovermode", "x unified"}},
+         0});
+  }
+
+ private:
+  void add(const html::Figure& figure) const { page_.add_figure(figure); }
+
+  static Eigen::Vector2d principal_point(const FrameResult& r) {
+    return {r.camera.cx_px, r.camera.cy_px};
+  }
+
+  static json mean_at(const std::vector<SegmentError>& errors,
+                      double length,
+                      double SegmentError::* member) {
+    double sum = 0.0;
+    int count = 0;
+    for (const SegmentError& error : errors) {
+      sum += error.length_m == length ? error.*member : 0.0;
+      count += error.length_m == length ? 1 : 0;
+    }
+    return count > 0 ? rounded(sum / count) : json();
+  }
+
+  template <typename Value>
+  [[nodiscard]] json over_frames(const char* name,
+                                 const char* y_axis,
+                                 const Value& value,
+                                 const char* mode = "lines") const {
+    return {{"name", name},
+            {"mode", mode},
+            {"x", numbers_},
+            {"y", list(run_.frames, value)},
+            {"yaxis", y_axis}};
+  }
+
+  /// y (the lowest), y2, .. above one x axis of frames.
+  static json stacked(int rows) {
+    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", titled("frame")}};
+    layout["xaxis"]["anchor"] = "y";
+    constexpr double kGap = 0.06;
+    for (int i = 0; i < rows; ++i) {
+      const std::string key = i == 0 ? "yaxis" : fmt::format("yaxis{}", i + 1);
+      layout[key] = {
+          {"domain", {static_cast<double>(i) / rows + (i > 0 ? kGap : 0.0), (i + 1.0) / rows}}};
+    }
+    return layout;
+  }
+
+  const RunPage& run_;
+  html::Page& page_;
+  json numbers_;
+  std::vector<double> travelled_;  ///< true metres up to each frame; empty without ground truth
+};
+
+}  // namespace
+
+Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
+  STEMVO_CHECK(!run.frames.empty() && run.estimate.size() == run.frames.size() &&
+                   (!run.ground_truth || run.ground_truth->size() == run.frames.size()),
+               "a pose and a result per frame");
+  html::Page page(run.title, run.subtitle);
+  const RunFigures figures(run, page);
+  page.set_frames(figures.descriptions());
+  figures.add_top_view();
+  page.add_text("Numbers", format_metrics_table(run.report));
+  figures.add_path_in_space();
+  if (run.ground_truth) {
+    figures.add_errors_over_distance();
+    if (run.report.metrics->num_segments > 0) {
+      figures.add_errors_by_length();
+    }
+  }
+  figures.add_tracks();
+  figures.add_scale_and_camera();
+  figures.add_times();
+  if (run.report.timing) {
+    page.add_text("Stages", format_timing_table(*run.report.timing));
+  }
+  if (!run.images.empty()) {
+    page.add_images("Frames and their channel", run.images);
+  }
+  if (!run.command.empty()) {
+    page.add_text("Command", run.command);
+  }
+  page.add_folded_text("Configuration", run.config);
+  return page.write(file);
+}
+
+}  // namespace stemvo

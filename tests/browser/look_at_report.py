@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Opens a report.html in Chromium without a network and prints as JSON what a reader finds.
+
+    look_at_report.py REPORT [SCREENSHOT.png]
+
+Runs in the environment of `tools/setup.sh browser`.
+"""
+
+import json
+import pathlib
+import sys
+
+from playwright.sync_api import sync_playwright
+
+ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SLIDER, TOP_VIEW = "#frame", ".figure"
+
+
+def open_page(browser, report, found, **options):
+    page = browser.new_page(**options)
+    page.on("console", lambda message: found["errors"].append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: found["errors"].append(str(error)))
+    page.on("request", lambda request: found["requests"].append(request.url[:100]))
+    page.goto(report.as_uri())
+    page.wait_for_selector("body[data-shown=yes]", timeout=120000)
+    return page
+
+
+def x_range(page):
+    return page.evaluate(f"document.querySelector('{TOP_VIEW}')._fullLayout.xaxis.range")
+
+
+def middle_of_path(page):
+    """On the screen, of the estimate's middle point in the top view."""
+    return page.evaluate(f"""(() => {{
+        const div = document.querySelector('{TOP_VIEW}'), box = div.getBoundingClientRect(), layout = div._fullLayout;
+        const trace = content.sections[0].traces[content.sections[0].frame_trace], k = Math.floor(trace.x.length / 2);
+        return [box.x + layout._size.l + layout.xaxis.d2p(trace.x[k]), box.y + layout._size.t + layout.yaxis.d2p(trace.y[k])];
+    }})()""")
+
+
+def look(browser, report, screenshot):
+    found = {"errors": [], "requests": []}
+    page = open_page(browser, report, found, viewport={"width": 1200, "height": 900}, color_scheme="light")
+    found["title"] = page.title()
+    found["headings"] = page.locator("h2, summary").all_text_contents()
+    found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
+    found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+
+    page.focus(SLIDER)
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    found["by_keyboard"] = page.locator("#frames output").text_content()
+
+    page.mouse.move(*middle_of_path(page))
+    page.wait_for_selector(f"{TOP_VIEW} .hovertext", timeout=10000)
+    found["hover"] = page.locator(f"{TOP_VIEW} .hovertext").first.text_content()
+    found["by_hover"] = page.locator("#frames output").text_content()
+
+    before = x_range(page)
+    for _ in range(5):
+        page.mouse.wheel(0, -100)
+        page.wait_for_timeout(200)
+    found["zoom"] = [before, x_range(page)]
+    if screenshot:
+        page.screenshot(path=screenshot, full_page=True)
+    page.close()
+
+    page = open_page(browser, report, found, viewport={"width": 380, "height": 800}, color_scheme="dark", has_touch=True)
+    found["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    found["phone_width"] = page.evaluate("document.documentElement.scrollWidth")
+    page.close()
+    return found
+
+
+def main():
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=ARGUMENTS)
+        found = look(browser, pathlib.Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) > 2 else None)
+        browser.close()
+    print(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "report/run_page.hpp"
+#include "support/temp_folder.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo {
+namespace {
+
+using nlohmann::json;
+
+/// 201 frames straight ahead, a metre each; the estimate is 1 % too long and drifts up.
+class RunPageTest : public ::testing::Test {
+ protected:
+  RunPageTest() {
+    truth_.emplace();
+    for (int i = 0; i <= 200; ++i) {
+      Rigid3 pose;
+      pose.translation = {0.0, 0.0, 1.0 * i};
+      truth_->push_back(pose);
+      pose.translation = {0.0, -0.001 * i, 1.01 * i};
+      estimate_.push_back(pose);
+      FrameResult frame;
+      frame.state = i == 0 ? FrameState::kFirst : FrameState::kTracking;
+      frame.num_matches = 400 + i;
+      frame.num_inliers = 300;
+      frame.camera = {700.0, 700.0, 600.0 + 0.01 * i, 180.0, 1241, 376};
+      frames_.push_back(frame);
+    }
+    report_.first_frame = 100;
+    report_.num_frames = frames_.size();
+    report_.metrics = evaluate(estimate_, *truth_);
+  }
+
+  json content() {
+    EXPECT_TRUE(write_run_page(
+        folder_ / "report.html",
+        {"a drive", "", "m", report_, frames_, estimate_, truth_, {}, "key: value", "stemvo run"}));
+    const std::string text = read_text_file(folder_ / "report.html").value_or("");
+    const std::string begin = "id=\"content\">";
+    const std::size_t at = text.find(begin) + begin.size();
+    return json::parse(text.substr(at, text.find("</script>", at) - at));
+  }
+  static json section(const json& page, const std::string& heading) {
+    for (const json& found : page["sections"]) {
+      if (found["heading"] == heading) {
+        return found;
+      }
+    }
+    return {};
+  }
+
+  testing::TempFolder folder_;
+  Trajectory estimate_;
+  std::optional<Trajectory> truth_;
+  std::vector<FrameResult> frames_;
+  MetricsReport report_;
+};
+
+TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
+  const json page = content();
+  ASSERT_EQ(page["frames"].size(), 201U);
+  EXPECT_EQ(page["frames"][200],
+            "frame 300: tracking, 300 of 600 tracks are inliers, 2.01 m off after 200.0 m");
+
+  const json top = section(page, "Path from above");
+  EXPECT_EQ(top["traces"][top["frame_trace"].get<int>()]["name"], "estimate");
+  EXPECT_EQ(top["traces"][1]["y"][100], 101.0);
+  EXPECT_EQ(top["traces"][0]["y"][100], 100.0);
+
+  const json error = section(page, "Error over distance");
+  EXPECT_EQ(error["traces"][0]["x"][200], 200.0);
+  EXPECT_NEAR(error["traces"][0]["y"][200].get<double>(), std::hypot(2.0, 0.2), 1e-4);
+  EXPECT_EQ(error["traces"][1]["y"][200], 0.2) << "too high";
+
+  // 1 % and a little of the climb, whatever the length; 100 m is the only length that fits in
+  // twice.
+  const json lengths = section(page, "Error by segment length");
+  const json mean = lengths["traces"][1];
+  EXPECT_EQ(mean["name"], "t_rel, mean");
+  EXPECT_EQ(mean["x"][0], 100.0);
+  EXPECT_NEAR(mean["y"][0].get<double>(), 100.0 * std::hypot(0.01, 0.001), 0.03);
+
+  const json tracks = section(page, "Tracks, model and state");
+  EXPECT_EQ(tracks["traces"][0]["x"][0], 100) << "in the folder's numbering";
+  EXPECT_EQ(tracks["traces"][0]["y"][200], 600);
+  EXPECT_EQ(tracks["traces"][3]["y"][1], "tracking");
+  const json camera = section(page, "Scale and camera");
+  EXPECT_NEAR(camera["traces"][2]["y"][200].get<double>(), 2.0, 1e-4);
+}
+
+TEST_F(RunPageTest, WithoutGroundTruthNoErrorsAreShown) {
+  truth_.reset();
+  report_.metrics.reset();
+  const json page = content();
+  EXPECT_TRUE(section(page, "Error over distance").is_null());
+  EXPECT_TRUE(section(page, "Error by segment length").is_null());
+  EXPECT_EQ(section(page, "Path from above")["traces"].size(), 1U);
+  EXPECT_EQ(page["frames"][0], "frame 100: first, 300 of 400 tracks are inliers");
+}
+
+TEST_F(RunPageTest, WhatIsNotFiniteIsLeftOut) {
+  estimate_[7].translation.x() = std::numeric_limits<double>::quiet_NaN();
+  truth_.reset();
+  report_.metrics.reset();
+  EXPECT_TRUE(section(content(), "Path from above")["traces"][0]["x"][7].is_null());
+}
+
+}  // namespace
+}  // namespace stemvo
