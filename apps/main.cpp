@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kFooter = R"(A first drive, without any data:
   stemvo synth drive                                  render a street
-  stemvo run drive/sequences/00 --out result          reconstruct it, see result/trajectory.png
+  stemvo run drive/sequences/00 --out result          reconstruct it, see result/report.html
 With KITTI:
   stemvo run kitti/sequences/00 --out result --set scale.source=ground_truth
 With your own camera (see 'stemvo run --help'):

@@ -138,6 +138,15 @@ std::string format_summaries(const RobustnessReport& report) {
     }
     table.add(std::move(cells));
   }
+  table.rule();
+  for (std::size_t drive = 0; drive < report.drives.size(); ++drive) {
+    std::vector<std::string> cells = {"on " + report.drives[drive],
+                                      std::to_string(report.rows.size())};
+    for (std::size_t i = 0; i < num_controls; ++i) {
+      cells.push_back(number_or_dash(ratio_on_drive(report.rows, i, drive), 2));
+    }
+    table.add(std::move(cells));
+  }
   return table.str();
 }
 
@@ -185,6 +194,22 @@ std::vector<Summary> summaries(const std::vector<Row>& rows, std::size_t control
   }
   result.push_back(summarize("all", all, control));
   return result;
+}
+
+std::optional<double> ratio_on_drive(const std::vector<Row>& rows,
+                                     std::size_t control,
+                                     std::size_t drive) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Row& row : rows) {
+    const auto judged = row.outcomes.front().at(drive).r_rel_deg_per_100m;
+    const auto other = row.outcomes.at(control + 1).at(drive).r_rel_deg_per_100m;
+    if (judged && other && *judged > 0.0 && *other > 0.0) {
+      sum += std::log(*judged / *other);
+      ++count;
+    }
+  }
+  return count == 0 ? std::nullopt : std::optional(std::exp(sum / count));
 }
 
 std::string format_table(const RobustnessReport& report) {
@@ -248,6 +273,7 @@ std::string format_json(const RobustnessReport& report) {
                     {"channels", channels}});
   }
   Json groups = Json::array();
+  Json drives = Json::array();
   for (std::size_t i = 1; i < report.contenders.size(); ++i) {
     for (const Summary& one : summaries(report.rows, i - 1)) {
       groups.push_back({{"group", one.group},
@@ -258,10 +284,16 @@ std::string format_json(const RobustnessReport& report) {
                         {"decided_for_judged", one.num_for_judged},
                         {"decided_for_control", one.num_for_control}});
     }
+    for (std::size_t drive = 0; drive < report.drives.size(); ++drive) {
+      drives.push_back({{"drive", report.drives[drive]},
+                        {"control", report.contenders[i]},
+                        {"rotation_ratio", ratio_on_drive(report.rows, i - 1, drive)}});
+    }
   }
   return to_text({{"drives", report.drives},
                   {"interrupted", report.interrupted},
                   {"groups", groups},
+                  {"by_drive", drives},
                   {"rows", rows}});
 }
 

@@ -77,6 +77,12 @@ struct Summary {
 /// Groups in the order of the rows, then all. `control` counts from 0.
 [[nodiscard]] std::vector<Summary> summaries(const std::vector<Row>& rows, std::size_t control);
 
+/// The judged channel's r_rel over a control's on one drive, geometric mean over the rows that have
+/// both; nullopt: none has. Drives disagree where a channel suits one kind of image.
+[[nodiscard]] std::optional<double> ratio_on_drive(const std::vector<Row>& rows,
+                                                   std::size_t control,
+                                                   std::size_t drive);
+
 /// r_rel in degrees per 100 m, the mean over drives; nullopt: one has no segment.
 [[nodiscard]] std::optional<double> mean_rotation_error(const std::vector<Outcome>& outcomes);
 

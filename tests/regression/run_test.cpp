@@ -52,6 +52,7 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
   EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_tum.txt")), 60);
   EXPECT_EQ(count_lines(read_file(out_ + "/frames.csv")), 61);
   EXPECT_GT(fs::file_size(out_ + "/trajectory.png"), 10000U);
+  EXPECT_GT(fs::file_size(out_ + "/report.html"), 1000000U);
   EXPECT_THAT(read_file(out_ + "/trajectory.svg"), HasSubstr("<svg"));
   EXPECT_THAT(read_file(out_ + "/config.yaml"),
               AllOf(HasSubstr("# stemvo 0."), HasSubstr("sha256"), HasSubstr("frames 0:60 of 00"),
@@ -60,7 +61,7 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
     EXPECT_TRUE(fs::exists(out_ + "/pictures/" + name + ".png")) << name;
   }
   EXPECT_FALSE(fs::exists(out_ + "/pictures/000001.png"));
-  EXPECT_THAT(result.out, AllOf(HasSubstr("t_rel"), HasSubstr("trajectory.png")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("t_rel"), HasSubstr("report.html")));
   EXPECT_THAT(result.err, HasSubstr("60/60 frames"));
 }
 

@@ -139,5 +139,21 @@ TEST(Summaries, AreGeometricMeansOfGroupsAndOfAll) {
   EXPECT_NEAR(*found[2].rotation_ratio, 1.0, 1e-12);
 }
 
+TEST(Summaries, TellDrivesApart) {
+  const auto outcome = [](std::optional<double> r_rel) {
+    Outcome one;
+    one.r_rel_deg_per_100m = r_rel;
+    return one;
+  };
+  Row first;
+  first.outcomes = {{outcome(1.0), outcome(2.0)}, {outcome(2.0), outcome(1.0)}};
+  Row second;
+  second.outcomes = {{outcome(1.0), outcome(std::nullopt)}, {outcome(8.0), outcome(1.0)}};
+  EXPECT_NEAR(*ratio_on_drive({first, second}, 0, 0), 0.25, 1e-12);
+  EXPECT_NEAR(*ratio_on_drive({first, second}, 0, 1), 2.0, 1e-12)
+      << "the second row has no segment";
+  EXPECT_FALSE(ratio_on_drive({second}, 0, 1));
+}
+
 }  // namespace
 }  // namespace stemvo::robustness
