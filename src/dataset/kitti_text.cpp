@@ -119,11 +119,6 @@ Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file
     if (!time_s) {
       return fail_at(file, i, time_s.error());
     }
-    constexpr double kMax_s = 1e20;
-    if (!(std::abs(time_s->front()) <= kMax_s)) {
-      return fail_at(
-          file, i, fail(fmt::format("expected at most {} s, found {} s", kMax_s, time_s->front())));
-    }
     if (!times_s.empty() && !(time_s->front() > times_s.back())) {
       return fail_at(file, i,
                      fail(fmt::format("expected a time after {} s, found {} s", times_s.back(),

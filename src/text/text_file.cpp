@@ -173,12 +173,16 @@ std::optional<std::size_t> parse_index(std::string_view text) {
 }
 
 Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count) {
+  constexpr double kLargest = 1e20;  // squares and sums stay finite
   std::vector<double> numbers;
   for (const std::string_view word : split_words(line)) {
     const std::optional<double> number = to_finite(word);
     if (!number) {
       return fail(fmt::format("expected a finite number, found '{}'",
                               word.substr(0, 40)));  // a binary file has long words
+    }
+    if (!(std::abs(*number) <= kLargest)) {
+      return fail(fmt::format("expected a number of size up to {}, found {}", kLargest, *number));
     }
     numbers.push_back(*number);
   }

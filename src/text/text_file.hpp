@@ -38,8 +38,8 @@ namespace stemvo {
 
 /// Nothing but decimal digits; nullopt: another text, or too large.
 [[nodiscard]] std::optional<std::size_t> parse_index(std::string_view text);
-/// Exactly `count` finite numbers, whatever the locale. The error says what was expected and found,
-/// without file and line: "expected 12 numbers, found 11".
+/// Exactly `count` numbers of size up to 1e20, whatever the locale. The error says what was
+/// expected and found, without file and line: "expected 12 numbers, found 11".
 [[nodiscard]] Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count);
 
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """tools/long_drives.py: what is rendered is kept, what changed is rendered anew, runs are watched."""
 
+import contextlib
 import json
 import os
 import pathlib
@@ -74,17 +75,16 @@ class RenderedDrives(unittest.TestCase):
 class WatchedRuns(unittest.TestCase):
     def test_a_growing_process_shows_in_the_second_half(self):
         script = ("import sys, time\n"
-                  "out = open(sys.argv[1], 'w')\n"
-                  "print('frame', file=out, flush=True)\n"
                   "kept = []\n"
+                  "print('warning: one of two words', file=sys.stderr)\n"
                   "for i in range(40):\n"
                   "    kept.append(bytearray(2_000_000))\n"
-                  "    print(i, file=out, flush=True)\n"
+                  "    print(f'\\r{i + 1}/40 frames, and more', end='', file=sys.stderr, flush=True)\n"
                   "    time.sleep(0.05)\n")
-        with tempfile.TemporaryDirectory() as folder:
-            frames = pathlib.Path(folder) / "frames.csv"
-            process = subprocess.Popen([sys.executable, "-c", script, str(frames)])
-            watched = watched_run.watch(process, frames, 40)
+        with contextlib.closing(watched_run.Messages()) as messages:
+            process = subprocess.Popen([sys.executable, "-c", script], stderr=messages.slave)
+            watched = watched_run.watch(process, messages.frames_done, 40)
+            self.assertEqual(messages.words(), "warning: one of two words")
         first, second, _ = watched.memory_mb
         self.assertGreater(second - first, 20.0)  # of 40 MB
         self.assertGreater(watched.memory_ratio, 1.2)
@@ -105,7 +105,7 @@ class Command(unittest.TestCase):
     def test_prints_a_row_per_drive_and_goes_on_after_a_failure(self):
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
-            write_poses(folder / "31.txt", 40)
+            write_poses(folder / "31.txt", 160)
             done = long_drives(folder / "cache", "--poses", folder, "--sequences", "77,31", "--size", "310x94",
                                "--out", folder / "out")
             self.assertEqual(done.returncode, 1, done.stderr)
@@ -113,7 +113,7 @@ class Command(unittest.TestCase):
             rows = done.stdout.splitlines()
             self.assertEqual(len(rows), 3, done.stdout)
             cells = [cell.strip() for cell in rows[2].strip("|").split("|")]
-            self.assertEqual(cells[:2], ["31", "40"])
+            self.assertEqual(cells[:2], ["31", "160"])
             first, second, _ = map(float, cells[6].split("/"))
             self.assertGreater(first, 5.0)
             self.assertGreater(second, 5.0)

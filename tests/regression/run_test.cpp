@@ -75,8 +75,8 @@ TEST_F(Run, NothingLooksAhead) {
 }
 
 TEST_F(Run, PicturesAreOfThisRunOnly) {
-  fs::create_directories(out_ + "/pictures");
-  for (const char* name : {"000001.png", "000777.png", "holiday.png", "1.png", "000003.txt"}) {
+  ASSERT_EQ(run_drive(sequence_, out_, {"--frames", "0:2", "--pictures", "1"}).exit_code, 0);
+  for (const char* name : {"000777.png", "holiday.png", "1.png", "000003.txt"}) {
     std::ofstream(out_ + "/pictures/" + name) << "old";
   }
   ASSERT_EQ(run_drive(sequence_, out_, {"--frames", "0:4", "--pictures", "2"}).exit_code, 0);

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: MIT
 """One run of the program, its memory sampled while it works, its numbers read afterwards."""
 
+import contextlib
 import dataclasses
 import json
 import os
 import pathlib
+import pty
+import re
 import statistics
 import subprocess
 import time
 
 SAMPLE_S = 0.02
+PROGRESS = re.compile(r"(\d+)/\d+ frames,")
 
 
 class RunError(Exception):
@@ -47,24 +51,33 @@ def processor_s(pid):
         return 0.0
 
 
-class RowCounter:
-    """Rows of a growing frames.csv, whose rows are written as the frames come."""
+class Messages:
+    """What a program says on standard error, where it believes to be at a terminal and tells its
+    progress ten times a second."""
 
-    def __init__(self, file):
-        self.file = file
-        self.rows = -1  # the header
-        self.stream = None
+    def __init__(self):
+        self.master, self.slave = pty.openpty()
+        os.set_blocking(self.master, False)
+        self.text = ""
 
-    def update(self):
-        if self.stream is None and self.file.exists():
-            self.stream = open(self.file, "rb")
-        if self.stream is not None:
-            self.rows += self.stream.read().count(b"\n")
-        return max(self.rows, 0)
+    def frames_done(self):
+        """Of the last line of progress; 0 before."""
+        try:
+            while said := os.read(self.master, 1 << 16):
+                self.text += said.decode("utf-8", errors="replace")
+        except OSError:  # nothing more for now
+            pass
+        done = PROGRESS.findall(self.text)
+        return int(done[-1]) if done else 0
+
+    def words(self):
+        """All but the progress, in one line."""
+        self.frames_done()
+        return " ".join(" ".join(line for line in self.text.splitlines() if not PROGRESS.search(line)).split())
 
     def close(self):
-        if self.stream is not None:
-            self.stream.close()
+        os.close(self.master)
+        os.close(self.slave)
 
 
 @dataclasses.dataclass
@@ -75,14 +88,14 @@ class Watched:
     second_quarter_mb: list = dataclasses.field(default_factory=list)  # the program has started, the queues are full
     marks: list = dataclasses.field(default_factory=list)  # (frames, seconds, processor seconds) at the quarters
 
-    def add(self, pid, rows, num_frames):
-        part = 2 if rows >= num_frames else 1 if 2 * rows >= num_frames else 0
+    def add(self, pid, done, num_frames):
+        part = 2 if done >= num_frames else 1 if 2 * done >= num_frames else 0
         memory_mb = resident_mb(pid)
         self.memory_samples_mb[part].append(memory_mb)
-        if part == 0 and 4 * rows >= num_frames:
+        if part == 0 and 4 * done >= num_frames:
             self.second_quarter_mb.append(memory_mb)
-        if len(self.marks) < 5 and (rows > 0 or self.marks) and 4 * rows >= len(self.marks) * num_frames:
-            self.marks.append((rows, time.monotonic(), processor_s(pid)))
+        if len(self.marks) < 5 and (done > 0 or self.marks) and 4 * done >= len(self.marks) * num_frames:
+            self.marks.append((done, time.monotonic(), processor_s(pid)))
 
     @property
     def memory_mb(self):
@@ -98,34 +111,29 @@ class Watched:
         return [1000.0 * seconds / frames if frames > 0 and seconds > 0.0 else None for frames, seconds in spans]
 
 
-def watch(process, frames_csv, num_frames):
+def watch(process, frames_done, num_frames):
     """Memory up to the middle frame, up to the last one, and from then until the process ends
     (evaluating, drawing the map); processor time at the quarters."""
     watched = Watched()
-    counter = RowCounter(frames_csv)
     while process.poll() is None:
-        watched.add(process.pid, counter.update(), num_frames)
+        watched.add(process.pid, frames_done(), num_frames)
         time.sleep(SAMPLE_S)
-    counter.close()
     return watched
 
 
 def run(program, sequence, out, num_frames, options):
     """`options` are those of `stemvo run`. Raises RunError where the program fails."""
     out = pathlib.Path(out)
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "frames.csv").unlink(missing_ok=True)  # of an earlier run: its rows must not count
-    command = [program, "run", str(sequence), "--out", str(out), "--quiet", *options]
-    with open(out / "messages.txt", "w+", encoding="utf-8", errors="replace") as messages:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=messages)
+    command = [program, "run", str(sequence), "--out", str(out), *options]
+    with contextlib.closing(Messages()) as messages:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=messages.slave)
         try:
-            watched = watch(process, out / "frames.csv", num_frames)
+            watched = watch(process, messages.frames_done, num_frames)
         finally:
             if process.poll() is None:
                 process.terminate()
                 process.wait()
-        messages.seek(0)
-        text = " ".join(messages.read().split())
+        text = messages.words()
     if process.returncode != 0:
         raise RunError(text or f"{program}: exit code {process.returncode}")
     if not watched.second_quarter_mb or not watched.memory_mb[1]:
