@@ -94,6 +94,14 @@ void add_threads_option(CLI::App& command, int& num_threads) {
       ->check(in_range(0, 1024));
 }
 
+void add_tolerance_option(CLI::App& command, double& tolerance_s) {
+  command
+      .add_option("--gt-tolerance", tolerance_s,
+                  "Most seconds between a frame and its true pose; default 0.01")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 3600.0).description(""));
+}
+
 CLI::Option* add_range_option(CLI::App& command,
                               const std::string& name,
                               std::optional<FrameRangeRequest>& range,

@@ -44,6 +44,9 @@ void add_out_folder(CLI::App& command,
 /// --threads N.
 void add_threads_option(CLI::App& command, int& num_threads);
 
+/// --gt-tolerance S.
+void add_tolerance_option(CLI::App& command, double& tolerance_s);
+
 /// An option "A:B"; text of another form is wrong usage.
 CLI::Option* add_range_option(CLI::App& command,
                               const std::string& name,
