@@ -19,7 +19,7 @@ namespace {
 int first_failure = 0;  // errno of the first write to standard output that failed
 
 void print_line(std::string_view label, std::string_view message) {
-  std::string line = fmt::format("{}: {}", label, message);
+  std::string line = label.empty() ? std::string(message) : fmt::format("{}: {}", label, message);
   for (char& c : line) {
     c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;  // libraries' messages may be many lines
   }
@@ -48,6 +48,8 @@ void print(std::string_view text) {
 }
 
 void print_error(std::string_view message) { print_line("error", message); }
+
+void print_note(std::string_view message) { print_line("", message); }
 
 void print_warning(std::string_view message) { print_line("warning", message); }
 

@@ -13,6 +13,8 @@ void prepare_console();
 void print(std::string_view text);
 /// "error: ..." on one line of standard error.
 void print_error(std::string_view message);
+/// A line of standard error that is neither.
+void print_note(std::string_view message);
 /// "warning: ..." on one line of standard error.
 void print_warning(std::string_view message);
 

@@ -48,4 +48,17 @@ Status check_pairs(const fs::path& truth_file,
       truth_s.back(), times_s.front(), times_s.back()));
 }
 
+Expected<GroundTruth> match_by_time(const PoseFile& truth,
+                                    const fs::path& truth_file,
+                                    const std::vector<double>& times_s,
+                                    double tolerance_s) {
+  const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
+  const Status status =
+      check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s);
+  if (!status) {
+    return status.error();
+  }
+  return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
+}
+
 }  // namespace stemvo::dataset

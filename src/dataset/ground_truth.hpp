@@ -5,7 +5,9 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "dataset/frame_source.hpp"
 #include "evaluation/pose_file.hpp"
 #include "stemvo/error.hpp"
 
@@ -24,5 +26,11 @@ namespace stemvo::dataset {
                                  std::span<const double> times_s,
                                  const TimePairs& pairs,
                                  double tolerance_s);
+
+/// The poses that frames of these times have. Error: fewer than two.
+[[nodiscard]] Expected<GroundTruth> match_by_time(const PoseFile& truth,
+                                                  const std::filesystem::path& truth_file,
+                                                  const std::vector<double>& times_s,
+                                                  double tolerance_s);
 
 }  // namespace stemvo::dataset

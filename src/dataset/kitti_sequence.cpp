@@ -112,13 +112,19 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   }
   const fs::path absolute = dataset::absolute_folder(directory);
   const std::string name = absolute.filename().string();
-  Expected<FrameList> listed = dataset::list_frames(
-      *range, *images, *times_s,
-      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name), false);
-  if (!listed) {
-    return listed.error();
+  FrameList frames = dataset::list_frames(*range, *images, *times_s);
+  const auto truth =
+      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name);
+  if (truth) {
+    if (const Status status =
+            dataset::add_ground_truth(frames, *truth, std::nullopt,
+                                      options.ground_truth_tolerance_s, images->size(), false);
+        !status) {
+      return status.error();
+    }
   }
-  FrameList& frames = *listed;
+  frames.kind = "KITTI sequence";
+  frames.is_kitti = true;
   frames.name = name;
   frames.camera = *camera;
   frames.given_calibration = options.calibration;

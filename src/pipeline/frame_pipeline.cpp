@@ -40,6 +40,7 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
             frame.started = std::chrono::steady_clock::now();
             frame.prepared = {};
             frame.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
+            return !sequence.stream() || !frame.pixels || !frame.pixels->empty();
           },
       .prepare =
           [&](std::size_t index) {

@@ -74,8 +74,10 @@ class ResultWriter {
         odometry_(odometry),
         drive_(drive),
         trajectory_(drive.trajectory) {
-    if (sequence.ground_truth()) {  // an interrupted run has fewer poses
-      truth_ = std::span(*sequence.ground_truth()).first(trajectory_.size());
+    const auto truth = sequence.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
+    matched_ = truth ? Status() : truth.error();
+    if (truth && *truth && !(*truth)->frames.empty()) {
+      truth_ = **truth;
     }
     trajectory_ = rescaled(std::move(trajectory_));
     if (request.config.odometry.mode == OdometryMode::kMap) {
@@ -85,7 +87,10 @@ class ResultWriter {
 
   Status write(MetricsReport& report) {
     const std::filesystem::path& folder = request_.out_dir;
-    const std::span<const double> times_s(sequence_.timestamps_s().data(), trajectory_.size());
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < trajectory_.size(); ++i) {
+      times_s.push_back(sequence_.time_s(i));
+    }
     Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
     keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
     keep_first(written, write_refined(folder / "trajectory_refined_kitti.txt"));
@@ -98,13 +103,18 @@ class ResultWriter {
     const TrajectoryPlot plot = make_plot(report);
     keep_first(written, write_trajectory_png(folder / "trajectory.png", plot));
     keep_first(written, write_trajectory_svg(folder / "trajectory.svg", plot));
+    keep_first(written, matched_);
+    if (request_.note && truth_ && sequence_.stream()) {
+      request_.note(fmt::format("ground truth: for {} of {} frames", truth_->frames.size(),
+                                trajectory_.size()));
+    }
     return written;
   }
 
  private:
   [[nodiscard]] Trajectory rescaled(Trajectory trajectory) const {
     return request_.config.scale.source == ScaleSource::kGroundTruth
-               ? rescale_steps(trajectory, *truth_)
+               ? rescale_steps(trajectory, truth_->poses)
                : trajectory;
   }
 
@@ -144,9 +154,13 @@ class ResultWriter {
       // A trajectory without a scale has no error in metres until one is fitted.
       const Alignment alignment =
           config.scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
-      report.metrics = evaluate_aligned(trajectory_, *truth_, alignment, config.evaluation);
+      const auto compare = [&](const Trajectory& trajectory) {
+        return evaluate_aligned(take_poses(trajectory, truth_->frames), truth_->poses, alignment,
+                                config.evaluation);
+      };
+      report.metrics = compare(trajectory_);
       if (refined_) {
-        report.refined = evaluate_aligned(*refined_, *truth_, alignment, config.evaluation);
+        report.refined = compare(*refined_);
       }
     }
     return report;
@@ -161,7 +175,7 @@ class ResultWriter {
   [[nodiscard]] std::string config_text() const {
     const StemInfo& stem = odometry_.stem_info();
     std::string text =
-        fmt::format("# stemvo {}\n# {}\n", version(), describe_frames(sequence_.size()));
+        fmt::format("# stemvo {}\n# {}\n", version(), describe_frames(sequence_.stream() ? trajectory_.size() : sequence_.size()));
     text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
                         stem.num_filters, stem.sampling_px,
                         stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
@@ -200,9 +214,10 @@ class ResultWriter {
     plot.subtitle = describe_numbers(report);
     plot.estimate = trajectory_;
     if (truth_) {
-      plot.ground_truth = Trajectory(truth_->begin(), truth_->end());
+      plot.ground_truth = truth_->poses;
+      plot.estimate = take_poses(trajectory_, truth_->frames);
       if (report.metrics->alignment != Alignment::kNone) {
-        plot.estimate = align_trajectory(trajectory_, *truth_, report.metrics->alignment);
+        plot.estimate = align_trajectory(plot.estimate, truth_->poses, report.metrics->alignment);
       }
     } else if (report.scale_source == "none") {
       plot.unit = "units";
@@ -216,7 +231,8 @@ class ResultWriter {
   const Drive& drive_;
   Trajectory trajectory_;
   std::optional<Trajectory> refined_;  ///< the same with look-ahead; mode map only
-  std::optional<std::span<const Rigid3>> truth_;
+  std::optional<GroundTruth> truth_;
+  Status matched_;  ///< the ground truth of a stream
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/frame_pipeline.hpp"
+#include "pipeline/input_notes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/thread_scope.hpp"
@@ -18,13 +19,13 @@
 namespace stemvo {
 namespace {
 
-/// A folder of images is no car of KITTI's: what its camera file does not say is not known.
-Config with_camera_height(Config config, const RunRequest& request, const FrameSource& source) {
+/// Another camera is not on KITTI's car: what its camera file does not say is not known.
+Config with_camera_height(Config config, const FrameSource& source) {
   constexpr const char* kSource = "scale.source";
   const bool is_chosen = config.scale.source != ScaleSource::kCameraHeight ||
                          config.keys_in_file.contains(kSource) ||
                          config.keys_overridden.contains(kSource);
-  if (request.camera_file && !source.camera_height_m() && !is_chosen) {
+  if (!source.is_kitti() && !source.camera_height_m() && !is_chosen) {
     config.scale.source = ScaleSource::kNone;
   }
   // A file's height is some camera's, often the default; that of the camera file is this one's.
@@ -38,14 +39,22 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
   auto sequence = open_source(source);
-  if (sequence && request.config.scale.source == ScaleSource::kGroundTruth &&
-      !sequence->ground_truth()) {
-    const auto file = request.camera_file
-                          ? request.sequence_dir
-                          : request.sequence_dir / "../../poses" / (sequence->name() + ".txt");
+  if (!sequence || request.config.scale.source != ScaleSource::kGroundTruth) {
+    return sequence;
+  }
+  if (!sequence->has_ground_truth()) {
+    const auto file = sequence->is_kitti()
+                          ? request.sequence_dir / "../../poses" / (sequence->name() + ".txt")
+                          : request.sequence_dir;
     return fail(fmt::format(
         "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
         file.lexically_normal().string()));
+  }
+  if (sequence->stream() || sequence->frames().ground_truth_frames) {
+    return fail(fmt::format(
+        "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
+        sequence->ground_truth_file()->string(),
+        sequence->stream() ? "a stream, whose times are not known before" : "some only"));
   }
   return sequence;
 }
@@ -83,16 +92,20 @@ pipeline::Drive drive(const RunRequest& request,
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     const StageTimer timer(Stage::kFrameFiles);
-    csv.write(number, sequence.timestamps_s()[i], pose);
+    csv.write(number, sequence.time_s(i), pose);
     if (request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0) {
       pipeline::keep_first(
           result.written,
           write_frame_image(request, odometry, frame.value_or(cv::Mat()), number, pose));
     }
-    result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
+    result.interrupted = progress && !progress(i + 1, pipeline::expected_frames(sequence, i + 1)) &&
+                         i + 1 < sequence.size();
     return !result.interrupted;
   };
   pipeline::run_frames(sequence, odometry, visit);
+  if (sequence.stream()) {
+    pipeline::end_stream(sequence, progress, result);
+  }
   pipeline::keep_first(result.written, csv.close());
   return result;
 }
@@ -127,6 +140,7 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (request.measure_times) {
     recorder.emplace();
   }
+  pipeline::note_input(request, sequence);
   pipeline::Drive done = drive(request, sequence, *odometry, *csv, progress);
   MetricsReport report;
   Status written = timed(Stage::kResultFiles, [&] {
@@ -156,7 +170,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return sequence.error();
   }
   RunRequest effective = request;
-  effective.config = with_camera_height(request.config, request, *sequence);
+  effective.config = with_camera_height(request.config, *sequence);
   return run_source(effective, *sequence, progress);
 }
 

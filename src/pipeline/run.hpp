@@ -28,6 +28,9 @@ struct RunRequest : FrameSourceRequest {
   int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
   bool measure_times = false;  ///< RunSummary::report.timing
+  /// Told before work starts, and of a stream's ground truth after it: what the input was taken
+  /// for, a line each.
+  std::function<void(const std::string&)> note;
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
@@ -36,11 +39,11 @@ struct RunRequest : FrameSourceRequest {
 struct RunSummary {
   MetricsReport report;               ///< what metrics.json holds
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
-  bool interrupted = false;           ///< stopped early; results hold what was computed
+  bool interrupted = false;           ///< stopped early, no live camera; results hold what was done
   Status written;                     ///< the first result that could not be written, if any
 };
 
-/// Called after each frame: frames done, frames in all; false stops (results are written).
+/// Called after each frame: frames done, frames in all (0: not known); false stops (results are written).
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
