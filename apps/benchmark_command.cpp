@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -55,7 +54,7 @@ int benchmark(Arguments& arguments) {
   std::optional<Progress> progress;
   request.on_run = [&](const std::string& run) {
     if (!arguments.is_quiet) {
-      fmt::print(stderr, "{}\n", run);
+      print_note(run + '\n');
     }
     progress.emplace("frames", arguments.is_quiet);
     return !is_interrupted();

@@ -4,7 +4,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <string>
 
 #include <fcntl.h>
@@ -12,19 +14,31 @@
 #include <unistd.h>
 
 #include "commands.hpp"
+#include "exceptions.hpp"
 
 namespace stemvo::apps {
 namespace {
 
-int first_failure = 0;  // errno of the first write to standard output that failed
+std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
+int first_failure = 0;        // errno of the first write to standard output that failed
 
-void print_line(std::string_view label, std::string_view message) {
+void print_labelled(std::string_view label, std::string_view message) {
   std::string line = label.empty() ? std::string(message) : fmt::format("{}: {}", label, message);
   for (char& c : line) {
     c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;  // libraries' messages may be many lines
   }
   line += '\n';
-  std::fwrite(line.data(), 1, line.size(), stderr);
+  print_note(line);
+}
+
+/// Whatever ends the program says so.
+[[noreturn]] void on_terminate() {
+  const std::string what = describe(std::current_exception());
+  print_error(what);
+  if (what.starts_with("internal")) {
+    std::abort();
+  }
+  std::_Exit(kExitFailed);
 }
 
 }  // namespace
@@ -39,7 +53,15 @@ void prepare_console() {
     ::close(descriptor);
   }
   std::signal(SIGPIPE, SIG_IGN);
+  std::set_terminate(on_terminate);
+#ifdef __GLIBC__  // where the manual says that the variable may be set
+  if (std::FILE* const nowhere = std::fopen("/dev/null", "we")) {
+    stderr = nowhere;
+  }
+#endif
 }
+
+void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size(), console); }
 
 void print(std::string_view text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && first_failure == 0) {
@@ -47,11 +69,11 @@ void print(std::string_view text) {
   }
 }
 
-void print_error(std::string_view message) { print_line("error", message); }
+void print_error(std::string_view message) { print_labelled("error", message); }
 
-void print_note(std::string_view message) { print_line("", message); }
+void print_line(std::string_view message) { print_labelled("", message); }
 
-void print_warning(std::string_view message) { print_line("warning", message); }
+void print_warning(std::string_view message) { print_labelled("warning", message); }
 
 int flush_console(int exit_code) {
   if (std::fflush(stdout) != 0 && first_failure == 0) {

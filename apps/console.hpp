@@ -6,17 +6,21 @@
 
 namespace stemvo::apps {
 
-/// Keeps files away from a closed standard output, and a closed pipe from ending the program.
+/// Keeps files away from a closed standard output, a closed pipe from ending the program, and what
+/// libraries print (libpng, libjpeg) from standard error, which is ours.
 void prepare_console();
 
 /// Results, to standard output. A failure is told by flush_console.
 void print(std::string_view text);
 /// "error: ..." on one line of standard error.
 void print_error(std::string_view message);
-/// A line of standard error that is neither.
-void print_note(std::string_view message);
 /// "warning: ..." on one line of standard error.
 void print_warning(std::string_view message);
+
+/// A line of standard error that is neither.
+void print_line(std::string_view message);
+/// To standard error as it is.
+void print_note(std::string_view text);
 
 /// Flushes standard output; the exit code, or 1 with a message when the results could not be
 /// written there (a reader that went away is no failure).

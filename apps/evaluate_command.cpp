@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "commands.hpp"
@@ -26,7 +24,6 @@ Examples:
 struct Arguments {
   EvaluationRequest request;
   std::string alignment = "none";
-  std::optional<std::filesystem::path> json;
 };
 
 Expected<int> evaluate(Arguments& arguments) {
@@ -36,8 +33,8 @@ Expected<int> evaluate(Arguments& arguments) {
     return report.error();
   }
   print(format_evaluation_table(*report));
-  if (arguments.json) {
-    if (const Status status = write_evaluation_json(*arguments.json, *report); !status) {
+  if (arguments.request.json) {
+    if (const Status status = write_evaluation_json(*arguments.request.json, *report); !status) {
       return status.error();
     }
   }
@@ -63,7 +60,8 @@ CLI::App* add_evaluate(CLI::App& app, Action& action) {
   add_tolerance_option(*command, arguments->request.tolerance_s);
   add_file_option(*command, "--camera", arguments->request.camera_file,
                   "With EuRoC's poses: the camera file with T_BS");
-  add_file_option(*command, "--json", arguments->json, "Write the numbers to this file as well");
+  add_file_option(*command, "--json", arguments->request.json,
+                  "Write the numbers to this file as well");
   command->footer(kFooter);
   command->callback(
       [arguments, &action] { action = [arguments] { return evaluate(*arguments); }; });

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "console.hpp"
+#include "exceptions.hpp"
 #include "interrupt.hpp"
 #include "stemvo/version.hpp"
 
@@ -96,10 +97,8 @@ int main(int argc, char** argv) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell
   try {
     return stemvo::apps::flush_console(stemvo::apps::run_program(argc, argv));
-  } catch (const std::exception& error) {
-    stemvo::apps::print_error(std::string("internal: ") + error.what());
   } catch (...) {
-    stemvo::apps::print_error("internal: unknown exception");
+    stemvo::apps::print_error(stemvo::apps::describe(std::current_exception()));
   }
   return stemvo::apps::kExitFailed;
 }

@@ -82,7 +82,7 @@ Expected<int> run(Arguments& arguments) {
   request.models_dir = data_folder("models");
   request.started = process_start();
   if (!arguments.is_quiet) {
-    request.note = print_note;
+    request.note = print_line;
   }
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
@@ -112,14 +112,16 @@ CLI::App* add_run(CLI::App& app, Action& action) {
   const auto arguments = std::make_shared<Arguments>();
   RunRequest& request = arguments->request;
   command
-      ->add_option("INPUT", request.sequence_dir,
-                   "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
+      ->add_option(
+          "INPUT", request.sequence_dir,
+          "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
   add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
-  add_file_option(*command, "--gt", request.ground_truth, "Ground truth: poses in KITTI's, TUM's or EuRoC's format");
+  add_file_option(*command, "--gt", request.ground_truth,
+                  "Ground truth: poses in KITTI's, TUM's or EuRoC's format");
   add_tolerance_option(*command, request.ground_truth_tolerance_s);
   add_file_option(*command, "--camera", request.camera_file,
                   "Camera file; INPUT may be any folder of images or a pattern (see below)");

@@ -14,7 +14,7 @@ readonly ORT_DIR=third_party/onnxruntime/lib
 readonly PACKAGES=(
   build-essential cmake ninja-build pkg-config ccache git ca-certificates
   libopencv-dev libeigen3-dev libceres-dev libtbb-dev libyaml-cpp-dev libcli11-dev libfmt-dev
-  nlohmann-json3-dev libcairo2-dev libdeflate-dev libssl-dev fonts-dejavu-core
+  nlohmann-json3-dev libcairo2-dev libdeflate-dev libturbojpeg0-dev libssl-dev fonts-dejavu-core
   libgtest-dev libgmock-dev libbenchmark-dev python3 python3-venv
 )
 

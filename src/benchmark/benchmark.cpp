@@ -27,6 +27,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
 constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
 constexpr const char* kMetricsFile = "metrics.json";
+constexpr const char* kPosesFile = "trajectory_kitti.txt";
 constexpr double kLengthTolerance_m = 1.5;
 
 /// Those asked for, where one that is not there is a row, or all.
@@ -109,11 +110,18 @@ Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence)
 /// Why the run of this folder is to be done (again), for its title; nothing where its result
 /// counts.
 std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inputs) {
-  const Expected<std::string> text = read_text_file(folder / kInputsFile);
-  if (!text) {
+  std::error_code ignored;
+  if (!fs::exists(folder / kInputsFile, ignored)) {
     return "";  // never completed
   }
+  const Expected<std::string> text = read_text_file(folder / kInputsFile);
+  if (!text) {
+    return fmt::format(" (again: {})", text.error().message);
+  }
   const Json before = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  if (!before.is_object()) {
+    return fmt::format(" (again: {} is damaged)", (folder / kInputsFile).string());
+  }
   std::vector<std::string> changed;
   for (const auto& [part, hash] : inputs.items()) {
     if (!before.contains(part) || before[part] != hash) {
@@ -124,7 +132,19 @@ std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inp
     return fmt::format(" (again: {} changed)", fmt::join(changed, ", "));
   }
   const Expected<MetricsReport> report = read_metrics_json(folder / kMetricsFile);
-  return report ? std::nullopt : std::optional(fmt::format(" (again: {})", report.error().message));
+  const Expected<Trajectory> poses = read_kitti_trajectory(folder / kPosesFile);
+  if (const auto lines = read_text_file(folder / kPosesFile); lines && !lines->ends_with('\n')) {
+    return fmt::format(" (again: {}: expected whole lines)", (folder / kPosesFile).string());
+  }
+  if (report && poses && poses->size() == report->num_frames) {
+    return std::nullopt;
+  }
+  const std::string problem =
+      !report  ? report.error().message
+      : !poses ? poses.error().message
+               : fmt::format("{}: expected {} poses, found {}", (folder / kPosesFile).string(),
+                             report->num_frames, poses->size());
+  return fmt::format(" (again: {})", problem);
 }
 
 const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
@@ -308,7 +328,7 @@ class Benchmark {
       const std::size_t wanted = i == 0 ? 0 : i + 1;
       const Json& run = runs[wanted]["state"] == "done" ? runs[wanted] : runs[wanted ^ 1U];
       if (run["state"] == "done") {
-        auto poses = read_kitti_trajectory(run_dir(sequence, run) / "trajectory_kitti.txt");
+        auto poses = read_kitti_trajectory(run_dir(sequence, run) / kPosesFile);
         if (!poses) {
           return poses.error();
         }
@@ -348,8 +368,9 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   if (!published) {
     return published.error();
   }
-  if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
-    return made.error();
+  const auto lock = pipeline::open_out_folder(request.out_dir);
+  if (!lock) {
+    return lock.error();
   }
   Benchmark benchmark(request);
   try {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -13,6 +13,8 @@
 #include "odometry/phased_odometry.hpp"
 #include "odometry/self_calibration.hpp"
 #include "pipeline/frame_pipeline.hpp"
+#include "pipeline/out_folder.hpp"
+#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -32,16 +34,15 @@ fs::path calibration_file(const CalibrationRequest& request) {
 }
 
 /// Everything that can be wrong with a request before work starts.
-Status check_request(const CalibrationRequest& request) {
+Status check_request(const CalibrationRequest& request, const FrameSource& sequence) {
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  std::error_code code;
-  if (fs::equivalent(request.out_file, calibration_file(request), code)) {
-    return fail(fmt::format("{}: expected another file than the calibration to start from",
-                            request.out_file.string()));
-  }
-  return check_can_write(request.out_file);
+  std::vector<fs::path> inputs = pipeline::input_files(sequence, request.config);
+  inputs.push_back(calibration_file(request));
+  inputs.push_back(request.sequence_dir / "times.txt");
+  const Status status = check_spares_inputs({request.out_file}, inputs);
+  return status ? check_can_write(request.out_file) : status;
 }
 
 Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
@@ -103,15 +104,14 @@ Status write_calibration(const CalibrationRequest& request,
 
 Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
                                                const CalibrationProgress& progress) {
-  const Expected<KittiSequence> sequence = KittiSequence::open(
-      request.sequence_dir,
-      {.camera = request.config.input.camera,
-       .frames = request.frames,
-       .calibration = calibration_file(request)});
+  const Expected<KittiSequence> sequence =
+      KittiSequence::open(request.sequence_dir, {.camera = request.config.input.camera,
+                                                 .frames = request.frames,
+                                                 .calibration = calibration_file(request)});
   if (!sequence) {
     return sequence.error();
   }
-  if (const Status status = check_request(request); !status) {
+  if (const Status status = check_request(request, *sequence); !status) {
     return status.error();
   }
   Expected<PhasedOdometry> odometry = create_odometry(request, sequence->camera());

@@ -51,6 +51,7 @@ Expected<Config> load_config(const std::filesystem::path& file, const Config& ba
     return root.error();
   }
   Config result = base;
+  result.file = file;
   std::vector<Field> fields = fields_of(result);
   if (Status status = config::read_document(*root, file.string(), fields); !status) {
     return status.error();

@@ -21,6 +21,8 @@ struct Config : Options {
   InputOptions input;
   EvaluationOptions evaluation;
 
+  std::filesystem::path file;  ///< that load_config read; empty: none
+
   // Who chose a key, e.g. "scale.source".
   std::set<std::string> keys_in_file;     ///< of load_config
   std::set<std::string> keys_overridden;  ///< of apply_override

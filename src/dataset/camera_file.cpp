@@ -131,7 +131,7 @@ class Reader {
     camera.fy_px = numbers[places[1]];
     camera.cx_px = numbers[places[2]];
     camera.cy_px = numbers[places[3]];
-    if (!(camera.fx_px > 0.0) || !(camera.fy_px > 0.0)) {
+    if (!(camera.fx_px >= 1e-3) || !(camera.fy_px >= 1e-3)) {
       return refuse(key, fmt::format("expected positive focal lengths, found {} and {}",
                                      camera.fx_px, camera.fy_px));
     }
@@ -199,16 +199,18 @@ class Reader {
     const Rule distortion =
         format_.has_matrix ? Rule::one_of({"plumb_bob", "equidistant", "fisheye", "none"})
                            : Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
-    return {{"", "image_width", &width_px_, side, ""},
-            {"", "image_height", &height_px_, side, ""},
-            {"", "resolution", &resolution_, side, ""},
-            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
-            {"", format_.has_matrix ? "camera_matrix" : "intrinsics", &intrinsics_, {}, ""},
-            {"", "distortion_model", &distortion_model_, distortion, ""},
-            {"", coefficients_key(), &distortion_coefficients_, {}, ""},
-            {"", format_.is_kalibr ? "T_cam_imu" : "T_BS", &transform_, {}, ""},
-            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
-            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
+    const char* intrinsics_key = format_.has_matrix ? "camera_matrix" : "intrinsics";
+    return {
+        {"", "image_width", &width_px_, side, ""},
+        {"", "image_height", &height_px_, side, ""},
+        {"", "resolution", &resolution_, side, ""},
+        {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
+        {"", intrinsics_key, &intrinsics_, Rule::between(-1e6, 1e6), ""},
+        {"", "distortion_model", &distortion_model_, distortion, ""},
+        {"", coefficients_key(), &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
+        {"", format_.is_kalibr ? "T_cam_imu" : "T_BS", &transform_, Rule::between(-1e6, 1e6), ""},
+        {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
+        {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;

@@ -95,8 +95,8 @@ Status add_ground_truth(FrameList& frames,
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_expected, num_found));
   }
-  frames.ground_truth = relative_to_first(
-      std::span(truth->poses).subspan(range.begin, range.end - range.begin));
+  frames.ground_truth =
+      relative_to_first(std::span(truth->poses).subspan(range.begin, range.end - range.begin));
   return {};
 }
 

@@ -103,7 +103,8 @@ Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t nu
     for (std::size_t i = 0; i < num_frames; ++i) {
       times_s.push_back(time_s(i));
     }
-    return frames_.match(times_s).map([](const GroundTruth& truth) { return std::optional(truth); });
+    return frames_.match(times_s).map(
+        [](const GroundTruth& truth) { return std::optional(truth); });
   }
   if (!frames_.ground_truth) {
     return std::optional<GroundTruth>();
@@ -132,9 +133,8 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
     return dataset::open_video(request);
   }
   if (listing) {
-    return listing->and_then([&](const dataset::Listing& found) {
-      return dataset::open_listing(found, request);
-    });
+    return listing->and_then(
+        [&](const dataset::Listing& found) { return dataset::open_listing(found, request); });
   }
   if (!dataset::is_folder(path) || !looks_like_kitti(path)) {
     return refuse(path);

@@ -32,9 +32,9 @@ struct FrameRangeRequest {
 
 /// What is known of frames that come one behind the other: of a video, of a camera.
 struct StreamInfo {
-  std::size_t max_frames = 0;       ///< as asked for; the stream may end before
-  std::size_t expected_frames = 0;  ///< what the container says; 0: not known
-  bool is_live = false;             ///< ends when the user says so
+  std::size_t max_frames = 0;                 ///< as asked for; the stream may end before
+  std::size_t expected_frames = 0;            ///< what the container says; 0: not known
+  bool is_live = false;                       ///< ends when the user says so
   std::function<double(std::size_t)> time_s;  ///< of a frame that was read
 };
 
@@ -137,7 +137,7 @@ struct FrameSourceRequest : SequenceOptions {
   /// `camera:N`.
   std::filesystem::path sequence_dir;
   std::optional<std::filesystem::path> camera_file;  ///< in place of the recording's own
-  std::optional<std::filesystem::path> times;        ///< of images; else the recording's, or rate_hz
+  std::optional<std::filesystem::path> times;  ///< of images; else the recording's, or rate_hz
 };
 
 /// Finds out what it is: `camera:N`; a file: a video; a folder in EuRoC's layout, TUM RGB-D's or

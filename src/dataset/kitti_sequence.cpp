@@ -70,15 +70,21 @@ Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
 }
 
 /// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.
-std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::string& name) {
+/// Error: that cannot be told.
+Expected<std::optional<fs::path>> find_ground_truth(const fs::path& absolute,
+                                                    const std::string& name) {
   std::error_code code;
   for (const fs::path& base : {absolute, fs::weakly_canonical(absolute, code)}) {
     fs::path file = base.parent_path().parent_path() / "poses" / (name + ".txt");
-    if (fs::exists(file, code)) {
-      return file;
+    if (fs::exists(fs::symlink_status(file, code))) {  // a link to nowhere is read, and refused
+      return std::optional(file);
+    }
+    if (code && code != std::errc::no_such_file_or_directory &&
+        code != std::errc::not_a_directory) {
+      return fail(fmt::format("{}: cannot be told from none: {}", file.string(), code.message()));
     }
   }
-  return std::nullopt;
+  return std::optional<fs::path>();
 }
 
 }  // namespace
@@ -115,12 +121,19 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   FrameList frames = dataset::list_frames(*range, *images, *times_s);
   const auto truth =
       options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name);
-  if (truth) {
-    if (const Status status =
-            dataset::add_ground_truth(frames, *truth, std::nullopt,
-                                      options.ground_truth_tolerance_s, images->size(), false);
+  if (!truth) {
+    return truth.error();
+  }
+  if (*truth) {
+    if (const Status status = dataset::add_ground_truth(
+            frames, **truth, std::nullopt, options.ground_truth_tolerance_s, images->size(), false);
         !status) {
       return status.error();
+    }
+    if (!options.ground_truth && frames.ground_truth_frames) {
+      return fail(fmt::format("{}: expected a pose for each of {} frames, found those of {}",
+                              (*truth)->string(), frames.files.size(),
+                              frames.ground_truth_frames->size()));
     }
   }
   frames.kind = "KITTI sequence";

@@ -47,6 +47,14 @@ Expected<Camera> to_camera(const Matrix34d& p) {
         "{} {} {}]",
         p(0, 0), p(0, 1), p(0, 2), p(1, 0), p(1, 1), p(1, 2), p(2, 0), p(2, 1), p(2, 2)));
   }
+  constexpr double kMax = 1e6;
+  if (!(p.leftCols<3>().cwiseAbs().maxCoeff() <= kMax && p(0, 0) >= 1.0 && p(1, 1) >= 1.0 &&
+        p.col(3).cwiseAbs().maxCoeff() <= kMax * kMax)) {
+    return fail(
+        fmt::format("expected focal lengths of 1 to {} pixels and a centre and offset of that "
+                    "order, found [{} 0 {} {}; 0 {} {} {}]",
+                    kMax, p(0, 0), p(0, 2), p(0, 3), p(1, 1), p(1, 2), p(1, 3)));
+  }
   return Camera{p(0, 0), p(1, 1), p(0, 2), p(1, 2)};
 }
 
@@ -110,6 +118,11 @@ Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file
     const auto time_s = parse_numbers((*lines)[i], 1);
     if (!time_s) {
       return fail_at(file, i, time_s.error());
+    }
+    constexpr double kMax_s = 1e20;
+    if (!(std::abs(time_s->front()) <= kMax_s)) {
+      return fail_at(
+          file, i, fail(fmt::format("expected at most {} s, found {} s", kMax_s, time_s->front())));
     }
     if (!times_s.empty() && !(time_s->front() > times_s.back())) {
       return fail_at(file, i,

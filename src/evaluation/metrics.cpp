@@ -11,6 +11,7 @@ namespace stemvo {
 namespace {
 
 constexpr std::size_t kFirstFrameStep = 10;  // devkit: every 10th frame starts a segment
+constexpr double kDenseShare = 1.0 / 8.0;    // of the path
 constexpr double kShortPath_m = 100.0;       // below it no devkit segment fits
 constexpr double kDevkitLengths_m[] = {100, 200, 300, 400, 500, 600, 700, 800};
 constexpr double kShortLengths_m[] = {10, 20, 30, 40, 50};
@@ -187,6 +188,21 @@ std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
   }
   add_segment_errors(estimate, ground_truth, 1, metrics);
   return metrics.t_rel_percent;
+}
+
+DenseErrors dense_errors(std::span<const Rigid3> estimate,
+                         std::span<const Rigid3> ground_truth,
+                         std::size_t max_segments) {
+  STEMVO_CHECK(!estimate.empty(), "at least one pose");
+  const double length_m = kDenseShare * distances_m(ground_truth).back();
+  const std::size_t step = (estimate.size() - 1) / max_segments + 1;
+  DenseErrors errors;
+  for (const SegmentError& one : segment_errors(estimate, ground_truth, {&length_m, 1}, step)) {
+    errors.t_percent.push_back(one.t_percent);
+    errors.r_deg_per_100m.push_back(one.r_deg_per_100m);
+    errors.block = std::max(errors.block, (one.last - one.first + step - 1) / step);
+  }
+  return errors;
 }
 
 Metrics evaluate_aligned(std::span<const Rigid3> estimate,

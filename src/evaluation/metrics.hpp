@@ -74,6 +74,18 @@ struct SegmentError {
                                                         std::span<const Rigid3> ground_truth,
                                                         std::span<const double> path_shares);
 
+/// What two methods are compared by (paired_ratio): segments of an eighth of the path from every
+/// frame on or, of more than `max_segments`, evenly spaced ones.
+struct DenseErrors {
+  std::vector<double> t_percent;
+  std::vector<double> r_deg_per_100m;
+  std::size_t block = 1;  ///< neighbours that overlap
+};
+/// Empty: none fits (a path of length zero). Same length, at least one pose (checked).
+[[nodiscard]] DenseErrors dense_errors(std::span<const Rigid3> estimate,
+                                       std::span<const Rigid3> ground_truth,
+                                       std::size_t max_segments);
+
 /// As evaluate(), after the estimate was fitted to the ground truth, for trajectories without a
 /// scale. The four kinds of ATE and the null offset are those of the estimate as it comes.
 [[nodiscard]] Metrics evaluate_aligned(std::span<const Rigid3> estimate,

@@ -16,6 +16,17 @@ namespace {
 /// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
 constexpr double kRotationTolerance = 1e-3;
 
+/// Metres: further than any drive, and near enough that squares and sums stay finite.
+constexpr double kFurthest_m = 1e9;
+
+Expected<Rigid3> with_near_translation(const Rigid3& pose) {
+  if (!(pose.translation.cwiseAbs().maxCoeff() <= kFurthest_m)) {
+    return fail(fmt::format("expected a position within {} m, found ({}, {}, {})", kFurthest_m,
+                            pose.translation.x(), pose.translation.y(), pose.translation.z()));
+  }
+  return pose;
+}
+
 Expected<Rigid3> pose_from_matrix_row(const std::vector<double>& numbers) {
   const Matrix34d matrix =
       Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
@@ -30,7 +41,7 @@ Expected<Rigid3> pose_from_matrix_row(const std::vector<double>& numbers) {
   if (!(rotation.determinant() > 0.0)) {
     return fail("expected a rotation in the first three columns, found a reflection");
   }
-  return Rigid3::from_matrix(matrix);
+  return with_near_translation(Rigid3::from_matrix(matrix));
 }
 
 Expected<Rigid3> pose_from_quaternion_row(const std::vector<double>& n) {
@@ -40,7 +51,7 @@ Expected<Rigid3> pose_from_quaternion_row(const std::vector<double>& n) {
         fmt::format("expected a quaternion of length 1 in the last four numbers, found {:.6g}",
                     rotation.norm()));
   }
-  return Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]));
+  return with_near_translation(Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3])));
 }
 
 Error fail_empty(const std::filesystem::path& file) {

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "io/image_file.hpp"
 
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
+#include <turbojpeg.h>
 
 #include "io/png.hpp"
 #include "text/text_file.hpp"
@@ -63,13 +66,63 @@ bool is_color_jpeg(Bytes bytes) {
   return frame && *frame + kNumComponents < bytes.size() && bytes[*frame + kNumComponents] > 1;
 }
 
+/// By TurboJPEG, which tells damaged data from sound; the pixels are OpenCV's. Error: damaged.
+class JpegDecoder {
+ public:
+  explicit JpegDecoder(Bytes bytes) : bytes_(bytes) {
+    is_known_ =
+        handle_ != nullptr && tjDecompressHeader3(handle_.get(), bytes.data(), bytes.size(),
+                                                  &width_, &height_, &subsampling_, &colors_) == 0;
+  }
+
+  /// Not of a kind that it does not take (CMYK), and with a header that it understands.
+  [[nodiscard]] bool takes() const {
+    return is_known_ && colors_ != TJCS_CMYK && colors_ != TJCS_YCCK;
+  }
+  [[nodiscard]] Status check_size(const std::string& name) const {
+    return is_known_ ? check_num_pixels(name, static_cast<std::uint64_t>(width_),
+                                        static_cast<std::uint64_t>(height_))
+                     : Status();
+  }
+  /// Empty: damaged.
+  [[nodiscard]] cv::Mat decode(bool as_color) {
+    cv::Mat image(height_, width_, as_color ? CV_8UC3 : CV_8UC1);
+    const int done = tjDecompress2(handle_.get(), bytes_.data(), bytes_.size(), image.data, width_,
+                                   static_cast<int>(image.step), height_,
+                                   as_color ? TJPF_RGB : TJPF_GRAY, TJFLAG_LIMITSCANS);
+    return done == 0 || changes_no_pixel() ? image : cv::Mat();
+  }
+
+ private:
+  /// Some cameras leave bytes between the image's data and its end.
+  [[nodiscard]] bool changes_no_pixel() {
+    return tjGetErrorCode(handle_.get()) == TJERR_WARNING &&
+           std::string_view(tjGetErrorStr2(handle_.get())).find("extraneous bytes") !=
+               std::string_view::npos;
+  }
+
+  Bytes bytes_;
+  std::unique_ptr<void, decltype(&tjDestroy)> handle_{tjInitDecompress(), &tjDestroy};
+  int width_ = 0;
+  int height_ = 0;
+  int subsampling_ = 0;
+  int colors_ = 0;
+  bool is_known_ = false;
+};
+
 /// The markers are walked to the end first, because the decoder fills what is missing with gray.
 Expected<cv::Mat> decode_jpeg(Bytes bytes, const std::string& name, bool as_color) {
   if (!find_segment(bytes, [](int code) { return code == kEndOfImage; })) {
     return fail(fmt::format("{}: expected a complete JPEG image, found one cut off after {} bytes",
                             name, bytes.size()));
   }
-  cv::Mat image = decode_by_opencv(bytes, as_color, cv::IMREAD_IGNORE_ORIENTATION);
+  JpegDecoder decoder(bytes);
+  if (const Status status = decoder.check_size(name); !status) {
+    return status.error();
+  }
+  cv::Mat image = decoder.takes()
+                      ? decoder.decode(as_color)
+                      : decode_by_opencv(bytes, as_color, cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) {
     return fail(fmt::format("{}: expected a sound JPEG image, found damaged data", name));
   }

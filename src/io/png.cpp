@@ -222,13 +222,25 @@ cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags) {
   cv::Mat image;
   try {
     image = cv::imdecode(packed, (as_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE) | flags);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) {
+      throw;  // the file is not to blame
+    }
     return {};
   }
   if (as_color && !image.empty()) {
     cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
   }
   return image;
+}
+
+Status check_num_pixels(const std::string& name, std::uint64_t width, std::uint64_t height) {
+  constexpr std::uint64_t kMaxPixels = 1U << 27U;
+  if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
+    return fail(fmt::format("{}: expected an image of at most {} pixels, found {}x{}", name,
+                            kMaxPixels, width, height));
+  }
+  return {};
 }
 
 Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color) {
@@ -239,6 +251,14 @@ Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color
   if (!is_complete(bytes)) {
     return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
                             name, bytes.size()));
+  }
+  Bytes rest = bytes.subspan(kSignature.size());
+  if (const Chunk header = next_chunk(rest); header.type == "IHDR" && header.data.size() == 13) {
+    const Status status =
+        check_num_pixels(name, big_endian_32(header.data), big_endian_32(header.data.subspan(4)));
+    if (!status) {
+      return status.error();
+    }
   }
   cv::Mat image = decode_plain_png(bytes, as_color);
   if (image.empty()) {

@@ -27,6 +27,11 @@ using Bytes = std::span<const std::uint8_t>;
 /// Every format and kind that OpenCV knows; empty: damaged. `flags` beside gray or colour.
 [[nodiscard]] cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags = 0);
 
+/// Error, starting with `name`: more pixels than any camera has. Asked before memory is.
+[[nodiscard]] Status check_num_pixels(const std::string& name,
+                                      std::uint64_t width,
+                                      std::uint64_t height);
+
 /// By the first bytes.
 [[nodiscard]] bool is_png(Bytes bytes);
 /// Of a PNG: palettes are colour.

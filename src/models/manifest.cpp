@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
+#include "stem/foreign_model.hpp"
 #include "stem/hand_made.hpp"
 #include "text/text_file.hpp"
 
@@ -17,9 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using options::Field;
 using options::Rule;
-
-/// Far above any first layer, and small enough that no product of sizes overflows.
-constexpr double kLargestNumber = 100000;
 
 /// An empty document has no mark.
 int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
@@ -41,23 +39,26 @@ class EntryReader {
 
  private:
   std::vector<Field> fields() {
-    const Rule positive = Rule::between(1, kLargestNumber);
-    const Rule not_negative = Rule::between(0, kLargestNumber);
+    const Rule filters = Rule::between(1, internal::kMaxFilters);
+    const Rule filter = Rule::between(0, internal::kMaxFilters - 1);
+    const Rule kernel = Rule::between(1, internal::kMaxKernel_px);
+    const Rule stride = Rule::between(1, internal::kMaxStride_px);
+    const Rule padding = Rule::between(0, internal::kMaxKernel_px);
     return {{"", "name", &entry_.name, {}, ""},
             {"", "file", &file_, {}, ""},
             {"", "sha256", &entry_.sha256, {}, ""},
             {"", "network", &entry_.network, {}, ""},
             {"", "layer", &entry_.layer, {}, ""},
-            {"", "filters", &entry_.num_filters, positive, ""},
-            {"", "kernel", &kernel_, positive, ""},
-            {"", "stride", &entry_.stride_px, positive, ""},
-            {"", "padding", &padding_, not_negative, ""},
-            {"", "default_filter", &entry_.default_filter, not_negative, ""},
+            {"", "filters", &entry_.num_filters, filters, ""},
+            {"", "kernel", &kernel_, kernel, ""},
+            {"", "stride", &entry_.stride_px, stride, ""},
+            {"", "padding", &padding_, padding, ""},
+            {"", "default_filter", &entry_.default_filter, filter, ""},
             {"", "licence", &entry_.licence, {}, ""},
             {"", "command", &entry_.command, {}, ""},
             {"", "sampling", &sampling_, Rule::one_of({"any", "native"}), ""},
-            {"folded", "filter", &folded_.filter, not_negative, ""},
-            {"folded", "sampling", &folded_.sampling_px, positive, ""},
+            {"folded", "filter", &folded_.filter, filter, ""},
+            {"folded", "sampling", &folded_.sampling_px, stride, ""},
             {"folded", "file", &folded_file_, {}, ""},
             {"folded", "sha256", &folded_.sha256, {}, ""}};
   }

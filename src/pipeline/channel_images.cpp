@@ -33,7 +33,8 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
   if (!filters) {
     return filters.error();
   }
-  Status status = pipeline::create_out_folder(request.out_dir);
+  const auto lock = pipeline::open_out_folder(request.out_dir);
+  Status status = lock ? Status() : lock.error();
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {
     if (status) {

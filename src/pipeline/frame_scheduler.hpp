@@ -20,9 +20,10 @@ struct FrameStages {
   std::function<bool(std::size_t)> optimize;  ///< beside track() of the next; false ends the run
 };
 
-/// Takes frames 0 .. num_frames - 1, or those there are, through the stages on `num_threads` threads, the calling one
-/// among them; one with nothing to do helps with the loops of OpenCV that a stage is in. What a
-/// stage throws ends the run and is thrown again; frames begun are dropped then.
+/// Takes frames 0 .. num_frames - 1, or those there are, through the stages on `num_threads`
+/// threads, the calling one among them; one with nothing to do helps with the loops of OpenCV that
+/// a stage is in. What a stage throws ends the run and is thrown again; frames begun are dropped
+/// then.
 void run_stages(const FrameStages& stages, std::size_t num_frames, int num_threads);
 
 }  // namespace stemvo::pipeline

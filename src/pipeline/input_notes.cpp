@@ -16,9 +16,10 @@ std::string describe_truth(const FrameSource& sequence) {
     return "ground truth to be matched";
   }
   const auto& frames = sequence.frames().ground_truth_frames;
-  return frames ? fmt::format("ground truth for {} of {} frames (the others have none of their time)",
-                              frames->size(), sequence.size())
-                : "ground truth";
+  return frames
+             ? fmt::format("ground truth for {} of {} frames (the others have none of their time)",
+                           frames->size(), sequence.size())
+             : "ground truth";
 }
 
 std::string describe_size(const FrameSource& sequence) {

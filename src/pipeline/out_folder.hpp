@@ -2,8 +2,11 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
+#include <vector>
 
+#include "config/config.hpp"
+#include "dataset/frame_source.hpp"
+#include "pipeline/folder_lock.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
@@ -11,11 +14,17 @@ namespace stemvo::pipeline {
 /// Creates the folder (and those above it) and proves that files can be written there. Error: the
 /// folder, what was expected, what the system says.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
+/// The same, and no other process has it while the lock lives. Error: one has it now.
+[[nodiscard]] Expected<FolderLock> open_out_folder(const std::filesystem::path& folder);
 
-/// Removes what an earlier run left in its folder, so that images of one run are not taken for
-/// another's: files of six digits and the extension, nothing else; no folder is none. Error: one
-/// that cannot be removed.
-[[nodiscard]] Status remove_old_frames(const std::filesystem::path& folder,
-                                       const std::string& extension);
+/// Creates OUT_DIR/pictures and removes what an earlier run left there, so that images of one run
+/// are not taken for another's: files of six digits and ".png", nothing else. Error: they are not
+/// an earlier run's (the folder is a link, or no frames.csv lies in OUT_DIR), or one cannot be
+/// removed.
+[[nodiscard]] Status prepare_pictures(const std::filesystem::path& out_dir);
+
+/// Every file that is read for a source's frames and its configuration, as far as they know it.
+[[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSource& source,
+                                                             const Config& config);
 
 }  // namespace stemvo::pipeline

@@ -79,9 +79,9 @@ class ResultWriter {
     if (truth && *truth && !(*truth)->frames.empty()) {
       truth_ = **truth;
     }
-    trajectory_ = rescaled(std::move(trajectory_));
+    trajectory_ = as_written(request, sequence, std::move(trajectory_));
     if (request.config.odometry.mode == OdometryMode::kMap) {
-      refined_ = rescaled(odometry.frames().estimator().refined_trajectory());
+      refined_ = as_written(request, sequence, odometry.frames().estimator().refined_trajectory());
     }
   }
 
@@ -112,12 +112,6 @@ class ResultWriter {
   }
 
  private:
-  [[nodiscard]] Trajectory rescaled(Trajectory trajectory) const {
-    return request_.config.scale.source == ScaleSource::kGroundTruth
-               ? rescale_steps(trajectory, truth_->poses)
-               : trajectory;
-  }
-
   [[nodiscard]] Status write_refined(const std::filesystem::path& file) const {
     if (refined_) {
       return write_kitti_trajectory(file, *refined_);
@@ -175,7 +169,8 @@ class ResultWriter {
   [[nodiscard]] std::string config_text() const {
     const StemInfo& stem = odometry_.stem_info();
     std::string text =
-        fmt::format("# stemvo {}\n# {}\n", version(), describe_frames(sequence_.stream() ? trajectory_.size() : sequence_.size()));
+        fmt::format("# stemvo {}\n# {}\n", version(),
+                    describe_frames(sequence_.stream() ? trajectory_.size() : sequence_.size()));
     text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
                         stem.num_filters, stem.sampling_px,
                         stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
@@ -241,6 +236,15 @@ void keep_first(Status& first, Status next) {
   if (first && !next) {
     first = std::move(next);
   }
+}
+
+Trajectory as_written(const RunRequest& request,
+                      const FrameSource& sequence,
+                      Trajectory trajectory) {
+  return request.config.scale.source == ScaleSource::kGroundTruth
+             ? rescale_steps(trajectory,
+                             std::span(*sequence.ground_truth()).first(trajectory.size()))
+             : trajectory;
 }
 
 Status write_results(const RunRequest& request,

@@ -27,6 +27,12 @@ struct Drive {
   Status written;  ///< of frames.csv and the images
 };
 
+/// The trajectory of the first frames of a run as its files hold it: of scale.source=ground_truth
+/// with the ground truth's step lengths.
+[[nodiscard]] Trajectory as_written(const RunRequest& request,
+                                    const FrameSource& sequence,
+                                    Trajectory trajectory);
+
 /// Everything that is written at the end but metrics.json, for which it makes `report`:
 /// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
 /// trajectory, what an earlier run left there is removed), config.yaml (the effective configuration

@@ -11,9 +11,12 @@
 #include "pipeline/input_notes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
+#include "pipeline/result_keeper.hpp"
 #include "pipeline/thread_scope.hpp"
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
+#include "text/spared_inputs.hpp"
+#include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -76,7 +79,7 @@ Status write_frame_image(const RunRequest& request,
 pipeline::Drive drive(const RunRequest& request,
                       const FrameSource& sequence,
                       PhasedOdometry& odometry,
-                      FramesCsv& csv,
+                      pipeline::ResultKeeper& keeper,
                       const RunProgress& progress) {
   pipeline::Drive result;
   const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
@@ -92,7 +95,7 @@ pipeline::Drive drive(const RunRequest& request,
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     const StageTimer timer(Stage::kFrameFiles);
-    csv.write(number, sequence.time_s(i), pose);
+    keeper.add(frames_csv_row(number, sequence.time_s(i), pose), pose.world_from_camera);
     if (request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0) {
       pipeline::keep_first(
           result.written,
@@ -106,18 +109,45 @@ pipeline::Drive drive(const RunRequest& request,
   if (sequence.stream()) {
     pipeline::end_stream(sequence, progress, result);
   }
-  pipeline::keep_first(result.written, csv.close());
+  pipeline::keep_first(result.written, keeper.finish());
   return result;
 }
 
 /// The folder and what an earlier run left in it, before work starts.
-Status prepare_out_folder(const RunRequest& request) {
-  if (request.image_every == 0) {
-    return pipeline::create_out_folder(request.out_dir);
+Expected<pipeline::FolderLock> prepare_out_folder(const RunRequest& request) {
+  auto lock = pipeline::open_out_folder(request.out_dir);
+  const Status status =
+      lock && request.image_every > 0 ? pipeline::prepare_pictures(request.out_dir) : Status();
+  return status ? std::move(lock) : status.error();
+}
+
+/// The configuration of an earlier run may be that of the next, in the same folder.
+bool is_config_of_results(const std::filesystem::path& file) {
+  const auto text = read_text_file(file);
+  return text && text->starts_with("# stemvo ");
+}
+
+/// Results must not take the place of what they are made from.
+Status check_inputs_are_spared(const RunRequest& request, const FrameSource& sequence) {
+  std::vector<std::filesystem::path> results;
+  for (const char* name :
+       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+        "trajectory.png", "trajectory.svg", "frames.csv", "metrics.json", "config.yaml"}) {
+    results.push_back(request.out_dir / name);
   }
-  const std::filesystem::path images = request.out_dir / "pictures";
-  const Status status = pipeline::create_out_folder(images);
-  return status ? pipeline::remove_old_frames(images, ".png") : status;
+  Config config = request.config;
+  if (is_config_of_results(config.file)) {
+    config.file.clear();
+  }
+  std::vector<std::filesystem::path> inputs = pipeline::input_files(sequence, config);
+  if (request.image_every > 0) {
+    results.push_back(request.out_dir / "pictures");
+    inputs.push_back(sequence.file(0).parent_path());
+  }
+  if (request.times) {
+    inputs.push_back(*request.times);
+  }
+  return check_spares_inputs(results, inputs);
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,
@@ -128,12 +158,17 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (!odometry) {
     return odometry.error();
   }
-  if (const Status status = prepare_out_folder(request); !status) {
-    return status.error();
+  const auto lock = check_inputs_are_spared(request, sequence).and_then([&] {
+    return prepare_out_folder(request);
+  });
+  if (!lock) {
+    return lock.error();
   }
-  Expected<FramesCsv> csv = FramesCsv::create(request.out_dir / "frames.csv");
-  if (!csv) {
-    return csv.error();
+  pipeline::ResultKeeper keeper(request.out_dir, [&](Trajectory so_far) {
+    return pipeline::as_written(request, sequence, std::move(so_far));
+  });
+  if (const Status status = keeper.start(); !status) {
+    return status.error();
   }
 
   std::optional<StageRecorder> recorder;
@@ -141,7 +176,7 @@ Expected<RunSummary> run_source(const RunRequest& request,
     recorder.emplace();
   }
   pipeline::note_input(request, sequence);
-  pipeline::Drive done = drive(request, sequence, *odometry, *csv, progress);
+  pipeline::Drive done = drive(request, sequence, *odometry, keeper, progress);
   MetricsReport report;
   Status written = timed(Stage::kResultFiles, [&] {
     return pipeline::write_results(request, sequence, *odometry, done, report);

@@ -43,7 +43,8 @@ struct RunSummary {
   Status written;                     ///< the first result that could not be written, if any
 };
 
-/// Called after each frame: frames done, frames in all (0: not known); false stops (results are written).
+/// Called after each frame: frames done, frames in all (0: not known); false stops (results are
+/// written).
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir

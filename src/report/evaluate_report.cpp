@@ -9,6 +9,7 @@
 
 #include "dataset/ground_truth.hpp"
 #include "report/metrics_keys.hpp"
+#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -74,6 +75,16 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 }  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
+  if (request.json) {
+    std::vector<std::filesystem::path> inputs = request.estimates;
+    inputs.push_back(request.ground_truth);
+    if (request.camera_file) {
+      inputs.push_back(*request.camera_file);
+    }
+    if (const Status status = check_spares_inputs({*request.json}, inputs); !status) {
+      return status.error();
+    }
+  }
   const auto truth = dataset::read_truth(request.ground_truth, request.camera_file);
   if (!truth) {
     return truth.error();

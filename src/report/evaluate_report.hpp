@@ -21,7 +21,8 @@ struct EvaluationRequest {
   Alignment alignment = Alignment::kNone;
   double tolerance_s = kTimeTolerance_s;  ///< between a pose and its true one
   std::optional<std::filesystem::path> camera_file =
-      std::nullopt;  ///< with EuRoC's: as read_truth says
+      std::nullopt;                                          ///< with EuRoC's: as read_truth says
+  std::optional<std::filesystem::path> json = std::nullopt;  ///< where the numbers will be written
 };
 
 /// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
@@ -43,7 +44,7 @@ struct EvaluationReport {
 
 /// Poses are matched by time (pair_by_time) where both files have times, else line by line. Both
 /// then start at the identity. Errors: those of the readers; without times another number of poses
-/// than the ground truth; with times fewer than two pairs.
+/// than the ground truth; with times fewer than two pairs; `json` is one of the files.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
 
 /// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "report/frames_csv.hpp"
 
-#include <cerrno>
-#include <system_error>
-
 #include <fmt/format.h>
 
 namespace stemvo {
@@ -18,50 +15,18 @@ constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // 
 
 }  // namespace
 
-Expected<FramesCsv> FramesCsv::create(const std::filesystem::path& file) {
-  FramesCsv csv;
-  csv.file_ = file;
-  errno = 0;
-  csv.stream_.open(file, std::ios::binary | std::ios::trunc);
-  csv.check();
-  csv.put(kHeader);
-  if (!csv.written_) {
-    return csv.written_.error();
-  }
-  return csv;
-}
+std::string_view frames_csv_header() { return kHeader; }
 
-void FramesCsv::put(std::string_view text) {
-  if (written_) {
-    errno = 0;
-    stream_ << text << std::flush;  // a killed run keeps its rows
-    check();
-  }
-}
-
-void FramesCsv::check() {
-  if (written_ && !stream_) {
-    written_ = fail(fmt::format("{}: cannot write: {}", file_.string(),
-                                std::generic_category().message(errno)));
-  }
-}
-
-void FramesCsv::write(std::size_t frame, double timestamp_s, const FrameResult& r) {
+std::string frames_csv_row(std::size_t frame, double timestamp_s, const FrameResult& r) {
   const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
   const auto& camera_sigma = r.principal_point_sigma_px;
-  put(fmt::format(
+  return fmt::format(
       "{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{},{:.2f},{:.2f},{:.2f},{}\n",
       frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
       r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
       r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.road),
       r.camera.fx_px, r.camera.cx_px, r.camera.cy_px,
-      camera_sigma ? fmt::format("{:.2f},{:.2f}", camera_sigma->x(), camera_sigma->y()) : ","));
-}
-
-Status FramesCsv::close() {
-  stream_.close();
-  check();
-  return written_;
+      camera_sigma ? fmt::format("{:.2f},{:.2f}", camera_sigma->x(), camera_sigma->y()) : ",");
 }
 
 }  // namespace stemvo

@@ -2,6 +2,7 @@
 #include "robustness/outcome.hpp"
 
 #include <algorithm>
+#include <cstdint>
 
 #include "geometry/degrees.hpp"
 #include "internal_check.hpp"
@@ -9,7 +10,6 @@
 namespace stemvo::robustness {
 namespace {
 
-constexpr double kDenseShare = 1.0 / 8.0;  // of the path
 constexpr double kJump_deg = 1.0;
 
 bool is_found(FrameState state) { return is_measured(state) && state != FrameState::kInitializing; }
@@ -62,12 +62,7 @@ void add_errors(std::span<const Rigid3> estimate,
   const Metrics metrics = evaluate(estimate, ground_truth, options);
   outcome.t_rel_percent = metrics.t_rel_percent;
   outcome.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
-  const double length_m = kDenseShare * metrics.path_length_m;
-  for (const SegmentError& one : segment_errors(estimate, ground_truth, {&length_m, 1}, 1)) {
-    outcome.dense_t_percent.push_back(one.t_percent);
-    outcome.dense_r_deg_per_100m.push_back(one.r_deg_per_100m);
-    outcome.block = std::max(outcome.block, one.last - one.first);
-  }
+  outcome.dense = dense_errors(estimate, ground_truth, SIZE_MAX);
 }
 
 }  // namespace stemvo::robustness

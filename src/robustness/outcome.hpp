@@ -24,10 +24,7 @@ struct Outcome {
   bool is_recovered = true;  ///< false: the drive, or the calm before the next disturbance, ended
   /// Steps between found frames whose rotation is wrong by more than a degree.
   std::size_t jumps = 0;
-  /// Of segments of an eighth of the path, one from every frame on.
-  std::vector<double> dense_t_percent;
-  std::vector<double> dense_r_deg_per_100m;
-  std::size_t block = 1;  ///< frames of the longest of them
+  DenseErrors dense;
 };
 
 /// Tracked, recovery and jumps. All of one length, at least one frame (checked).

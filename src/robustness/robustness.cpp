@@ -61,8 +61,9 @@ std::vector<Verdict> verdicts_of(const Row& row) {
         translation.clear();
         break;
       }
-      rotation.push_back({ours.dense_r_deg_per_100m, theirs.dense_r_deg_per_100m, ours.block});
-      translation.push_back({ours.dense_t_percent, theirs.dense_t_percent, ours.block});
+      const std::size_t block = ours.dense.block;
+      rotation.push_back({ours.dense.r_deg_per_100m, theirs.dense.r_deg_per_100m, block});
+      translation.push_back({ours.dense.t_percent, theirs.dense.t_percent, block});
     }
     result.push_back({paired_ratio(rotation, 1), paired_ratio(translation, 1)});
   }

@@ -94,7 +94,11 @@ ShownFilters choose_rows(const SearchIdentity& identity, const std::vector<Filte
   return shown;
 }
 
-Status write_contact_sheet(const Results& results) {
+Status write_contact_sheet(const Results& results, std::vector<std::string>& warnings) {
+  const auto no_sheet = [&warnings](const Error& error) {
+    warnings.push_back("no sheet.png: " + error.message);
+    return Status();
+  };
   const ShownFilters shown = choose_rows(results.identity, results.rows);
   if (shown.empty()) {
     return {};
@@ -104,7 +108,7 @@ Status write_contact_sheet(const Results& results) {
       first.directory, {.camera = results.config.input.camera,
                         .frames = FrameRangeRequest{first.first_frame, first.end_frame()}});
   if (!sequence) {
-    return sequence.error();
+    return no_sheet(sequence.error());
   }
   const fs::path plot_file = results.out_dir / "trajectories.png";
   if (const Status status = write_trajectories(plot_file, *sequence, shown); !status) {
@@ -112,7 +116,7 @@ Status write_contact_sheet(const Results& results) {
   }
   const Expected<cv::Mat> channels = draw_channels(results, *sequence, shown);
   if (!channels) {
-    return channels.error();
+    return no_sheet(channels.error());
   }
   cv::Mat plot = cv::imread(plot_file.string(), cv::IMREAD_COLOR);
   if (plot.empty()) {

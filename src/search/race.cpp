@@ -2,8 +2,6 @@
 #include "search/race.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -11,136 +9,11 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "evaluation/metrics.hpp"
-#include "geometry/degrees.hpp"
 #include "internal_check.hpp"
-#include "odometry/channel_odometry.hpp"
+#include "search/filter_drive.hpp"
 
 namespace stemvo::search {
 namespace {
-
-constexpr double kMinTracked = 0.5;
-constexpr std::size_t kMaxPathPoints = 400;
-constexpr std::size_t kMaxDense = 400;
-constexpr double kDenseShare = 1.0 / 8.0;  // of the path, as robustness
-/// Of the path so far; chosen among prefixes of clips (docs/search.md).
-constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
-
-/// Evenly spaced, first and last included, to the centimetre.
-std::vector<std::array<double, 2>> path_of(std::span<const Rigid3> trajectory) {
-  const std::size_t count = std::min(trajectory.size(), kMaxPathPoints);
-  std::vector<std::array<double, 2>> path;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t index = count < 2 ? 0 : i * (trajectory.size() - 1) / (count - 1);
-    const Eigen::Vector3d cm = (100.0 * trajectory[index].translation).array().round();
-    path.push_back({cm.x() / 100.0, cm.z() / 100.0});
-  }
-  return path;
-}
-
-/// One filter's odometry over one sequence, and what is counted on the way.
-class FilterDrive {
- public:
-  /// The sequence, with ground truth, stays where it is.
-  FilterDrive(const Config& config, const PlanSequence& planned)
-      : odometry_(config, planned.sequence.camera()),
-        config_(&config),
-        sequence_(&planned.sequence),
-        road_(&planned.road) {}
-
-  [[nodiscard]] std::size_t num_frames() const { return odometry_.estimator().trajectory().size(); }
-
-  /// Null: no image, or a stem that refused it.
-  void process(const Channel* channel, const cv::Mat& frame) {
-    const FrameResult result = odometry_.process(
-        channel == nullptr ? PreparedFrame() : odometry_.prepare(*channel, frame));
-    if (num_frames() <= 1) {
-      return;
-    }
-    num_matches_ += static_cast<std::size_t>(result.num_matches);
-    num_inliers_ += static_cast<std::size_t>(result.num_inliers);
-    ++outcomes_[is_measured(result.state)                            ? kMeasured
-                : result.state == FrameState::kNoImage               ? kNoImage
-                : result.state == FrameState::kGated                 ? kGated
-                : result.num_matches < config_->odometry.min_inliers ? kFewMatches
-                                                                     : kFewInliers];
-  }
-
-  /// Of the frames so far, at least one.
-  [[nodiscard]] DriveScore score() const {
-    const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
-    DriveScore score;
-    score.sequence = sequence_->name();
-    score.road = *road_;
-    score.frames = num_frames();
-    score.inliers = static_cast<double>(num_inliers_) / num_steps;
-    score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
-    score.detected = num_frames() == 1 || *score.tracked >= kMinTracked;
-    score.reason = score.detected ? "" : missing_reason();
-    if (outcomes_[kMeasured] > 0) {  // else the numbers would be those of the zero-motion baseline
-      add_errors(num_steps, score);
-    }
-    return score;
-  }
-
- private:
-  void add_errors(double num_steps, DriveScore& score) const {
-    const auto truth = std::span(*sequence_->ground_truth()).first(num_frames());
-    const Trajectory trajectory = rescale_steps(odometry_.estimator().trajectory(), truth);
-    const Metrics metrics = evaluate(trajectory, truth, config_->evaluation);
-    score.t_rel_percent = metrics.t_rel_percent;
-    score.r_rel_deg_per_100m = metrics.r_rel_deg_per_100m;
-    score.average_offset_m = metrics.average_offset_m;
-    double translation_m = 0.0;
-    double rotation_rad = 0.0;
-    for (std::size_t i = 1; i < trajectory.size(); ++i) {
-      const Rigid3 change = trajectory[i - 1].inverse() * trajectory[i];
-      translation_m += change.translation.norm();
-      rotation_rad += change.angle_rad();
-    }
-    score.E_t_m = translation_m / num_steps;
-    score.E_r_deg = kDegPerRad * rotation_rad / num_steps;
-    // A standing start has no segments: nothing is known against the filter.
-    score.early_error_percent = dense_t_rel_percent(trajectory, truth, kEarlyShares).value_or(0.0);
-    if (num_frames() == sequence_->size()) {
-      add_dense_errors(trajectory, truth, kDenseShare * metrics.path_length_m, score);
-    }
-    score.path_xz_m = path_of(trajectory);
-  }
-
-  static void add_dense_errors(const Trajectory& trajectory,
-                               std::span<const Rigid3> truth,
-                               double length_m,
-                               DriveScore& score) {
-    const std::size_t step = (truth.size() + kMaxDense - 1) / kMaxDense;
-    for (const SegmentError& one : segment_errors(trajectory, truth, {&length_m, 1}, step)) {
-      score.dense_t_percent.push_back(std::round(1e4 * one.t_percent) / 1e4);
-      score.block = std::max(score.block, (one.last - one.first + step - 1) / step);
-    }
-  }
-
-  [[nodiscard]] std::string missing_reason() const {
-    if (num_matches_ == 0 && outcomes_[kNoImage] < num_frames() - 1) {
-      return "no matches: a channel without contrast";
-    }
-    constexpr std::array<const char*, kMeasured> kReasons = {"too few matches", "too few inliers",
-                                                             "not a forward motion", "no image"};
-    const auto most = std::max_element(outcomes_.begin(), outcomes_.begin() + kMeasured);
-    return fmt::format("{} in {} of {} frames",
-                       kReasons[static_cast<std::size_t>(most - outcomes_.begin())], *most,
-                       num_frames() - 1);
-  }
-
-  ChannelOdometry odometry_;
-  const Config* config_;
-  const FrameSource* sequence_;
-  const std::string* road_;
-  // Of the frames after the first.
-  std::size_t num_matches_ = 0;
-  std::size_t num_inliers_ = 0;
-  enum Outcome { kFewMatches, kFewInliers, kGated, kNoImage, kMeasured, kNumOutcomes };
-  std::array<std::size_t, kNumOutcomes> outcomes_{};
-};
 
 using Candidates = std::vector<std::size_t>;  // ascending indices
 
@@ -314,7 +187,7 @@ struct Race {
         running.push_back(candidate);
         if (!drive) {
           const Config& config = plan.layers[plan.candidates[candidate].layer].config;
-          drive.emplace(config, planned);
+          drive.emplace(config, planned.sequence);
         }
       }
     }
@@ -327,7 +200,6 @@ struct Race {
       const std::optional<FilterDrive>& drive = drives[block[i]][index];
       DriveScore cannot;
       cannot.sequence = planned.sequence.name();
-      cannot.road = planned.road;
       cannot.reason = problem(block[i], planned);
       done[i].add(drive ? drive->score() : cannot, planned.is_held_out, drive ? end - begin : 0);
     }

@@ -30,7 +30,6 @@ struct Candidate {
 /// One sequence and what can be said of it before work starts.
 struct PlanSequence {
   FrameSource sequence;
-  std::string road;  ///< its name without the disturbance
   bool is_held_out = false;
   std::vector<std::string> problems;  ///< per layer: why it cannot be run here; empty: it can
 };

@@ -54,7 +54,7 @@ double log_geometric_mean(const FilterRow& row) {
 }
 
 /// Against the row with the lowest geometric mean.
-void compare_with_best(std::span<FilterRow> ranked) {
+void compare_with_best(const SearchIdentity& identity, std::span<FilterRow> ranked) {
   const FilterRow& best = *std::ranges::min_element(ranked, {}, log_geometric_mean);
   for (FilterRow& row : ranked) {
     std::vector<PairedErrors> drives;
@@ -62,7 +62,8 @@ void compare_with_best(std::span<FilterRow> ranked) {
       const DriveScore& ours = row.drives[i];
       const DriveScore& theirs = best.drives[i];
       if (ours.dense_t_percent.size() == theirs.dense_t_percent.size()) {
-        drives.push_back({ours.dense_t_percent, theirs.dense_t_percent, theirs.block, ours.road});
+        drives.push_back({ours.dense_t_percent, theirs.dense_t_percent, theirs.block,
+                          identity.road_of(ours.sequence)});
       }
     }
     row.over_best = paired_ratio(drives, 1);
@@ -99,7 +100,7 @@ DriveScore mean_score(const std::vector<DriveScore>& drives) {
   return mean;
 }
 
-std::vector<FilterRow> rank_filters(const FilterRecords& records, std::size_t num_rungs) {
+std::vector<FilterRow> rank_filters(const SearchIdentity& identity, const FilterRecords& records) {
   std::map<FilterKey, FilterRow> last;
   for (const FilterRecord& record : records) {
     FilterRow& row = last[record.key];
@@ -108,16 +109,16 @@ std::vector<FilterRow> rank_filters(const FilterRecords& records, std::size_t nu
   }
   std::vector<FilterRow> rows;
   for (auto& [key, row] : last) {
-    row.status = !row.mean.detected         ? FilterStatus::kNotDetected
-                 : row.rung + 1 < num_rungs ? FilterStatus::kStopped
-                                            : FilterStatus::kRanked;
+    row.status = !row.mean.detected                     ? FilterStatus::kNotDetected
+                 : row.rung + 1 < identity.rungs.size() ? FilterStatus::kStopped
+                                                        : FilterStatus::kRanked;
     rows.push_back(std::move(row));
   }
   std::ranges::stable_sort(rows, {}, order_of);
   const auto num_ranked = std::ranges::count(rows, FilterStatus::kRanked, &FilterRow::status);
   const auto ranked = std::span(rows).first(static_cast<std::size_t>(num_ranked));
   if (!ranked.empty()) {
-    compare_with_best(ranked);
+    compare_with_best(identity, ranked);
     std::ranges::stable_sort(ranked, {}, [](const FilterRow& row) {
       return std::pair(!row.is_equal, row.is_equal ? row.over_best.ratio : 0.0);
     });

@@ -15,6 +15,7 @@
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
 #include "report/metrics_keys.hpp"
+#include "search/record_check.hpp"
 #include "text/text_file.hpp"
 
 using Json = nlohmann::ordered_json;
@@ -34,7 +35,6 @@ namespace stemvo::search {
 STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
 STEMVO_JSON_MEMBERS(DriveScore,
                     (sequence,
-                     road,
                      frames,
                      detected,
                      reason,
@@ -133,6 +133,22 @@ std::string line_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
+bool is_same(const FilterRecord& a, const FilterRecord& b) {
+  return a.drives == b.drives && a.held_out == b.held_out;
+}
+
+/// Error: none of the search, or another than an earlier line's.
+Status add_record(FilterRecord record, SearchRecords& records) {
+  if (Status status = check_record(record, records.identity); !status) {
+    return status;
+  }
+  const auto [there, is_new] = records.records.insert(record);
+  return is_new || is_same(*there, record)
+             ? Status()
+             : Status(fail(
+                   fmt::format("expected {} once, found another result", to_string(record.key))));
+}
+
 /// The first line is the identity. Error without the file: not JSON, a key missing or of another
 /// type, another format.
 Status parse_line(const std::string& line, bool is_first, SearchRecords& records) {
@@ -141,14 +157,14 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
     if (!is_first) {
       FilterRecord record = json.get<FilterRecord>();
       json.get_to(record.key);
-      records.records.insert(std::move(record));
-    } else if (json.at("stemvo_search") == records.identity.stemvo_search) {
-      json.get_to(records.identity);
-    } else {
-      return fail(fmt::format("expected records of format {}, found {}",
-                              records.identity.stemvo_search, json["stemvo_search"].dump()));
+      return add_record(std::move(record), records);
     }
-    return {};
+    if (json.at("stemvo_search") == records.identity.stemvo_search) {
+      json.get_to(records.identity);
+      return check_identity(records.identity);
+    }
+    return fail(fmt::format("expected records of format {}, found {}",
+                            records.identity.stemvo_search, json["stemvo_search"].dump()));
   } catch (const Json::exception& error) {
     return fail(fmt::format("expected {}, found: {}",
                             is_first ? "the identity of a search" : "the record of a filter",
@@ -177,6 +193,12 @@ std::size_t SearchIdentity::count(bool baselines) const {
     sum += layer.baseline == baselines ? layer.size() : 0;
   }
   return sum;
+}
+
+std::string SearchIdentity::road_of(const std::string& sequence) const {
+  const auto found = std::ranges::find(sequences, sequence, &SequenceIdentity::name);
+  return found == sequences.end() ? std::string()
+                                  : sequence.substr(0, sequence.size() - found->disturbance.size());
 }
 
 const LayerIdentity& SearchIdentity::layer_of(const FilterKey& key) const {
@@ -219,9 +241,15 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   for (std::size_t end = 0; (end = text->find('\n', begin)) != text->npos; begin = end + 1) {
     ++line_number;
     const Status parsed = parse_line(text->substr(begin, end - begin), line_number == 1, records);
-    if (!parsed) {
-      return fail(fmt::format("{}: {}", at_line(file, line_number), parsed.error().message));
+    if (parsed) {
+      continue;
     }
+    const std::string problem =
+        fmt::format("{}: {}", at_line(file, line_number), parsed.error().message);
+    if (line_number == 1) {
+      return fail(problem);
+    }
+    records.warnings.push_back(problem + "; left out");
   }
   return records;
 }
@@ -253,6 +281,7 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
                             file.string(), change));
   }
   opened.records_ = std::move(before->records);
+  opened.warnings_ = std::move(before->warnings);
   if (::ftruncate(::fileno(stream), static_cast<off_t>(before->num_good_bytes)) != 0) {
     return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
   }

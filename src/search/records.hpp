@@ -40,7 +40,6 @@ struct FilterKey {
 /// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
 struct DriveScore {
   std::string sequence;
-  std::string road;  ///< the sequence's name without its disturbance
   std::size_t frames = 0;
   bool detected = false;
   std::string reason;  ///< why the pose was not detected, else empty
@@ -132,6 +131,8 @@ struct SearchIdentity {
   /// Filters, or baselines.
   [[nodiscard]] std::size_t count(bool baselines) const;
   [[nodiscard]] std::size_t num_rows() const { return count(false) + count(true); }
+  /// The sequence's name without its disturbance; empty: none of that name.
+  [[nodiscard]] std::string road_of(const std::string& sequence) const;
   /// The layer a row belongs to (checked).
   [[nodiscard]] const LayerIdentity& layer_of(const FilterKey& key) const;
   /// "the configuration (klt_levels: 3, now klt_levels: 4) and the frames of 00 changed"; empty
@@ -146,10 +147,11 @@ struct SearchIdentity {
 struct SearchRecords {
   SearchIdentity identity;
   FilterRecords records;
-  std::size_t num_good_bytes = 0;  ///< up to the last whole line; a kill may tear the next
+  std::size_t num_good_bytes = 0;     ///< up to the last whole line; a kill may tear the next
+  std::vector<std::string> warnings;  ///< lines that are no record of the search, and left out
 };
 
-/// Reads all whole lines. Errors: not there, a whole line that is no record, another format.
+/// Reads all whole lines. Errors: not there, the first line is no identity, another format.
 [[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file);
 
 /// Records that grow, on the disk when append() returns. A second writer of a file is an error.
@@ -163,6 +165,8 @@ class RecordFile {
                                                  bool resume);
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
   [[nodiscard]] const FilterRecords& records() const { return records_; }
+  /// Of what it held when it was opened.
+  [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
   [[nodiscard]] Status write(const std::string& text);
@@ -170,6 +174,7 @@ class RecordFile {
   std::filesystem::path file_;
   std::shared_ptr<std::FILE> stream_;
   FilterRecords records_;
+  std::vector<std::string> warnings_;
 };
 
 /// Ran over all frames, so that it has a t_rel; was stopped by halving, others being better on the
@@ -196,8 +201,8 @@ struct FilterRow : FilterRecord {
 /// One row per filter from its last rung: those that cannot be told from the best, by
 /// over_best; the others by t_rel, ties by r_rel; then those that were stopped, the later the
 /// better; not detected last.
-[[nodiscard]] std::vector<FilterRow> rank_filters(const FilterRecords& records,
-                                                  std::size_t num_rungs);
+[[nodiscard]] std::vector<FilterRow> rank_filters(const SearchIdentity& identity,
+                                                  const FilterRecords& records);
 
 /// filters.csv: a header, then the rows by rank; `model,layer,filter` first, no times. Columns per
 /// sequence where there are several, and of the held-out one.
@@ -205,8 +210,9 @@ struct FilterRow : FilterRecord {
                                      const std::vector<FilterRow>& rows);
 
 /// Ranks the records and writes the files of run_search, of which filters.json says what was
-/// searched, how, and the work it took. A sheet that cannot be drawn is a warning. Where records
-/// are missing the search was interrupted. Of a part with one sequence nothing is written.
+/// searched, how, and the work it took. A sheet whose frames or models are not where they were is a
+/// warning, one that cannot be written an error. Where records are missing the search was
+/// interrupted. Of a part with one sequence nothing is written.
 [[nodiscard]] Expected<SearchReport> write_results(const std::filesystem::path& out_dir,
                                                    const std::filesystem::path& models_dir,
                                                    const SearchIdentity& identity,
@@ -228,8 +234,10 @@ struct Results {
 };
 /// sheet.png: the input and the channels of the filters of choose_rows on the middle frame of the
 /// first sequence, above their trajectories (trajectories.png), and where they were stopped.
-/// Nothing where there is none. Error: the sequence or the model is not where it was.
-[[nodiscard]] Status write_contact_sheet(const Results& results);
+/// Nothing where there is none; where the sequence or the model is not where it was, a warning.
+/// Error: it cannot be written.
+[[nodiscard]] Status write_contact_sheet(const Results& results,
+                                         std::vector<std::string>& warnings);
 
 void to_json(nlohmann::ordered_json& json, const FilterKey& key);
 void to_json(nlohmann::ordered_json& json, const DriveScore& score);

@@ -170,7 +170,6 @@ Json drive_json(const DriveScore& drive) {
   json.erase("path_xz_m");
   json.erase("dense_t_percent");
   json.erase("block");
-  json.erase("road");
   if (drive.detected) {
     json.erase("reason");
   }
@@ -273,8 +272,7 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
   if (!config) {
     return config.error();
   }
-  const Results results = {out_dir, models_dir, identity, *config,
-                           rank_filters(records, identity.rungs.size())};
+  const Results results = {out_dir, models_dir, identity, *config, rank_filters(identity, records)};
   std::vector<std::pair<const char*, std::string>> files = {
       {"filters.csv", format_csv(identity, results.rows)},
       {"filters.json", format_json(results, work, !report.interrupted)}};
@@ -286,8 +284,8 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
       return status.error();
     }
   }
-  if (const Status status = write_contact_sheet(results); !status) {
-    report.warnings.push_back("no sheet.png: " + status.error().message);
+  if (const Status status = write_contact_sheet(results, report.warnings); !status) {
+    return status.error();
   }
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();

@@ -30,8 +30,9 @@ Expected<SearchRecords> read_part(const fs::path& folder) {
         part->num_good_bytes == 0 ? "none" : "one that halves: its parts cannot be joined"));
   }
   if (part->records.size() != num_rows) {
-    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume", file,
-                            num_rows, part->records.size()));
+    return fail(fmt::format("{}: expected {} filters, found {}: finish it with --resume{}", file,
+                            num_rows, part->records.size(),
+                            part->warnings.empty() ? "" : " (" + part->warnings.front() + ")"));
   }
   return part;
 }
@@ -142,6 +143,8 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
       write_results(request.out_dir, request.models_dir, plan->identity, records->records());
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
+    report->warnings.insert(report->warnings.begin(), records->warnings().begin(),
+                            records->warnings().end());
   }
   return report;
 }
@@ -151,6 +154,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
                                       const std::filesystem::path& models_dir) {
   SearchIdentity identity;
   Scores scores;
+  std::vector<std::string> warnings;
   for (const std::filesystem::path& folder : parts) {
     const auto part = read_part(folder);
     if (!part) {
@@ -160,6 +164,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
       return fail(fmt::format("{}: expected a part of the same search as {}, found that {}",
                               folder.string(), parts.front().string(), fits.error().message));
     }
+    warnings.insert(warnings.end(), part->warnings.begin(), part->warnings.end());
     for (const FilterRecord& record : part->records) {
       if (const Status agrees = add_record(record, scores); !agrees) {
         return fail(fmt::format("{}: {}", folder.string(), agrees.error().message));
@@ -176,7 +181,14 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   auto file = pipeline::create_out_folder(out_dir).and_then(
       [&] { return RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false); });
   const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
-  return written ? write_results(out_dir, models_dir, identity, *records) : written.error();
+  if (!written) {
+    return written.error();
+  }
+  auto report = write_results(out_dir, models_dir, identity, *records);
+  if (report) {
+    report->warnings.insert(report->warnings.begin(), warnings.begin(), warnings.end());
+  }
+  return report;
 }
 
 }  // namespace stemvo::search

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 
 #include "default_stem.hpp"
 #include "internal_check.hpp"
+#include "stem/foreign_model.hpp"
 #include "stem/network_layer.hpp"
 #include "text/text_file.hpp"
 
@@ -24,6 +27,7 @@ namespace {
 constexpr int kStrides = 6;
 // Side of an image that all of a deep network's layers can take.
 constexpr int kSmallest = 96;
+constexpr std::chrono::seconds kTimeLimit(kMaxSecondsOfProbe);
 // Of the output's size: differences below it are rounding.
 constexpr float kRounding = 1e-4F;
 
@@ -80,8 +84,8 @@ class GraphCheck {
     const cv::Size fixed = session_.fixed_size();
     const cv::Size small(small_size(plan_.x, fixed.width), small_size(plan_.y, fixed.height));
     const cv::Size other = fixed.empty() ? small + cv::Size(1, plan_.y.stride) : small;
-    const Status status = size(small);
-    return status ? size(other) : status;
+    const Status status = size(small).and_then([&] { return size(other); });
+    return status ? check_finite() : status;
   }
 
   [[nodiscard]] Status window() {
@@ -94,7 +98,7 @@ class GraphCheck {
     window_ = {output_.x * plan_.x.stride - plan_.x.before,
                output_.y * plan_.y.stride - plan_.y.before, plan_.x.kernel, plan_.y.kernel};
     if ((window_ & cv::Rect({0, 0}, frame_)) != window_) {
-      return {};  // a model of one size, too small to look inside
+      return check_finite();  // a model of one size, too small to look inside
     }
     return dependence();
   }
@@ -102,12 +106,23 @@ class GraphCheck {
  private:
   /// For a frame of this size, on which later checks run. Error: another one than the plan says.
   [[nodiscard]] Status size(cv::Size frame) {
-    const auto found = session_.channel_size(frame);
+    if (std::int64_t{frame.width} * frame.height > kMaxPixels) {
+      return fail(
+          fmt::format("{}: expected a kernel, stride and padding that show in an image of at "
+                      "most {} pixels, found that {}x{} are needed",
+                      file_, kMaxPixels, frame.width, frame.height));
+    }
+    const auto found = session_.channel_size(frame, kTimeLimit);
     if (!found) {
       return found.error();
     }
     frame_ = frame;
     channel_ = plan_.channel_size(frame);
+    if (std::int64_t{channel_.area()} * session_.num_filters() > kMaxProbeValues) {
+      return fail(fmt::format("{}: expected at most {} values of {} filters for a frame of {}x{}",
+                              file_, kMaxProbeValues, session_.num_filters(), frame.width,
+                              frame.height));
+    }
     if (*found != channel_) {
       return fail(
           fmt::format("{}: expected channels of {}x{} for a frame of {}x{} by the manifest's "
@@ -118,7 +133,12 @@ class GraphCheck {
     return {};
   }
 
-  /// All filters at the one output.
+  [[nodiscard]] Status check_finite() const {
+    const auto values = run(noise(frame_, 0));
+    return values ? Status() : values.error();
+  }
+
+  /// All filters at the one output. Error: not finite somewhere.
   [[nodiscard]] Expected<std::vector<float>> run(const cv::Mat1f& image) const {
     std::vector<float> planes;
     for (int i = 0; i < session_.num_planes(); ++i) {
@@ -126,8 +146,15 @@ class GraphCheck {
     }
     const auto area = static_cast<std::size_t>(channel_.area());
     std::vector<float> channels(area * static_cast<std::size_t>(session_.num_filters()));
-    if (Status status = session_.run(planes.data(), frame_, channels.data(), channel_); !status) {
+    if (Status status = session_.run(planes.data(), frame_, channels.data(), channel_, kTimeLimit);
+        !status) {
       return status.error();
+    }
+    if (!std::ranges::all_of(channels, [](float value) { return std::isfinite(value); })) {
+      return fail(
+          fmt::format("{}: expected finite channels of an image without pattern, found NaN "
+                      "or infinity",
+                      file_));
     }
     std::vector<float> values;
     for (auto i = static_cast<std::size_t>(output_.y * channel_.width + output_.x);
@@ -193,6 +220,9 @@ Expected<OnnxSession> load_model(const StemNetwork& network, std::string_view by
     if (const std::string hash = sha256_hex(bytes); hash != network.sha256) {
       return fail(fmt::format("{}: expected sha256 {}, found {}", file, network.sha256, hash));
     }
+  }
+  if (const Status status = check_foreign_model(file, bytes); !status) {
+    return status.error();
   }
   auto session = OnnxSession::create(file, bytes, network.layer);
   if (!session) {

@@ -3,12 +3,21 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <condition_variable>
 #include <cstdint>
+#include <functional>
+#include <mutex>
+#include <stop_token>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <onnxruntime_c_api.h>
+
+#include "stem/foreign_model.hpp"
+#include "stemvo/camera.hpp"
 
 namespace stemvo::internal {
 
@@ -50,6 +59,27 @@ namespace {
 constexpr std::uint32_t kApiVersion = 1;
 constexpr const char* kInputName = "image";
 constexpr const char* kOnlyOutput = "channels";
+
+/// Calls `end` once the time is over, from a thread of its own, unless it is destroyed before.
+class Alarm {
+ public:
+  Alarm(std::chrono::milliseconds time, const std::function<void()>& end)
+      : thread_([this, time, end](const std::stop_token& token) {
+          std::unique_lock lock(mutex_);
+          if (!stopped_.wait_for(lock, token, time, [&] { return token.stop_requested(); })) {
+            is_over_ = true;
+            end();
+          }
+        }) {}
+
+  [[nodiscard]] bool is_over() const { return is_over_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any stopped_;
+  std::atomic<bool> is_over_ = false;
+  std::jthread thread_;  ///< stopped and joined first
+};
 
 }  // namespace
 
@@ -165,9 +195,14 @@ Status OnnxSession::check_input() {
     return fail(fmt::format("{}: expected input '{} float 1x3xHxW' or 1x1xHxW, found '{}'", label_,
                             kInputName, input->describe()));
   }
+  const std::int64_t rows = std::max<std::int64_t>(input->shape[2], 0);
+  const std::int64_t cols = std::max<std::int64_t>(input->shape[3], 0);
+  if (rows > kMaxImageSide_px || cols > kMaxImageSide_px || rows * cols > kMaxPixels) {
+    return fail(fmt::format("{}: expected an input of at most {} pixels, found '{}'", label_,
+                            kMaxPixels, input->describe()));
+  }
   num_planes_ = is_gray ? 1 : 3;
-  fixed_size_ = {static_cast<int>(std::max<std::int64_t>(input->shape[3], 0)),
-                 static_cast<int>(std::max<std::int64_t>(input->shape[2], 0))};
+  fixed_size_ = {static_cast<int>(cols), static_cast<int>(rows)};
   return {};
 }
 
@@ -184,9 +219,12 @@ Status OnnxSession::choose_output(const std::string& layer) {
     if (output->name != layer && (count > 1 || output->name != kOnlyOutput)) {
       continue;
     }
-    if (!output->is_float({1, -1, -1, -1}) || output->shape[1] < 1) {
-      return fail(fmt::format("{}: expected output '{} float 1xCxhxw' with C known, found '{}'",
-                              label_, output->name, known.back()));
+    if (!output->is_float({1, -1, -1, -1}) || output->shape[1] < 1 ||
+        output->shape[1] > kMaxFilters) {
+      return fail(
+          fmt::format("{}: expected output '{} float 1xCxhxw' with C known and at most {}, "
+                      "found '{}'",
+                      label_, output->name, kMaxFilters, known.back()));
     }
     output_ = output->name;
     num_filters_ = static_cast<int>(output->shape[1]);
@@ -211,20 +249,36 @@ Expected<OnnxHandle<OrtValue>> OnnxSession::make_tensor(const float* data,
   return OnnxHandle<OrtValue>(raw, api_->ReleaseValue);
 }
 
-Status OnnxSession::run_graph(const OrtValue* input, OrtValue*& output) const {
+Status OnnxSession::run_graph(const OrtValue* input, OrtValue*& output, Limit limit) const {
   const char* const output_name = output_.c_str();
-  return to_status(
-      api_->Run(session_.get(), nullptr, &kInputName, &input, 1, &output_name, 1, &output));
+  const auto run = [&](const OrtRunOptions* options) {
+    return to_status(
+        api_->Run(session_.get(), options, &kInputName, &input, 1, &output_name, 1, &output));
+  };
+  if (!limit) {
+    return run(nullptr);
+  }
+  OrtRunOptions* options = nullptr;
+  STEMVO_ORT_TRY(api_->CreateRunOptions(&options));
+  const OnnxHandle<OrtRunOptions> handle(options, api_->ReleaseRunOptions);
+  const Alarm alarm(*limit, [&] { (void)to_status(api_->RunOptionsSetTerminate(options)); });
+  const Status status = run(options);
+  return !status && alarm.is_over()
+             ? Status(fail(fmt::format("{}: expected a small image to take less than {} s, found "
+                                       "that it takes longer",
+                                       label_, static_cast<double>(limit->count()) / 1000.0)))
+             : status;
 }
 
-Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
-  const std::vector<float> zeros(static_cast<std::size_t>(num_planes_ * image_size.area()));
+Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size, Limit limit) const {
+  const std::vector<float> zeros(static_cast<std::size_t>(num_planes_) *
+                                 static_cast<std::size_t>(image_size.area()));
   const auto input = make_tensor(zeros.data(), num_planes_, image_size);
   if (!input) {
     return input.error();
   }
   OrtValue* raw_output = nullptr;
-  if (Status status = run_graph(input->get(), raw_output); !status) {
+  if (Status status = run_graph(input->get(), raw_output, limit); !status) {
     return status.error();
   }
   const OnnxHandle<OrtValue> output(raw_output, api_->ReleaseValue);
@@ -235,20 +289,27 @@ Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
   if (Status status = read_shape(raw_info, found); !status) {
     return status.error();
   }
-  return cv::Size(static_cast<int>(found.shape.at(3)), static_cast<int>(found.shape.at(2)));
+  found.name = output_;
+  if (!found.is_float({1, num_filters_, -1, -1}) || found.shape[2] > kMaxImageSide_px ||
+      found.shape[3] > kMaxImageSide_px) {
+    return fail(fmt::format("{}: expected output '{} float 1x{}xhxw', found '{}'", label_, output_,
+                            num_filters_, found.describe()));
+  }
+  return cv::Size(static_cast<int>(found.shape[3]), static_cast<int>(found.shape[2]));
 }
 
 Status OnnxSession::run(const float* image,
                         cv::Size image_size,
                         float* channels,
-                        cv::Size channel_size) const {
+                        cv::Size channel_size,
+                        Limit limit) const {
   const auto input = make_tensor(image, num_planes_, image_size);
   const auto output = make_tensor(channels, num_filters_, channel_size);
   if (!input || !output) {
     return (input ? output : input).error();
   }
   OrtValue* raw_output = output->get();
-  return run_graph(input->get(), raw_output);
+  return run_graph(input->get(), raw_output, limit);
 }
 
 }  // namespace stemvo::internal

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <initializer_list>
 #include <numeric>
-#include <tuple>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "internal_check.hpp"
+#include "stem/foreign_model.hpp"
 #include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
 #include "stem/network_layer.hpp"
@@ -61,22 +61,28 @@ Expected<int> choose_sampling(int asked, const StemNetwork& network) {
 
 /// What a manifest would refuse: numbers that no convolution has.
 Status check_network(const StemNetwork& network) {
-  constexpr int kMax = 4096;  // no product of sizes overflows
-  const auto refuse = [&](const char* what, int min, int found) {
-    return fail(
-        fmt::format("{}: {}: expected {} to {}, found {}", network.name, what, min, kMax, found));
+  using internal::kMaxFilters;
+  using internal::kMaxKernel_px;
+  using internal::kMaxStride_px;
+  struct Number {
+    const char* what;
+    int min;
+    int max;
+    int found;
   };
-  for (const auto& [what, min, found] : std::initializer_list<std::tuple<const char*, int, int>>{
-           {"filters", 1, network.num_filters},
-           {"kernel", 1, network.kernel_px[0]},
-           {"kernel", 1, network.kernel_px[1]},
-           {"stride", 1, network.stride_px},
-           {"padding", 0, *std::ranges::min_element(network.padding_px)},
-           {"padding", 0, *std::ranges::max_element(network.padding_px)},
-           {"default_filter", 0, network.default_filter},
-           {"folded sampling", 1, network.folded ? network.folded->sampling_px : 1}}) {
-    if (found < min || found > kMax) {
-      return refuse(what, min, found);
+  for (const auto& [what, min, max, found] : std::initializer_list<Number>{
+           {"filters", 1, kMaxFilters, network.num_filters},
+           {"kernel", 1, kMaxKernel_px, network.kernel_px[0]},
+           {"kernel", 1, kMaxKernel_px, network.kernel_px[1]},
+           {"stride", 1, kMaxStride_px, network.stride_px},
+           {"padding", 0, kMaxKernel_px, *std::ranges::min_element(network.padding_px)},
+           {"padding", 0, kMaxKernel_px, *std::ranges::max_element(network.padding_px)},
+           {"default_filter", 0, kMaxFilters, network.default_filter},
+           {"folded sampling", 1, kMaxStride_px,
+            network.folded ? network.folded->sampling_px : 1}}) {
+    if (found < min || found > max) {
+      return fail(
+          fmt::format("{}: {}: expected {} to {}, found {}", network.name, what, min, max, found));
     }
   }
   return {};

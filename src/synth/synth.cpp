@@ -15,6 +15,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "internal_check.hpp"
+#include "pipeline/folder_lock.hpp"
 #include "pipeline/out_folder.hpp"
 #include "synth/renderer.hpp"
 #include "text/text_file.hpp"
@@ -53,8 +54,23 @@ struct Output {
         final_dir_(out_dir / "sequences" / name),
         final_poses_(out_dir / "poses" / (name + ".txt")) {}
 
-  /// Makes the folders. Error: what is there was not rendered.
-  [[nodiscard]] Status prepare(bool with_depth) const {
+  /// Makes the folders, for one process at a time. Error: what is there was not rendered.
+  [[nodiscard]] Expected<pipeline::FolderLock> prepare(bool with_depth) const {
+    if (const Status status = check_final_names(); !status) {
+      return status.error();
+    }
+    std::error_code code;
+    fs::create_directories(sequence_dir, code);
+    if (code) {
+      return cannot("create the folder", sequence_dir, code);
+    }
+    auto lock = pipeline::FolderLock::take(sequence_dir);
+    const Status status = lock ? make_folders(with_depth) : Status(lock.error());
+    return status ? std::move(lock) : status.error();
+  }
+
+  /// Error: something there was not rendered.
+  [[nodiscard]] Status check_final_names() const {
     std::error_code code;
     // Killed in finish(), only the unfinished folder says whose the poses are.
     const bool is_ours =
@@ -69,14 +85,22 @@ struct Output {
                         path.string()));
       }
     }
-    if (fs::exists(sequence_dir, code) &&
-        !(fs::exists(sequence_dir / kMark, code) && holds_only_a_drive(sequence_dir))) {
+    return {};
+  }
+
+  /// In place of an unfinished drive.
+  [[nodiscard]] Status make_folders(bool with_depth) const {
+    std::error_code code;
+    const bool is_ours = fs::exists(sequence_dir / kMark, code) && holds_only_a_drive(sequence_dir);
+    if (!is_ours && !fs::is_empty(sequence_dir, code)) {
       return fail(fmt::format("{}: expected an unfinished drive or none, found something else",
                               sequence_dir.string()));
     }
-    fs::remove_all(sequence_dir, code);
-    if (code) {
-      return cannot("remove the unfinished drive", sequence_dir, code);
+    for (const char* name : {"image_2", "depth", "calib.txt", "times.txt", "camera.yaml"}) {
+      fs::remove_all(sequence_dir / name, code);
+      if (code) {
+        return cannot("remove the unfinished drive", sequence_dir, code);
+      }
     }
     for (const fs::path& folder :
          {sequence_dir / "image_2", pose_file.parent_path(), sequence_dir / "depth"}) {
@@ -297,9 +321,8 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
     return path.error();
   }
   const Output output(out_dir, options.name);
-  Status status = output.prepare(options.write_depth).and_then([&] {
-    return output.write_calibration(camera);
-  });
+  const auto lock = output.prepare(options.write_depth);
+  Status status = lock ? output.write_calibration(camera) : Status(lock.error());
   if (status && options.walk) {
     status = output.write_camera_file(camera, pace.rate_hz);
   }

@@ -33,6 +33,14 @@ std::optional<double> to_finite(std::string_view word) {
 
 fs::path beside(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
 
+Status refuse_folder(const fs::path& file) {
+  std::error_code ignored;
+  return fs::is_directory(file, ignored)
+             ? Status(
+                   fail(fmt::format("{}: expected a file to write, found a folder", file.string())))
+             : Status();
+}
+
 /// On the disk when it returns. Errors name `file`.
 Status write_in_place(const fs::path& file, const fs::path& place, std::string_view text) {
   const auto failed = [&] {
@@ -76,16 +84,20 @@ Expected<std::string> read_text_file(const fs::path& file) {
     text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
   }
   if (!stream.eof()) {  // not opened, or failed in the middle
+    // What runs out is no fault of the file: it ends the program, as a lack of memory does.
+    if (errno == EMFILE || errno == ENFILE || errno == ENOMEM) {
+      throw std::system_error(errno, std::generic_category(), file.string() + ": cannot read");
+    }
     return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
   }
   return text;
 }
 
 Status write_text_file(const fs::path& file, std::string_view text) {
-  std::error_code code;
-  if (fs::is_directory(file, code)) {
-    return fail(fmt::format("{}: expected a file to write, found a folder", file.string()));
+  if (Status status = refuse_folder(file); !status) {
+    return status;
   }
+  std::error_code code;
   if (fs::exists(file, code) && !fs::is_regular_file(file, code)) {
     return write_in_place(file, file, text);  // a pipe or a device cannot be replaced
   }
@@ -104,10 +116,10 @@ Status write_text_file(const fs::path& file, std::string_view text) {
 }
 
 Status check_can_write(const fs::path& file) {
-  std::error_code ignored;
-  if (fs::is_directory(file, ignored)) {
-    return fail(fmt::format("{}: expected a file to write, found a folder", file.string()));
+  if (Status status = refuse_folder(file); !status) {
+    return status;
   }
+  std::error_code ignored;
   const Status status = write_in_place(file, beside(file), "can be written");
   fs::remove(beside(file), ignored);
   return status;

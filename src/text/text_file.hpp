@@ -12,7 +12,8 @@
 
 namespace stemvo {
 
-/// The whole file as it is. Error: missing, a folder, unreadable.
+/// The whole file as it is. Error: missing, a folder, unreadable. Throws std::system_error where
+/// the process may open no more files.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file);
 /// Replaces the file at once: whoever reads it finds the old or the new one, whole, also after a
 /// kill or a full disk. Written beside as NAME.unfinished, synced, renamed; a pipe or device in

@@ -80,17 +80,58 @@ def value(name, shape, kind=TensorProto.FLOAT):
     return helper.make_tensor_value_info(name, kind, shape)
 
 
-def write(name, nodes, inputs, outputs, constants=()):
+def write(name, nodes, inputs, outputs, constants=(), domains=(), is_checked=True):
     graph = helper.make_graph(nodes, name, inputs, outputs, list(constants))
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], producer_name="stemvo tests")
+    domains = [helper.make_opsetid("", 13)] + [helper.make_opsetid(domain, 1) for domain in domains]
+    model = helper.make_model(graph, opset_imports=domains, producer_name="stemvo tests")
     model.ir_version = 7
-    onnx.checker.check_model(model)
+    if is_checked:
+        onnx.checker.check_model(model)
     (OUT / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
 
 
 def identity(name, inputs, outputs):
     """A model of the given shapes that copies its input, to be refused at load."""
     write(name, [helper.make_node("Identity", [inputs[0].name], [outputs[0].name])], inputs, outputs)
+
+
+def hostile():
+    """Models that ask for too much, or for what is outside their file."""
+    image, channels = value("image", [1, 3, "H", "W"]), value("channels", [1, 3, "h", "w"])
+    pool = {"kernel_shape": [40000, 40000], "pads": [39999] * 4}
+    write("hostile_kernel", [helper.make_node("MaxPool", ["image"], ["channels"], **pool)], [image], [channels])
+    pool = {"kernel_shape": [4, 4], "strides": [8000, 8000]}
+    write("hostile_stride", [helper.make_node("MaxPool", ["image"], ["channels"], **pool)], [image], [channels])
+    identity("hostile_size", [value("image", [1, 3, 46341, 46341])], [value("channels", [1, 3, 46341, 46341])])
+    write("hostile_domain", [helper.make_node("Steal", ["image"], ["channels"], domain="com.example")], [image], [channels],
+          domains=["com.example"])
+    # An output said to be of rank 4 that is of rank 3, by a shape that only a run knows.
+    shape = [helper.make_node("Shape", ["image"], ["shape"]), helper.make_node("Slice", ["shape", "from", "to"], ["some"]),
+             helper.make_node("Reshape", ["image", "some"], ["channels"])]
+    ends = [numpy_helper.from_array(np.array([number]), key) for key, number in (("from", 1), ("to", 4))]
+    write("hostile_rank", shape, [image], [channels], ends)
+    body = helper.make_graph([helper.make_node("Identity", ["go"], ["go_on"]), helper.make_node("Identity", ["x"], ["y"])], "body",
+                             [value("i", [], TensorProto.INT64), value("go", [], TensorProto.BOOL), value("x", None)],
+                             [value("go_on", [], TensorProto.BOOL), value("y", None)])
+    write("hostile_loop", [helper.make_node("Loop", ["count", "true", "image"], ["channels"], body=body)], [image], [channels],
+          [numpy_helper.from_array(np.array(2**62), "count"), numpy_helper.from_array(np.array(True), "true")], is_checked=False)
+    kernel = numpy_helper.from_array(np.zeros((3, 3, 1, 1), np.float32), "weights")
+    conv = helper.make_node("Conv", ["image", "weights"], ["channels"], kernel_shape=[1, 1])
+    outside = onnx.TensorProto()
+    outside.CopyFrom(kernel)
+    outside.ClearField("raw_data")
+    outside.data_location = TensorProto.EXTERNAL
+    outside.external_data.add(key="location", value="../../../../etc/hostname")
+    write("hostile_external", [conv], [image], [channels], [outside], is_checked=False)
+    broken = np.ones((3, 3, 1, 1), np.float32)
+    broken[1, 1] = np.nan
+    write("hostile_nan", [conv], [image], [channels], [numpy_helper.from_array(broken, "weights")])
+    write("hostile_infinite", [helper.make_node("Log", ["image"], ["channels"])], [image], [channels])
+    # Some 10^10 multiplications per operator: slower than any first layer.
+    box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
+    slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],
+                                     kernel_shape=[65, 65], pads=[32] * 4) for i in range(300)]
+    write("hostile_slow", slow, [image], [channels], [numpy_helper.from_array(np.array([3, 3, 65, 65]), "size")])
 
 
 def main():
@@ -119,6 +160,7 @@ def main():
           [value("image", shape), value("more", shape)], [value("channels", shape)])
     write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
           [value("image", shape)], [value("channels", [1, *picture])])
+    hostile()
 
 
 if __name__ == "__main__":

@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
 #include <sys/stat.h>
 
 #include "support/program_test.hpp"
@@ -89,6 +91,48 @@ TEST_F(BadInput, EveryImageBroken) {
   expect_error(run(), 1, {"000000.png"});
 }
 
+/// Decoders print lines of their own, which name no file.
+TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
+  const fs::path images = sequence_ / "image_2";
+  for (const char* name : {"000003.png", "000004.png", "000005.png", "000006.png"}) {
+    std::string bytes = read_file(images / name);
+    bytes.replace(bytes.size() / 2, 4, "xxxx");
+    write_file(images / name, bytes);
+  }
+  std::string twice = read_file(images / "000008.png");
+  write_file(images / "000008.png", twice.insert(33, twice.substr(8, 25)));  // two headers
+  const ProgramResult result = run({"--quiet"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 5) << result.err;
+  EXPECT_THAT(result.err, AllOf(HasSubstr("warning: " + images.string() + "/000003.png"),
+                                HasSubstr("000008.png: expected a sound PNG image, found damaged"),
+                                Not(HasSubstr("libpng"))));
+}
+
+TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {
+  const fs::path images = folder_ / "jpeg";
+  fs::create_directories(images);
+  for (int i = 0; i < 10; ++i) {
+    const std::string number = fmt::format("{:06}", i);
+    cv::imwrite(images / (number + ".jpg"), cv::imread(sequence_ / "image_2" / (number + ".png")));
+  }
+  std::string bytes = read_file(images / "000004.jpg");
+  write_file(images / "000004.jpg", bytes.erase(bytes.size() / 2, 400));
+  bytes = read_file(images / "000006.jpg");
+  const std::size_t frame_header = bytes.find("\xff\xc0");
+  bytes[frame_header + 4] = 77;  // bits of a sample
+  write_file(images / "000006.jpg", bytes);
+  write_file(folder_ / "camera.yaml",
+             "image_width: 620\nimage_height: 188\nintrinsics: [360, 360, 310, 94]\n"
+             "distortion_model: none\nrate_hz: 10\n");
+  const ProgramResult result = run_stemvo(
+      {"run", images.string(), "--camera", folder_ / "camera.yaml", "--out", out_, "--quiet"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, AllOf(StartsWith("warning: "), HasSubstr("000006.jpg")));
+  EXPECT_LE(std::count(result.err.begin(), result.err.end(), '\n'), 2) << result.err;
+  EXPECT_THAT(result.err, Not(HasSubstr("orrupt JPEG data")));
+}
+
 TEST_F(BadInput, CameraThatIsNotThere) {
   expect_error(run({"--set", "input.camera=image_0"}), 1, {"image_0"});
   expect_error(run({"--set", "input.camera=left"}), 1, {"input.camera", "image_0", "'left'"});
@@ -127,6 +171,17 @@ TEST_F(BadInput, Poses) {
   expect_error(run({"--set", "scale.source=ground_truth"}), 1,
                {"poses/00.txt", "scale.source=ground_truth", "found none"});
   EXPECT_FALSE(fs::exists(out_ + "/trajectory_kitti.txt"));
+}
+
+/// Poses that cannot be read are not poses that are not there.
+TEST_F(BadInput, PosesBehindALinkToNowhere) {
+  const fs::path poses = folder_.path() / "poses/00.txt";
+  fs::remove(poses);
+  fs::create_symlink("00.txt", poses);
+  expect_error(run(), 1, {"poses/00.txt", "symbolic links"});
+  fs::remove_all(folder_ / "poses");
+  fs::create_symlink("poses", folder_ / "poses");
+  expect_error(run(), 1, {"poses/00.txt", "symbolic links"});
 }
 
 TEST_F(BadInput, OutputFolderThatCannotBeWritten) {

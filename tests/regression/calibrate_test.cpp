@@ -127,7 +127,7 @@ TEST_F(Calibrate, WhatIsWrongIsSaid) {
   expect_error(run_stemvo({"run", sequence_.string(), "--out", folder_ / "o", "--calib", other}),
                {"other.txt", "620x188"});
   write_intrinsics(out_, read_intrinsics(sequence_ / "calib.txt"));
-  expect_error(calibrate({"--calib", out_}), {out_, "another file"});
+  expect_error(calibrate({"--calib", out_}), {out_, "no input"});
   fs::remove(out_);
   expect_error(run_stemvo({"calibrate", folder_ / "none", "--out", out_}), {folder_ / "none"});
   expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_.path().string()}),

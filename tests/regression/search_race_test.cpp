@@ -43,7 +43,7 @@ class SearchRace : public Search {
     EXPECT_TRUE(run_race(*plan, progress, *file, max_kept));
     const FilterRecords& records = file->records();
     Outcome outcome;
-    outcome.table = format_csv(plan->identity, rank_filters(records, plan->identity.rungs.size()));
+    outcome.table = format_csv(plan->identity, rank_filters(plan->identity, records));
     for (const FilterRecord& record : records) {
       outcome.filter_frames += record.filter_frames;
     }

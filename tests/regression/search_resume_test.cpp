@@ -93,6 +93,35 @@ TEST_F(Search, InterruptedLeavesAPartOfTheTableAndGoesOn) {
   EXPECT_TRUE(result("stopped")["complete"].get<bool>());
 }
 
+/// A line that no search wrote is named and left out; its filter is run again.
+TEST_F(Search, ADamagedRecordIsNamedAndRunAgain) {
+  const Words asked = {"--exhaustive", "--filters", "0:3", "--no-baselines"};
+  ASSERT_EQ(search("out", asked).exit_code, 0);
+  const std::string whole = table("out");
+  const fs::path records = folder_ / "out/records.jsonl";
+  std::string text = read_file(records);
+  const std::size_t second = text.find('\n', text.find('\n') + 1) + 1;
+  text.replace(text.find("\"rung\":0", second), 8, "\"rung\":9");
+  write_file(records, text);
+  Words resumed = asked;
+  resumed.emplace_back("--resume");
+  const ProgramResult result = search("out", resumed);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, StartsWith("warning: " + records.string() + ":3: expected a rung"));
+  EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+  EXPECT_EQ(table("out"), whole);
+}
+
+TEST_F(Search, ASheetThatCannotBeWrittenIsAnError) {
+  for (const char* name : {"sheet.png", "trajectories.png"}) {
+    fs::create_directories(folder_ / "out" / name);
+    expect_error(search("out", {"--exhaustive", "--filters", "0:1", "--no-baselines", "--resume"}),
+                 1, {name, "expected a file to write, found a folder"});
+    EXPECT_THAT(table("out"), HasSubstr("default,stem,0"));
+    fs::remove(folder_ / "out" / name);
+  }
+}
+
 /// As many bytes as before, one of them another: of a text the digit before its last point.
 void spoil(const fs::path& file) {
   std::string bytes = read_file(file);

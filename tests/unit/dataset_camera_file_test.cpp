@@ -97,7 +97,8 @@ TEST_F(CameraFileTest, OtherNamesOfTheModels) {
 TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
   const std::string text =
       "%YAML:1.0\n# comment\n---\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
-      "  data: [1, 0, 0, 0.1,\n    0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: [752, 480]\n"
+      "  data: [1, 0, 0, 0.1,\n    0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: "
+      "[752, 480]\n"
       "camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
       "distortion_model: radial-tangential\n"
       "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";

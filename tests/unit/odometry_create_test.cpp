@@ -96,7 +96,7 @@ TEST(OdometryCreate, ANetworkThatIsNoConvolutionIsAnError) {
   };
   EXPECT_EQ(message([](StemNetwork&) {}), "no error");
   EXPECT_EQ(message([](StemNetwork& n) { n.stride_px = 0; }),
-            "default: stride: expected 1 to 4096, found 0");
+            "default: stride: expected 1 to 256, found 0");
   EXPECT_THAT(message([](StemNetwork& n) { n.kernel_px = {4, 0}; }), HasSubstr("kernel"));
   EXPECT_THAT(message([](StemNetwork& n) { n.padding_px[2] = -1; }), HasSubstr("padding"));
   EXPECT_THAT(message([](StemNetwork& n) { n.folded->sampling_px = 0; }), HasSubstr("folded"));

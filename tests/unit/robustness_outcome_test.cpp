@@ -87,9 +87,9 @@ TEST(Segments, BlockIsAsLongAsTheLongestOfThem) {
   }
   Outcome outcome;
   add_errors(truth, truth, {}, outcome);
-  ASSERT_FALSE(outcome.dense_r_deg_per_100m.empty());
-  EXPECT_GE(outcome.block, 25U);  // an eighth of 50 m at a quarter of a metre a frame
-  EXPECT_LE(outcome.block, 27U);
+  ASSERT_FALSE(outcome.dense.r_deg_per_100m.empty());
+  EXPECT_GE(outcome.dense.block, 25U);  // an eighth of 50 m at a quarter of a metre a frame
+  EXPECT_LE(outcome.dense.block, 27U);
 }
 
 TEST(Contenders, KeepWhatTheJudgedModelNeeds) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -29,6 +30,12 @@ FilterRecord record(int filter, std::size_t rung, std::vector<DriveScore> drives
           .held_out_filter_frames = 0};
 }
 
+SearchIdentity rungs(std::size_t count) {
+  SearchIdentity identity;
+  identity.rungs.resize(count);
+  return identity;
+}
+
 std::vector<int> filters_of(const std::vector<FilterRow>& rows) {
   std::vector<int> filters;
   for (const FilterRow& row : rows) {
@@ -42,7 +49,7 @@ TEST(Ranking, ByTRelThenRRelThenNotDetected) {
   lost.detected = false;
   const FilterRecords records = {record(0, 0, {score(2.0, 1.0)}), record(1, 0, {lost}),
                                  record(2, 0, {score(1.0, 3.0)}), record(3, 0, {score(1.0, 2.0)})};
-  const auto rows = rank_filters(records, 1);
+  const auto rows = rank_filters(rungs(1), records);
   EXPECT_THAT(filters_of(rows), ElementsAre(3, 2, 0, 1));
   EXPECT_EQ(rows.back().status, FilterStatus::kNotDetected);
 }
@@ -53,7 +60,7 @@ TEST(Ranking, IsOnTheMeanOfAllSequencesAndNeedsEach) {
   const FilterRecords records = {record(0, 0, {score(1.0, 1.0), score(4.0, 1.0)}),
                                  record(1, 0, {score(2.0, 1.0), score(2.0, 1.0)}),
                                  record(2, 0, {score(0.5, 1.0), lost})};
-  EXPECT_THAT(filters_of(rank_filters(records, 1)), ElementsAre(1, 0, 2));
+  EXPECT_THAT(filters_of(rank_filters(rungs(1), records)), ElementsAre(1, 0, 2));
   EXPECT_DOUBLE_EQ(*mean_score({score(1.0, 1.0), score(4.0, 1.0)}).t_rel_percent, 2.5);
 }
 
@@ -74,7 +81,7 @@ TEST(Ranking, HeldOutAndStandingRankNothing) {
   other.held_out = score(0.0, 0.0);
   good.held_out = score(9.0, 9.0);
   good.drives[0].E_t_m = 5.0;  // E_t of `other` is that of a camera that stands
-  EXPECT_THAT(filters_of(rank_filters(FilterRecords{other, good}, 1)), ElementsAre(1, 0));
+  EXPECT_THAT(filters_of(rank_filters(rungs(1), FilterRecords{other, good})), ElementsAre(1, 0));
 }
 
 /// Errors of 200 segments that scatter about a mean, ten of them alike.
@@ -93,7 +100,7 @@ TEST(Ranking, NamesThoseThatCannotBeToldFromTheBest) {
   const FilterRecords records = {record(0, 0, {dense_score(1.00, 1)}),
                                  record(1, 0, {dense_score(1.02, 2)}),
                                  record(2, 0, {dense_score(2.00, 3)})};
-  const auto rows = rank_filters(records, 1);
+  const auto rows = rank_filters(rungs(1), records);
   EXPECT_TRUE(rows[0].is_equal);
   EXPECT_EQ(rows[0].over_best.ratio, 1.0);
   EXPECT_TRUE(rows[1].is_equal);
@@ -110,12 +117,34 @@ TEST(Ranking, NoDriveCountsForMoreBecauseItIsHard) {
       record(0, 0, {dense_score(5.0, 1), dense_score(1.5, 2), dense_score(1.5, 3)}),
       record(1, 0, {dense_score(7.5, 4), dense_score(0.5, 5), dense_score(0.5, 6)}),
       record(2, 0, {dense_score(20.0, 7), dense_score(0.5, 8), dense_score(0.5, 9)})};
-  const auto rows = rank_filters(records, 1);
+  const auto rows = rank_filters(rungs(1), records);
   EXPECT_EQ(rows[0].key.filter, 1);
   EXPECT_FALSE(rows[1].is_equal && rows[2].is_equal);
   for (const FilterRow& row : rows) {
     EXPECT_GE(row.over_best.ratio, 1.0);
   }
+}
+
+TEST(Ranking, DisturbedVersionsOfOneRoadTellNoMoreThanTheRoad) {
+  const auto width_of = [](std::size_t num_drives, bool are_one_road) {
+    SearchIdentity identity = rungs(1);
+    FilterRecord good = record(0, 0, {});
+    FilterRecord other = record(1, 0, {});
+    for (std::size_t i = 0; i < num_drives; ++i) {
+      const std::string suffix = "_dusk_" + std::to_string(i);
+      SequenceIdentity& sequence = identity.sequences.emplace_back();
+      sequence.name = "00" + suffix;
+      sequence.disturbance = are_one_road ? suffix : "";
+      good.drives.push_back(dense_score(1.0, 1));
+      other.drives.push_back(dense_score(1.1, 2));
+      good.drives.back().sequence = other.drives.back().sequence = sequence.name;
+    }
+    const ErrorRatio ratio = rank_filters(identity, {good, other}).back().over_best;
+    return std::log(ratio.high / ratio.low);
+  };
+  const double one = width_of(1, true);
+  EXPECT_NEAR(width_of(4, true), one, 0.05 * one);
+  EXPECT_LT(width_of(4, false), 0.8 * one) << "four roads tell more than one";
 }
 
 TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
@@ -127,7 +156,7 @@ TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
                                  record(2, 0, {worse}),           record(3, 0, {early}),
                                  record(0, 1, {score(9.0, 9.0)}), record(1, 1, {worse}),
                                  record(0, 2, {score(9.0, 9.0)})};
-  const auto rows = rank_filters(records, 3);
+  const auto rows = rank_filters(rungs(3), records);
   EXPECT_THAT(filters_of(rows), ElementsAre(0, 1, 3, 2));
   EXPECT_EQ(rows[0].status, FilterStatus::kRanked);
   EXPECT_EQ(rows[1].status, FilterStatus::kStopped);

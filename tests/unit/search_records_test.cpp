@@ -108,11 +108,69 @@ TEST_F(Records, ATornLineIsLeftOutAndOverwritten) {
   EXPECT_EQ((*content->records.rbegin()).key.filter, 2);
 }
 
-TEST_F(Records, AWholeLineThatIsNoRecordIsAnErrorWithItsLine) {
+TEST_F(Records, AWholeLineThatIsNoRecordIsLeftOutAndNamed) {
   write("a", identity(0, 3), {record(0)});
   std::ofstream(file("a"), std::ios::app) << "{\"model\": 1}\n";
-  EXPECT_THAT(read_records(file("a")).error().message, HasSubstr("records.jsonl:3: expected"));
+  const auto content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  EXPECT_EQ(content->records.size(), 1U);
+  ASSERT_EQ(content->warnings.size(), 1U);
+  EXPECT_THAT(content->warnings.front(),
+              AllOf(HasSubstr("records.jsonl:3: expected"), HasSubstr("left out")));
   EXPECT_FALSE(RecordFile::open(file("a"), identity(0, 3), false));  // never replaced
+}
+
+/// What somebody, or a broken disk, made of the second of three records.
+TEST_F(Records, WhatNoSearchWritesIsLeftOutAndTheRestKept) {
+  const std::vector<std::pair<std::string, std::string>> changes = {
+      {R"("filter":1)", R"("filter":7)"},
+      {R"("filter":1)", R"("filter":-1)"},
+      {R"("filter":1)", R"("filter":0)"},  // once more, with another result
+      {R"("layer":"stem")", R"("layer":"deep")"},
+      {R"("rung":0)", R"("rung":99)"},
+      {R"("t_rel_percent":1.5)", R"("t_rel_percent":1e300)"},
+      {R"("t_rel_percent":1.5)", R"("t_rel_percent":-1)"},
+      {R"("t_rel_percent":1.5)", R"("t_rel_percent":NaN)"},
+      {R"("t_rel_percent":1.5)", R"("t_rel_percent":1e999)"},
+      {R"("t_rel_percent":1.5)", R"("t_rel_percent":"1.5")"},
+      {R"("sequence":"00")", R"("sequence":"01")"},
+      {R"("frames":100)", R"("frames":101)"},
+      {R"("block":2)", R"("block":0)"},
+      {R"("held_out":null)", R"("held_out":3)"},
+      {R"("drives":[{)", R"("drives":[],"rives":[{)"},
+      {R"([0.25,1.5])", R"([0.25])"}};
+  write("a", identity(0, 3), {record(0), record(1, 1.5), record(2)});
+  const std::string good = testing::read_all(file("a"));
+  for (const auto& [from, to] : changes) {
+    const std::size_t third_line = good.find('\n', good.find('\n') + 1) + 1;
+    const std::size_t at = good.find(from, third_line);
+    ASSERT_NE(at, good.npos) << from;
+    std::ofstream(file("a")) << std::string(good).replace(at, from.size(), to);
+    const auto content = read_records(file("a"));
+    ASSERT_TRUE(content) << to << ": " << content.error().message;
+    EXPECT_EQ(content->records.size(), 2U) << to;
+    ASSERT_EQ(content->warnings.size(), 1U) << to;
+    EXPECT_THAT(content->warnings.front(), HasSubstr("records.jsonl:3: ")) << to;
+  }
+}
+
+TEST_F(Records, AnIdentityThatIsNoneIsAnError) {
+  write("a", identity(0, 3), {record(0)});
+  const std::string good = testing::read_all(file("a"));
+  for (const auto& [from, to] : {std::pair(R"("rungs":[{)", R"("rungs":[],"ungs":[{)"),
+                                 std::pair(R"("layers":[{)", R"("layers":[],"ayers":[{)"),
+                                 std::pair(R"("sequences":[{)", R"("sequences":[],"equences":[{)"),
+                                 std::pair(R"("last":3)", R"("last":0)"),
+                                 std::pair(R"("frame_share":1.0)", R"("frame_share":1e300)"),
+                                 std::pair(R"("held_out":false)", R"("held_out":true)"),
+                                 std::pair(R"("only_sequence":null)", R"("only_sequence":5)")}) {
+    const std::size_t at = good.find(from);
+    ASSERT_NE(at, good.npos) << from;
+    std::ofstream(file("a")) << std::string(good).replace(at, std::string(from).size(), to);
+    const auto content = read_records(file("a"));
+    ASSERT_FALSE(content) << to;
+    EXPECT_THAT(content.error().message, HasSubstr("records.jsonl:1: ")) << to;
+  }
 }
 
 TEST_F(Records, OneWriterAtATime) {

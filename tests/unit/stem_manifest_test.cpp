@@ -144,14 +144,14 @@ TEST_F(Manifest, WrongValuesNameTheLine) {
   EXPECT_EQ(error_with("filters: 16", "filters: 99999999999"),
             ":7: filters: expected a whole number, found '99999999999'");
   EXPECT_EQ(error_with("stride: 2", "stride: 0"),
-            ":9: stride: expected a whole number from 1 to 100000, found 0");
+            ":9: stride: expected a whole number from 1 to 256, found 0");
   EXPECT_EQ(error_with("[4, 5]", "4"),
             ":8: kernel: expected a list of numbers like [100, 200], found '4'");
   EXPECT_EQ(error_with("[4, 5]", "[4, 5.5]"), ":8: kernel: expected a list of 2 whole numbers");
   EXPECT_EQ(error_with("[4, 5]", "[4]"), ":8: kernel: expected a list of 2 whole numbers");
   EXPECT_EQ(error_with("[4, 5]", "[4, .nan]"), ":8: kernel: expected a number, found '.nan'");
   EXPECT_EQ(error_with("[0, 1, 2, 3]", "[0, 1, 2, -3]"),
-            ":10: padding: expected a number from 0 to 100000, found -3");
+            ":10: padding: expected a number from 0 to 4096, found -3");
   EXPECT_EQ(error_with("[0, 1, 2, 3]", "[0, 1, 4, 3]"),
             ":10: padding: expected less than the kernel (4), found 4");
   EXPECT_EQ(error_with("default_filter: 7", "default_filter: 16"),

@@ -121,7 +121,11 @@ typedef struct OrtApi {
                                        size_t index,
                                        OrtAllocator* allocator,
                                        char** out);
-  void* unused_38_48[11];
+  void* unused_38;
+  OrtStatusPtr (*CreateRunOptions)(OrtRunOptions** out);
+  void* unused_40_45[6];
+  OrtStatusPtr (*RunOptionsSetTerminate)(OrtRunOptions* options);
+  void* unused_47_48[2];
   OrtStatusPtr (*CreateTensorWithDataAsOrtValue)(const OrtMemoryInfo* memory,
                                                  void* data,
                                                  size_t data_bytes,
@@ -156,7 +160,7 @@ typedef struct OrtApi {
   void (*ReleaseMemoryInfo)(OrtMemoryInfo* memory);
   void (*ReleaseSession)(OrtSession* session);
   void (*ReleaseValue)(OrtValue* value);
-  void* unused_97;
+  void (*ReleaseRunOptions)(OrtRunOptions* options);
   void (*ReleaseTypeInfo)(OrtTypeInfo* info);
   void (*ReleaseTensorTypeAndShapeInfo)(OrtTensorTypeAndShapeInfo* info);
   void (*ReleaseSessionOptions)(OrtSessionOptions* options);
@@ -175,6 +179,7 @@ const OrtApiBase* OrtGetApiBase(void);
 
 static_assert(offsetof(OrtApi, Run) == 9 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, SessionGetInputCount) == 30 * sizeof(void*), "place in the table");
+static_assert(offsetof(OrtApi, RunOptionsSetTerminate) == 46 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, CreateCpuMemoryInfo) == 69 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, ReleaseSessionOptions) == 100 * sizeof(void*), "place in the table");
 #endif

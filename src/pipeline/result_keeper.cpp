@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+#include "pipeline/result_keeper.hpp"
+
+#include <chrono>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "report/frames_csv.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo::pipeline {
+namespace {
+
+constexpr std::chrono::seconds kPeriod(1);
+
+}  // namespace
+
+ResultKeeper::ResultKeeper(const std::filesystem::path& out_dir,
+                           std::function<Trajectory(Trajectory)> finished)
+    : out_dir_(out_dir), finished_(std::move(finished)), csv_(frames_csv_header()) {}
+
+Status ResultKeeper::start() {
+  const Status status = write_text_file(out_dir_ / "frames.csv", csv_);
+  if (!status) {
+    return status;
+  }
+  try {
+    thread_ = std::jthread([this](const std::stop_token& token) { keep(token); });
+  } catch (const std::system_error& error) {
+    return fail(fmt::format("{}: no thread to keep results with: {}", out_dir_.string(),
+                            error.code().message()));
+  }
+  return {};
+}
+
+void ResultKeeper::add(std::string_view csv_row, const Rigid3& world_from_camera) {
+  const std::lock_guard lock(mutex_);
+  csv_ += csv_row;
+  trajectory_.push_back(world_from_camera);
+}
+
+Status ResultKeeper::finish() {
+  stop();
+  return write_text_file(out_dir_ / "frames.csv", csv_);
+}
+
+void ResultKeeper::stop() {
+  if (thread_.joinable()) {
+    thread_.request_stop();
+    thread_.join();
+  }
+}
+
+void ResultKeeper::keep(const std::stop_token& token) {
+  std::unique_lock lock(mutex_);
+  while (!stopped_.wait_for(lock, token, kPeriod, [&] { return token.stop_requested(); })) {
+    if (trajectory_.empty()) {
+      continue;
+    }
+    const std::string csv = csv_;
+    Trajectory trajectory = trajectory_;
+    lock.unlock();
+    // What cannot be written now is written, or reported, at the end.
+    static_cast<void>(write_text_file(out_dir_ / "frames.csv", csv));
+    static_cast<void>(write_kitti_trajectory(out_dir_ / "trajectory_kitti.txt",
+                                             finished_(std::move(trajectory))));
+    lock.lock();
+  }
+}
+
+}  // namespace stemvo::pipeline

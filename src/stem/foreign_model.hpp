@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::internal {
+
+/// Limits of a model, foreign code as it is. docs/security.md says them.
+inline constexpr std::size_t kMaxModelBytes = std::size_t{512} << 20U;
+inline constexpr int kMaxKernel_px = 4096;
+inline constexpr int kMaxStride_px = 256;
+inline constexpr int kMaxFilters = 4096;
+inline constexpr int kMaxPixels = 1 << 24;       ///< of an input of one size, and of a probe
+inline constexpr int kMaxProbeValues = 1 << 27;  ///< of what a probe's outputs hold
+inline constexpr int kMaxSecondsOfProbe = 10;    ///< for one small image
+
+/// What can be told of the bytes of an .onnx before ONNX Runtime sees them. Error, starting with
+/// `label`: no ONNX file; data in other files; operators that are not ONNX's own; loops and
+/// branches; kernels, strides, paddings and dilations over kMaxKernel_px; weights that are not
+/// finite.
+[[nodiscard]] Status check_foreign_model(const std::string& label, std::string_view model);
+
+}  // namespace stemvo::internal

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "options/option_fields.hpp"
+#include "support/program_test.hpp"
+#include "support/search_program.hpp"
+#include "support/tiny_stem.hpp"
+
+namespace stemvo {
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// A call of the program, and the word its one line must hold.
+struct Case {
+  std::string name;
+  Words arguments;
+  std::string word;
+};
+
+/// Each ends with 1 and one line, within ten seconds, by no crash and no bug of ours.
+void expect_refused(const std::vector<Case>& cases) {
+  for (const Case& one : cases) {
+    const auto start = std::chrono::steady_clock::now();
+    const ProgramResult result = run_stemvo(one.arguments);
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10)) << one.name;
+    EXPECT_EQ(result.exit_code, 1) << one.name << ": " << result.err;
+    EXPECT_THAT(result.err,
+                AllOf(StartsWith("error: "), Not(HasSubstr("internal")), HasSubstr(one.word)))
+        << one.name;
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << one.name << ": " << result.err;
+  }
+}
+
+/// What may become of a file.
+using Fault = std::pair<std::string, std::function<void(const fs::path&)>>;
+
+std::string replace_first(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  return at == text.npos ? to : text.replace(at, from.size(), to);
+}
+
+/// `number`: one of the file's, as it stands there.
+std::vector<Fault> faults(const std::string& number) {
+  const auto with = [](const auto& change) {
+    return [change](const fs::path& file) { write_file(file, change(read_file(file))); };
+  };
+  const auto with_number = [&](const std::string& text) {
+    return with([=](const std::string& whole) { return replace_first(whole, number, text); });
+  };
+  return {
+      {"cut", with([](const std::string& whole) { return whole.substr(0, whole.size() / 2); })},
+      {"binary", with([](const std::string&) {
+         std::mt19937 random(1);
+         std::string bytes(3000, '\0');
+         std::ranges::generate(bytes, [&] { return static_cast<char>(random()); });
+         return bytes;
+       })},
+      {"zeros", with([](const std::string&) { return std::string(5000, '\0'); })},
+      {"one long word", with([](const std::string&) { return std::string(1 << 20, 'x'); })},
+      {"open brackets", with([](const std::string&) { return std::string(100000, '['); })},
+      {"NaN", with_number("nan")},
+      {"infinity", with_number("inf")},
+      {"1e300", with_number("1e300")},
+      {"1e999", with_number("1e999")},
+      {"hexadecimal", with_number("0x1p3")},
+      {"decimal comma", with_number("1,5 ,")},
+      {"a word", with_number("street")},
+      {"folder",
+       [](const fs::path& file) {
+         fs::remove(file);
+         fs::create_directory(file);
+       }},
+      {"missing", [](const fs::path& file) { fs::remove(file); }},
+      {"loop",
+       [](const fs::path& file) {
+         fs::remove(file);
+         fs::create_symlink(file.filename(), file);
+       }},
+      {"link to nowhere",
+       [](const fs::path& file) {
+         fs::remove(file);
+         fs::create_symlink("none", file);
+       }},
+      {"pipe",
+       [](const fs::path& file) {
+         fs::remove(file);
+         ::mkfifo(file.c_str(), 0600);
+       }},
+      {"device",
+       [](const fs::path& file) {
+         fs::remove(file);
+         fs::create_symlink("/dev/zero", file);
+       }},
+      {"unreadable",
+       [](const fs::path& file) {
+         ::geteuid() == 0 ? static_cast<void>(fs::remove(file))
+                          : fs::permissions(file, fs::perms::none);
+       }},
+  };
+}
+
+class BadInputTable : public ::testing::Test {
+ protected:
+  /// Every fault but `spared`, which such a file may have, and `more`.
+  void expect_refused_with_faults(const fs::path& file,
+                                  const std::string& number,
+                                  const Words& arguments,
+                                  const Words& spared = {},
+                                  const std::vector<Fault>& more = {}) {
+    ASSERT_TRUE(fs::exists(file));
+    const fs::path kept = file.string() + ".kept";
+    fs::copy_file(file, kept);
+    std::vector<Fault> all = faults(number);
+    all.insert(all.end(), more.begin(), more.end());
+    for (const auto& [name, damage] : all) {
+      if (std::ranges::find(spared, name) == spared.end()) {
+        damage(file);
+        expect_refused(
+            {{file.filename().string() + ", " + name, arguments, file.filename().string()}});
+        fs::remove_all(file);
+        fs::copy_file(kept, file);
+      }
+    }
+  }
+  static Fault text(const std::string& name, const std::string& content) {
+    return {name, [content](const fs::path& file) { write_file(file, content); }};
+  }
+  [[nodiscard]] Words run(const Words& more = {}) const {
+    Words words = {"run",     sequence_.string(), "--out", folder_ / "out",
+                   "--quiet", "--frames",         "0:1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+
+  TempFolder folder_;
+  fs::path sequence_ = test::copy_drive(folder_.path(), 3);
+};
+
+TEST_F(BadInputTable, Calibration) {
+  write_file(sequence_ / "calib.txt",
+             "P0: 360 0 310 0 0 360 94 0 0 0 1 0\nP2: 361 0 310 0 0 361 94 0 0 0 1 0\n");
+  expect_refused_with_faults(
+      sequence_ / "calib.txt", "361", run(), {},
+      {text("empty", ""), text("eleven numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1\n"),
+       text("thirteen numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1 0 0\n"),
+       text("no focal length", "P2: 0 0 310 0 0 0 94 0 0 0 1 0\n"),
+       text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
+       text("centre far away", "P2: 361 0 1e300 0 0 361 94 0 0 0 1 0\n"),
+       text("offset far away", "P2: 361 0 310 1e200 0 361 94 0 0 0 1 0\n"),
+       text("negative focal length", "P2: -361 0 310 0 0 361 94 0 0 0 1 0\n")});
+}
+
+TEST_F(BadInputTable, Poses) {
+  write_file(folder_ / "truth.txt", "1 0 0 0.125 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
+  fs::copy_file(folder_ / "truth.txt", folder_ / "estimate.txt");
+  for (const char* name : {"truth.txt", "estimate.txt"}) {
+    expect_refused_with_faults(
+        folder_ / name, "0.125",
+        {"evaluate", "--gt", folder_ / "truth.txt", folder_ / "estimate.txt"}, {},
+        {text("empty", ""), text("eleven numbers", "1 0 0 0 0 1 0 0 0 0 1\n"),
+         text("no rotation", "2 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
+         text("reflection", "-1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
+         text("1e160", "1 0 0 1e160 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
+         text("three poses",
+              "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
+         text("a gap", "1 0 0 0 0 1 0 0 0 0 1 0\n\n1 0 0 0 0 1 0 0 0 0 1 1\n")});
+  }
+}
+
+TEST_F(BadInputTable, TumPoses) {
+  write_file(folder_ / "truth.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
+  write_file(folder_ / "tum.txt", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 1\n");
+  expect_refused_with_faults(folder_ / "tum.txt", "2.5",
+                             {"evaluate", "--gt", folder_ / "truth.txt", folder_ / "tum.txt"}, {},
+                             {text("seven numbers", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0\n"),
+                              text("no rotation", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 0\n"),
+                              text("1e160", "1.5 0 0 1e160 0 0 0 1\n2.5 0 0 1 0 0 0 1\n"),
+                              text("only a comment", "# nothing\n")});
+}
+
+TEST_F(BadInputTable, Times) {
+  write_file(sequence_ / "times.txt", "0.0\n0.125\n0.25\n");
+  expect_refused_with_faults(sequence_ / "times.txt", "0.125", run(), {"cut"},
+                             {text("empty", ""), text("two columns", "0 1\n1 2\n2 3\n"),
+                              text("backwards", "2\n1\n3\n"), text("twice", "1\n1\n1\n")});
+}
+
+TEST_F(BadInputTable, CameraFile) {
+  write_file(
+      folder_ / "camera.yaml",
+      "image_width: 620\nimage_height: 188\nintrinsics: [360.5, 360, 310, 94]\n"
+      "distortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\nrate_hz: 10\n");
+  const std::string good = read_file(folder_ / "camera.yaml");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return text(from + " -> " + to, replace_first(good, from, to));
+  };
+  expect_refused_with_faults(
+      folder_ / "camera.yaml", "360.5",
+      {"run", (sequence_ / "image_2").string(), "--camera", folder_ / "camera.yaml", "--out",
+       folder_ / "out"},
+      {},
+      {text("empty", ""), with("620", "0"), with("620", "-1"), with("620", "1e9"),
+       with("620", "62.5"), with("188", "99999999999999999999"), with("360.5", "-1"),
+       with("310", "1000"), with("[0, 0, 0, 0]", "[0, 0]"),
+       with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"), with("[0, 0, 0, 0]", "[nan, 0, 0, 0]"),
+       with("radial-tangential", "fish"), with("rate_hz: 10", "rate_hz: 0"),
+       with("rate_hz: 10", "rate_hz: 1e300"), with("rate_hz", "rate"),
+       with("image_width", "image_height"), text("a list", "- 1\n- 2\n"),
+       text("two documents", good + "---\n" + good), text("a tab", "\t" + good)});
+}
+
+TEST_F(BadInputTable, ConfigurationFile) {
+  write_file(folder_ / "my.yaml", "scale:\n  constant_m: 1.5\n");
+  expect_refused_with_faults(
+      folder_ / "my.yaml", "1.5",
+      {"run", folder_ / "none", "--out", folder_ / "out", "--config", folder_ / "my.yaml"},
+      {"cut", "missing"},
+      {text("unknown key", "scale: {height: 1}\n"), text("unknown group", "scales: {}\n"),
+       text("twice", "seed: 1\nseed: 2\n"), text("a list", "[1, 2]\n"),
+       text("a comma", "{seed: 1},\n"), text("two documents", "seed: 1\n---\nseed: 2\n"),
+       text("an alias", "seed: *one\n"),
+       text("a bomb", "a: &a [x, x, x]\nb: &b [*a, *a, *a]\nc: [*b, *b, *b]\n"),
+       text("a group for a value", "seed: {a: 1}\n"), text("a value for a group", "scale: 1\n"),
+       text("no end", "stem: {model: \"gray\n")});
+}
+
+TEST_F(BadInputTable, ManifestAndModel) {
+  testing::write_models(folder_, testing::kPlain4);
+  const std::string model = folder_ / "plain_k4s4.onnx";
+  const std::string good = read_file(folder_ / "manifest.yaml");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    return text(from + " -> " + to, replace_first(good, from, to));
+  };
+  expect_refused_with_faults(
+      folder_ / "manifest.yaml", "stride: 4", {"models", model}, {"NaN"},
+      {text("empty", ""), with("stride: 4", "stride: 0"), with("stride: 4", "stride: 8000"),
+       with("stride: 4", "stride: x"), with("[4, 4]", "[40000, 40000]"), with("[4, 4]", "[4]"),
+       with("[4, 4]", "[4.5, 4]"), with("[0, 0, 0, 0]", "[4, 0, 0, 0]"),
+       with("[0, 0, 0, 0]", "[-1, 0, 0, 0]"), with("filters: 3", "filters: 1000000"),
+       with("filters: 3", "filters: 0"), with("default_filter: 1", "default_filter: 3"),
+       with("sha256: ", "sha256: x"), with("file: plain", "file: ../plain"),
+       with("name: plain_k4s4", "name: gray"),
+       with("licence: MIT",
+            "folded: {filter: 0, sampling: 0, file: a.onnx, sha256: b}\n    licence: MIT"),
+       with("models:", "model:"), text("twice", good + good.substr(good.find('\n') + 1))});
+  expect_refused_with_faults(folder_ / "plain_k4s4.onnx", "weights", {"models", model}, {},
+                             {text("empty", "")});
+}
+
+TEST_F(BadInputTable, HostileModels) {
+  for (const char* name :
+       {"kernel", "stride", "size", "domain", "loop", "external", "nan", "infinite", "rank"}) {
+    const TempFolder folder;
+    const testing::TinyStem stem{.name = std::string("hostile_") + name, .kernel = 1, .stride = 1};
+    testing::write_models(folder, stem);
+    const ProgramResult result = run_stemvo({"models", folder / (stem.name + ".onnx")});
+    EXPECT_EQ(result.exit_code, 1) << name;
+    EXPECT_THAT(result.err,
+                AllOf(StartsWith("error: "), HasSubstr(stem.name), Not(HasSubstr("internal"))))
+        << name;
+    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
+  }
+}
+
+TEST_F(BadInputTable, MetricsAndThresholds) {
+  write_file(folder_ / "metrics.json", "{\"t_rel_percent\": 0.875, \"segments\": null}\n");
+  write_file(folder_ / "limits.yaml", "t_rel_percent: {max: 1.5}\n");
+  const Words check = {"check", folder_ / "metrics.json", "--against", folder_ / "limits.yaml"};
+  expect_refused_with_faults(folder_ / "metrics.json", "0.875", check, {"1e300"},
+                             {text("empty", ""), text("a list", "[1, 2]"), text("a number", "3"),
+                              text("more behind it", "{} {}")});
+  expect_refused_with_faults(
+      folder_ / "limits.yaml", "1.5", check, {},
+      {text("empty", ""), text("a list", "[1, 2]"), text("no bound", "t_rel_percent: {}\n"),
+       text("unknown bound", "t_rel_percent: {most: 1}\n"),
+       text("twice", "t_rel_percent: {max: 1}\nt_rel_percent: {max: 2}\n"),
+       text("unknown number", "t_rel: {max: 1}\n"),
+       text("two documents", "t_rel_percent: {max: 1}\n---\nt_rel_percent: {max: 2}\n")});
+}
+
+TEST_F(BadInputTable, Images) {
+  const fs::path image = sequence_ / "image_2/000000.png";
+  const std::string good = read_file(image);
+  const auto with = [&](std::size_t at, const std::string& bytes) {
+    return text(fmt::format("byte {}", at), std::string(good).replace(at, bytes.size(), bytes));
+  };
+  expect_refused_with_faults(
+      image, "IDAT", run(), {},
+      {text("empty", ""), text("signature alone", good.substr(0, 8)),
+       text("header alone", good.substr(0, 33)), with(0, "x"), with(16, std::string("\0\0\0\0", 4)),
+       with(16, "\xff\xff\xff\xff"), with(20, "\x7f\xff\xff\xff"), with(24, "\x07"),
+       with(25, "\x09"), with(29, "xxxx"), with(good.size() / 2, "xxxx"),
+       with(good.size() - 12, "\xff"), text("a JPEG", "\xff\xd8\xff\xe0 and no more")});
+}
+
+/// A record of a search, merged.
+TEST_F(BadInputTable, Records) {
+  const fs::path drive = test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
+  const std::string part = folder_ / "part";
+  ASSERT_EQ(
+      run_stemvo({"search", drive / "sequences/00", "--out", part, "--exhaustive", "--filters",
+                  "0:1", "--no-baselines", "--quiet", "--set", "evaluation.segment_lengths_m=[2]"})
+          .exit_code,
+      0);
+  const fs::path records = part + "/records.jsonl";
+  const std::string good = read_file(records);
+  const auto with = [&](const std::string& from, const std::string& to) {
+    EXPECT_THAT(good, HasSubstr(from));
+    return text(from + " -> " + to, replace_first(good, from, to));
+  };
+  expect_refused_with_faults(
+      records, "\"rung\":0", {"search", "--merge", part, "--out", folder_ / "merged"}, {},
+      {text("empty", ""), text("identity alone", good.substr(0, good.find('\n') + 1)),
+       with("\"rung\":0", "\"rung\":99"), with("\"rung\":0", "\"rung\":-1"),
+       with("\"filter\":0", "\"filter\":5"), with("\"drives\":[{", "\"drives\":[],\"x\":[{"),
+       with("\"sequences\":[{", "\"sequences\":[],\"x\":[{"),
+       with("\"layers\":[{", "\"layers\":[],\"x\":[{"),
+       with("\"rungs\":[{", "\"rungs\":[],\"x\":[{"),
+       with("\"stemvo_search\":", "\"stemvo_search\":9"),
+       with("\"detected\":true", "\"detected\":1e300")});
+}
+
+/// Every key with every value that it cannot have; and that it can have those at its ends, which
+/// shows in that the next thing is missed.
+TEST_F(BadInputTable, ConfigurationKeys) {
+  Options options;
+  std::vector<Case> cases;
+  const std::string none = folder_ / "none";
+  const auto add = [&](const std::string& key, const std::string& value, const std::string& word) {
+    const std::string assignment = key + "=" + value;
+    cases.push_back(
+        {assignment, {"run", none, "--out", folder_ / "out", "--set", assignment}, word});
+  };
+  for (const options::Field& field : options::fields_of(options)) {
+    const bool is_whole = std::holds_alternative<int*>(field.value);
+    const std::string key = field.name();
+    if (is_whole || std::holds_alternative<double*>(field.value)) {
+      const double step = is_whole ? 1.0 : 1e-6;
+      add(key, fmt::format("{}", field.rule.min - step), key);
+      add(key,
+          fmt::format("{}", is_whole ? std::ceil(1.001 * field.rule.max + step)
+                                     : 1.001 * field.rule.max + step),
+          key);
+      add(key, "nan", key);
+      add(key, "1e300", key);
+      const bool is_pair = key.starts_with("stem.stretch_");  // one of them ends at the other
+      add(key, fmt::format("{}", field.rule.min), is_pair ? "error" : none);
+      add(key, fmt::format("{}", field.rule.max), is_pair ? "error" : none);
+    }
+    if (!std::holds_alternative<std::string*>(field.value)) {
+      add(key, "x", key);
+      add(key, "", key);
+    }
+  }
+  EXPECT_GT(cases.size(), 250U);
+  expect_refused(cases);
+}
+
+}  // namespace
+}  // namespace stemvo

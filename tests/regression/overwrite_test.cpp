@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "support/program_test.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A copy of ten rendered frames, which no command may write over.
+class Overwrite : public ::testing::Test {
+ protected:
+  [[nodiscard]] ProgramResult run(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"run", sequence_.string(), "--quiet"});
+    return run_stemvo(more);
+  }
+  [[nodiscard]] std::string copy_of_poses(const std::string& name) const {
+    fs::create_directories((folder_ / name).parent_path());
+    fs::copy_file(folder_ / "poses/00.txt", folder_ / name);
+    return folder_ / name;
+  }
+
+  TempFolder folder_;
+  fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  std::string out_ = folder_ / "out";
+};
+
+TEST_F(Overwrite, EvaluateSparesWhatItReads) {
+  const std::string truth = copy_of_poses("truth.txt");
+  const std::string estimate = copy_of_poses("estimate.txt");
+  const std::string poses = read_file(truth);
+  fs::create_symlink(truth, folder_ / "link.json");
+  fs::create_symlink("estimate.txt", folder_ / "also.txt");
+  for (const std::string& json : {truth, estimate, (folder_ / "link.json").string()}) {
+    expect_error(run_stemvo({"evaluate", "--gt", truth, folder_ / "also.txt", "--json", json}), 1,
+                 {json, "expected a file to write that is no input"});
+  }
+  EXPECT_EQ(read_file(truth), poses);
+  EXPECT_EQ(read_file(estimate), poses);
+  EXPECT_EQ(
+      run_stemvo({"evaluate", "--gt", truth, estimate, "--json", folder_ / "new.json"}).exit_code,
+      0);
+}
+
+TEST_F(Overwrite, CalibrateSparesWhatItReads) {
+  write_file(folder_ / "my.yaml", "seed: 1\n");
+  fs::create_symlink(sequence_ / "times.txt", folder_ / "link.txt");
+  for (const fs::path& file :
+       {sequence_ / "calib.txt", sequence_ / "times.txt", folder_ / "link.txt", folder_ / "my.yaml",
+        sequence_ / "image_2/000003.png", folder_ / "poses/00.txt"}) {
+    const std::string before = read_file(file);
+    expect_error(run_stemvo({"calibrate", sequence_.string(), "--config", folder_ / "my.yaml",
+                             "--out", file.string()}),
+                 1, {file.string(), "expected a file to write that is no input"});
+    EXPECT_EQ(read_file(file), before);
+  }
+}
+
+TEST_F(Overwrite, ResultsOfARunSpareWhatItReads) {
+  const std::string truth = copy_of_poses("out/trajectory_kitti.txt");
+  const std::string poses = read_file(truth);
+  expect_error(run({"--out", out_, "--gt", truth}), 1, {truth, "no input"});
+  EXPECT_EQ(read_file(truth), poses);
+  write_file(out_ + "/config.yaml", "# mine\nseed: 3\n");
+  expect_error(run({"--out", out_, "--config", out_ + "/config.yaml"}), 1,
+               {"config.yaml", "no input"});
+  fs::remove(out_ + "/config.yaml");
+  EXPECT_EQ(run({"--out", out_}).exit_code, 0);
+  EXPECT_EQ(run({"--out", out_, "--config", out_ + "/config.yaml"}).exit_code, 0)
+      << "a run is repeated with its own configuration";
+}
+
+TEST_F(Overwrite, PicturesRemoveTheirOwnOnly) {
+  fs::create_directories(out_);
+  fs::copy(sequence_ / "image_2", folder_ / "mine");
+  write_file(out_ + "/frames.csv", "");
+  fs::create_directory_symlink(folder_ / "mine", out_ + "/pictures");
+  expect_error(run({"--out", out_, "--pictures", "1"}), 1, {"pictures", "found a link"});
+  EXPECT_TRUE(fs::exists(folder_ / "mine/000007.png"));
+  fs::remove(out_ + "/pictures");
+  fs::remove(out_ + "/frames.csv");
+  fs::copy(sequence_ / "image_2", out_ + "/pictures");
+  expect_error(run({"--out", out_, "--pictures", "1"}), 1, {"pictures", "earlier run"});
+  EXPECT_EQ(read_file(out_ + "/pictures/000007.png"), read_file(sequence_ / "image_2/000007.png"));
+  fs::remove_all(out_ + "/pictures");
+  EXPECT_EQ(run({"--out", out_, "--pictures", "1"}).exit_code, 0);
+  EXPECT_EQ(run({"--out", out_, "--pictures", "5"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists(out_ + "/pictures/000005.png"));
+  EXPECT_FALSE(fs::exists(out_ + "/pictures/000004.png"));
+}
+
+TEST_F(Overwrite, PicturesInTheFolderOfTheFrames) {
+  const fs::path drive = folder_ / "drive";
+  fs::create_directories(drive);
+  fs::copy(sequence_ / "image_2", drive / "pictures");
+  write_file(drive / "frames.csv", "");
+  write_file(folder_ / "camera.yaml",
+             "image_width: 620\nimage_height: 188\nintrinsics: [360, 360, 310, 94]\n"
+             "distortion_model: none\nrate_hz: 10\n");
+  expect_error(run_stemvo({"run", drive / "pictures", "--camera", folder_ / "camera.yaml", "--out",
+                           drive.string(), "--pictures", "2"}),
+               1, {"pictures", "no input"});
+  EXPECT_TRUE(fs::exists(drive / "pictures/000000.png"));
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "support/program_test.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Runs the program where it may have so much of a resource only.
+class ResourceLimits : public ::testing::Test {
+ protected:
+  [[nodiscard]] ProgramResult run_under(const std::string& limit) const {
+    const std::string command = "ulimit -c 0; " + limit + "; exec " + STEMVO_PROGRAM + " run " +
+                                drive_.string() + " --quiet --out " + (folder_ / "out").string();
+    return test::run_program("/bin/bash", {"-c", command});
+  }
+
+  /// One line that is no bug's, or all frames were read.
+  void expect_said(const std::string& limit, const std::string& what) const {
+    const ProgramResult result = run_under(limit);
+    if (result.exit_code == 0) {
+      EXPECT_THAT(result.err, IsEmpty()) << limit;
+      const std::string rows = read_file(folder_ / "out/frames.csv");
+      EXPECT_THAT(rows, Not(HasSubstr("no_image"))) << limit;
+      return;
+    }
+    EXPECT_EQ(result.exit_code, 1) << limit << ": " << result.err;
+    EXPECT_THAT(result.err, ::testing::ContainsRegex(what)) << limit;
+    EXPECT_THAT(result.err, Not(HasSubstr("internal"))) << limit;
+    // ONNX Runtime may say on standard error too what it lacks.
+    const std::size_t last = result.err.rfind('\n', result.err.size() - 2) + 1;
+    EXPECT_THAT(result.err.substr(last), StartsWith("error: ")) << limit;
+  }
+
+  TempFolder folder_;
+  fs::path drive_ =
+      test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94}) / "sequences/00";
+};
+
+TEST_F(ResourceLimits, TooFewOpenFiles) {
+  for (const int limit : {4, 7, 9, 10, 12}) {
+    expect_said("ulimit -n " + std::to_string(limit), "open files");
+  }
+}
+
+/// From where the program's libraries are loaded on: the dynamic loader says what it lacks.
+TEST_F(ResourceLimits, TooLittleMemory) {
+  const ProgramResult probe = test::run_program(
+      "/bin/bash",
+      {"-c", std::string(STEMVO_PROGRAM) +
+                 " --version & wait $!; "
+                 "for v in $(seq 200000 10000 500000); do (ulimit -c 0; ulimit -v $v; exec " +
+                 STEMVO_PROGRAM + " --version >/dev/null 2>&1) && echo $v && break; done"});
+  const std::string first = probe.out.substr(probe.out.find('\n') + 1);
+  ASSERT_FALSE(first.empty()) << probe.err;
+  for (int kib = std::stoi(first), end = kib + 96000; kib < end; kib += 12000) {
+    expect_said("ulimit -v " + std::to_string(kib),
+                "out of memory|out of threads|bad_alloc|Cannot allocate memory");
+  }
+}
+
+TEST_F(ResourceLimits, TooFewThreads) {
+  if (::geteuid() == 0) {
+    GTEST_SKIP() << "the limit is none for root";
+  }
+  expect_said("ulimit -u 1", "out of threads");
+}
+
+}  // namespace
+}  // namespace stemvo
