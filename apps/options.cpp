@@ -84,8 +84,10 @@ CLI::Option* add_file_option(CLI::App& command,
   return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
 }
 
-void add_out_folder(CLI::App& command, std::filesystem::path& folder, const std::string& help) {
-  command.add_option("--out", folder, help)->required()->type_name("DIR");
+CLI::Option* add_out_folder(CLI::App& command,
+                            std::filesystem::path& folder,
+                            const std::string& help) {
+  return command.add_option("--out", folder, help)->required()->type_name("DIR");
 }
 
 void add_threads_option(CLI::App& command, int& num_threads) {

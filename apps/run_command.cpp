@@ -35,12 +35,14 @@ or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
   rate_hz: 30                                                   # or give --times
   camera_height: 1.65                                           # metres above the road, if known
 
-Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are undistorted. Without camera_height the path is up to
-scale (scale.source=none).
+Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are
+undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
+(scale.source=none).
 
---out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory_refined_kitti.txt
-(odometry.mode map: the same with look-ahead), trajectory.png and .svg (the path drawn), metrics.json
-(the numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
+--out (results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
+poses), trajectory_refined_kitti.txt (odometry.mode map: the same with look-ahead), trajectory.png and
+.svg (the path drawn), metrics.json (the numbers), frames.csv (a row per frame), config.yaml (what was
+run) and, with --map, map.ply.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
@@ -49,7 +51,7 @@ Examples:
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
   stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn
   stemvo run drive/images --camera camera.yaml --out result                    your own camera
-  stemvo run drive.mp4 --camera camera.yaml --out result                       a video
+  stemvo run drive.mp4 --camera camera.yaml --mask 0,900,1920,180              a video, no bonnet
   stemvo run 'drive/left_*.png' --camera camera.yaml --times times.txt --out result)";
 
 struct Arguments {
@@ -66,9 +68,12 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   if (summary.report.timing) {
     print('\n' + format_timing_table(*summary.report.timing) + '\n');
   }
-  print(fmt::format("plot: {}\n", (arguments.request.out_dir / "trajectory.png").string()));
+  if (arguments.request.out_dir.empty()) {
+    print(fmt::format("results: {}\n", summary.out_dir.string()));
+  }
+  print(fmt::format("plot: {}\n", (summary.out_dir / "trajectory.png").string()));
   if (arguments.request.write_map) {
-    print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
+    print(fmt::format("map: {}\n", (summary.out_dir / "map.ply").string()));
   }
 }
 
@@ -108,7 +113,7 @@ Expected<int> run(Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_run(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a folder of frames");
+  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a recording");
   const auto arguments = std::make_shared<Arguments>();
   RunRequest& request = arguments->request;
   command
@@ -117,7 +122,9 @@ CLI::App* add_run(CLI::App& app, Action& action) {
           "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
-  add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
+  add_out_folder(*command, request.out_dir,
+                 "Folder for the results; created, files replaced; default: results/NAME of INPUT")
+      ->required(false);
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
   add_file_option(*command, "--gt", request.ground_truth,
@@ -129,6 +136,14 @@ CLI::App* add_run(CLI::App& app, Action& action) {
                   "Of images: a time in seconds per image; default: the camera's rate_hz");
   add_file_option(*command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
+  command
+      ->add_option(
+          "--mask", request.masks,
+          "No points there: a rectangle of the frames in pixels, or an image of their size, "
+          "black there; may be repeated")
+      ->type_name("x,y,w,h|FILE")
+      ->expected(1)
+      ->take_all();
   add_threads_option(*command, request.num_threads);
   command->add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")

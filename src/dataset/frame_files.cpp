@@ -111,6 +111,24 @@ Status check_center(const Camera& camera) {
   return {};
 }
 
+Status add_view(FrameList& frames,
+                const FrameView& view,
+                const std::vector<std::string>& masks,
+                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+  const auto mask = make_mask(masks, view.full_size());
+  if (!mask) {
+    return mask.error();
+  }
+  frames.mask = view.apply_to_mask(*mask);
+  frames.full_size = view.full_size();
+  frames.camera = view.camera();
+  frames.read = [view, read_whole = std::move(read_whole)](std::size_t index) {
+    return read_whole(index).map(
+        [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
+  };
+  return {};
+}
+
 Expected<cv::Mat> check_size(const fs::path& file, Expected<cv::Mat> image, const Camera& camera) {
   if (image && (image->cols != camera.width_px || image->rows != camera.height_px)) {
     return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", file.string(),

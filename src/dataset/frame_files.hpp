@@ -14,6 +14,7 @@
 
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_source.hpp"
+#include "dataset/frame_view.hpp"
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
@@ -70,6 +71,13 @@ namespace stemvo::dataset {
 [[nodiscard]] Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);
+
+/// Camera, size, mask and reader: `read_whole` gives the frames as they come, of the view's full
+/// size. Errors: those of make_mask.
+[[nodiscard]] Status add_view(FrameList& frames,
+                              const FrameView& view,
+                              const std::vector<std::string>& masks,
+                              std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
 /// What most of the first readable images are; of equals the one seen first. One odd frame must
 /// not throw the rest away. `kind_of`: of a file. Error: none can be read.

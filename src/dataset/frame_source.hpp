@@ -45,12 +45,14 @@ struct GroundTruth {
 };
 
 /// What a source knows of its frames before one is read. Files, times and poses are those of the
-/// range, one per frame; a stream has none of them.
+/// range, one per frame; a stream has none of them but a video's file.
 struct FrameList {
-  std::string kind;  ///< what it was recognised as, e.g. "KITTI sequence"
-  std::string name;  ///< of the folder, e.g. "03"
-  FrameRange range;  ///< in the folder's numbering
-  Camera camera;     ///< pinhole without distortion, of the frames as they are read
+  std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
+  std::string name;    ///< of the folder, e.g. "03"
+  FrameRange range;    ///< in the folder's numbering
+  Camera camera;       ///< pinhole without distortion, of the frames as they are read
+  cv::Size full_size;  ///< of the frames as they come, where they are read at another size
+  cv::Mat mask;  ///< of the frames as they are read: 0 where no points are wanted; empty: none
   std::vector<std::filesystem::path> files;
   std::vector<double> timestamps_s;
   std::optional<Trajectory> ground_truth;  ///< first pose is the identity
@@ -127,6 +129,7 @@ struct SequenceOptions {
   /// the file has times, else a pose per frame.
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
   double ground_truth_tolerance_s = kTimeTolerance_s;
+  std::vector<std::string> masks = {};  ///< parts without points, as dataset::make_mask takes them
   /// Else calib.txt in the folder. KITTI's layout only.
   std::optional<std::filesystem::path> calibration = std::nullopt;
 };

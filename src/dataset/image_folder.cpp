@@ -4,7 +4,6 @@
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_files.hpp"
 #include "dataset/kitti_text.hpp"
-#include "dataset/undistortion.hpp"
 #include "io/image_file.hpp"
 
 namespace stemvo::dataset {
@@ -94,23 +93,20 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   if (!is_color) {
     return is_color.error();
   }
-  auto undistortion = Undistortion::create(camera_file->lens);
-  if (!undistortion) {
-    return fail(fmt::format("{}: {}", camera_path->string(), undistortion.error().message));
+  const auto view = FrameView::create(camera_file->lens, *camera_path);
+  if (!view) {
+    return view.error();
   }
   frames.kind = listing.kind;
   frames.name = listing.name;
   frames.given_calibration = camera_path;
-  frames.camera = undistortion->camera();
   frames.camera_height_m = camera_file->camera_height_m;
-  frames.read = [files = frames.files, is_color = *is_color, raw = camera_file->lens.camera,
-                 undistortion = *undistortion](std::size_t index) {
-    const fs::path& file = files[index];
-    return check_size(file, io::read_image(file, is_color), raw).map([&](const cv::Mat& image) {
-      return undistortion.apply(image);
-    });
-  };
-  return FrameSource(std::move(frames));
+  const Status status = add_view(
+      frames, *view, request.masks,
+      [files = frames.files, is_color = *is_color, raw = camera_file->lens.camera](std::size_t i) {
+        return check_size(files[i], io::read_image(files[i], is_color), raw);
+      });
+  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
 }
 
 }  // namespace stemvo::dataset

@@ -158,6 +158,12 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                               status.error().message));
     }
   }
+  const auto mask = dataset::make_mask(options.masks, kind->size);
+  if (!mask) {
+    return mask.error();
+  }
+  frames.mask = *mask;
+  frames.full_size = kind->size;
   frames.read = [files = frames.files, is_color, sized = frames.camera](std::size_t index) {
     return dataset::check_size(files[index], io::read_png(files[index], is_color), sized);
   };

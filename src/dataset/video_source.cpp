@@ -61,13 +61,12 @@ Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
                                   const CameraFile& camera,
                                   const FrameSourceRequest& request) {
   const std::string owner = request.sequence_dir.string();
-  Status status = check_stream_size(stream->size(), camera.lens.camera, owner);
-  auto undistortion = Undistortion::create(camera.lens);
-  if (status && !undistortion) {
-    status =
-        fail(fmt::format("{}: {}", request.camera_file->string(), undistortion.error().message));
-  }
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
+  Status status = check_stream_size(stream->size(), camera.lens.camera, owner);
+  const auto view = FrameView::create(camera.lens, *request.camera_file);
+  if (status && !view) {
+    status = view.error();
+  }
   status = status ? stream->skip(range.begin) : status;
   if (!status) {
     return status.error();
@@ -77,13 +76,15 @@ Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
   frames.kind = stream->is_live() ? "live camera" : "video";
   frames.name = stream->is_live() ? fmt::format("camera{}", camera_number(owner).value_or(0))
                                   : request.sequence_dir.stem().string();
+  if (!stream->is_live()) {
+    frames.files = {request.sequence_dir};
+  }
   const std::size_t end = range.end.value_or(std::numeric_limits<std::size_t>::max());
   frames.range = {range.begin, end};
   const std::size_t all = stream->expected_frames();
   frames.stream =
       StreamInfo{end - range.begin, all > range.begin ? std::min(all, end) - range.begin : 0U,
                  stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); }};
-  frames.camera = undistortion->camera();
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
   if (request.ground_truth) {
@@ -96,11 +97,12 @@ Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
       return match_frames(truth, *request.ground_truth, request, times_s);
     };
   }
-  frames.read = [stream, undistortion = *undistortion](std::size_t index) {
-    return stream->read(index).map(
-        [&](const cv::Mat& image) { return image.empty() ? image : undistortion.apply(image); });
-  };
-  return FrameSource(std::move(frames));
+  status = add_view(
+      frames, *view, request.masks, [stream, owner, raw = camera.lens.camera](std::size_t index) {
+        auto image = stream->read(index);
+        return image && image->empty() ? image : check_size(owner, std::move(image), raw);
+      });
+  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
 }
 
 Expected<FrameSource> open_video(const FrameSourceRequest& request) {

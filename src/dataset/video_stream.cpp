@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,7 +16,11 @@ namespace fs = std::filesystem;
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file) {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
-  auto capture = std::make_unique<cv::VideoCapture>(file.string(), cv::CAP_FFMPEG);
+  // A playlist may name anything; and a relative path with a colon would be taken for an address.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
+  std::error_code code;
+  const fs::path path = fs::absolute(file, code);
+  auto capture = std::make_unique<cv::VideoCapture>(path.string(), cv::CAP_FFMPEG);
   if (!capture->isOpened()) {
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
@@ -83,11 +88,13 @@ bool VideoStream::grab() {
 
 Status VideoStream::skip(std::size_t count) {
   const std::lock_guard lock(mutex_);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i <= count; ++i) {
     if (!grab()) {
-      return fail(fmt::format("{}: expected more than {} frames, found {}", name_, count, i));
+      return fail(fmt::format("{}: expected more than {} frames that can be decoded, found {}",
+                              name_, count, i));
     }
   }
+  is_grabbed_ = true;
   return {};
 }
 
@@ -98,7 +105,7 @@ Expected<cv::Mat> VideoStream::read(std::size_t index) {
     return cv::Mat();
   }
   cv::Mat image;
-  if (grab()) {
+  if (std::exchange(is_grabbed_, false) || grab()) {
     capture_->retrieve(image);
     times_s_.push_back(*last_time_s_);
     ++next_;

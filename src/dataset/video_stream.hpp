@@ -38,7 +38,7 @@ class VideoStream {
   VideoStream(const VideoStream&) = delete;
   VideoStream& operator=(const VideoStream&) = delete;
 
-  /// Decodes and drops frames, before the first is read. Error: fewer are there.
+  /// Decodes and drops frames, before the first is read. Error: none is left to be read.
   [[nodiscard]] Status skip(std::size_t count);
 
   [[nodiscard]] cv::Size size() const;
@@ -50,7 +50,7 @@ class VideoStream {
 
   /// Frame `index`, counted from 0 behind those skipped: CV_8UC3, RGB; empty behind the last one.
   /// Each is read once; several threads may ask for frames that follow one another, and wait for
-  /// their turn. Error: a frame of another size than the first.
+  /// their turn. Error: a frame that cannot be decoded.
   [[nodiscard]] Expected<cv::Mat> read(std::size_t index);
   /// Of a frame that was read, in seconds; increasing.
   [[nodiscard]] double time_s(std::size_t index) const;
@@ -68,7 +68,8 @@ class VideoStream {
 
   mutable std::mutex mutex_;
   std::condition_variable turn_;
-  std::size_t next_ = 0;  ///< the frame whose turn it is
+  std::size_t next_ = 0;     ///< the frame whose turn it is
+  bool is_grabbed_ = false;  ///< it waits to be read
   bool is_ended_ = false;
   std::optional<double> last_time_s_;  ///< of the frame grabbed last
   std::deque<double> times_s_;

@@ -6,9 +6,19 @@
 #include <fmt/format.h>
 
 namespace stemvo::pipeline {
+
+std::string count_matched(const RunRequest& request,
+                          std::size_t num_matched,
+                          std::size_t num_frames) {
+  const std::string others = fmt::format(" (the others have none within {} s: --gt-tolerance)",
+                                         request.ground_truth_tolerance_s);
+  return fmt::format(" for {} of {} frames{}", num_matched, num_frames,
+                     num_matched < num_frames ? others : "");
+}
+
 namespace {
 
-std::string describe_truth(const FrameSource& sequence) {
+std::string describe_truth(const RunRequest& request, const FrameSource& sequence) {
   if (!sequence.has_ground_truth()) {
     return "no ground truth";
   }
@@ -16,17 +26,20 @@ std::string describe_truth(const FrameSource& sequence) {
     return "ground truth to be matched";
   }
   const auto& frames = sequence.frames().ground_truth_frames;
-  return frames
-             ? fmt::format("ground truth for {} of {} frames (the others have none of their time)",
-                           frames->size(), sequence.size())
-             : "ground truth";
+  return "ground truth" +
+         (frames ? count_matched(request, frames->size(), sequence.size()) : std::string());
 }
 
 std::string describe_size(const FrameSource& sequence) {
   const Camera& camera = sequence.camera();
   const std::string count =
       sequence.stream() ? "frames" : fmt::format("{} frames", sequence.size());
-  return fmt::format("{} of {}x{} pixels", count, camera.width_px, camera.height_px);
+  const cv::Size full = sequence.frames().full_size;
+  const std::string worked_on =
+      full == cv::Size(camera.width_px, camera.height_px)
+          ? ""
+          : fmt::format(" worked on at {}x{}", camera.width_px, camera.height_px);
+  return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
 }  // namespace
@@ -34,7 +47,7 @@ std::string describe_size(const FrameSource& sequence) {
 void note_input(const RunRequest& request, const FrameSource& sequence) {
   if (request.note) {
     request.note(fmt::format("input: {} {}, {}, {}", sequence.kind(), sequence.name(),
-                             describe_size(sequence), describe_truth(sequence)));
+                             describe_size(sequence), describe_truth(request, sequence)));
   }
 }
 

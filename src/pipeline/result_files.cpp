@@ -12,6 +12,7 @@
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
+#include "pipeline/input_notes.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/map_ply.hpp"
 #include "report/trajectory_plot.hpp"
@@ -105,8 +106,8 @@ class ResultWriter {
     keep_first(written, write_trajectory_svg(folder / "trajectory.svg", plot));
     keep_first(written, matched_);
     if (request_.note && truth_ && sequence_.stream()) {
-      request_.note(fmt::format("ground truth: for {} of {} frames", truth_->frames.size(),
-                                trajectory_.size()));
+      request_.note("ground truth" +
+                    count_matched(request_, truth_->frames.size(), trajectory_.size()));
     }
     return written;
   }

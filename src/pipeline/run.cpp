@@ -142,19 +142,22 @@ Status check_inputs_are_spared(const RunRequest& request, const FrameSource& seq
   std::vector<std::filesystem::path> inputs = pipeline::input_files(sequence, config);
   if (request.image_every > 0) {
     results.push_back(request.out_dir / "pictures");
-    inputs.push_back(sequence.file(0).parent_path());
+    if (!sequence.frames().files.empty()) {  // a live camera has none
+      inputs.push_back(sequence.file(0).parent_path());
+    }
   }
   if (request.times) {
     inputs.push_back(*request.times);
   }
+  inputs.insert(inputs.end(), request.masks.begin(), request.masks.end());
   return check_spares_inputs(results, inputs);
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
-  Expected<PhasedOdometry> odometry =
-      pipeline::create_odometry(request.config, sequence.camera(), request.models_dir);
+  Expected<PhasedOdometry> odometry = pipeline::create_odometry(
+      request.config, sequence.camera(), request.models_dir, sequence.frames().mask);
   if (!odometry) {
     return odometry.error();
   }
@@ -177,6 +180,10 @@ Expected<RunSummary> run_source(const RunRequest& request,
   }
   pipeline::note_input(request, sequence);
   pipeline::Drive done = drive(request, sequence, *odometry, keeper, progress);
+  if (done.trajectory.empty()) {
+    return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
+                            request.sequence_dir.string()));
+  }
   MetricsReport report;
   Status written = timed(Stage::kResultFiles, [&] {
     return pipeline::write_results(request, sequence, *odometry, done, report);
@@ -187,7 +194,8 @@ Expected<RunSummary> run_source(const RunRequest& request,
     report.timing->num_threads = cv::getNumThreads();
   }
   pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
-  return RunSummary{report, std::move(done.warnings), done.interrupted, std::move(written)};
+  return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
+                    std::move(written)};
 }
 
 }  // namespace
@@ -206,6 +214,9 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   }
   RunRequest effective = request;
   effective.config = with_camera_height(request.config, *sequence);
+  if (request.out_dir.empty()) {
+    effective.out_dir = std::filesystem::path("results") / sequence->name();
+  }
   return run_source(effective, *sequence, progress);
 }
 

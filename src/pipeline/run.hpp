@@ -21,7 +21,7 @@ namespace stemvo {
 /// camera_height sets scale.camera_height_m where --set did not; without one scale.source becomes
 /// none where neither --set nor a configuration file named it.
 struct RunRequest : FrameSourceRequest {
-  std::filesystem::path out_dir;
+  std::filesystem::path out_dir;  ///< empty: results/ and the recording's name
   std::filesystem::path models_dir;
   Config config;
   int num_threads = 0;         ///< 0: all cores
@@ -38,6 +38,7 @@ struct RunRequest : FrameSourceRequest {
 /// What became of a run. Every file is written, also after an interrupt.
 struct RunSummary {
   MetricsReport report;               ///< what metrics.json holds
+  std::filesystem::path out_dir;      ///< where all of it is
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
   bool interrupted = false;           ///< stopped early, no live camera; results hold what was done
   Status written;                     ///< the first result that could not be written, if any
