@@ -23,18 +23,14 @@ namespace {
 std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
 int first_failure = 0;        // errno of the first write to standard output that failed
 
-void print_line(std::string_view label, std::string_view message) {
-  std::string line = fmt::format("{}: {}", label, message);
+void print_labelled(std::string_view label, std::string_view message) {
+  std::string line = label.empty() ? std::string(message) : fmt::format("{}: {}", label, message);
   for (char& c : line) {
     c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;  // libraries' messages may be many lines
   }
   line += '\n';
   print_note(line);
 }
-
-}  // namespace
-
-namespace {
 
 /// Whatever ends the program says so.
 [[noreturn]] void on_terminate() {
@@ -74,9 +70,11 @@ void print(std::string_view text) {
   }
 }
 
-void print_error(std::string_view message) { print_line("error", message); }
+void print_error(std::string_view message) { print_labelled("error", message); }
 
-void print_warning(std::string_view message) { print_line("warning", message); }
+void print_line(std::string_view message) { print_labelled("", message); }
+
+void print_warning(std::string_view message) { print_labelled("warning", message); }
 
 int flush_console(int exit_code) {
   if (std::fflush(stdout) != 0 && first_failure == 0) {

@@ -18,6 +18,8 @@ void print_error(std::string_view message);
 /// "warning: ..." on one line of standard error.
 void print_warning(std::string_view message);
 
+/// A line of standard error that is neither.
+void print_line(std::string_view message);
 /// To standard error as it is.
 void print_note(std::string_view text);
 

@@ -11,11 +11,14 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(Pose files are KITTI's (12 numbers a line) or TUM's (8 numbers a line). Both trajectories are moved to
-start at the identity; nothing else is fitted unless --align says so.
+    R"(Pose files are KITTI's (12 numbers a line), TUM's (8) or EuRoC's (state_groundtruth_estimate0/data.csv,
+the body's pose, which T_BS of ../cam0/sensor.yaml, or of --camera, makes the camera's). Where both
+files have times, each pose is compared with the true one nearest in time; else line by line. Both
+trajectories are moved to start at the identity; nothing else is fitted unless --align says so.
 
 Examples:
   stemvo evaluate --gt kitti/poses/03.txt result/trajectory_kitti.txt
+  stemvo evaluate --gt mav0/state_groundtruth_estimate0/data.csv result/trajectory_tum.txt --align sim3
   stemvo evaluate --gt kitti/poses/03.txt a.txt b.txt --align sim3 --json numbers.json)";
 
 struct Arguments {
@@ -43,7 +46,9 @@ Expected<int> evaluate(Arguments& arguments) {
 CLI::App* add_evaluate(CLI::App& app, Action& action) {
   CLI::App* command = app.add_subcommand("evaluate", "Compare trajectories with the ground truth");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("--gt", arguments->request.ground_truth, "Ground truth: KITTI poses")
+  command
+      ->add_option("--gt", arguments->request.ground_truth,
+                   "Ground truth: KITTI's, TUM's or EuRoC's poses")
       ->required()
       ->type_name("POSES");
   command->add_option("ESTIMATE", arguments->request.estimates, "Trajectories to judge")
@@ -52,6 +57,9 @@ CLI::App* add_evaluate(CLI::App& app, Action& action) {
   command->add_option("--align", arguments->alignment, "none (default), scale, se3 or sim3")
       ->type_name("KIND")
       ->check(CLI::IsMember({"none", "scale", "se3", "sim3"}));
+  add_tolerance_option(*command, arguments->request.tolerance_s);
+  add_file_option(*command, "--camera", arguments->request.camera_file,
+                  "With EuRoC's poses: the camera file with T_BS");
   add_file_option(*command, "--json", arguments->request.json,
                   "Write the numbers to this file as well");
   command->footer(kFooter);

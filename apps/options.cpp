@@ -84,14 +84,24 @@ CLI::Option* add_file_option(CLI::App& command,
   return command.add_option_function<std::string>(name, take, help)->type_name("FILE");
 }
 
-void add_out_folder(CLI::App& command, std::filesystem::path& folder, const std::string& help) {
-  command.add_option("--out", folder, help)->required()->type_name("DIR");
+CLI::Option* add_out_folder(CLI::App& command,
+                            std::filesystem::path& folder,
+                            const std::string& help) {
+  return command.add_option("--out", folder, help)->required()->type_name("DIR");
 }
 
 void add_threads_option(CLI::App& command, int& num_threads) {
   command.add_option("--threads", num_threads, "Threads; 0 (default): all cores")
       ->type_name("N")
       ->check(in_range(0, 1024));
+}
+
+void add_tolerance_option(CLI::App& command, double& tolerance_s) {
+  command
+      .add_option("--gt-tolerance", tolerance_s,
+                  "Most seconds between a frame and its true pose; default 0.01")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 3600.0).description(""));
 }
 
 CLI::Option* add_range_option(CLI::App& command,

@@ -37,12 +37,15 @@ CLI::Option* add_file_option(CLI::App& command,
 [[nodiscard]] CLI::Validator in_range(int min, int max);
 
 /// --out DIR, which must be given.
-void add_out_folder(CLI::App& command,
-                    std::filesystem::path& folder,
-                    const std::string& help = "Folder for the results; created");
+CLI::Option* add_out_folder(CLI::App& command,
+                            std::filesystem::path& folder,
+                            const std::string& help = "Folder for the results; created");
 
 /// --threads N.
 void add_threads_option(CLI::App& command, int& num_threads);
+
+/// --gt-tolerance S.
+void add_tolerance_option(CLI::App& command, double& tolerance_s);
 
 /// An option "A:B"; text of another form is wrong usage.
 CLI::Option* add_range_option(CLI::App& command,

@@ -44,10 +44,12 @@ bool Progress::update(std::size_t done, std::size_t total) {
     const double elapsed_s = std::max(std::chrono::duration<double>(now - start_).count(), 1e-9);
     const double per_s = static_cast<double>(done) / elapsed_s;
     const std::string rest =
-        is_last ? fmt::format("{} in all", describe_time(elapsed_s))
-                : describe_time(static_cast<double>(total - done) / per_s) + " left";
+        is_last      ? fmt::format("{} in all", describe_time(elapsed_s))
+        : total == 0 ? describe_time(elapsed_s) + " so far"
+                     : describe_time(static_cast<double>(total - done) / per_s) + " left";
+    const std::string of = total == 0 ? "" : fmt::format("/{}", total);
     const std::string text =
-        fmt::format("{}/{} {}, {:.1f} {}/s, {}", done, total, unit_, per_s, unit_, rest);
+        fmt::format("{}{} {}, {:.1f} {}/s, {}", done, of, unit_, per_s, unit_, rest);
     // \r and "erase to the end" keep a terminal's cursor on one line until the last.
     const std::string line =
         is_terminal_ ? "\r" + text + "\x1b[K" + (is_last ? "\n" : "") : text + "\n";

@@ -14,7 +14,8 @@ class Progress {
   /// `unit`: what is counted, e.g. "frames".
   Progress(std::string unit, bool is_quiet);
 
-  /// After each unit of work. False once the user interrupted, so that it fits as a callback.
+  /// After each unit of work; `total` 0: not known. False once the user interrupted, so that it
+  /// fits as a callback.
   bool update(std::size_t done, std::size_t total);
 
  private:

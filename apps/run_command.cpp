@@ -15,11 +15,17 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter =
-    R"(SEQUENCE_DIR holds image_2/000000.png, .. (colour) or image_0 (gray), calib.txt and times.txt, as in
-KITTI odometry. Ground truth is ../../poses/NN.txt from there, where it exists.
+    R"(INPUT is one of
+  KITTI/sequences/03    image_2/000000.png, .. (colour) or image_0 (gray), calib.txt, times.txt;
+                        ground truth is ../../poses/03.txt from there, where it exists
+  EUROC, or its mav0    cam0/data.csv, cam0/sensor.yaml, state_groundtruth_estimate0/data.csv
+  TUM                   rgb.txt, groundtruth.txt; the camera by --camera
+  RECORDING             images/, camera.yaml, and where they exist times.txt and poses.txt
+  drive.mp4             a video, decoded by FFmpeg; the camera by --camera
+  camera:0              /dev/video0, live, until Ctrl-C or the end of --frames; --camera
 
-With --camera it is a folder of PNG or JPEG images in the order of their names (frame2 before
-frame10), or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
+With --camera any folder of PNG or JPEG images in the order of their names (frame2 before frame10),
+or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
 
   image_width: 640
   image_height: 480
@@ -29,13 +35,14 @@ frame10), or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose
   rate_hz: 30                                                   # or give --times
   camera_height: 1.65                                           # metres above the road, if known
 
-EuRoC's sensor.yaml is read as well. Frames are undistorted. Without camera_height the path is up to
-scale (scale.source=none).
+Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are
+undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
+(scale.source=none).
 
---out receives trajectory_kitti.txt and trajectory_tum.txt (the poses), trajectory_refined_kitti.txt
-(odometry.mode map: the same with look-ahead), report.html (all there is to look at, for a browser),
-trajectory.png and .svg (the path drawn), metrics.json (the numbers), frames.csv (a row per frame),
-config.yaml (what was run) and, with --map, map.ply.
+--out (results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
+poses), trajectory_refined_kitti.txt (odometry.mode map: the same with look-ahead), report.html (all
+there is to look at, for a browser), trajectory.png and .svg (the path drawn), metrics.json (the
+numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
@@ -44,6 +51,7 @@ Examples:
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
   stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn
   stemvo run drive/images --camera camera.yaml --out result                    your own camera
+  stemvo run drive.mp4 --camera camera.yaml --mask 0,900,1920,180              a video, no bonnet
   stemvo run 'drive/left_*.png' --camera camera.yaml --times times.txt --out result)";
 
 struct Arguments {
@@ -60,9 +68,12 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   if (summary.report.timing) {
     print('\n' + format_timing_table(*summary.report.timing) + '\n');
   }
-  print(fmt::format("report: {}\n", (arguments.request.out_dir / "report.html").string()));
+  if (arguments.request.out_dir.empty()) {
+    print(fmt::format("results: {}\n", summary.out_dir.string()));
+  }
+  print(fmt::format("report: {}\n", (summary.out_dir / "report.html").string()));
   if (arguments.request.write_map) {
-    print(fmt::format("map: {}\n", (arguments.request.out_dir / "map.ply").string()));
+    print(fmt::format("map: {}\n", (summary.out_dir / "map.ply").string()));
   }
 }
 
@@ -76,6 +87,9 @@ Expected<int> run(Arguments& arguments) {
   request.models_dir = data_folder("models");
   request.command = command_line();
   request.started = process_start();
+  if (!arguments.is_quiet) {
+    request.note = print_line;
+  }
   Progress progress("frames", arguments.is_quiet);
   const Expected<RunSummary> summary = run_sequence(
       request,
@@ -100,24 +114,37 @@ Expected<int> run(Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_run(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a folder of frames");
+  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a recording");
   const auto arguments = std::make_shared<Arguments>();
   RunRequest& request = arguments->request;
   command
-      ->add_option("SEQUENCE_DIR", request.sequence_dir,
-                   "Sequence in KITTI's layout; with --camera, images")
+      ->add_option(
+          "INPUT", request.sequence_dir,
+          "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
-  add_out_folder(*command, request.out_dir, "Folder for the results; created, files replaced");
+  add_out_folder(*command, request.out_dir,
+                 "Folder for the results; created, files replaced; default: results/NAME of INPUT")
+      ->required(false);
   add_config_options(*command, arguments->config);
   add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
-  add_file_option(*command, "--gt", request.ground_truth, "Ground truth: a pose file of KITTI");
+  add_file_option(*command, "--gt", request.ground_truth,
+                  "Ground truth: poses in KITTI's, TUM's or EuRoC's format");
+  add_tolerance_option(*command, request.ground_truth_tolerance_s);
   add_file_option(*command, "--camera", request.camera_file,
-                  "SEQUENCE_DIR is a folder of images or a pattern, of this camera (see below)");
+                  "Camera file; INPUT may be any folder of images or a pattern (see below)");
   add_file_option(*command, "--times", request.times,
-                  "With --camera: a time in seconds per image; default: its rate_hz");
+                  "Of images: a time in seconds per image; default: the camera's rate_hz");
   add_file_option(*command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
+  command
+      ->add_option(
+          "--mask", request.masks,
+          "No points there: a rectangle of the frames in pixels, or an image of their size, "
+          "black there; may be repeated")
+      ->type_name("x,y,w,h|FILE")
+      ->expected(1)
+      ->take_all();
   add_threads_option(*command, request.num_threads);
   command->add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")

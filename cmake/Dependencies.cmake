@@ -7,7 +7,7 @@ macro(stemvo_require package apt)
 endmacro()
 
 stemvo_require(Eigen3 libeigen3-dev 3.4 NO_MODULE)
-stemvo_require(OpenCV libopencv-dev 4.5.2 COMPONENTS core imgproc imgcodecs features2d calib3d video)
+stemvo_require(OpenCV libopencv-dev 4.5.2 COMPONENTS core imgproc imgcodecs features2d calib3d video videoio)
 stemvo_require(TBB libtbb-dev 2021)
 stemvo_require(yaml-cpp libyaml-cpp-dev 0.7)
 stemvo_require(fmt libfmt-dev 9)

@@ -104,9 +104,10 @@ Status write_calibration(const CalibrationRequest& request,
 
 Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
                                                const CalibrationProgress& progress) {
-  const Expected<KittiSequence> sequence = KittiSequence::open(
-      request.sequence_dir,
-      {request.config.input.camera, request.frames, std::nullopt, calibration_file(request)});
+  const Expected<KittiSequence> sequence =
+      KittiSequence::open(request.sequence_dir, {.camera = request.config.input.camera,
+                                                 .frames = request.frames,
+                                                 .calibration = calibration_file(request)});
   if (!sequence) {
     return sequence.error();
   }

@@ -2,6 +2,7 @@
 #include "dataset/camera_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include "config/config_yaml.hpp"
+#include "dataset/camera_formats.hpp"
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
 
@@ -31,6 +33,7 @@ class Reader {
     status = status ? set_size(result.lens.camera) : status;
     status = status ? set_intrinsics(result.lens.camera) : status;
     status = status ? set_distortion(result.lens) : status;
+    status = status ? set_body(result.body_from_camera) : status;
     if (!status) {
       return status.error();
     }
@@ -55,12 +58,9 @@ class Reader {
     if (!root) {
       return root.error();
     }
-    root_ = *root;
-    for (const char* key : {"sensor_type", "comment", "T_BS"}) {
-      if (root_.IsMap()) {
-        root_.remove(key);
-      }
-    }
+    format_ = format_of_camera(*root);
+    root_ = format_.keys;
+    distortion_model_ = format_.implied_model;
     std::vector<Field> fields = this->fields();
     return config::read_document(root_, file_.string(), fields);
   }
@@ -116,40 +116,52 @@ class Reader {
   }
 
   Status set_intrinsics(Camera& camera) const {
+    const char* key = format_.has_matrix ? "camera_matrix" : "intrinsics";
     const std::vector<double>& numbers = intrinsics_;
-    if (const Status status = check_length("intrinsics", numbers, {4}, "[fx, fy, cx, cy]");
-        !status) {
+    Status status = format_.has_matrix
+                        ? check_length(key, numbers, {9}, "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]")
+                        : check_length(key, numbers, {4}, "[fx, fy, cx, cy]");
+    if (!status) {
       return status;
     }
-    camera.fx_px = numbers[0];
-    camera.fy_px = numbers[1];
-    camera.cx_px = numbers[2];
-    camera.cy_px = numbers[3];
+    const std::array<std::size_t, 4> places = format_.has_matrix
+                                                  ? std::array<std::size_t, 4>{0, 4, 2, 5}
+                                                  : std::array<std::size_t, 4>{0, 1, 2, 3};
+    camera.fx_px = numbers[places[0]];
+    camera.fy_px = numbers[places[1]];
+    camera.cx_px = numbers[places[2]];
+    camera.cy_px = numbers[places[3]];
     if (!(camera.fx_px >= 1e-3) || !(camera.fy_px >= 1e-3)) {
-      return refuse("intrinsics", fmt::format("expected positive focal lengths, found {} and {}",
-                                              camera.fx_px, camera.fy_px));
+      return refuse(key, fmt::format("expected positive focal lengths, found {} and {}",
+                                     camera.fx_px, camera.fy_px));
     }
-    const Status status = check_center(camera);
-    return status ? status : refuse("intrinsics", status.error().message);
+    status = check_center(camera);
+    return status ? status : refuse(key, status.error().message);
   }
 
   Status set_distortion(Lens& lens) const {
-    const std::string& model = distortion_model_;
-    const std::vector<double>& numbers = distortion_coefficients_;
+    const std::string_view model = model_name(distortion_model_);
+    std::vector<double> numbers = distortion_coefficients_;
     if (model.empty()) {
       return missing("distortion_model: none, radial-tangential or equidistant");
     }
-    constexpr const char* kKey = "distortion_coefficients";
+    const char* key = coefficients_key();
+    if (format_.has_matrix) {  // written with the zeros of models that have more
+      const std::size_t least = model == "equidistant" ? 4U : 5U;
+      while (numbers.size() > least && numbers.back() == 0.0) {
+        numbers.pop_back();
+      }
+    }
     Status status;
     if (model == "none") {
       lens.distortion = Distortion::kNone;
-      status = check_length(kKey, numbers, {0}, "[] for distortion_model none");
+      status = check_length(key, numbers, {0}, "[] for distortion_model none");
     } else if (model == "equidistant") {
       lens.distortion = Distortion::kEquidistant;
-      status = check_length(kKey, numbers, {4}, "[k1, k2, k3, k4]");
+      status = check_length(key, numbers, {4}, "[k1, k2, k3, k4]");
     } else {
       lens.distortion = Distortion::kRadialTangential;
-      status = check_length(kKey, numbers, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
+      status = check_length(key, numbers, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
     }
     if (status) {
       std::copy(numbers.begin(), numbers.end(), lens.coefficients.begin());
@@ -157,22 +169,52 @@ class Reader {
     return status;
   }
 
+  /// [R | t] of 12 numbers, or 16 with a last row that is not looked at.
+  Status set_body(std::optional<Rigid3>& body_from_camera) const {
+    if (transform_.empty()) {
+      return {};
+    }
+    const char* key = format_.is_kalibr ? "T_cam_imu" : "T_BS";
+    if (const Status status = check_length(key, transform_, {12, 16}, "16 numbers"); !status) {
+      return status;
+    }
+    const Matrix34d matrix =
+        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(transform_.data());
+    const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+    constexpr double kTolerance = 1e-3;
+    if (!(rotation.transpose() * rotation).isIdentity(kTolerance) || rotation.determinant() < 0.0) {
+      return refuse(key, "expected a rotation in the first three columns, found none");
+    }
+    const Rigid3 transform = Rigid3::from_matrix(matrix);
+    body_from_camera = format_.is_kalibr ? transform.inverse() : transform;
+    return {};
+  }
+
+  [[nodiscard]] const char* coefficients_key() const {
+    return format_.is_kalibr ? "distortion_coeffs" : "distortion_coefficients";
+  }
+
   std::vector<Field> fields() {
     const Rule side = Rule::between(1.0, kMaxImageSide_px);
-    const Rule distortion = Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
+    const Rule distortion =
+        format_.has_matrix ? Rule::one_of({"plumb_bob", "equidistant", "fisheye", "none"})
+                           : Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
+    const char* intrinsics_key = format_.has_matrix ? "camera_matrix" : "intrinsics";
     return {
         {"", "image_width", &width_px_, side, ""},
         {"", "image_height", &height_px_, side, ""},
         {"", "resolution", &resolution_, side, ""},
         {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
-        {"", "intrinsics", &intrinsics_, Rule::between(-1e6, 1e6), ""},
+        {"", intrinsics_key, &intrinsics_, Rule::between(-1e6, 1e6), ""},
         {"", "distortion_model", &distortion_model_, distortion, ""},
-        {"", "distortion_coefficients", &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
+        {"", coefficients_key(), &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
+        {"", format_.is_kalibr ? "T_cam_imu" : "T_BS", &transform_, Rule::between(-1e6, 1e6), ""},
         {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
         {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;
+  CameraFormat format_;
   YAML::Node root_;
   // What the keys say; as here where they are absent.
   int width_px_ = 0;
@@ -182,6 +224,7 @@ class Reader {
   std::vector<double> intrinsics_;
   std::string distortion_model_;
   std::vector<double> distortion_coefficients_;
+  std::vector<double> transform_;
   double rate_hz_ = 0.0;
   double camera_height_m_ = 0.0;
 };

@@ -6,6 +6,7 @@
 
 #include "dataset/undistortion.hpp"
 #include "stemvo/error.hpp"
+#include "stemvo/rigid3.hpp"
 
 namespace stemvo::dataset {
 
@@ -13,15 +14,18 @@ namespace stemvo::dataset {
 struct CameraFile {
   Lens lens;
   std::optional<double> rate_hz;
-  std::optional<double> camera_height_m;  ///< above the road
+  std::optional<double> camera_height_m;   ///< above the road
+  std::optional<Rigid3> body_from_camera;  ///< EuRoC's T_BS, or of Kalibr's T_cam_imu
 };
 
-/// YAML with the keys image_width and image_height or `resolution: [w, h]`, camera_model (pinhole,
-/// also where it is absent), intrinsics [fx, fy, cx, cy], distortion_model (none,
-/// radial-tangential or radtan, equidistant), distortion_coefficients, and where known rate_hz and
-/// camera_height. EuRoC's sensor.yaml is one: its other keys (sensor_type, comment, T_BS) are not
-/// read. Errors, naming file and line: unreadable, not YAML, a key missing, unknown or twice, a
-/// value that cannot be.
+/// The format is told by its keys. Ours is YAML with the keys image_width and image_height or
+/// `resolution: [w, h]`, camera_model (pinhole, also where it is absent), intrinsics [fx, fy, cx,
+/// cy], distortion_model (none, radial-tangential or radtan, equidistant), distortion_coefficients,
+/// and where known rate_hz and camera_height. EuRoC's sensor.yaml is one, with T_BS (sensor_type
+/// and comment are not read). Others, whose further keys are not read: Kalibr's camchain.yaml
+/// (cam0), OpenCV's FileStorage (camera_matrix, distortion_coefficients, fisheye_model), ROS'
+/// camera_info (the same and distortion_model plumb_bob, equidistant or fisheye). Errors, naming
+/// file and line: unreadable, not YAML, a key missing, unknown or twice, a value that cannot be.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
 
 }  // namespace stemvo::dataset

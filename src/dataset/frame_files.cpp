@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "dataset/ground_truth.hpp"
+
 namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
@@ -51,11 +53,9 @@ Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& reque
   return range;
 }
 
-Expected<FrameList> list_frames(const FrameRange& range,
-                                const std::vector<fs::path>& files,
-                                const std::vector<double>& times_s,
-                                const std::optional<fs::path>& poses,
-                                bool is_exact) {
+FrameList list_frames(const FrameRange& range,
+                      const std::vector<fs::path>& files,
+                      const std::vector<double>& times_s) {
   const auto cut = [&](const auto& all) {
     return std::span(all).subspan(range.begin, range.end - range.begin);
   };
@@ -63,20 +63,41 @@ Expected<FrameList> list_frames(const FrameRange& range,
   frames.range = range;
   frames.files.assign(cut(files).begin(), cut(files).end());
   frames.timestamps_s.assign(cut(times_s).begin(), cut(times_s).end());
-  if (poses) {
-    const Expected<Trajectory> trajectory = read_kitti_trajectory(*poses);
-    if (!trajectory) {
-      return trajectory.error();
-    }
-    const std::size_t num_expected = is_exact ? files.size() : range.end;
-    if (trajectory->size() < num_expected || (is_exact && trajectory->size() > num_expected)) {
-      return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
-                              poses->string(), num_expected, trajectory->size()));
-    }
-    frames.ground_truth = relative_to_first(cut(*trajectory));
-    frames.ground_truth_file = poses;
-  }
   return frames;
+}
+
+Status add_ground_truth(FrameList& frames,
+                        const fs::path& poses,
+                        const std::optional<fs::path>& camera_file,
+                        double tolerance_s,
+                        std::size_t num_files,
+                        bool is_exact) {
+  const auto truth = read_truth(poses, camera_file);
+  if (!truth) {
+    return truth.error();
+  }
+  frames.ground_truth_file = poses;
+  if (!truth->timestamps_s.empty()) {
+    const auto matched = match_by_time(*truth, poses, frames.timestamps_s, tolerance_s);
+    if (!matched) {
+      return matched.error();
+    }
+    frames.ground_truth = matched->poses;
+    if (matched->frames.size() < frames.files.size()) {
+      frames.ground_truth_frames = matched->frames;
+    }
+    return {};
+  }
+  const FrameRange& range = frames.range;
+  const std::size_t num_expected = is_exact ? num_files : range.end;
+  const std::size_t num_found = truth->poses.size();
+  if (num_found < num_expected || (is_exact && num_found > num_expected)) {
+    return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
+                            poses.string(), num_expected, num_found));
+  }
+  frames.ground_truth =
+      relative_to_first(std::span(truth->poses).subspan(range.begin, range.end - range.begin));
+  return {};
 }
 
 Status check_center(const Camera& camera) {
@@ -87,6 +108,24 @@ Status check_center(const Camera& camera) {
         fmt::format("expected a principal point inside images of {}x{} pixels, found ({}, {})",
                     camera.width_px, camera.height_px, camera.cx_px, camera.cy_px));
   }
+  return {};
+}
+
+Status add_view(FrameList& frames,
+                const FrameView& view,
+                const std::vector<std::string>& masks,
+                std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
+  const auto mask = make_mask(masks, view.full_size());
+  if (!mask) {
+    return mask.error();
+  }
+  frames.mask = view.apply_to_mask(*mask);
+  frames.full_size = view.full_size();
+  frames.camera = view.camera();
+  frames.read = [view, read_whole = std::move(read_whole)](std::size_t index) {
+    return read_whole(index).map(
+        [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
+  };
   return {};
 }
 

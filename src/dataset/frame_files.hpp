@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,7 +12,11 @@
 
 #include <opencv2/core.hpp>
 
+#include "dataset/camera_file.hpp"
 #include "dataset/frame_source.hpp"
+#include "dataset/frame_view.hpp"
+#include "dataset/listing.hpp"
+#include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
 #include "stemvo/error.hpp"
 
@@ -32,15 +37,20 @@ namespace stemvo::dataset {
                                                  const std::string& owner,
                                                  std::string_view things = "frames");
 
-/// Files, times and, where there is a file of them, poses (KITTI's format) of the range; the rest
-/// of the list is left as it is made. The file has at least the poses up to the range's end;
-/// `is_exact`: as many as there are files. Errors: those of read_kitti_trajectory; another number
-/// of poses.
-[[nodiscard]] Expected<FrameList> list_frames(const FrameRange& range,
-                                              const std::vector<std::filesystem::path>& files,
-                                              const std::vector<double>& times_s,
-                                              const std::optional<std::filesystem::path>& poses,
-                                              bool is_exact);
+/// Files and times of the range; the rest of the list is left as it is made.
+[[nodiscard]] FrameList list_frames(const FrameRange& range,
+                                    const std::vector<std::filesystem::path>& files,
+                                    const std::vector<double>& times_s);
+/// Adds the poses of a file: by time where it has times, else one per frame; then it has at least
+/// the poses up to the range's end, `is_exact`: as many as there are files in all (`num_files`).
+/// `camera_file`: as read_truth says. Errors: those of read_truth; another number of poses; none
+/// of these times.
+[[nodiscard]] Status add_ground_truth(FrameList& frames,
+                                      const std::filesystem::path& poses,
+                                      const std::optional<std::filesystem::path>& camera_file,
+                                      double tolerance_s,
+                                      std::size_t num_files,
+                                      bool is_exact);
 
 /// Error: the principal point is outside the image, or not a number.
 [[nodiscard]] Status check_center(const Camera& camera);
@@ -50,8 +60,24 @@ namespace stemvo::dataset {
                                            Expected<cv::Mat> image,
                                            const Camera& camera);
 
-/// Images of a folder beside a camera file, which is given (open_source).
-[[nodiscard]] Expected<FrameSource> open_image_folder(const FrameSourceRequest& request);
+/// Images that were listed; what the request names goes before what lies beside them.
+[[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
+                                                 const FrameSourceRequest& request);
+/// N of "camera:N".
+[[nodiscard]] std::optional<int> camera_number(const std::filesystem::path& path);
+/// A video file, or a live camera.
+[[nodiscard]] Expected<FrameSource> open_video(const FrameSourceRequest& request);
+/// The same of a stream that is open.
+[[nodiscard]] Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
+                                                const CameraFile& camera,
+                                                const FrameSourceRequest& request);
+
+/// Camera, size, mask and reader: `read_whole` gives the frames as they come, of the view's full
+/// size. Errors: those of make_mask.
+[[nodiscard]] Status add_view(FrameList& frames,
+                              const FrameView& view,
+                              const std::vector<std::string>& masks,
+                              std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
 /// What most of the first readable images are; of equals the one seen first. One odd frame must
 /// not throw the rest away. `kind_of`: of a file. Error: none can be read.

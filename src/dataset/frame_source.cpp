@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/frame_source.hpp"
 
+#include <algorithm>
+#include <numeric>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -27,17 +29,50 @@ bool looks_like_kitti(const fs::path& folder) {
   return false;
 }
 
-/// No camera file is given.
+/// Nothing that is known.
 Error refuse(const fs::path& path) {
   std::string_view problem =
-      "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt) or, for images, --camera "
-      "FILE, found neither";
+      "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt), EuRoC's (mav0/cam0), "
+      "TUM's (rgb.txt), camera.yaml beside images, or --camera FILE, found neither";
   if (dataset::is_pattern(path)) {
     problem = "expected --camera FILE beside a pattern, found none";
   } else if (!dataset::is_folder(path)) {
-    problem = "expected a folder in KITTI's layout, or of images with --camera FILE, found none";
+    problem = "expected a folder, a video file, a quoted pattern of images or camera:N, found none";
   }
   return fail(fmt::format("{}: {}", path.string(), problem));
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code code;
+  return fs::is_regular_file(path, code);
+}
+
+/// A listing of images, if it is one that is known.
+std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest& request) {
+  const fs::path& path = request.sequence_dir;
+  for (const dataset::Layout& layout :
+       {dataset::euroc_layout(), dataset::tum_layout(), dataset::own_layout()}) {
+    if (dataset::is_folder(path) && layout.is_layout_of(path)) {
+      return layout.list(path);
+    }
+  }
+  return request.camera_file ? std::optional(dataset::list_plain_images(path)) : std::nullopt;
+}
+
+/// Files that belong to other kinds of recordings.
+Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_stream) {
+  if (request.calibration && (is_listing || is_stream)) {
+    return fail(fmt::format(
+        "{}: expected --camera or --calib, which is for KITTI's layout only, found it with {}",
+        request.calibration->string(), request.sequence_dir.string()));
+  }
+  if (request.times && !is_listing) {
+    return fail(
+        fmt::format("{}: expected --times beside --camera only, with images (KITTI's layout has "
+                    "times.txt, a video its own), found {}",
+                    request.times->string(), request.sequence_dir.string()));
+  }
+  return {};
 }
 
 }  // namespace
@@ -62,26 +97,49 @@ Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
   return FrameRangeRequest{*begin, end};
 }
 
-Expected<FrameSource> open_source(const FrameSourceRequest& request) {
-  if (request.camera_file) {
-    if (request.calibration) {
-      return fail(fmt::format("{}: expected --camera or --calib (KITTI's layout only), found both",
-                              request.calibration->string()));
+Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t num_frames) const {
+  if (frames_.match) {
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < num_frames; ++i) {
+      times_s.push_back(time_s(i));
     }
-    return dataset::open_image_folder(request);
+    return frames_.match(times_s).map(
+        [](const GroundTruth& truth) { return std::optional(truth); });
   }
-  if (request.times) {
-    return fail(
-        fmt::format("{}: expected --times beside --camera only (KITTI's layout has "
-                    "times.txt), found no --camera",
-                    request.times->string()));
+  if (!frames_.ground_truth) {
+    return std::optional<GroundTruth>();
   }
-  if (!dataset::is_folder(request.sequence_dir) || !looks_like_kitti(request.sequence_dir)) {
-    return refuse(request.sequence_dir);
+  GroundTruth truth{*frames_.ground_truth, {}};
+  if (frames_.ground_truth_frames) {
+    truth.frames = *frames_.ground_truth_frames;
+    const auto end = std::lower_bound(truth.frames.begin(), truth.frames.end(), num_frames);
+    truth.frames.erase(end, truth.frames.end());
+  } else {
+    truth.frames.resize(num_frames);
+    std::iota(truth.frames.begin(), truth.frames.end(), std::size_t{0});
   }
-  return KittiSequence::open(request.sequence_dir, request).map([](const FrameSource& source) {
-    return source;
-  });
+  truth.poses.resize(truth.frames.size());
+  return std::optional(std::move(truth));
+}
+
+Expected<FrameSource> open_source(const FrameSourceRequest& request) {
+  const fs::path& path = request.sequence_dir;
+  const bool is_stream = dataset::camera_number(path) || is_file(path);
+  const auto listing = is_stream ? std::nullopt : find_listing(request);
+  if (const Status status = check_unused(request, listing.has_value(), is_stream); !status) {
+    return status.error();
+  }
+  if (is_stream) {
+    return dataset::open_video(request);
+  }
+  if (listing) {
+    return listing->and_then(
+        [&](const dataset::Listing& found) { return dataset::open_listing(found, request); });
+  }
+  if (!dataset::is_folder(path) || !looks_like_kitti(path)) {
+    return refuse(path);
+  }
+  return KittiSequence::open(path, request).map([](const FrameSource& source) { return source; });
 }
 
 }  // namespace stemvo

@@ -11,6 +11,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
@@ -29,21 +30,45 @@ struct FrameRangeRequest {
 };
 [[nodiscard]] Expected<FrameRangeRequest> parse_frame_range(const std::string& text);
 
+/// What is known of frames that come one behind the other: of a video, of a camera.
+struct StreamInfo {
+  std::size_t max_frames = 0;                 ///< as asked for; the stream may end before
+  std::size_t expected_frames = 0;            ///< what the container says; 0: not known
+  bool is_live = false;                       ///< ends when the user says so
+  std::function<double(std::size_t)> time_s;  ///< of a frame that was read
+};
+
+/// True poses of some frames.
+struct GroundTruth {
+  Trajectory poses;                 ///< the first is the identity
+  std::vector<std::size_t> frames;  ///< whose they are; increasing
+};
+
 /// What a source knows of its frames before one is read. Files, times and poses are those of the
-/// range, one per frame.
+/// range, one per frame; a stream has none of them but a video's file.
 struct FrameList {
-  std::string name;  ///< of the folder, e.g. "03"
-  FrameRange range;  ///< in the folder's numbering
-  Camera camera;     ///< pinhole without distortion, of the frames as they are read
+  std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
+  std::string name;    ///< of the folder, e.g. "03"
+  FrameRange range;    ///< in the folder's numbering
+  Camera camera;       ///< pinhole without distortion, of the frames as they are read
+  cv::Size full_size;  ///< of the frames as they come, where they are read at another size
+  cv::Mat mask;  ///< of the frames as they are read: 0 where no points are wanted; empty: none
   std::vector<std::filesystem::path> files;
   std::vector<double> timestamps_s;
   std::optional<Trajectory> ground_truth;  ///< first pose is the identity
+  /// Frames that have a pose in ground_truth; absent: all.
+  std::optional<std::vector<std::size_t>> ground_truth_frames = std::nullopt;
   std::optional<std::filesystem::path> ground_truth_file;
   /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
-  /// Index in `files` -> frame; several threads may call it.
+  bool is_kitti = false;                  ///< whose camera is 1.65 m above a road
+  /// Index in `files` -> frame; several threads may call it. Of a stream, each frame once, in
+  /// order; an empty image behind the last.
   std::function<Expected<cv::Mat>(std::size_t)> read;
+  std::optional<StreamInfo> stream = std::nullopt;
+  /// Of a stream with a pose file: true poses by the times of frames that were read.
+  std::function<Expected<GroundTruth>(const std::vector<double>& times_s)> match = nullptr;
 };
 
 /// Frames of one camera, in order; what is known of them as in FrameList.
@@ -51,7 +76,13 @@ class FrameSource {
  public:
   explicit FrameSource(FrameList frames) : frames_(std::move(frames)) {}
 
-  [[nodiscard]] std::size_t size() const { return frames_.files.size(); }
+  /// Of a stream the most there may be.
+  [[nodiscard]] std::size_t size() const {
+    return frames_.stream ? frames_.stream->max_frames : frames_.files.size();
+  }
+  [[nodiscard]] const std::optional<StreamInfo>& stream() const { return frames_.stream; }
+  [[nodiscard]] const std::string& kind() const { return frames_.kind; }
+  [[nodiscard]] bool is_kitti() const { return frames_.is_kitti; }
   [[nodiscard]] const Camera& camera() const { return frames_.camera; }
   [[nodiscard]] const std::string& name() const { return frames_.name; }
   [[nodiscard]] FrameRange range() const { return frames_.range; }
@@ -59,6 +90,14 @@ class FrameSource {
   [[nodiscard]] const std::optional<Trajectory>& ground_truth() const {
     return frames_.ground_truth;
   }
+  [[nodiscard]] bool has_ground_truth() const { return frames_.ground_truth || frames_.match; }
+  /// Of a frame; of a stream's after it was read.
+  [[nodiscard]] double time_s(std::size_t index) const {
+    return frames_.stream ? frames_.stream->time_s(index) : frames_.timestamps_s[index];
+  }
+  /// Of those of the first `num_frames` that have a true pose; nullopt: there is no ground truth.
+  /// Error, of a stream only: no times match.
+  [[nodiscard]] Expected<std::optional<GroundTruth>> ground_truth_of(std::size_t num_frames) const;
   [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
     return frames_.ground_truth_file;
   }
@@ -86,27 +125,30 @@ class FrameSource {
 struct SequenceOptions {
   std::string camera = "auto";  ///< `auto` (image_2 if there, else image_0), `image_0` .. `image_3`
   std::optional<FrameRangeRequest> frames = std::nullopt;
-  /// Else ../../poses/NN.txt if it exists; of images none.
+  /// Else the recording's own: KITTI's ../../poses/NN.txt, .. if it exists. Matched by time where
+  /// the file has times, else a pose per frame.
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
+  double ground_truth_tolerance_s = kTimeTolerance_s;
+  std::vector<std::string> masks = {};  ///< parts without points, as dataset::make_mask takes them
   /// Else calib.txt in the folder. KITTI's layout only.
   std::optional<std::filesystem::path> calibration = std::nullopt;
 };
 
 /// What was asked for, and the files given beside it.
 struct FrameSourceRequest : SequenceOptions {
-  /// A folder in KITTI's layout or, with `camera_file`, a folder of images or a pattern such as
-  /// `drive/left_*.png` (* and ? in the last part).
+  /// A folder, a pattern such as `drive/left_*.png` (* and ? in the last part), a video file, or
+  /// `camera:N`.
   std::filesystem::path sequence_dir;
-  std::optional<std::filesystem::path> camera_file;  ///< of images
-  std::optional<std::filesystem::path> times;        ///< of images; else the camera's rate_hz
+  std::optional<std::filesystem::path> camera_file;  ///< in place of the recording's own
+  std::optional<std::filesystem::path> times;  ///< of images; else the recording's, or rate_hz
 };
 
-/// KITTI's layout without a camera file: KittiSequence::open. With one: PNG and JPEG images in
-/// the order of their names, numbers by value, undistorted when read, colour if the images are.
-/// `ground_truth` (KITTI's pose format) and `times` (seconds) hold a line per image; without
-/// `times` the camera file's rate_hz counts. Errors: those of KittiSequence::open; neither layout
-/// nor camera file; a camera file that is wrong; no images; images of another size; more or
-/// fewer times or poses than images; a range outside.
+/// Finds out what it is: `camera:N`; a file: a video; a folder in EuRoC's layout, TUM RGB-D's or
+/// ours (camera.yaml beside the images; listing.hpp); with `camera_file` any folder of PNG and JPEG
+/// images, or a pattern, in the order of their names, numbers by value; else KITTI's layout. All
+/// but KITTI's are undistorted when read, colour if the images are. Errors: those of
+/// KittiSequence::open; none of these; no camera file; a camera file that is wrong; no images;
+/// images of another size; times or poses that do not fit; a range outside.
 [[nodiscard]] Expected<FrameSource> open_source(const FrameSourceRequest& request);
 
 }  // namespace stemvo

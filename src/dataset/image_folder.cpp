@@ -3,9 +3,7 @@
 
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_files.hpp"
-#include "dataset/image_list.hpp"
 #include "dataset/kitti_text.hpp"
-#include "dataset/undistortion.hpp"
 #include "io/image_file.hpp"
 
 namespace stemvo::dataset {
@@ -14,22 +12,27 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of all images.
-Expected<std::vector<double>> find_times(const FrameSourceRequest& request,
-                                         const std::optional<double>& rate_hz,
-                                         std::size_t num_images) {
-  if (request.times) {
-    auto read = read_kitti_times(*request.times, num_images);
+Expected<std::vector<double>> find_times(const Listing& listing,
+                                         const FrameSourceRequest& request,
+                                         const fs::path& camera_file,
+                                         const std::optional<double>& rate_hz) {
+  const std::size_t num_images = listing.files.size();
+  if (const auto& file = request.times ? request.times : listing.times_file) {
+    auto read = read_kitti_times(*file, num_images);
     if (read && read->size() != num_images) {
       return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                              request.times->string(), num_images, read->size()));
+                              file->string(), num_images, read->size()));
     }
     return read;
+  }
+  if (!listing.times_s.empty()) {
+    return listing.times_s;
   }
   if (!rate_hz) {
     return fail(
         fmt::format("{}: expected rate_hz (frames per second) or --times FILE, found "
                     "neither",
-                    request.camera_file->string()));
+                    camera_file.string()));
   }
   std::vector<double> times_s;
   for (std::size_t i = 0; i < num_images; ++i) {
@@ -57,48 +60,53 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
 
 }  // namespace
 
-Expected<FrameSource> open_image_folder(const FrameSourceRequest& request) {
-  const auto camera_file = read_camera_file(*request.camera_file);
+Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequest& request) {
+  const auto camera_path = request.camera_file ? request.camera_file : listing.camera_file;
+  if (!camera_path) {
+    return fail(fmt::format("{}: a {}: expected --camera FILE or camera.yaml in it, found neither",
+                            request.sequence_dir.string(), listing.kind));
+  }
+  const auto camera_file = read_camera_file(*camera_path);
   if (!camera_file) {
     return camera_file.error();
   }
-  const auto images = list_images(request.sequence_dir);
-  if (!images) {
-    return images.error();
-  }
   const auto range =
-      resolve_range(request.frames, images->files.size(), request.sequence_dir.string());
+      resolve_range(request.frames, listing.files.size(), request.sequence_dir.string());
   if (!range) {
     return range.error();
   }
-  const auto times_s = find_times(request, camera_file->rate_hz, images->files.size());
+  const auto times_s = find_times(listing, request, *camera_path, camera_file->rate_hz);
   if (!times_s) {
     return times_s.error();
   }
-  auto frames = list_frames(*range, images->files, *times_s, request.ground_truth, true);
-  if (!frames) {
-    return frames.error();
+  FrameList frames = list_frames(*range, listing.files, *times_s);
+  if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
+    if (const Status status =
+            add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
+                             listing.files.size(), true);
+        !status) {
+      return status.error();
+    }
   }
   const auto is_color =
-      check_images(frames->files, images->folder, *request.camera_file, camera_file->lens.camera);
+      check_images(frames.files, listing.folder, *camera_path, camera_file->lens.camera);
   if (!is_color) {
     return is_color.error();
   }
-  auto undistortion = Undistortion::create(camera_file->lens);
-  if (!undistortion) {
-    return fail(fmt::format("{}: {}", request.camera_file->string(), undistortion.error().message));
+  const auto view = FrameView::create(camera_file->lens, *camera_path);
+  if (!view) {
+    return view.error();
   }
-  frames->name = absolute_folder(images->folder).filename().string();
-  frames->given_calibration = request.camera_file;
-  frames->camera = undistortion->camera();
-  frames->camera_height_m = camera_file->camera_height_m;
-  frames->read = [files = frames->files, is_color = *is_color,
-                  undistortion = *undistortion](std::size_t index) {
-    const fs::path& file = files[index];
-    return check_size(file, io::read_image(file, is_color), undistortion.camera())
-        .map([&](const cv::Mat& image) { return undistortion.apply(image); });
-  };
-  return FrameSource(std::move(*frames));
+  frames.kind = listing.kind;
+  frames.name = listing.name;
+  frames.given_calibration = camera_path;
+  frames.camera_height_m = camera_file->camera_height_m;
+  const Status status = add_view(
+      frames, *view, request.masks,
+      [files = frames.files, is_color = *is_color, raw = camera_file->lens.camera](std::size_t i) {
+        return check_size(files[i], io::read_image(files[i], is_color), raw);
+      });
+  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
 }
 
 }  // namespace stemvo::dataset

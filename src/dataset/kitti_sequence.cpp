@@ -118,17 +118,26 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   }
   const fs::path absolute = dataset::absolute_folder(directory);
   const std::string name = absolute.filename().string();
-  const auto ground_truth =
+  FrameList frames = dataset::list_frames(*range, *images, *times_s);
+  const auto truth =
       options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name);
-  if (!ground_truth) {
-    return ground_truth.error();
+  if (!truth) {
+    return truth.error();
   }
-  Expected<FrameList> listed =
-      dataset::list_frames(*range, *images, *times_s, *ground_truth, false);
-  if (!listed) {
-    return listed.error();
+  if (*truth) {
+    if (const Status status = dataset::add_ground_truth(
+            frames, **truth, std::nullopt, options.ground_truth_tolerance_s, images->size(), false);
+        !status) {
+      return status.error();
+    }
+    if (!options.ground_truth && frames.ground_truth_frames) {
+      return fail(fmt::format("{}: expected a pose for each of {} frames, found those of {}",
+                              (*truth)->string(), frames.files.size(),
+                              frames.ground_truth_frames->size()));
+    }
   }
-  FrameList& frames = *listed;
+  frames.kind = "KITTI sequence";
+  frames.is_kitti = true;
   frames.name = name;
   frames.camera = *camera;
   frames.given_calibration = options.calibration;
@@ -149,6 +158,12 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                               status.error().message));
     }
   }
+  const auto mask = dataset::make_mask(options.masks, kind->size);
+  if (!mask) {
+    return mask.error();
+  }
+  frames.mask = *mask;
+  frames.full_size = kind->size;
   frames.read = [files = frames.files, is_color, sized = frames.camera](std::size_t index) {
     return dataset::check_size(files[index], io::read_png(files[index], is_color), sized);
   };

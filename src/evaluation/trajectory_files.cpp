@@ -84,6 +84,13 @@ Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file) {
   return poses;
 }
 
+Expected<TimedPose> parse_tum_row(std::string_view row) {
+  return parse_numbers(row, 8).and_then([](const std::vector<double>& numbers) {
+    return pose_from_quaternion_row(numbers).map(
+        [&](const Rigid3& pose) { return TimedPose{numbers.front(), pose}; });
+  });
+}
+
 Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file) {
   const Expected<std::vector<std::string>> lines = read_lines(file);
   if (!lines) {
@@ -95,16 +102,12 @@ Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file)
     if (split_words(line).empty()) {
       continue;
     }
-    const Expected<std::vector<double>> numbers = parse_numbers(line, 8);
-    if (!numbers) {
-      return fail_at(file, i, numbers.error());
+    const Expected<TimedPose> row = parse_tum_row(line);
+    if (!row) {
+      return fail_at(file, i, row.error());
     }
-    const Expected<Rigid3> pose = pose_from_quaternion_row(*numbers);
-    if (!pose) {
-      return fail_at(file, i, pose.error());
-    }
-    result.timestamps_s.push_back(numbers->front());
-    result.world_from_camera.push_back(*pose);
+    result.timestamps_s.push_back(row->time);
+    result.world_from_camera.push_back(row->world_from_camera);
   }
   if (result.world_from_camera.empty()) {
     return fail_empty(file);

@@ -40,7 +40,9 @@ std::shared_ptr<const PreparedImage> DescriptorFrontEnd::prepare(
     const ChannelImage& channel) const {
   auto described = std::make_shared<Described>(channel);
   std::vector<cv::KeyPoint> found;
-  timed(Stage::kDetection, [&] { feature_->detect(channel.pixels, found); });
+  timed(Stage::kDetection, [&] {
+    feature_->detect(channel.pixels, found, mask_of(channel.map, channel.pixels.size()));
+  });
   std::sort(found.begin(), found.end(), is_stronger);
   GridQuota quota(options_, channel.pixels.size());
   std::vector<cv::KeyPoint> kept;

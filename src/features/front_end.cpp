@@ -1,11 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "features/front_end.hpp"
 
+#include <opencv2/imgproc.hpp>
+
 #include "features/descriptor_front_end.hpp"
 #include "features/klt_front_end.hpp"
 #include "features/patch_front_end.hpp"
 
 namespace stemvo {
+
+cv::Mat FrontEnd::mask_of(const PixelMap& map, cv::Size size) const {
+  cv::Mat mask;
+  if (!mask_.empty()) {
+    const cv::Matx23d to_input(map.scale.x(), 0.0, map.offset_px.x(), 0.0, map.scale.y(),
+                               map.offset_px.y());
+    cv::warpAffine(mask_, mask, to_input, size, cv::INTER_NEAREST | cv::WARP_INVERSE_MAP,
+                   cv::BORDER_REPLICATE);
+  }
+  return mask;
+}
 
 std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {
   if (options.method == FeatureMethod::kPatch) {

@@ -33,6 +33,9 @@ struct PreparedImage {
 class FrontEnd {
  public:
   virtual ~FrontEnd() = default;
+  /// Where new points may be: CV_8UC1 of the input's size, 0 where none; empty: everywhere. Called
+  /// before the first image.
+  void set_mask(const cv::Mat& mask) { mask_ = mask; }
   /// The part of process() that needs only the image: it may run ahead, in another thread than
   /// the rest, one call at a time.
   [[nodiscard]] virtual std::shared_ptr<const PreparedImage> prepare(
@@ -47,6 +50,13 @@ class FrontEnd {
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
   /// not followed further.
   virtual void keep(const std::vector<char>& is_good) = 0;
+
+ protected:
+  /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.
+  [[nodiscard]] cv::Mat mask_of(const PixelMap& map, cv::Size size) const;
+
+ private:
+  cv::Mat mask_;
 };
 
 [[nodiscard]] std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options);

@@ -152,14 +152,19 @@ void PointFrontEnd::replenish(View& view) {
   const double min_distance =
       options_.min_distance_px / (image.channel.map.scale.minCoeff() * to_pixels);
   GridQuota quota(options_, image.channel.pixels.size());
-  cv::Mat mask(pixels.size(), CV_8U, cv::Scalar(255));
+  PixelMap map = image.channel.map;
+  map.scale *= to_pixels;
+  cv::Mat mask = mask_of(map, pixels.size());
+  if (mask.empty()) {
+    mask = cv::Mat(pixels.size(), CV_8U, cv::Scalar(255));
+  }
   std::vector<Point> kept;
   kept.reserve(view.points.size());
   for (const Point& point : view.points) {
     const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
                            std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
     if (mask.at<unsigned char>(center) == 0) {
-      continue;  // tracks that ran into each other: the older one stays
+      continue;  // tracks that ran into each other: the older one stays; or behind the mask
     }
     cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
     quota.take(point.uv);

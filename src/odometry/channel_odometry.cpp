@@ -21,11 +21,12 @@ StemOptions stretch_options(const Options& options, const Camera& camera) {
 
 }  // namespace
 
-ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera)
+ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask)
     : camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
       stretch_(stretch_options(options, camera)),
       front_end_(create_front_end(options.features)) {
+  front_end_->set_mask(mask);
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
     estimator_ = std::make_unique<PairEstimator>(options, camera);
   } else {

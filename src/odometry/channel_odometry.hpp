@@ -32,8 +32,8 @@ struct PreparedFrame {
 /// Movable. The same channels give the same poses, whatever runs beside it.
 class ChannelOdometry {
  public:
-  /// For valid options; `options.stem` gives the stretch only.
-  ChannelOdometry(const Options& options, const Camera& camera);
+  /// For valid options; `options.stem` gives the stretch only. `mask`: as FrontEnd::set_mask.
+  ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask = {});
 
   /// The phases, as in PhasedOdometry. `frame`, of the camera's size, is where landmarks get their
   /// colour; `stem_ms` is the stretch's alone.

@@ -9,7 +9,9 @@
 
 namespace stemvo {
 
-Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera, const Options& options) {
+Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
+                                                const Options& options,
+                                                const cv::Mat& mask) {
   Expected<Stem> stem = Stem::create(options.stem);
   if (!stem) {
     return stem.error();
@@ -19,11 +21,14 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera, const Opti
   if (const Expected<Channel> channel = stem->apply(blank); !channel) {
     return channel.error();
   }
-  return PhasedOdometry(camera, options, *std::move(stem));
+  return PhasedOdometry(camera, options, mask, *std::move(stem));
 }
 
-PhasedOdometry::PhasedOdometry(const Camera& camera, const Options& options, Stem stem)
-    : camera_(camera), stem_(std::move(stem)), channel_odometry_(options, camera) {}
+PhasedOdometry::PhasedOdometry(const Camera& camera,
+                               const Options& options,
+                               const cv::Mat& mask,
+                               Stem stem)
+    : camera_(camera), stem_(std::move(stem)), channel_odometry_(options, camera, mask) {}
 
 PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
   STEMVO_CHECK(image.cols == camera_.width_px && image.rows == camera_.height_px,

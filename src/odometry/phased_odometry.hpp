@@ -18,9 +18,10 @@ namespace stemvo {
 /// are the same.
 class PhasedOdometry {
  public:
-  /// As Odometry::create, for options and a camera that are valid.
+  /// As Odometry::create, for options and a camera that are valid. `mask`: as FrontEnd::set_mask.
   [[nodiscard]] static Expected<PhasedOdometry> create(const Camera& camera,
-                                                       const Options& options);
+                                                       const Options& options,
+                                                       const cv::Mat& mask = {});
 
   /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked). Frames are prepared in their order,
   /// one call at a time, which may run ahead of the others in another thread.
@@ -43,7 +44,7 @@ class PhasedOdometry {
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 
  private:
-  PhasedOdometry(const Camera& camera, const Options& options, Stem stem);
+  PhasedOdometry(const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem);
 
   Camera camera_;
   Stem stem_;

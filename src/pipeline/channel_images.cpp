@@ -49,6 +49,9 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
   for (std::size_t i = 0; i < sequence->size() && goes_on && status; ++i) {
     const std::size_t number = sequence->range().begin + i;
     const Expected<cv::Mat> frame = sequence->read(i);
+    if (sequence->stream() && frame && frame->empty()) {
+      break;
+    }
     const auto channels =
         frame.and_then([&](const cv::Mat& pixels) { return stem->apply_all(pixels); });
     if (!channels) {

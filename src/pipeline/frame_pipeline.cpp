@@ -15,14 +15,15 @@ namespace stemvo::pipeline {
 
 Expected<PhasedOdometry> create_odometry(const Config& config,
                                          const Camera& camera,
-                                         const std::filesystem::path& models_dir) {
+                                         const std::filesystem::path& models_dir,
+                                         const cv::Mat& mask) {
   Options options = config;
   auto stem = with_network(config.stem, models_dir);
   if (!stem) {
     return stem.error();
   }
   options.stem = *std::move(stem);
-  return PhasedOdometry::create(camera, options);
+  return PhasedOdometry::create(camera, options, mask);
 }
 
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
@@ -40,6 +41,7 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
             frame.started = std::chrono::steady_clock::now();
             frame.prepared = {};
             frame.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
+            return !sequence.stream() || !frame.pixels || !frame.pixels->empty();
           },
       .prepare =
           [&](std::size_t index) {

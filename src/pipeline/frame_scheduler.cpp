@@ -110,11 +110,11 @@ class FrameScheduler {
   }
 
   [[nodiscard]] bool run_stage(const Job& job) const {
-    if (job.stage == kOptimize) {
-      return stages_.optimize(job.frame);
+    if (job.stage == kOptimize || job.stage == kRead) {
+      return (job.stage == kRead ? stages_.read : stages_.optimize)(job.frame);
     }
-    const std::array stages = {&stages_.read, &stages_.prepare, &stages_.track, &stages_.localize};
-    (*stages.at(job.stage))(job.frame);
+    const std::array stages = {&stages_.prepare, &stages_.track, &stages_.localize};
+    (*stages.at(job.stage - kPrepare))(job.frame);
     return true;
   }
 
@@ -131,7 +131,7 @@ class FrameScheduler {
     const Progress& own = progress_[stage];
     const std::size_t frame = own.num_begun;
     const bool is_busy = stage != kRead && own.num_begun > own.num_done;
-    if (is_over() || is_busy || frame == num_frames_) {
+    if (is_over() || is_busy || frame >= num_frames_) {
       return false;
     }
     switch (stage) {
@@ -169,7 +169,10 @@ class FrameScheduler {
     if (job.stage == kRead) {
       is_read_[job.frame % kMaxInFlight] = true;
     }
-    is_ended_ = is_ended_ || !goes_on;
+    if (job.stage == kRead && !goes_on) {
+      num_frames_ = std::min(num_frames_, job.frame);
+    }
+    is_ended_ = is_ended_ || (job.stage == kOptimize && !goes_on);
     if (is_over()) {
       changed_.notify_all();
     }
@@ -195,7 +198,7 @@ class FrameScheduler {
   }
 
   const FrameStages& stages_;
-  const std::size_t num_frames_;
+  std::size_t num_frames_;  ///< at most; those there are, once a stream has ended
   const int num_threads_;
 
   std::mutex mutex_;
@@ -288,6 +291,7 @@ void FrameScheduler::work(int thread) {
       }
       lock.lock();
       thrown_ = thrown_ == nullptr ? thrown : thrown_;
+      is_ended_ = is_ended_ || thrown != nullptr;
       end(*job, goes_on);
     } else if (is_help_wanted()) {
       help(lock);

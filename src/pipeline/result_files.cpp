@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <system_error>
@@ -12,6 +13,7 @@
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
+#include "pipeline/input_notes.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/map_ply.hpp"
 #include "report/run_page.hpp"
@@ -75,8 +77,10 @@ class ResultWriter {
         odometry_(odometry),
         drive_(drive),
         trajectory_(drive.trajectory) {
-    if (sequence.ground_truth()) {  // an interrupted run has fewer poses
-      truth_ = std::span(*sequence.ground_truth()).first(trajectory_.size());
+    const auto truth = sequence.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
+    matched_ = truth ? Status() : truth.error();
+    if (truth && *truth && !(*truth)->frames.empty()) {
+      truth_ = **truth;
     }
     trajectory_ = as_written(request, sequence, std::move(trajectory_));
     if (request.config.odometry.mode == OdometryMode::kMap) {
@@ -86,7 +90,10 @@ class ResultWriter {
 
   Status write(MetricsReport& report) {
     const std::filesystem::path& folder = request_.out_dir;
-    const std::span<const double> times_s(sequence_.timestamps_s().data(), trajectory_.size());
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < trajectory_.size(); ++i) {
+      times_s.push_back(sequence_.time_s(i));
+    }
     Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
     keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
     keep_first(written, write_refined(folder / "trajectory_refined_kitti.txt"));
@@ -99,14 +106,27 @@ class ResultWriter {
     const TrajectoryPlot plot = make_plot(report);
     keep_first(written, write_trajectory_png(folder / "trajectory.png", plot));
     keep_first(written, write_trajectory_svg(folder / "trajectory.svg", plot));
+    keep_first(written, matched_);
+    if (request_.note && truth_ && sequence_.stream()) {
+      request_.note("ground truth" +
+                    count_matched(request_, truth_->frames.size(), trajectory_.size()));
+    }
     return written;
   }
 
   [[nodiscard]] Status write_page(const MetricsReport& report) const {
     const TrajectoryPlot plot = make_plot(report);
+    std::vector<std::size_t> drawn(drive_.frames.size());
+    std::iota(drawn.begin(), drawn.end(), std::size_t{0});
+    drawn = truth_ ? truth_->frames : drawn;
+    std::vector<FrameResult> frames;
+    for (std::size_t& i : drawn) {
+      frames.push_back(drive_.frames[i]);
+      i += sequence_.range().begin;
+    }
     return write_run_page(
         request_.out_dir / "report.html",
-        {plot.title, plot.subtitle, plot.unit, report, drive_.frames, plot.estimate,
+        {plot.title, plot.subtitle, plot.unit, report, frames, drawn, plot.estimate,
          plot.ground_truth, drive_.images, config_text(), request_.command});
   }
 
@@ -147,9 +167,13 @@ class ResultWriter {
       // A trajectory without a scale has no error in metres until one is fitted.
       const Alignment alignment =
           config.scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
-      report.metrics = evaluate_aligned(trajectory_, *truth_, alignment, config.evaluation);
+      const auto compare = [&](const Trajectory& trajectory) {
+        return evaluate_aligned(take_poses(trajectory, truth_->frames), truth_->poses, alignment,
+                                config.evaluation);
+      };
+      report.metrics = compare(trajectory_);
       if (refined_) {
-        report.refined = evaluate_aligned(*refined_, *truth_, alignment, config.evaluation);
+        report.refined = compare(*refined_);
       }
     }
     return report;
@@ -164,7 +188,8 @@ class ResultWriter {
   [[nodiscard]] std::string config_text() const {
     const StemInfo& stem = odometry_.stem_info();
     std::string text =
-        fmt::format("# stemvo {}\n# {}\n", version(), describe_frames(sequence_.size()));
+        fmt::format("# stemvo {}\n# {}\n", version(),
+                    describe_frames(sequence_.stream() ? trajectory_.size() : sequence_.size()));
     text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
                         stem.num_filters, stem.sampling_px,
                         stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
@@ -203,9 +228,10 @@ class ResultWriter {
     plot.subtitle = describe_numbers(report);
     plot.estimate = trajectory_;
     if (truth_) {
-      plot.ground_truth = Trajectory(truth_->begin(), truth_->end());
+      plot.ground_truth = truth_->poses;
+      plot.estimate = take_poses(trajectory_, truth_->frames);
       if (report.metrics->alignment != Alignment::kNone) {
-        plot.estimate = align_trajectory(trajectory_, *truth_, report.metrics->alignment);
+        plot.estimate = align_trajectory(plot.estimate, truth_->poses, report.metrics->alignment);
       }
     } else if (report.scale_source == "none") {
       plot.unit = "units";
@@ -219,7 +245,8 @@ class ResultWriter {
   const Drive& drive_;
   Trajectory trajectory_;
   std::optional<Trajectory> refined_;  ///< the same with look-ahead; mode map only
-  std::optional<std::span<const Rigid3>> truth_;
+  std::optional<GroundTruth> truth_;
+  Status matched_;  ///< the ground truth of a stream
 };
 
 }  // namespace

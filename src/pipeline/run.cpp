@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/run.hpp"
 
+#include <bit>
 #include <optional>
 #include <utility>
 
@@ -8,6 +9,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/frame_pipeline.hpp"
+#include "pipeline/input_notes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/result_keeper.hpp"
@@ -21,13 +23,13 @@
 namespace stemvo {
 namespace {
 
-/// A folder of images is no car of KITTI's: what its camera file does not say is not known.
-Config with_camera_height(Config config, const RunRequest& request, const FrameSource& source) {
+/// Another camera is not on KITTI's car: what its camera file does not say is not known.
+Config with_camera_height(Config config, const FrameSource& source) {
   constexpr const char* kSource = "scale.source";
   const bool is_chosen = config.scale.source != ScaleSource::kCameraHeight ||
                          config.keys_in_file.contains(kSource) ||
                          config.keys_overridden.contains(kSource);
-  if (request.camera_file && !source.camera_height_m() && !is_chosen) {
+  if (!source.is_kitti() && !source.camera_height_m() && !is_chosen) {
     config.scale.source = ScaleSource::kNone;
   }
   // A file's height is some camera's, often the default; that of the camera file is this one's.
@@ -41,14 +43,22 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
   auto sequence = open_source(source);
-  if (sequence && request.config.scale.source == ScaleSource::kGroundTruth &&
-      !sequence->ground_truth()) {
-    const auto file = request.camera_file
-                          ? request.sequence_dir
-                          : request.sequence_dir / "../../poses" / (sequence->name() + ".txt");
+  if (!sequence || request.config.scale.source != ScaleSource::kGroundTruth) {
+    return sequence;
+  }
+  if (!sequence->has_ground_truth()) {
+    const auto file = sequence->is_kitti()
+                          ? request.sequence_dir / "../../poses" / (sequence->name() + ".txt")
+                          : request.sequence_dir;
     return fail(fmt::format(
         "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
         file.lexically_normal().string()));
+  }
+  if (sequence->stream() || sequence->frames().ground_truth_frames) {
+    return fail(fmt::format(
+        "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
+        sequence->ground_truth_file()->string(),
+        sequence->stream() ? "a stream, whose times are not known before" : "some only"));
   }
   return sequence;
 }
@@ -65,10 +75,11 @@ cv::Mat draw_frame(const PhasedOdometry& odometry,
                           odometry.frames().inlier_mask(), caption);
 }
 
-/// Whether frame i of n is one of the few in report.html, evenly spaced.
+/// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
+/// the one before where n is not known (0).
 bool is_in_report(std::size_t i, std::size_t n) {
   constexpr std::size_t kImages = 6;
-  return (i + 1) * kImages / n > i * kImages / n;
+  return n == 0 ? i >= kImages && std::has_single_bit(i) : (i + 1) * kImages / n > i * kImages / n;
 }
 
 pipeline::Drive drive(const RunRequest& request,
@@ -90,25 +101,29 @@ pipeline::Drive drive(const RunRequest& request,
     result.num_measured += is_measured(pose.state) ? 1 : 0;
     result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
     const StageTimer timer(Stage::kFrameFiles);
-    keeper.add(frames_csv_row(number, sequence.timestamps_s()[i], pose), pose.world_from_camera);
+    keeper.add(frames_csv_row(number, sequence.time_s(i), pose), pose.world_from_camera);
+    const std::size_t expected = pipeline::expected_frames(sequence, i + 1);
     const bool is_asked_for =
         request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
-    if (is_asked_for || is_in_report(i, sequence.size())) {
+    if (is_asked_for || is_in_report(i, expected)) {
       const cv::Mat image = draw_frame(odometry, frame.value_or(cv::Mat()), number, pose);
       if (is_asked_for) {
         const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
         pipeline::keep_first(result.written, write_image(file, image));
       }
-      if (is_in_report(i, sequence.size())) {
+      if (is_in_report(i, expected)) {
         constexpr int kReportWidth_px = 720;
         result.images.push_back(
             {fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
       }
     }
-    result.interrupted = progress && !progress(i + 1, sequence.size()) && i + 1 < sequence.size();
+    result.interrupted = progress && !progress(i + 1, expected) && i + 1 < sequence.size();
     return !result.interrupted;
   };
   pipeline::run_frames(sequence, odometry, visit);
+  if (sequence.stream()) {
+    pipeline::end_stream(sequence, progress, result);
+  }
   pipeline::keep_first(result.written, keeper.finish());
   return result;
 }
@@ -142,19 +157,22 @@ Status check_inputs_are_spared(const RunRequest& request, const FrameSource& seq
   std::vector<std::filesystem::path> inputs = pipeline::input_files(sequence, config);
   if (request.image_every > 0) {
     results.push_back(request.out_dir / "pictures");
-    inputs.push_back(sequence.file(0).parent_path());
+    if (!sequence.frames().files.empty()) {  // a live camera has none
+      inputs.push_back(sequence.file(0).parent_path());
+    }
   }
   if (request.times) {
     inputs.push_back(*request.times);
   }
+  inputs.insert(inputs.end(), request.masks.begin(), request.masks.end());
   return check_spares_inputs(results, inputs);
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
-  Expected<PhasedOdometry> odometry =
-      pipeline::create_odometry(request.config, sequence.camera(), request.models_dir);
+  Expected<PhasedOdometry> odometry = pipeline::create_odometry(
+      request.config, sequence.camera(), request.models_dir, sequence.frames().mask);
   if (!odometry) {
     return odometry.error();
   }
@@ -175,7 +193,12 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (request.measure_times) {
     recorder.emplace();
   }
+  pipeline::note_input(request, sequence);
   pipeline::Drive done = drive(request, sequence, *odometry, keeper, progress);
+  if (done.trajectory.empty()) {
+    return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
+                            request.sequence_dir.string()));
+  }
   MetricsReport report;
   Status written = timed(Stage::kResultFiles, [&] {
     return pipeline::write_results(request, sequence, *odometry, done, report);
@@ -188,7 +211,8 @@ Expected<RunSummary> run_source(const RunRequest& request,
   pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
   pipeline::keep_first(written,
                        pipeline::write_report_page(request, sequence, *odometry, done, report));
-  return RunSummary{report, std::move(done.warnings), done.interrupted, std::move(written)};
+  return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
+                    std::move(written)};
 }
 
 }  // namespace
@@ -206,7 +230,10 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return sequence.error();
   }
   RunRequest effective = request;
-  effective.config = with_camera_height(request.config, request, *sequence);
+  effective.config = with_camera_height(request.config, *sequence);
+  if (request.out_dir.empty()) {
+    effective.out_dir = std::filesystem::path("results") / sequence->name();
+  }
   return run_source(effective, *sequence, progress);
 }
 

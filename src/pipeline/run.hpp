@@ -21,7 +21,7 @@ namespace stemvo {
 /// camera_height sets scale.camera_height_m where --set did not; without one scale.source becomes
 /// none where neither --set nor a configuration file named it.
 struct RunRequest : FrameSourceRequest {
-  std::filesystem::path out_dir;
+  std::filesystem::path out_dir;  ///< empty: results/ and the recording's name
   std::filesystem::path models_dir;
   Config config;
   int num_threads = 0;         ///< 0: all cores
@@ -29,6 +29,9 @@ struct RunRequest : FrameSourceRequest {
   bool write_map = false;      ///< map.ply; needs odometry.mode map
   bool measure_times = false;  ///< RunSummary::report.timing
   std::string command;         ///< that repeats the run, for report.html; may be empty
+  /// Told before work starts, and of a stream's ground truth after it: what the input was taken
+  /// for, a line each.
+  std::function<void(const std::string&)> note;
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
@@ -36,12 +39,14 @@ struct RunRequest : FrameSourceRequest {
 /// What became of a run. Every file is written, also after an interrupt.
 struct RunSummary {
   MetricsReport report;               ///< what metrics.json holds
+  std::filesystem::path out_dir;      ///< where all of it is
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
-  bool interrupted = false;           ///< stopped early; results hold what was computed
+  bool interrupted = false;           ///< stopped early, no live camera; results hold what was done
   Status written;                     ///< the first result that could not be written, if any
 };
 
-/// Called after each frame: frames done, frames in all; false stops (results are written).
+/// Called after each frame: frames done, frames in all (0: not known); false stops (results are
+/// written).
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "dataset/ground_truth.hpp"
 #include "report/metrics_keys.hpp"
 #include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
@@ -18,27 +19,41 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kAlignments = {"none", "scale", "se3", "sim3"};
 
-/// TUM rows have eight numbers, KITTI rows twelve; only TUM has comments.
-bool looks_like_tum(const std::string& text) {
-  for (const std::string_view line : split_lines(text)) {
-    const std::vector<std::string_view> words = split_words(line);
-    if (!words.empty()) {
-      return words.front().starts_with('#') || words.size() == 8;
-    }
+/// Those poses of the two files that belong together.
+struct Pairs {
+  Trajectory estimate;
+  Trajectory truth;
+};
+
+Expected<Pairs> pair_by_line(const PoseFile& estimate,
+                             const PoseFile& truth,
+                             const std::string& file,
+                             const std::string& truth_file) {
+  if (estimate.poses.size() != truth.poses.size()) {
+    return fail(
+        fmt::format("{}: expected {} poses as in {}, found {} (poses are compared line by line "
+                    "unless both files have times, as TUM's and EuRoC's)",
+                    file, truth.poses.size(), truth_file, estimate.poses.size()));
   }
-  return false;
+  return Pairs{estimate.poses, truth.poses};
 }
 
-Expected<Trajectory> read_poses(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (text && looks_like_tum(*text)) {
-    Expected<TimedTrajectory> timed = read_tum_trajectory(file);
-    if (!timed) {
-      return timed.error();
-    }
-    return std::move(timed->world_from_camera);
+Expected<Pairs> pair_poses(const PoseFile& estimate,
+                           const PoseFile& truth,
+                           const std::filesystem::path& file,
+                           const EvaluationRequest& request) {
+  if (estimate.timestamps_s.empty() || truth.timestamps_s.empty()) {
+    return pair_by_line(estimate, truth, file.string(), request.ground_truth.string());
   }
-  return read_kitti_trajectory(file);
+  const TimePairs pairs =
+      pair_by_time(estimate.timestamps_s, truth.timestamps_s, request.tolerance_s);
+  if (const Status status =
+          dataset::check_pairs(request.ground_truth, truth.timestamps_s, file.string(),
+                               estimate.timestamps_s, pairs, request.tolerance_s);
+      !status) {
+    return status.error();
+  }
+  return Pairs{take_poses(estimate.poses, pairs.first), take_poses(truth.poses, pairs.second)};
 }
 
 void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
@@ -52,6 +67,7 @@ void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
 nlohmann::ordered_json row_json(const EvaluationRow& row) {
   nlohmann::ordered_json json;
   json["file"] = row.name;
+  json["compared_poses"] = row.num_pairs;
   add_metrics(json, row.metrics);
   return json;
 }
@@ -62,33 +78,37 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
   if (request.json) {
     std::vector<std::filesystem::path> inputs = request.estimates;
     inputs.push_back(request.ground_truth);
+    if (request.camera_file) {
+      inputs.push_back(*request.camera_file);
+    }
     if (const Status status = check_spares_inputs({*request.json}, inputs); !status) {
       return status.error();
     }
   }
-  const Expected<Trajectory> truth = read_poses(request.ground_truth);
+  const auto truth = dataset::read_truth(request.ground_truth, request.camera_file);
   if (!truth) {
     return truth.error();
   }
   EvaluationReport report;
   report.ground_truth = request.ground_truth.string();
-  report.num_poses = truth->size();
+  report.num_poses = truth->poses.size();
   report.alignment = request.alignment;
   for (const std::filesystem::path& file : request.estimates) {
-    const Expected<Trajectory> estimate = read_poses(file);
+    const auto estimate = dataset::read_truth(file, request.camera_file);
     if (!estimate) {
       return estimate.error();
     }
-    if (estimate->size() != truth->size()) {
-      return fail(
-          fmt::format("{}: expected {} poses as in {}, found {} (poses are compared line by "
-                      "line, KITTI or TUM; nothing is matched by time)",
-                      file.string(), truth->size(), report.ground_truth, estimate->size()));
+    const auto pairs = pair_poses(*estimate, *truth, file, request);
+    if (!pairs) {
+      return pairs.error();
     }
-    report.rows.push_back({file.string(), evaluate_aligned(*estimate, *truth, request.alignment)});
+    report.rows.push_back({file.string(),
+                           evaluate_aligned(pairs->estimate, pairs->truth, request.alignment),
+                           estimate->poses.size(), pairs->estimate.size()});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
-  report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth->size()), *truth)};
+  report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth->poses.size()), truth->poses),
+                        truth->poses.size(), truth->poses.size()};
   return report;
 }
 
@@ -106,12 +126,19 @@ std::string format_evaluation_table(const EvaluationReport& report) {
           ? "no segment fits into the drive: no t_rel and r_rel"
           : fmt::format("t_rel and r_rel: mean over {} segments of {}", zero_motion.num_segments,
                         length_range(zero_motion.segment_lengths_m));
+  std::string unmatched;
+  for (const EvaluationRow& row : report.rows) {
+    if (row.num_pairs < row.num_poses) {
+      unmatched += fmt::format("{}: {} of {} poses have no true pose of their time\n", row.name,
+                               row.num_poses - row.num_pairs, row.num_poses);
+    }
+  }
   return fmt::format(
       "ground truth  {}, {} poses, {:.1f} m\nalignment     {} (the last row: none)\n\n{}\n{}\n"
       "offset: mean of |dx| + |dz|; ATE: root mean square position error; RPE: mean rotation error "
-      "per frame\n",
+      "per frame\n{}",
       report.ground_truth, report.num_poses, zero_motion.path_length_m, to_string(report.alignment),
-      table.str(), segments);
+      table.str(), segments, unmatched);
 }
 
 Status write_evaluation_json(const std::filesystem::path& file, const EvaluationReport& report) {

@@ -9,15 +9,19 @@
 #include <vector>
 
 #include "evaluation/metrics.hpp"
+#include "evaluation/pose_file.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {
 
 /// Everything `stemvo evaluate` was asked for.
 struct EvaluationRequest {
-  std::filesystem::path ground_truth;            ///< KITTI poses
-  std::vector<std::filesystem::path> estimates;  ///< KITTI poses, or TUM with as many poses
+  std::filesystem::path ground_truth;            ///< KITTI's, TUM's or EuRoC's format
+  std::vector<std::filesystem::path> estimates;  ///< the same
   Alignment alignment = Alignment::kNone;
+  double tolerance_s = kTimeTolerance_s;  ///< between a pose and its true one
+  std::optional<std::filesystem::path> camera_file =
+      std::nullopt;                                          ///< with EuRoC's: as read_truth says
   std::optional<std::filesystem::path> json = std::nullopt;  ///< where the numbers will be written
 };
 
@@ -26,6 +30,8 @@ struct EvaluationRequest {
 struct EvaluationRow {
   std::string name;  ///< the path as given, or "(zero motion)"
   Metrics metrics;
+  std::size_t num_poses = 0;  ///< of the file
+  std::size_t num_pairs = 0;  ///< of them compared with a true pose
 };
 
 struct EvaluationReport {
@@ -36,8 +42,9 @@ struct EvaluationReport {
   EvaluationRow zero_motion;        ///< the baseline that stays at the origin
 };
 
-/// Both files start at the identity; nothing is matched by time. Errors: those of the readers; an
-/// estimate with another number of poses than the ground truth; `json` is one of the files.
+/// Poses are matched by time (pair_by_time) where both files have times, else line by line. Both
+/// then start at the identity. Errors: those of the readers; without times another number of poses
+/// than the ground truth; with times fewer than two pairs; `json` is one of the files.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
 
 /// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a

@@ -47,11 +47,7 @@ json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
 
 class RunFigures {
  public:
-  RunFigures(const RunPage& run, html::Page& page)
-      : run_(run), page_(page), numbers_(json::array()) {
-    for (std::size_t i = 0; i < run.frames.size(); ++i) {
-      numbers_.push_back(run.report.first_frame + i);
-    }
+  RunFigures(const RunPage& run, html::Page& page) : run_(run), page_(page), numbers_(run.numbers) {
     if (run.ground_truth) {
       travelled_ = {0.0};
       const Trajectory& truth = *run.ground_truth;
@@ -67,9 +63,8 @@ class RunFigures {
     std::vector<std::string> lines;
     for (std::size_t i = 0; i < run_.frames.size(); ++i) {
       const FrameResult& r = run_.frames[i];
-      lines.push_back(fmt::format("frame {}: {}, {} of {} tracks are inliers",
-                                  run_.report.first_frame + i, to_string(r.state), r.num_inliers,
-                                  r.num_matches));
+      lines.push_back(fmt::format("frame {}: {}, {} of {} tracks are inliers", run_.numbers[i],
+                                  to_string(r.state), r.num_inliers, r.num_matches));
       if (run_.ground_truth) {
         const Eigen::Vector3d error =
             run_.estimate[i].translation - (*run_.ground_truth)[i].translation;
@@ -316,8 +311,9 @@ class RunFigures {
 
 Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
   STEMVO_CHECK(!run.frames.empty() && run.estimate.size() == run.frames.size() &&
+                   run.numbers.size() == run.frames.size() &&
                    (!run.ground_truth || run.ground_truth->size() == run.frames.size()),
-               "a pose and a result per frame");
+               "a pose, a result and a number per frame");
   html::Page page(run.title, run.subtitle);
   const RunFigures figures(run, page);
   page.set_frames(figures.descriptions());

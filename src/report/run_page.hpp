@@ -22,8 +22,9 @@ struct RunPage {
   std::string subtitle;
   std::string unit = "m";  ///< of the trajectories
   const MetricsReport& report;
-  std::span<const FrameResult> frames;  ///< the first is number report.first_frame
-  const Trajectory& estimate;           ///< after the alignment of report.metrics
+  std::span<const FrameResult> frames;   ///< those with a true pose, where there is ground truth
+  std::span<const std::size_t> numbers;  ///< of the frames, in the sequence
+  const Trajectory& estimate;            ///< after the alignment of report.metrics
   const std::optional<Trajectory>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
   std::string config;   ///< YAML

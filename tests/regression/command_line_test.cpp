@@ -65,8 +65,8 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
   const std::vector<Misuse> cases = {
       {{}, "expected a command"},
       {{"drive"}, "drive"},
-      {{"run"}, "SEQUENCE_DIR"},
-      {{"run", "x"}, "--out"},
+      {{"run"}, "INPUT"},
+      {{"robustness", "x"}, "--out"},
       {{"run", "x", "--out"}, "--out"},
       {{"run", "x", "y", "--out", "o"}, "y"},
       {{"run", "x", "--out", "o", "--bogus"}, "--bogus"},

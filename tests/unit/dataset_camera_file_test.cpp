@@ -97,7 +97,8 @@ TEST_F(CameraFileTest, OtherNamesOfTheModels) {
 TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
   const std::string text =
       "%YAML:1.0\n# comment\n---\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
-      "  data: [0.1, 0.2,\n    0.3, 0.4]\nrate_hz: 20\nresolution: [752, 480]\n"
+      "  data: [1, 0, 0, 0.1,\n    0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: "
+      "[752, 480]\n"
       "camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
       "distortion_model: radial-tangential\n"
       "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";
@@ -203,6 +204,129 @@ TEST_F(CameraFileTest, OddRateAndHeight) {
                    {"camera_height: expected"});
   }
   expect_refused(with_line(7, "rate_hz: 0"), {"camera.yaml:7", "from 1e-09 to 100000", "found 0"});
+}
+
+constexpr const char* kKalibr =
+    "cam0:\n"
+    "  T_cam_imu:\n"
+    "  - [0.0, 1.0, 0.0, 0.5]\n"
+    "  - [-1.0, 0.0, 0.0, 0.0]\n"
+    "  - [0.0, 0.0, 1.0, 0.0]\n"
+    "  - [0.0, 0.0, 0.0, 1.0]\n"
+    "  cam_overlaps: [1]\n"
+    "  camera_model: pinhole\n"
+    "  distortion_coeffs: [0.1, 0.02, -0.003, 0.0004]\n"
+    "  distortion_model: equidistant\n"
+    "  intrinsics: [190.0, 191.0, 254.0, 256.0]\n"
+    "  resolution: [512, 511]\n"
+    "  rostopic: /cam0/image_raw\n"
+    "cam1:\n"
+    "  intrinsics: [1, 2, 3, 4]\n";
+
+constexpr const char* kOpenCv =
+    "%YAML:1.0\n"
+    "---\n"
+    "calibration_time: \"today\"\n"
+    "image_width: 640\n"
+    "image_height: 480\n"
+    "flags: 0\n"
+    "camera_matrix: !!opencv-matrix\n"
+    "   rows: 3\n"
+    "   cols: 3\n"
+    "   dt: d\n"
+    "   data: [ 520., 0., 325.5, 0., 521., 249.5, 0., 0., 1. ]\n"
+    "distortion_coefficients: !!opencv-matrix\n"
+    "   rows: 5\n"
+    "   cols: 1\n"
+    "   dt: d\n"
+    "   data: [ 0.2, -0.7, 0., 0.001,\n"
+    "       0.9 ]\n"
+    "avg_reprojection_error: 0.2\n";
+
+constexpr const char* kRos =
+    "image_width: 640\n"
+    "image_height: 480\n"
+    "camera_name: head\n"
+    "camera_matrix:\n"
+    "  rows: 3\n"
+    "  cols: 3\n"
+    "  data: [520, 0, 325.5, 0, 521, 249.5, 0, 0, 1]\n"
+    "distortion_model: plumb_bob\n"
+    "distortion_coefficients:\n"
+    "  rows: 1\n"
+    "  cols: 8\n"
+    "  data: [0.2, -0.7, 0, 0.001, 0.9, 0, 0, 0]\n"
+    "rectification_matrix:\n"
+    "  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+
+TEST_F(CameraFileTest, KalibrsChain) {
+  const auto file = read_camera_file(folder_.file("camchain.yaml", kKalibr));
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->lens.camera.fy_px, 191.0);
+  EXPECT_EQ(file->lens.camera.height_px, 511);
+  EXPECT_EQ(file->lens.distortion, Distortion::kEquidistant);
+  EXPECT_THAT(file->lens.coefficients, ElementsAre(0.1, 0.02, -0.003, 0.0004, 0.0));
+  // The camera's centre in the body: -R^T t.
+  ASSERT_TRUE(file->body_from_camera);
+  EXPECT_LT((file->body_from_camera->translation - Eigen::Vector3d(0, -0.5, 0)).norm(), 1e-12);
+  std::string text = kKalibr;
+  text.replace(text.find("[190.0, "), 8, "[");
+  expect_refused(text, {"camera.yaml:11: intrinsics: expected [fx, fy, cx, cy], found 3 numbers"});
+  text = kKalibr;
+  text.replace(text.find("pinhole"), 7, "omni");
+  expect_refused(text, {"camera.yaml:8: camera_model: expected one of pinhole, found 'omni'"});
+}
+
+TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
+  for (const char* text : {kOpenCv, kRos}) {
+    const auto file = read_camera_file(folder_.file("camera.yaml", text));
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_EQ(file->lens.camera.width_px, 640);
+    EXPECT_EQ(file->lens.camera.fx_px, 520.0);
+    EXPECT_EQ(file->lens.camera.fy_px, 521.0);
+    EXPECT_EQ(file->lens.camera.cx_px, 325.5);
+    EXPECT_EQ(file->lens.camera.cy_px, 249.5);
+    EXPECT_EQ(file->lens.distortion, Distortion::kRadialTangential);
+    EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+    EXPECT_FALSE(file->rate_hz);
+  }
+}
+
+TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
+  std::string text = kOpenCv;
+  text.replace(text.find("flags: 0"), 8, "fisheye_model: 1");
+  expect_refused(text, {"camera.yaml:16: distortion_coefficients: expected [k1, k2, k3, k4]"});
+  text.replace(text.find("0.001,\n       0.9"), 17, "0.001");
+  const auto fisheye = read_camera_file(folder_.file("camera.yaml", text));
+  ASSERT_TRUE(fisheye) << fisheye.error().message;
+  EXPECT_EQ(fisheye->lens.distortion, Distortion::kEquidistant);
+  text = kRos;
+  text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
+  expect_refused(text, {"camera.yaml:8: distortion_model: expected one of plumb_bob",
+                        "found 'rational_polynomial'"});
+  text = kRos;
+  text.replace(text.find("0, 0, 0]"), 8, "0, 0, 3]");
+  expect_refused(text, {"camera.yaml:12: distortion_coefficients: expected [k1, k2, p1, p2]",
+                        "found 8 numbers"});
+  text = kRos;
+  text.replace(text.find("[520, "), 6, "[");
+  expect_refused(text, {"camera.yaml:7: camera_matrix: expected data: [fx, 0, cx", "found 8"});
+}
+
+TEST_F(CameraFileTest, TheBodyOfEuroc) {
+  const std::string head =
+      "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: none\n";
+  const std::string good = "T_BS:\n  cols: 4\n  rows: 4\n  data: [0, -1, 0, 3, 1, 0, 0, 4,";
+  const auto file =
+      read_camera_file(folder_.file("c.yaml", head + good + " 0, 0, 1, 5, 0, 0, 0, 1]\n"));
+  ASSERT_TRUE(file) << file.error().message;
+  EXPECT_EQ(file->body_from_camera->translation, Eigen::Vector3d(3, 4, 5));
+  EXPECT_LT((file->body_from_camera->rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY())
+                .norm(),
+            1e-12);
+  expect_refused(head + good + " 0, 0, 2, 5, 0, 0, 0, 1]\n",
+                 {"camera.yaml:7: T_BS: expected a rotation"});
+  expect_refused(head + good + " 0]\n", {"camera.yaml:7: T_BS: expected 16 numbers, found 9"});
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <numeric>
 #include <random>
@@ -61,7 +62,14 @@ class Diary {
   }
 
   [[nodiscard]] FrameStages stages() {
-    return {.read = [this](std::size_t k) { record(kRead, k); },
+    return {.read =
+                [this](std::size_t k) {
+                  const bool is_there = k < num_there_;
+                  if (is_there) {
+                    record(kRead, k);
+                  }
+                  return is_there;
+                },
             .prepare = [this](std::size_t k) { record(kPrepare, k); },
             .track = [this](std::size_t k) { record(kTrack, k); },
             .localize = [this](std::size_t k) { record(kLocalize, k); },
@@ -71,6 +79,9 @@ class Diary {
                   return true;
                 }};
   }
+
+  /// Frames behind it are asked for and are not there.
+  void set_num_there(std::size_t num_there) { num_there_ = num_there; }
 
   [[nodiscard]] const Span& at(Name name, std::size_t frame) const {
     return spans_[name].at(frame);
@@ -88,6 +99,7 @@ class Diary {
     }
   }
 
+  std::size_t num_there_ = 1000000;
   int longest_nap_us_;
   std::mutex mutex_;
   std::array<std::vector<Span>, kNumNames> spans_;
@@ -149,6 +161,18 @@ TEST(FrameScheduler, WithOneThreadAllRunsInTheCallingOne) {
   run_stages(diary.stages(), 20, 1);
   EXPECT_EQ(diary.threads(), std::set{std::this_thread::get_id()});
   EXPECT_LT(diary.at(kOptimize, 3).end, diary.at(kRead, 4).begin);  // no work is done ahead
+}
+
+TEST(FrameScheduler, EndsWhereAStreamDoes) {
+  for (const int num_threads : {1, 2, 4, 8}) {
+    for (const std::size_t num_there : {0U, 1U, 5U, 6U, 7U, 50U}) {
+      SCOPED_TRACE(std::to_string(num_threads) + " threads, frames " + std::to_string(num_there));
+      Diary diary(num_there, 200);
+      diary.set_num_there(num_there);
+      run_stages(diary.stages(), std::numeric_limits<std::size_t>::max(), num_threads);
+      expect_order(diary, num_there);
+    }
+  }
 }
 
 TEST(FrameScheduler, HasNothingToDoWithoutFrames) {
@@ -215,6 +239,7 @@ TEST(FrameScheduler, ReadsAndPreparesAheadBesideTheRest) {
   stages.read = [four = meet_at(4), five = meet_at(5)](std::size_t k) {
     four(k);
     five(k);
+    return true;
   };
   run_stages(stages, 10, 5);
 }
@@ -246,7 +271,7 @@ TEST(FrameScheduler, ThrowsAgainWhatAStageThrows) {
             throw std::runtime_error("stage " + std::to_string(bad));
           }
         };
-        const FrameStages stages = {.read = [&](std::size_t k) { work(kRead, k); },
+        const FrameStages stages = {.read = [&](std::size_t k) { return work(kRead, k), true; },
                                     .prepare = [&](std::size_t k) { work(kPrepare, k); },
                                     .track = [&](std::size_t k) { work(kTrack, k); },
                                     .localize = [&](std::size_t k) { work(kLocalize, k); },
@@ -310,7 +335,7 @@ TEST(FrameScheduler, NeverHasMoreThreadsThanAskedForInStagesAndTheirLoops) {
         sums[name] += range.size();
       });
     };
-    const FrameStages stages = {.read = [&](std::size_t) { work(kRead); },
+    const FrameStages stages = {.read = [&](std::size_t) { return work(kRead), true; },
                                 .prepare = [&](std::size_t) { work(kPrepare); },
                                 .track = [&](std::size_t) { work(kTrack); },
                                 .localize = [&](std::size_t) { work(kLocalize); },

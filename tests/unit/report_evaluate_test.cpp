@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -86,12 +88,81 @@ TEST(EvaluateFiles, NamesTheFileThatDoesNotFit) {
   EXPECT_THAT(message(files.truth, one), HasSubstr("one.txt: expected 300 poses as in "));
   EXPECT_THAT(message(files.truth, one), HasSubstr("found 1 (poses are compared line by line"));
   const auto tum = files.folder.file("tum.txt", "# TUM\n0.5 0 0 0 0 0 0 1\n");
-  EXPECT_THAT(message(files.truth, tum), HasSubstr("nothing is matched by time"));
+  EXPECT_THAT(message(files.truth, tum), HasSubstr("unless both files have times"));
   EXPECT_THAT(message(files.truth, files.folder / "none.txt"), HasSubstr("none.txt: cannot read"));
   EXPECT_THAT(message(files.folder / "none.txt", files.kitti), HasSubstr("none.txt: cannot read"));
   const auto eleven = files.folder.file("eleven.txt", "1 0 0 0 0 1 0 0 0 0 1\n");
   EXPECT_THAT(message(files.truth, eleven),
               HasSubstr("eleven.txt:1: expected 12 numbers, found 11"));
+}
+
+TEST(EvaluateFiles, FilesWithTimesAreMatchedByTime) {
+  const Files files;
+  const Trajectory truth = circle(300, 1.0);
+  // Every second pose of the estimate, 4 ms late; the last one far behind the ground truth.
+  std::vector<double> truth_s(300);
+  std::vector<double> times_s;
+  Trajectory estimate;
+  for (std::size_t i = 0; i < 300; ++i) {
+    truth_s[i] = 0.1 * static_cast<double>(i);
+    if (i % 2 == 1) {
+      times_s.push_back(truth_s[i] + 0.004);
+      estimate.push_back(truth[i]);
+    }
+  }
+  times_s.push_back(99.0);
+  estimate.emplace_back();
+  ASSERT_TRUE(write_tum_trajectory(files.folder / "truth_tum.txt", truth_s, truth));
+  ASSERT_TRUE(write_tum_trajectory(files.tum, times_s, estimate));
+  EvaluationRequest request{files.folder / "truth_tum.txt", {files.tum}};
+  const auto report = evaluate_files(request);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report->rows[0].num_pairs, 150U);
+  EXPECT_EQ(report->rows[0].num_poses, 151U);
+  EXPECT_LT(report->rows[0].metrics.ate_rmse.none_m, 1e-6);
+  EXPECT_THAT(format_evaluation_table(*report),
+              HasSubstr("estimate_tum.txt: 1 of 151 poses have no true pose of their time\n"));
+  request.tolerance_s = 0.003;
+  const auto none = evaluate_files(request);
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message, HasSubstr("at least 2 poses within 0.003 s"));
+  EXPECT_THAT(none.error().message, HasSubstr("0.000 to 29.900 s, the others of 0.104 to 99.000"));
+}
+
+TEST(EvaluateFiles, TheTruthOfEurocIsTheBodys) {
+  const TempFolder folder;
+  const Rigid3 body_from_camera(so3_exp({0, 0, M_PI / 2}), {0.1, 0.2, 0.3});
+  Trajectory camera;
+  std::vector<double> times_s;
+  std::string csv = "#timestamp [ns], p_RS_R_x [m], ...\n";
+  for (int i = 0; i < 50; ++i) {
+    const Rigid3 body(so3_exp({0.02 * i, 0, 0}), {0.1 * i, 0, 0});
+    camera.push_back(body * body_from_camera);
+    times_s.push_back(1403715273.0 + 0.05 * i);
+    const Eigen::Quaterniond& q = body.rotation;
+    csv += fmt::format("{},{},0,0,{},{},{},{},0.5,0,0,1,1,1,2,2,2\n",
+                       1403715273000000000 + 50000000LL * i, 0.1 * i, q.w(), q.x(), q.y(), q.z());
+  }
+  const auto estimate = folder / "estimate.txt";
+  ASSERT_TRUE(write_tum_trajectory(estimate, times_s, camera));
+  std::filesystem::create_directories(folder / "mav0/state_groundtruth_estimate0");
+  std::filesystem::create_directories(folder / "mav0/cam0");
+  const auto truth = folder.file("mav0/state_groundtruth_estimate0/data.csv", csv);
+  const std::string keys =
+      "resolution: [64, 48]\nintrinsics: [50, 50, 31, 23]\ndistortion_model: none\n";
+  const auto no_body = evaluate_files({truth, {estimate}});
+  ASSERT_FALSE(no_body);
+  EXPECT_THAT(no_body.error().message, HasSubstr("data.csv: expected a camera file with T_BS"));
+  (void)folder.file("mav0/cam0/sensor.yaml",
+                    keys + "T_BS: {data: [0,-1,0,0.1, 1,0,0,0.2, 0,0,1,0.3]}\n");
+  const auto report = evaluate_files({truth, {estimate}});
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report->rows[0].num_pairs, 50U);
+  EXPECT_LT(report->rows[0].metrics.ate_rmse.none_m, 1e-6);
+  EXPECT_LT(report->rows[0].metrics.rpe_rotation_deg, 1e-4);
+  EXPECT_FALSE(evaluate_files({.ground_truth = truth,
+                               .estimates = {estimate},
+                               .camera_file = folder.file("c.yaml", keys)}));
 }
 
 TEST(EvaluateFiles, TableAndJsonSayTheSame) {

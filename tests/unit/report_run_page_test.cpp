@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -33,16 +34,24 @@ class RunPageTest : public ::testing::Test {
       frame.num_inliers = 300;
       frame.camera = {700.0, 700.0, 600.0 + 0.01 * i, 180.0, 1241, 376};
       frames_.push_back(frame);
+      numbers_.push_back(100U + 2U * static_cast<std::size_t>(i));
     }
-    report_.first_frame = 100;
     report_.num_frames = frames_.size();
     report_.metrics = evaluate(estimate_, *truth_);
   }
 
   json content() {
-    EXPECT_TRUE(write_run_page(
-        folder_ / "report.html",
-        {"a drive", "", "m", report_, frames_, estimate_, truth_, {}, "key: value", "stemvo run"}));
+    EXPECT_TRUE(write_run_page(folder_ / "report.html", {"a drive",
+                                                         "",
+                                                         "m",
+                                                         report_,
+                                                         frames_,
+                                                         numbers_,
+                                                         estimate_,
+                                                         truth_,
+                                                         {},
+                                                         "key: value",
+                                                         "stemvo run"}));
     const std::string text = read_text_file(folder_ / "report.html").value_or("");
     const std::string begin = "id=\"content\">";
     const std::size_t at = text.find(begin) + begin.size();
@@ -61,6 +70,7 @@ class RunPageTest : public ::testing::Test {
   Trajectory estimate_;
   std::optional<Trajectory> truth_;
   std::vector<FrameResult> frames_;
+  std::vector<std::size_t> numbers_;
   MetricsReport report_;
 };
 
@@ -68,7 +78,7 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   const json page = content();
   ASSERT_EQ(page["frames"].size(), 201U);
   EXPECT_EQ(page["frames"][200],
-            "frame 300: tracking, 300 of 600 tracks are inliers, 2.01 m off after 200.0 m");
+            "frame 500: tracking, 300 of 600 tracks are inliers, 2.01 m off after 200.0 m");
 
   const json top = section(page, "Path from above");
   EXPECT_EQ(top["traces"][top["frame_trace"].get<int>()]["name"], "estimate");
@@ -89,7 +99,7 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   EXPECT_NEAR(mean["y"][0].get<double>(), 100.0 * std::hypot(0.01, 0.001), 0.03);
 
   const json tracks = section(page, "Tracks, model and state");
-  EXPECT_EQ(tracks["traces"][0]["x"][0], 100) << "in the folder's numbering";
+  EXPECT_EQ(tracks["traces"][0]["x"][1], 102) << "in the folder's numbering";
   EXPECT_EQ(tracks["traces"][0]["y"][200], 600);
   EXPECT_EQ(tracks["traces"][3]["y"][1], "tracking");
   const json camera = section(page, "Scale and camera");

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#include "dataset/ground_truth.hpp"
+
+#include <fmt/format.h>
+
+#include "dataset/camera_file.hpp"
+#include "dataset/frame_files.hpp"
+
+namespace stemvo::dataset {
+
+namespace fs = std::filesystem;
+
+Expected<PoseFile> read_truth(const fs::path& file, const std::optional<fs::path>& camera_file) {
+  Expected<PoseFile> result = read_pose_file(file);
+  if (!result || !result->is_of_body) {
+    return result;
+  }
+  const fs::path folder = absolute_folder(file.parent_path().empty() ? "." : file.parent_path());
+  const auto camera =
+      read_camera_file(camera_file.value_or(folder.parent_path() / "cam0/sensor.yaml"));
+  if (!camera || !camera->body_from_camera) {
+    return fail(fmt::format(
+        "{}: expected a camera file with T_BS, for these are poses of the body: --camera FILE, or "
+        "../cam0/sensor.yaml from there; found {}",
+        file.string(), camera ? "one without T_BS" : camera.error().message));
+  }
+  for (Rigid3& pose : result->poses) {
+    pose = pose * *camera->body_from_camera;
+  }
+  result->is_of_body = false;
+  return result;
+}
+
+Status check_pairs(const fs::path& truth_file,
+                   std::span<const double> truth_s,
+                   const std::string& owner,
+                   std::span<const double> times_s,
+                   const TimePairs& pairs,
+                   double tolerance_s) {
+  constexpr std::size_t kMinPairs = 2;
+  if (pairs.first.size() >= kMinPairs) {
+    return {};
+  }
+  return fail(fmt::format(
+      "{}: expected at least {} poses within {} s of times in {}, found {}; poses are of {:.3f} to "
+      "{:.3f} s, the others of {:.3f} to {:.3f} s (see --gt-tolerance)",
+      truth_file.string(), kMinPairs, tolerance_s, owner, pairs.first.size(), truth_s.front(),
+      truth_s.back(), times_s.front(), times_s.back()));
+}
+
+Expected<GroundTruth> match_by_time(const PoseFile& truth,
+                                    const fs::path& truth_file,
+                                    const std::vector<double>& times_s,
+                                    double tolerance_s) {
+  const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
+  const Status status =
+      check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s);
+  if (!status) {
+    return status.error();
+  }
+  return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
+}
+
+}  // namespace stemvo::dataset

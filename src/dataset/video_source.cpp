@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "dataset/frame_files.hpp"
+#include "dataset/ground_truth.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo::dataset {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The lens' image: the driver of a camera may give another size than it was asked for.
+Status check_stream_size(const cv::Size& size, const Camera& camera, const std::string& owner) {
+  if (size != cv::Size(camera.width_px, camera.height_px)) {
+    return fail(
+        fmt::format("{}: expected frames of {}x{} pixels, as the camera file says, found "
+                    "{}x{}",
+                    owner, camera.width_px, camera.height_px, size.width, size.height));
+  }
+  return {};
+}
+
+/// Poses by the times of frames, or by their number where the file has no times.
+Expected<GroundTruth> match_frames(const PoseFile& truth,
+                                   const fs::path& file,
+                                   const FrameSourceRequest& request,
+                                   const std::vector<double>& times_s) {
+  if (!truth.timestamps_s.empty()) {
+    return match_by_time(truth, file, times_s, request.ground_truth_tolerance_s);
+  }
+  const std::size_t begin = request.frames ? request.frames->begin : 0;
+  if (truth.poses.size() < begin + times_s.size()) {
+    return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",
+                            file.string(), begin + times_s.size(), truth.poses.size()));
+  }
+  GroundTruth result{relative_to_first(std::span(truth.poses).subspan(begin, times_s.size())), {}};
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    result.frames.push_back(i);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::optional<int> camera_number(const fs::path& path) {
+  constexpr std::string_view kPrefix = "camera:";
+  constexpr std::size_t kMaxNumber = 1000;
+  const std::string text = path.string();
+  if (!text.starts_with(kPrefix)) {
+    return std::nullopt;
+  }
+  const auto number = parse_index(std::string_view(text).substr(kPrefix.size()));
+  return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
+}
+
+Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
+                                  const CameraFile& camera,
+                                  const FrameSourceRequest& request) {
+  const std::string owner = request.sequence_dir.string();
+  const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
+  Status status = check_stream_size(stream->size(), camera.lens.camera, owner);
+  const auto view = FrameView::create(camera.lens, *request.camera_file);
+  if (status && !view) {
+    status = view.error();
+  }
+  status = status ? stream->skip(range.begin) : status;
+  if (!status) {
+    return status.error();
+  }
+  stream->set_default_rate(camera.rate_hz.value_or(30.0));
+  FrameList frames;
+  frames.kind = stream->is_live() ? "live camera" : "video";
+  frames.name = stream->is_live() ? fmt::format("camera{}", camera_number(owner).value_or(0))
+                                  : request.sequence_dir.stem().string();
+  if (!stream->is_live()) {
+    frames.files = {request.sequence_dir};
+  }
+  const std::size_t end = range.end.value_or(std::numeric_limits<std::size_t>::max());
+  frames.range = {range.begin, end};
+  const std::size_t all = stream->expected_frames();
+  frames.stream =
+      StreamInfo{end - range.begin, all > range.begin ? std::min(all, end) - range.begin : 0U,
+                 stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); }};
+  frames.given_calibration = request.camera_file;
+  frames.camera_height_m = camera.camera_height_m;
+  if (request.ground_truth) {
+    const auto truth = read_truth(*request.ground_truth, request.camera_file);
+    if (!truth) {
+      return truth.error();
+    }
+    frames.ground_truth_file = request.ground_truth;
+    frames.match = [truth = *truth, request](const std::vector<double>& times_s) {
+      return match_frames(truth, *request.ground_truth, request, times_s);
+    };
+  }
+  status = add_view(
+      frames, *view, request.masks, [stream, owner, raw = camera.lens.camera](std::size_t index) {
+        auto image = stream->read(index);
+        return image && image->empty() ? image : check_size(owner, std::move(image), raw);
+      });
+  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
+}
+
+Expected<FrameSource> open_video(const FrameSourceRequest& request) {
+  if (!request.camera_file) {
+    return fail(fmt::format("{}: a video: expected --camera FILE, found none",
+                            request.sequence_dir.string()));
+  }
+  const auto camera = read_camera_file(*request.camera_file);
+  if (!camera) {
+    return camera.error();
+  }
+  const auto number = camera_number(request.sequence_dir);
+  const cv::Size size(camera->lens.camera.width_px, camera->lens.camera.height_px);
+  const auto stream = number ? VideoStream::open_camera(*number, size)
+                             : VideoStream::open_file(request.sequence_dir);
+  return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
+    return open_stream(opened, *camera, request);
+  });
+}
+
+}  // namespace stemvo::dataset

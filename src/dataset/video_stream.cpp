@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#include "dataset/video_stream.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+namespace stemvo::dataset {
+
+namespace fs = std::filesystem;
+
+Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file) {
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
+  // A playlist may name anything; and a relative path with a colon would be taken for an address.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
+  std::error_code code;
+  const fs::path path = fs::absolute(file, code);
+  auto capture = std::make_unique<cv::VideoCapture>(path.string(), cv::CAP_FFMPEG);
+  if (!capture->isOpened()) {
+    return fail(fmt::format(
+        "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
+        "no video)",
+        file.string()));
+  }
+  // The sensor's rows and columns, as of JPEGs: the calibration knows nothing of a turned screen.
+  capture->set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  return std::make_shared<VideoStream>(std::move(capture), file.string(), false);
+}
+
+Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
+  auto capture = std::make_unique<cv::VideoCapture>(number, cv::CAP_V4L2);
+  if (!capture->isOpened()) {
+    return fail(fmt::format(
+        "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none",
+        number));
+  }
+  capture->set(cv::CAP_PROP_FRAME_WIDTH, size.width);
+  capture->set(cv::CAP_PROP_FRAME_HEIGHT, size.height);
+  return std::make_shared<VideoStream>(std::move(capture), fmt::format("camera:{}", number), true);
+}
+
+VideoStream::VideoStream(std::unique_ptr<cv::VideoCapture> capture, std::string name, bool is_live)
+    : capture_(std::move(capture)), name_(std::move(name)), is_live_(is_live) {}
+
+VideoStream::~VideoStream() = default;
+
+cv::Size VideoStream::size() const {
+  return {static_cast<int>(capture_->get(cv::CAP_PROP_FRAME_WIDTH)),
+          static_cast<int>(capture_->get(cv::CAP_PROP_FRAME_HEIGHT))};
+}
+
+std::size_t VideoStream::expected_frames() const {
+  const double count = is_live_ ? 0.0 : capture_->get(cv::CAP_PROP_FRAME_COUNT);
+  return count > 0.0 && count < 1e12 ? static_cast<std::size_t>(count) : 0U;
+}
+
+double VideoStream::next_time_s() const {
+  constexpr double kMillisecond_s = 1e-3;
+  if (is_live_) {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - *started_;
+    return since.count();
+  }
+  const double told_s = kMillisecond_s * capture_->get(cv::CAP_PROP_POS_MSEC);
+  if (std::isfinite(told_s) && (!last_time_s_ || told_s > *last_time_s_)) {
+    return told_s;
+  }
+  const double told_hz = capture_->get(cv::CAP_PROP_FPS);  // a container without times
+  return last_time_s_.value_or(0.0) + 1.0 / (told_hz > 0.0 ? told_hz : default_rate_hz_);
+}
+
+bool VideoStream::grab() {
+  if (is_ended_ || !capture_->grab()) {
+    is_ended_ = true;
+    return false;
+  }
+  if (!started_) {
+    started_ = std::chrono::steady_clock::now();
+  }
+  const double time_s = next_time_s();
+  last_time_s_ = last_time_s_ ? std::max(time_s, std::nextafter(*last_time_s_, 1e300)) : time_s;
+  return true;
+}
+
+Status VideoStream::skip(std::size_t count) {
+  const std::lock_guard lock(mutex_);
+  for (std::size_t i = 0; i <= count; ++i) {
+    if (!grab()) {
+      return fail(fmt::format("{}: expected more than {} frames that can be decoded, found {}",
+                              name_, count, i));
+    }
+  }
+  is_grabbed_ = true;
+  return {};
+}
+
+Expected<cv::Mat> VideoStream::read(std::size_t index) {
+  std::unique_lock lock(mutex_);
+  turn_.wait(lock, [&] { return next_ == index || is_ended_; });
+  if (is_ended_) {
+    return cv::Mat();
+  }
+  cv::Mat image;
+  if (std::exchange(is_grabbed_, false) || grab()) {
+    capture_->retrieve(image);
+    times_s_.push_back(*last_time_s_);
+    ++next_;
+  }
+  const bool is_ended = is_ended_;
+  lock.unlock();
+  turn_.notify_all();
+  if (is_ended) {
+    return cv::Mat();
+  }
+  if (image.type() != CV_8UC3) {
+    return fail(
+        fmt::format("{}: frame {}: expected 8-bit colour, found another or none", name_, index));
+  }
+  cv::Mat rgb;
+  cv::cvtColor(image, rgb, cv::COLOR_BGR2RGB);
+  return rgb;
+}
+
+double VideoStream::time_s(std::size_t index) const {
+  const std::lock_guard lock(mutex_);
+  return times_s_.at(index);
+}
+
+}  // namespace stemvo::dataset

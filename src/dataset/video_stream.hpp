@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/error.hpp"
+
+namespace cv {
+class VideoCapture;
+}
+
+namespace stemvo::dataset {
+
+/// Frames of a video file or a live camera, decoded one behind the other; none is kept.
+class VideoStream {
+ public:
+  /// Decoded by FFmpeg. Error: no file, or not a video.
+  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_file(
+      const std::filesystem::path& file);
+  /// Camera N of the machine (V4L2, /dev/videoN), asked for images of this size. Error: no such
+  /// camera.
+  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_camera(int number,
+                                                                          const cv::Size& size);
+  /// `is_live`: times are those of the clock, from the first frame on, and no frame is skipped to
+  /// be read again; how a test plays a file as a camera.
+  VideoStream(std::unique_ptr<cv::VideoCapture> capture, std::string name, bool is_live);
+  ~VideoStream();
+  VideoStream(const VideoStream&) = delete;
+  VideoStream& operator=(const VideoStream&) = delete;
+
+  /// Decodes and drops frames, before the first is read. Error: none is left to be read.
+  [[nodiscard]] Status skip(std::size_t count);
+
+  [[nodiscard]] cv::Size size() const;
+  [[nodiscard]] bool is_live() const { return is_live_; }
+  /// As the container says, which may be wrong; 0: it does not say.
+  [[nodiscard]] std::size_t expected_frames() const;
+  /// Frames per second where the container says none.
+  void set_default_rate(double rate_hz) { default_rate_hz_ = rate_hz; }
+
+  /// Frame `index`, counted from 0 behind those skipped: CV_8UC3, RGB; empty behind the last one.
+  /// Each is read once; several threads may ask for frames that follow one another, and wait for
+  /// their turn. Error: a frame that cannot be decoded.
+  [[nodiscard]] Expected<cv::Mat> read(std::size_t index);
+  /// Of a frame that was read, in seconds; increasing.
+  [[nodiscard]] double time_s(std::size_t index) const;
+
+ private:
+  /// With the mutex held.
+  [[nodiscard]] bool grab();
+  [[nodiscard]] double next_time_s() const;
+
+  std::unique_ptr<cv::VideoCapture> capture_;
+  std::string name_;
+  bool is_live_ = false;
+  double default_rate_hz_ = 30.0;
+  std::optional<std::chrono::steady_clock::time_point> started_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable turn_;
+  std::size_t next_ = 0;     ///< the frame whose turn it is
+  bool is_grabbed_ = false;  ///< it waits to be read
+  bool is_ended_ = false;
+  std::optional<double> last_time_s_;  ///< of the frame grabbed last
+  std::deque<double> times_s_;
+};
+
+}  // namespace stemvo::dataset

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "evaluation/trajectory.hpp"
+#include "support/program_test.hpp"
+#include "support/shared_data.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr int kNumFrames = 12;
+
+/// One rendered drive as others record: its images, times and camera in their layouts.
+class RecordingsRun : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string calib = read_file(sequence_ / "calib.txt");
+    double fx = 0.0;
+    double cx = 0.0;
+    double fy = 0.0;
+    double cy = 0.0;
+    std::sscanf(calib.c_str() + calib.find("P2:"), "P2: %lf 0 %lf %*f 0 %lf %lf", &fx, &cx, &fy,
+                &cy);
+    camera_text_ = fmt::format(
+        "resolution: [620, 188]\nintrinsics: [{}, {}, {}, {}]\ndistortion_model: none\n", fx, fy,
+        cx, cy);
+    write_file(camera_, camera_text_);
+  }
+
+  fs::path image(int index) const { return sequence_ / fmt::format("image_2/{:06}.png", index); }
+  ProgramResult run(const std::string& input, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"run", input, "--out", out_});
+    return run_stemvo(more);
+  }
+  /// Of the same images in KITTI's layout.
+  std::string expected_poses() const {
+    const std::string out = folder_ / "kitti";
+    const ProgramResult result =
+        run_stemvo({"run", sequence_.string(), "--out", out, "--set", "scale.source=none"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return read_file(out + "/trajectory_kitti.txt");
+  }
+  std::string poses() const { return read_file(out_ + "/trajectory_kitti.txt"); }
+  nlohmann::json metrics() const {
+    return nlohmann::json::parse(read_file(out_ + "/metrics.json"));
+  }
+  std::string write_video() const {
+    const std::string file = folder_ / "drive.avi";
+    cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
+                           {620, 188});
+    for (int i = 0; i < kNumFrames; ++i) {
+      writer.write(cv::imread(image(i).string()));
+    }
+    return file;
+  }
+
+  TempFolder folder_;
+  const fs::path sequence_ = test::copy_drive(folder_.path(), kNumFrames);
+  const std::string camera_ = folder_ / "camera.yaml";
+  const std::string out_ = folder_ / "out";
+  std::string camera_text_;
+};
+
+TEST_F(RecordingsRun, Euroc) {
+  const fs::path mav = folder_.path() / "V1/mav0";
+  fs::create_directories(mav / "cam0/data");
+  fs::create_directories(mav / "state_groundtruth_estimate0");
+  std::string list = "#timestamp [ns],filename\n";
+  std::string truth = "#timestamp,..\n";
+  const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");
+  for (int i = 0; i < kNumFrames; ++i) {
+    const long time_ns = 1400000000000000000 + 100000000L * i;
+    const std::string name = fmt::format("{}.png", time_ns);
+    fs::copy_file(image(i), mav / "cam0/data" / name);
+    list += fmt::format("{},{}\n", time_ns, name);
+    const Rigid3& pose = (*true_poses)[static_cast<std::size_t>(i)];
+    const Eigen::Quaterniond q(pose.rotation);
+    if (i != 5) {  // 3 ms late, one of them missing
+      truth += fmt::format("{},{},{},{},{},{},{},{},0,0,0,0,0,0,0,0,0\n", time_ns + 3000000,
+                           pose.translation.x(), pose.translation.y(), pose.translation.z(), q.w(),
+                           q.x(), q.y(), q.z());
+    }
+  }
+  write_file(mav / "cam0/data.csv", list);
+  write_file(mav / "cam0/sensor.yaml",
+             camera_text_ +
+                 "rate_hz: 10\nT_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n");
+  write_file(mav / "state_groundtruth_estimate0/data.csv", truth);
+  const ProgramResult result = run(folder_ / "V1");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, StartsWith("input: EuRoC recording V1, 12 frames of 620x188 pixels, "
+                                     "ground truth for 11 of 12 frames"));
+  EXPECT_EQ(poses(), expected_poses());
+  EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.2);
+}
+
+TEST_F(RecordingsRun, Tum) {
+  const fs::path desk = folder_.path() / "desk";
+  fs::create_directories(desk / "rgb");
+  std::string list = "# timestamp filename\n";
+  for (int i = 0; i < kNumFrames; ++i) {
+    fs::copy_file(image(i), desk / fmt::format("rgb/{}.png", i));
+    list += fmt::format("{:.2f} rgb/{}.png\n", 1305031452.79 + 0.1 * i, i);
+  }
+  write_file(desk / "rgb.txt", list);
+  write_file(desk / "camera.yaml", camera_text_);
+  const ProgramResult result = run(desk.string(), {"--pictures", "6"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("input: TUM RGB-D recording desk"));
+  EXPECT_EQ(poses(), expected_poses());
+  EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("1305031452.789999962 "));
+}
+
+TEST_F(RecordingsRun, AVideoWithTruthByTime) {
+  std::string truth;
+  const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");
+  for (int i = 0; i < kNumFrames; ++i) {
+    const Rigid3& pose = (*true_poses)[static_cast<std::size_t>(i)];
+    const Eigen::Quaterniond q(pose.rotation);
+    truth += fmt::format("{} {} {} {} {} {} {} {}\n", 0.1 * i, pose.translation.x(),
+                         pose.translation.y(), pose.translation.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  write_file(folder_ / "truth.txt", truth);
+  const std::string video = write_video();
+  const ProgramResult result = run(video, {"--camera", camera_, "--gt", folder_ / "truth.txt",
+                                           "--pictures", "5", "--threads", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("input: video drive, frames of 620x188 pixels"));
+  EXPECT_THAT(result.err, HasSubstr("ground truth for 12 of 12 frames"));
+  EXPECT_EQ(metrics().at("frames"), kNumFrames);
+  EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.5);
+  EXPECT_TRUE(fs::exists(out_ + "/pictures/000010.png"));
+  const std::string first = poses();
+  ASSERT_EQ(run(video, {"--camera", camera_, "--threads", "1"}).exit_code, 0);
+  EXPECT_EQ(poses(), first) << "threads change nothing";
+  ASSERT_EQ(run(video, {"--camera", camera_, "--frames", "2:7"}).exit_code, 0);
+  EXPECT_EQ(metrics().at("frames"), 5);
+}
+
+TEST_F(RecordingsRun, AVideoThatIsCutOff) {
+  const std::string video = write_video();
+  const std::string whole = read_file(video);
+  const auto cut_to = [&](double share) {
+    write_file(video, whole.substr(
+                          0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
+    return run(video, {"--camera", camera_, "--quiet"});
+  };
+  const ProgramResult half = cut_to(0.5);
+  EXPECT_THAT(half.exit_code, ::testing::AnyOf(0, 1));
+  EXPECT_THAT(half.err, Not(HasSubstr("internal")));
+  if (half.exit_code == 0) {
+    EXPECT_THAT(half.err, HasSubstr("may be cut off"));
+    EXPECT_LT(metrics().at("frames"), kNumFrames);
+  }
+  expect_error(cut_to(0.02), 1, {"drive.avi"});
+  expect_error(cut_to(0.0), 1, {"drive.avi"});
+}
+
+TEST_F(RecordingsRun, LargeFramesAreWorkedOnSmaller) {
+  fs::create_directories(folder_.path() / "large");
+  for (int i = 0; i < 3; ++i) {
+    cv::Mat large;
+    cv::resize(cv::imread(image(i).string()), large, {2480, 752}, 0, 0, cv::INTER_CUBIC);
+    cv::imwrite(folder_ / fmt::format("large/{}.png", i), large);
+  }
+  write_file(camera_,
+             "resolution: [2480, 752]\nintrinsics: [1400, 1400, 1240, 376]\n"
+             "distortion_model: none\nrate_hz: 10\n");
+  const ProgramResult result = run(folder_ / "large", {"--camera", camera_});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("3 frames of 2480x752 pixels worked on at 1653x501"));
+}
+
+TEST_F(RecordingsRun, AMaskKeepsPointsAway) {
+  const std::string before = expected_poses();
+  ASSERT_EQ(
+      run(sequence_.string(), {"--mask", "0,150,620,38", "--set", "scale.source=none"}).exit_code,
+      0);
+  EXPECT_NE(poses(), before);
+  cv::imwrite(folder_ / "mask.png", [] {
+    cv::Mat mask(188, 620, CV_8UC1, cv::Scalar(255));
+    mask(cv::Rect(0, 150, 620, 38)) = 0;
+    return mask;
+  }());
+  const std::string by_rectangle = poses();
+  ASSERT_EQ(run(sequence_.string(), {"--mask", folder_ / "mask.png", "--set", "scale.source=none"})
+                .exit_code,
+            0);
+  EXPECT_EQ(poses(), by_rectangle);
+  expect_error(run(sequence_.string(), {"--mask", "0,0,620,188"}), 1, {"--mask"});
+  expect_error(run(sequence_.string(), {"--mask", "0,0,10,10", "--mask", "nowhere.png"}), 1,
+               {"--mask", "nowhere.png"});
+}
+
+TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {
+  const fs::path here = fs::current_path();
+  fs::current_path(folder_.path());
+  ::setenv("NO_COLOR", "1", 1);
+  const ProgramResult result = run_stemvo({"run", sequence_.string(), "--frames", "0:3"});
+  ::unsetenv("NO_COLOR");
+  fs::current_path(here);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("results: results/00\n"));
+  EXPECT_THAT(result.out + result.err, Not(HasSubstr("\x1b")));
+  EXPECT_TRUE(fs::exists(folder_ / "results/00/trajectory_kitti.txt"));
+}
+
+TEST_F(RecordingsRun, ACameraThatIsNotThereIsOneLine) {
+  expect_error(run("camera:987", {"--camera", camera_}), 1, {"/dev/video987"});
+}
+
+TEST_F(RecordingsRun, RealRecordingsOfOthers) {
+  STEMVO_NEEDS_SHARED_DATA();
+  const fs::path data = testing::shared_data();
+  write_file(camera_,  // freiburg2, as its authors publish it
+             "resolution: [640, 480]\nintrinsics: [520.9, 521.0, 325.1, 249.7]\n"
+             "distortion_model: radial-tangential\n"
+             "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\n");
+  for (const auto& [name, more] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"euroc", {}}, {"tum", {"--camera", camera_}}, {"handheld", {"--frames", "0:30"}}}) {
+    const ProgramResult result = run((data / name).string(), more);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_GT(metrics().at("tracked_fraction").get<double>(), 0.5) << name;
+  }
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "dataset/frame_view.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo::dataset {
+namespace {
+
+using ::testing::HasSubstr;
+
+Lens lens_of(int width_px, int height_px) {
+  Lens lens;
+  lens.camera = {0.9 * width_px, 0.9 * width_px, 0.5 * width_px - 0.5, 0.5 * height_px - 0.5};
+  lens.camera.width_px = width_px;
+  lens.camera.height_px = height_px;
+  return lens;
+}
+
+cv::Size working_size(int width_px, int height_px) {
+  const Camera camera = working_lens(lens_of(width_px, height_px)).camera;
+  return {camera.width_px, camera.height_px};
+}
+
+TEST(WorkingSize, OnlyLargeFramesAreMadeSmaller) {
+  EXPECT_EQ(working_size(1241, 376), cv::Size(1241, 376));
+  EXPECT_EQ(working_size(1280, 1024), cv::Size(1280, 1024));
+  EXPECT_EQ(working_size(1920, 1080), cv::Size(1280, 720));
+  EXPECT_EQ(working_size(3840, 2160), cv::Size(1280, 720));
+  EXPECT_EQ(working_size(2448, 2048), cv::Size(979, 819));
+  EXPECT_EQ(working_size(2000000, 1), cv::Size(1333333, 1)) << "a side never vanishes";
+}
+
+/// Where a dot is found in the small image is where the small camera sees its ray.
+TEST(WorkingSize, TheCameraShrinksWithTheImage) {
+  Lens lens = lens_of(2447, 2049);
+  const auto view = FrameView::create(lens, "camera.yaml");
+  ASSERT_TRUE(view) << view.error().message;
+  cv::Mat image(2049, 2447, CV_8UC1, cv::Scalar(0));
+  image(cv::Rect(300, 1500, 51, 51)) = 255;
+  const cv::Mat small = view->apply(image);
+  ASSERT_EQ(small.cols, view->camera().width_px);
+  const cv::Moments moments = cv::moments(small);
+  const Eigen::Vector2d centre(moments.m10 / moments.m00, moments.m01 / moments.m00);
+  const Eigen::Vector2d ray = lens.camera.normalize({325.0, 1525.0});
+  EXPECT_LT((view->camera().project({ray.x(), ray.y(), 1.0}) - centre).norm(), 0.02);
+}
+
+TEST(Mask, RectanglesAndImages) {
+  testing::TempFolder temp;
+  cv::Mat drawn(48, 64, CV_8UC1, cv::Scalar(255));
+  drawn(cv::Rect(0, 0, 4, 4)) = 0;
+  cv::imwrite(temp / "mask.png", drawn);
+  const auto mask = make_mask({"10,40,20,100", temp / "mask.png"}, {64, 48});
+  ASSERT_TRUE(mask) << mask.error().message;
+  EXPECT_EQ(mask->at<unsigned char>(3, 3), 0);
+  EXPECT_EQ(mask->at<unsigned char>(47, 29), 0);
+  EXPECT_EQ(mask->at<unsigned char>(47, 30), 255);
+  EXPECT_EQ(cv::countNonZero(*mask), 64 * 48 - 16 - 20 * 8);
+  EXPECT_TRUE(make_mask({}, {64, 48})->empty());
+}
+
+TEST(Mask, WhatIsNone) {
+  testing::TempFolder temp;
+  cv::imwrite(temp / "small.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(0)));
+  const auto error_of = [](const std::string& part) {
+    const auto mask = make_mask({part}, {64, 48});
+    return mask ? "(made)" : mask.error().message;
+  };
+  EXPECT_THAT(error_of("64,0,5,5"), HasSubstr("64x48"));
+  EXPECT_THAT(error_of("1,1,0,5"), HasSubstr("a rectangle inside"));
+  EXPECT_THAT(error_of("0,0,64,48"), HasSubstr("that is left"));
+  EXPECT_THAT(error_of("1,1,5"), HasSubstr("x,y,w,h"));
+  EXPECT_THAT(error_of("1,1,5,-5"), HasSubstr("x,y,w,h"));
+  EXPECT_THAT(error_of("1,1,5,99999999999"), HasSubstr("x,y,w,h"));
+  EXPECT_THAT(error_of(temp / "small.png"), HasSubstr("found 4x4"));
+}
+
+TEST(Mask, GoesTheWayOfTheFrames) {
+  Lens lens = lens_of(1920, 1080);
+  lens.distortion = Distortion::kRadialTangential;
+  lens.coefficients = {-0.2, 0.05};
+  const auto view = FrameView::create(lens, "camera.yaml");
+  ASSERT_TRUE(view) << view.error().message;
+  const auto mask = make_mask({"0,900,1920,180"}, {1920, 1080});
+  const cv::Mat seen = view->apply_to_mask(*mask);
+  cv::Mat frame(1080, 1920, CV_8UC1, cv::Scalar(0));
+  frame(cv::Rect(0, 900, 1920, 180)) = 200;
+  const cv::Mat bonnet = view->apply(frame) > 0;
+  ASSERT_EQ(seen.size(), cv::Size(1280, 720));
+  EXPECT_GT(cv::countNonZero(bonnet), 1280 * 60);
+  EXPECT_EQ(cv::countNonZero(bonnet & seen), 0) << "no pixel of the bonnet is left";
+  EXPECT_LT(cv::countNonZero(~bonnet & ~seen), 2 * 1280);
+}
+
+}  // namespace
+}  // namespace stemvo::dataset

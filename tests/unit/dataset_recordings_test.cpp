@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "dataset/frame_files.hpp"
+#include "dataset/frame_source.hpp"
+#include "support/shared_data.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr int kNumFrames = 6;
+constexpr int kWidth_px = 64;
+constexpr int kHeight_px = 48;
+constexpr const char* kIntrinsics =
+    "resolution: [64, 48]\nintrinsics: [60, 61, 31.5, 23.5]\ndistortion_model: none\n";
+
+/// Frame i is gray of 20 + 40 i, so that it is known again.
+cv::Mat frame(int index) {
+  return {kHeight_px, kWidth_px, CV_8UC3, cv::Scalar::all(20 + 40 * index)};
+}
+
+/// Recordings in the layouts of others, written anew for each test.
+class Recordings : public ::testing::Test {
+ protected:
+  FrameSourceRequest request(const std::string& input) const {
+    FrameSourceRequest result;
+    result.sequence_dir = input;
+    return result;
+  }
+  static std::string error_of(const FrameSourceRequest& request) {
+    const auto source = open_source(request);
+    return source ? "(opened)" : source.error().message;
+  }
+  /// As frame() made it, but for what a lossy video changes.
+  static void expect_frame(const Expected<cv::Mat>& image, int index) {
+    ASSERT_TRUE(image) << image.error().message;
+    ASSERT_FALSE(image->empty()) << index;
+    EXPECT_NEAR(cv::mean(*image)[0], 20 + 40 * index, 4.0);
+  }
+  std::string camera(const std::string& more = "rate_hz: 10\n") const {
+    return temp_.file("camera.yaml", kIntrinsics + more);
+  }
+
+  /// cam0 at 20 Hz from 1403636579.763555584 s on; true poses at 200 Hz from frame 1 to frame 4.
+  fs::path write_euroc() const {
+    const fs::path mav = temp_ / "MH_00/mav0";
+    fs::create_directories(mav / "cam0/data");
+    fs::create_directories(mav / "state_groundtruth_estimate0");
+    constexpr long kFirst_ns = 1403636579763555584;
+    constexpr long kFrame_ns = 50000000;
+    std::string list = "#timestamp [ns],filename\r\n";
+    for (int i = 0; i < kNumFrames; ++i) {
+      const std::string name = fmt::format("{}.png", kFirst_ns + i * kFrame_ns);
+      list += fmt::format("{},{}\r\n", kFirst_ns + i * kFrame_ns, name);
+      cv::imwrite((mav / "cam0/data" / name).string(), frame(i));
+    }
+    std::string truth = "#timestamp, p_RS_R_x [m], ..\n";
+    for (int k = 10; k <= 40; ++k) {  // the body moves along its x by 1 m per frame
+      truth += fmt::format("{},{},0,0,1,0,0,0,0,0,0,0,0,0,0,0,0\n",
+                           kFirst_ns + k * kFrame_ns / 10 + 1000000, 0.1 * k);
+    }
+    (void)temp_.file("MH_00/mav0/cam0/data.csv", list);
+    (void)temp_.file("MH_00/mav0/cam0/sensor.yaml",  // the camera looks along the body's x
+                     "sensor_type: camera\nrate_hz: 20\n" + std::string(kIntrinsics) +
+                         "T_BS:\n  cols: 4\n  rows: 4\n"
+                         "  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\n");
+    (void)temp_.file("MH_00/mav0/state_groundtruth_estimate0/data.csv", truth);
+    return temp_ / "MH_00";
+  }
+
+  fs::path write_tum() const {
+    fs::create_directories(temp_ / "desk/rgb");
+    std::string list = "# color images\n# timestamp filename\n";
+    std::string truth = "# timestamp tx ty tz qx qy qz qw\n";
+    for (int i = 0; i < kNumFrames; ++i) {
+      const double time_s = 1305031452.791720 + i / 30.0;
+      const std::string name = fmt::format("rgb/{:.6f}.png", time_s);
+      list += fmt::format("{:.6f} {}\n", time_s, name);
+      truth += fmt::format("{:.4f} 0 0 {} 0 0 0 1\n", time_s + (i == 2 ? 0.015 : 0.004), i);
+      cv::imwrite((temp_ / "desk" / name).string(), frame(i));
+    }
+    (void)temp_.file("desk/rgb.txt", list);
+    (void)temp_.file("desk/groundtruth.txt", truth);
+    return temp_ / "desk";
+  }
+
+  std::string write_video(double rate_hz = 25.0) const {
+    const std::string file = temp_ / "drive.avi";
+    cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
+                           rate_hz, {kWidth_px, kHeight_px});
+    EXPECT_TRUE(writer.isOpened());
+    for (int i = 0; i < kNumFrames; ++i) {
+      writer.write(frame(i));
+    }
+    return file;
+  }
+
+  testing::TempFolder temp_;
+};
+
+TEST_F(Recordings, EurocByItsFolderItsMav0OrOneCamera) {
+  const fs::path folder = write_euroc();
+  for (const fs::path& input : {folder, folder / "mav0", folder / "mav0/cam0", folder / "mav0/"}) {
+    const auto source = open_source(request(input));
+    ASSERT_TRUE(source) << source.error().message;
+    EXPECT_EQ(source->kind(), "EuRoC recording");
+    EXPECT_EQ(source->name(), "MH_00");
+    ASSERT_EQ(source->size(), 6U);
+    EXPECT_NEAR(source->time_s(5) - source->time_s(0), 0.25, 1e-6);
+    EXPECT_EQ(source->camera().fy_px, 61.0);
+    EXPECT_EQ(source->given_calibration()->filename(), "sensor.yaml");
+    for (int i = 0; i < kNumFrames; ++i) {
+      expect_frame(source->read(static_cast<std::size_t>(i)), i);
+    }
+  }
+}
+
+TEST_F(Recordings, EurocTruthIsTheCamerasAndOfFramesThatHaveSome) {
+  const auto source = open_source(request(write_euroc()));
+  ASSERT_TRUE(source) << source.error().message;
+  const auto truth = source->ground_truth_of(6);
+  ASSERT_TRUE(truth);
+  ASSERT_TRUE(*truth);
+  EXPECT_THAT((*truth)->frames, ElementsAre(1, 2, 3, 4));
+  for (std::size_t i = 0; i < 4; ++i) {  // along the camera's z, which is the body's x
+    EXPECT_TRUE((*truth)->poses[i].translation.isApprox(
+        Eigen::Vector3d(0.0, 0.0, static_cast<double>(i)), 1e-9))
+        << (*truth)->poses[i].translation.transpose();
+  }
+  const auto interrupted = source->ground_truth_of(3);
+  EXPECT_THAT((*interrupted)->frames, ElementsAre(1, 2));
+}
+
+TEST_F(Recordings, TumWithinTheTolerance) {
+  FrameSourceRequest tum = request(write_tum());
+  EXPECT_THAT(error_of(tum), AllOf(HasSubstr("desk"), HasSubstr("--camera FILE")));
+  tum.camera_file = camera("");
+  const auto source = open_source(tum);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ(source->kind(), "TUM RGB-D recording");
+  EXPECT_EQ(source->name(), "desk");
+  ASSERT_EQ(source->size(), 6U);
+  EXPECT_NEAR(source->time_s(0), 1305031452.791720, 1e-6);
+  expect_frame(source->read(3), 3);
+  EXPECT_THAT((*source->ground_truth_of(6))->frames, ElementsAre(0, 1, 3, 4, 5)) << "0.01 s";
+  tum.ground_truth_tolerance_s = 0.016;
+  EXPECT_THAT((*open_source(tum)->ground_truth_of(6))->frames, ElementsAre(0, 1, 2, 3, 4, 5));
+  tum.ground_truth_tolerance_s = 0.001;
+  EXPECT_THAT(error_of(tum), AllOf(HasSubstr("groundtruth.txt"), HasSubstr("0.001 s"),
+                                   HasSubstr("--gt-tolerance")));
+}
+
+TEST_F(Recordings, ListsOfImagesAreChecked) {
+  FrameSourceRequest tum = request(write_tum());
+  tum.camera_file = camera("");
+  fs::remove(temp_ / "desk/groundtruth.txt");
+  const auto error_with = [&](const std::string& list) {
+    (void)temp_.file("desk/rgb.txt", list);
+    return error_of(tum);
+  };
+  EXPECT_THAT(error_with("# nothing\n"), HasSubstr("at least one image"));
+  EXPECT_THAT(error_with("1.0 rgb/a.png\n1.0 rgb/b.png\n"),
+              HasSubstr("rgb.txt:2: expected a time"));
+  EXPECT_THAT(error_with("1.0 my photo.png\n"), HasSubstr("rgb.txt:1: expected a time and"));
+  EXPECT_THAT(error_with("one rgb/a.png\n"), HasSubstr("rgb.txt:1: "));
+  EXPECT_THAT(error_with("1.0 rgb/a.png\n"), HasSubstr("none of 1 images can be read"));
+}
+
+TEST_F(Recordings, AVideoIsReadFrameByFrame) {
+  FrameSourceRequest video = request(write_video());
+  EXPECT_THAT(error_of(video), AllOf(HasSubstr("a video"), HasSubstr("--camera FILE")));
+  video.camera_file = camera("");
+  video.frames = FrameRangeRequest{1, std::nullopt};
+  const auto source = open_source(video);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ(source->kind(), "video");
+  EXPECT_EQ(source->name(), "drive");
+  ASSERT_TRUE(source->stream());
+  EXPECT_EQ(source->stream()->expected_frames, 5U);
+  for (std::size_t i = 0; i < 5; ++i) {
+    expect_frame(source->read(i), static_cast<int>(i) + 1);
+    EXPECT_NEAR(source->time_s(i), 0.04 * static_cast<double>(i + 1), 1e-3);
+  }
+  const auto behind = source->read(5);
+  ASSERT_TRUE(behind);
+  EXPECT_TRUE(behind->empty());
+}
+
+TEST_F(Recordings, AVideoHasTruthByTimeOrByFrame) {
+  FrameSourceRequest video = request(write_video());
+  video.camera_file = camera("");
+  const auto frames_of = [&] {
+    const auto source = open_source(video);
+    for (std::size_t i = 0; i < 3; ++i) {
+      expect_frame(source->read(i), static_cast<int>(i));
+    }
+    const auto truth = source->ground_truth_of(3);
+    EXPECT_TRUE(truth) << truth.error().message;
+    return truth ? (*truth)->frames : std::vector<std::size_t>();
+  };
+  std::string poses;
+  std::string timed;
+  for (int i = 0; i < kNumFrames; ++i) {
+    poses += fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", i);
+    timed += i == 1 ? "" : fmt::format("{} 0 0 {} 0 0 0 1\n", 0.04 * i + 0.003, i);
+  }
+  video.ground_truth = temp_.file("kitti.txt", poses);
+  EXPECT_THAT(frames_of(), ElementsAre(0, 1, 2));
+  video.ground_truth = temp_.file("tum.txt", timed);
+  EXPECT_THAT(frames_of(), ElementsAre(0, 2));
+}
+
+TEST_F(Recordings, WhatIsNoVideoOrOfAnotherSizeIsRefused) {
+  FrameSourceRequest video = request(temp_.file("notes.mp4", "no video at all\n"));
+  video.camera_file = camera("");
+  EXPECT_THAT(error_of(video), AllOf(HasSubstr("notes.mp4"), HasSubstr("FFmpeg")));
+  video.sequence_dir = write_video();
+  video.camera_file = temp_.file(
+      "wrong.yaml", "resolution: [32, 24]\nintrinsics: [30, 30, 15, 11]\ndistortion_model: none\n");
+  EXPECT_THAT(error_of(video), AllOf(HasSubstr("32x24"), HasSubstr("64x48")));
+  video.camera_file = camera("");
+  video.frames = FrameRangeRequest{6, std::nullopt};
+  EXPECT_THAT(error_of(video),
+              HasSubstr("expected more than 6 frames that can be decoded, found 6"));
+  EXPECT_THAT(error_of(request(temp_ / "nothing.mp4")), HasSubstr("a video file"));
+  video.frames.reset();
+  video.times = temp_.file("times.txt", "0\n1\n");
+  EXPECT_THAT(error_of(video), HasSubstr("--times"));
+}
+
+TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
+  fs::rename(write_video(), temp_ / "concat:drive.avi");
+  const fs::path here = fs::current_path();
+  fs::current_path(temp_.path());
+  FrameSourceRequest video = request("concat:drive.avi");
+  video.camera_file = camera("");
+  EXPECT_EQ(error_of(video), "(opened)");
+  fs::current_path(here);
+}
+
+TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
+  auto capture = std::make_unique<cv::VideoCapture>(write_video(), cv::CAP_FFMPEG);
+  auto stream = std::make_shared<dataset::VideoStream>(std::move(capture), "camera:0", true);
+  const std::string file = camera("");
+  FrameSourceRequest live = request("camera:0");
+  live.camera_file = file;
+  const auto source = dataset::open_stream(stream, *dataset::read_camera_file(file), live);
+  ASSERT_TRUE(source) << source.error().message;
+  EXPECT_EQ(source->kind(), "live camera");
+  EXPECT_EQ(source->name(), "camera0");
+  EXPECT_TRUE(source->stream()->is_live);
+  EXPECT_EQ(source->stream()->expected_frames, 0U);
+  double last_s = -1.0;
+  for (std::size_t i = 0; i < kNumFrames; ++i) {
+    expect_frame(source->read(i), static_cast<int>(i));
+    EXPECT_GT(source->time_s(i), last_s);
+    last_s = source->time_s(i);
+  }
+  EXPECT_LT(last_s, 10.0) << "from the first frame on";
+  EXPECT_TRUE(source->read(kNumFrames)->empty());
+}
+
+TEST_F(Recordings, ACameraThatIsNotThere) {
+  FrameSourceRequest live = request("camera:987");
+  EXPECT_THAT(error_of(live), HasSubstr("--camera FILE"));
+  live.camera_file = camera("");
+  EXPECT_THAT(error_of(live), AllOf(HasSubstr("/dev/video987"), HasSubstr("found none")));
+  EXPECT_THAT(error_of(request("camera:x")), HasSubstr("camera:N"));
+}
+
+TEST_F(Recordings, RealOnesAreRecognised) {
+  STEMVO_NEEDS_SHARED_DATA();
+  const fs::path base = testing::shared_data();
+  const auto euroc = open_source(request(base / "euroc"));
+  ASSERT_TRUE(euroc) << euroc.error().message;
+  EXPECT_EQ(euroc->kind(), "EuRoC recording");
+  EXPECT_GT(euroc->size(), 10U);
+  const auto image = euroc->read(0);
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->cols, euroc->camera().width_px);
+  EXPECT_EQ(image->rows, euroc->camera().height_px);
+  FrameSourceRequest tum = request(base / "tum");
+  tum.camera_file = temp_.file("tum.yaml",
+                               "resolution: [640, 480]\nintrinsics: [517.3, 516.5, 318.6, 255.3]\n"
+                               "distortion_model: none\n");
+  const auto desk = open_source(tum);
+  ASSERT_TRUE(desk) << desk.error().message;
+  EXPECT_EQ(desk->kind(), "TUM RGB-D recording");
+}
+
+}  // namespace
+}  // namespace stemvo

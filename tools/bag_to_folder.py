@@ -1,0 +1,141 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Makes a folder in EuRoC's layout of a camera in a ROS 1 bag, a ROS 2 bag or an MCAP file: `stemvo run FOLDER` takes it. Needs no ROS.
+
+Compressed images stay the bytes they are. The camera is that of the camera_info topic beside the images', or --camera FILE.
+"""
+
+import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+
+import argparse
+import pathlib
+import shutil
+import sys
+
+import numpy as np
+import PIL.Image
+import rosbags.highlevel
+import rosbags.typesys
+
+IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+# Encoding: type of a sample, channels, order of those that are kept.
+ENCODINGS = {"mono8": (np.uint8, 1, (0,)), "8UC1": (np.uint8, 1, (0,)), "mono16": (np.uint16, 1, (0,)), "16UC1": (np.uint16, 1, (0,)),
+             "rgb8": (np.uint8, 3, (0, 1, 2)), "bgr8": (np.uint8, 3, (2, 1, 0)), "8UC3": (np.uint8, 3, (2, 1, 0)),
+             "rgba8": (np.uint8, 4, (0, 1, 2)), "bgra8": (np.uint8, 4, (2, 1, 0))}
+MODELS = {"plumb_bob": ("radial-tangential", 5), "rational_polynomial": ("radial-tangential", 5),
+          "equidistant": ("equidistant", 4), "fisheye": ("equidistant", 4)}
+
+
+class BagError(Exception):
+    """What is wrong with the bag or the request, in one line."""
+
+
+def stamp_ns(message):
+    return message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+
+
+def to_pixels(message):
+    """Height x width (x 3, RGB) of 8 bit; of 16 bit the upper eight."""
+    if message.encoding not in ENCODINGS:
+        raise BagError(f"expected images of encoding {', '.join(ENCODINGS)}, found '{message.encoding}'")
+    kind, channels, order = ENCODINGS[message.encoding]
+    sample = np.dtype(kind).newbyteorder(">" if message.is_bigendian else "<")
+    row = message.width * channels * sample.itemsize
+    data = np.asarray(message.data, np.uint8)
+    if message.step < row or data.size < message.height * message.step or message.height * row == 0:
+        raise BagError(f"expected {message.height} rows of {message.step} bytes for {message.width} {message.encoding} pixels, found {data.size} bytes")
+    rows = data[:message.height * message.step].reshape(message.height, message.step)[:, :row]
+    pixels = np.ascontiguousarray(rows).view(sample).reshape(message.height, message.width, channels)[:, :, order]
+    return (pixels >> 8 if kind == np.uint16 else pixels).astype(np.uint8).squeeze()
+
+
+def write_image(message, kind, stem):
+    """The file's name."""
+    if kind.endswith("/Image"):
+        PIL.Image.fromarray(to_pixels(message)).save(stem.with_suffix(".png"), compress_level=1)
+        return stem.with_suffix(".png").name
+    data = bytes(message.data)
+    suffix = {b"\xff\xd8": ".jpg", b"\x89P": ".png"}.get(data[:2])
+    if suffix is None:
+        raise BagError(f"expected compressed images that are JPEG or PNG, found format '{message.format}'")
+    stem.with_suffix(suffix).write_bytes(data)
+    return stem.with_suffix(suffix).name
+
+
+def choose_topic(reader, asked):
+    found = sorted({c.topic for c in reader.connections if c.msgtype in IMAGE_TYPES})
+    names = ", ".join(found) or "none"
+    if asked is None and len(found) != 1:
+        raise BagError(f"expected one topic of images, or --topic, found {names}")
+    if asked is not None and asked not in found:
+        raise BagError(f"expected a topic of images, found no '{asked}' among {names}")
+    return asked or found[0]
+
+
+def camera_yaml(reader, topic):
+    """sensor.yaml of the first camera_info beside the topic: /cam0/image_raw has /cam0/camera_info."""
+    folder = topic.rsplit("/compressed", 1)[0].rsplit("/", 1)[0]
+    wanted = (f"{folder}/camera_info", f"{topic}/camera_info")
+    connections = [c for c in reader.connections if c.topic in wanted and c.msgtype == "sensor_msgs/msg/CameraInfo"]
+    for connection, _, raw in reader.messages(connections) if connections else ():
+        info = reader.deserialize(raw, connection.msgtype)
+        matrix, lens = [float(x) for x in (info.k if hasattr(info, "k") else info.K)], [float(x) for x in (info.d if hasattr(info, "d") else info.D)]
+        model, count = MODELS.get(info.distortion_model, (None, 0))
+        if model is None and any(lens) or any(lens[count:]):
+            raise BagError(f"{connection.topic}: expected distortion_model plumb_bob or equidistant, found '{info.distortion_model}' of {len(lens)} coefficients; see --camera")
+        if not matrix[0] > 0.0:
+            raise BagError(f"{connection.topic}: expected a calibrated camera, found focal length {matrix[0]}; see --camera")
+        return (f"# {connection.topic}\nresolution: [{info.width}, {info.height}]\nintrinsics: [{matrix[0]}, {matrix[4]}, {matrix[2]}, {matrix[5]}]\n"
+                + (f"distortion_model: {model}\ndistortion_coefficients: {lens[:count]}\n" if any(lens) else "distortion_model: none\n"))
+    raise BagError(f"expected messages of {' or '.join(wanted)}, or --camera FILE, found none")
+
+
+def convert(options, folder):
+    """Images written, images left out."""
+    default = rosbags.typesys.get_typestore(rosbags.typesys.Stores.ROS2_HUMBLE)  # ROS 2 bags before Iron say nothing of types
+    with rosbags.highlevel.AnyReader([options.bag], default_typestore=default) as reader:
+        topic = choose_topic(reader, options.topic)
+        camera = folder / "mav0/cam0"
+        (camera / "data").mkdir(parents=True)
+        sensor = options.camera.read_text(encoding="utf-8") if options.camera else camera_yaml(reader, topic)
+        (camera / "sensor.yaml").write_text(sensor, encoding="utf-8")
+        last_ns, written, left_out = -1, 0, 0
+        with (camera / "data.csv").open("w", encoding="utf-8") as table:
+            table.write("#timestamp [ns],filename\n")
+            for connection, bag_ns, raw in reader.messages([c for c in reader.connections if c.topic == topic]):
+                message = reader.deserialize(raw, connection.msgtype)
+                time_ns = stamp_ns(message) or bag_ns
+                if time_ns <= last_ns:  # twice, or late: the order of the pictures is that of their times
+                    left_out += 1
+                    continue
+                table.write(f"{time_ns},{write_image(message, connection.msgtype, camera / 'data' / str(time_ns))}\n")
+                last_ns, written = time_ns, written + 1
+    if written == 0:
+        raise BagError(f"{topic}: expected at least one image, found none")
+    return written, left_out
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bag", type=pathlib.Path, help="a .bag file (ROS 1), a folder with metadata.yaml (ROS 2), or an .mcap or .db3 file")
+    parser.add_argument("out", type=pathlib.Path, help="the folder to make; must not exist")
+    parser.add_argument("--topic", help="of the images; default: the only one")
+    parser.add_argument("--camera", type=pathlib.Path, help="a camera file in place of the camera_info topic")
+    options = parser.parse_args(arguments)
+    unfinished = options.out.parent / f"{options.out.name}.unfinished"
+    try:
+        if options.out.exists():
+            raise BagError(f"{options.out}: expected a folder that does not exist, found one")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        written, left_out = convert(options, unfinished)
+        unfinished.rename(options.out)
+    except Exception as error:  # rosbags throws whatever a damaged file leads to
+        shutil.rmtree(unfinished, ignore_errors=True)
+        print(f"error: {options.bag}: {' '.join(str(error).split()) or type(error).__name__}", file=sys.stderr)
+        return 1
+    print(f"{options.out}: {written} images" + (f"; {left_out} of no later time than the one before are left out" if left_out else ""))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
