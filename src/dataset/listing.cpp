@@ -122,7 +122,11 @@ Layout tum_layout() {
 }
 
 Layout own_layout() {
-  return {[](const fs::path& folder) { return is_there(folder / "camera.yaml"); }, list_own};
+  // A rendered walk is KITTI's layout with a camera.yaml for those who read its images alone.
+  const auto is_own = [](const fs::path& folder) {
+    return is_there(folder / "camera.yaml") && !is_there(folder / "calib.txt");
+  };
+  return {is_own, list_own};
 }
 
 Expected<Listing> list_plain_images(const fs::path& folder_or_pattern) {
