@@ -302,7 +302,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
-      history_.rescale(window_, factor);
+      history_.rescale(factor);
       calibration_.rescale(factor, center);
       for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);
@@ -333,6 +333,7 @@ void WindowEstimator::remember(const TrackedFrame& frame, FrameState state) {
         {frame.number, newest.world_from_camera.inverse() * world_from_camera_});
   }
   trajectory_.push_back(world_from_camera_);
+  history_.end_frame();
 }
 
 std::vector<Rigid3> WindowEstimator::refined_trajectory() const {

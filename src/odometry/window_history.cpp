@@ -52,6 +52,16 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
   }
 }
 
+double WindowHistory::units_of(int frame) const {
+  const auto index = static_cast<std::size_t>(frame);
+  return index < scale_of_frame_.size() ? scale_of_frame_[index] / scale_ : 1.0;
+}
+
+void WindowHistory::keep_motion(int prev, int cur, Rigid3 prev_from_cur) {
+  prev_from_cur.translation *= units_of(cur);
+  motions_.push_back({prev, cur, prev_from_cur});
+}
+
 void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, int track_id) {
   const auto track = tracks_.find(track_id);
   if (track == tracks_.end()) {
@@ -60,7 +70,9 @@ void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, i
   const auto landmark = window.landmarks.find(track_id);
   if (landmark != window.landmarks.end() && track->second.num_keyframes >= kMinKeyframes &&
       track->second.max_parallax_rad >= kMinParallax_rad) {
-    const Eigen::Vector3d in_camera = last_seen_from.world_from_camera.inverse() * landmark->second;
+    const Eigen::Vector3d in_camera =
+        units_of(last_seen_from.frame) *
+        (last_seen_from.world_from_camera.inverse() * landmark->second);
     landmarks_.push_back({last_seen_from.frame, in_camera.cast<float>(), track->second.rgb});
   }
   tracks_.erase(track);
@@ -68,14 +80,13 @@ void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, i
 
 void WindowHistory::keep_followers(const Keyframe& keyframe) {
   for (const FrameBetween& follower : keyframe.followers) {
-    motions_.push_back({keyframe.frame, follower.frame, follower.keyframe_from_camera});
+    keep_motion(keyframe.frame, follower.frame, follower.keyframe_from_camera);
   }
 }
 
 void WindowHistory::keep_motions(const Keyframe& prev, const Keyframe& cur) {
   keep_followers(prev);
-  motions_.push_back(
-      {prev.frame, cur.frame, prev.world_from_camera.inverse() * cur.world_from_camera});
+  keep_motion(prev.frame, cur.frame, prev.world_from_camera.inverse() * cur.world_from_camera);
 }
 
 void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyframe& coming) {
@@ -85,14 +96,6 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
   }
   for (const int track_id : lost_tracks(window, leaving, coming)) {
     keep(window, keyframe, track_id);
-  }
-}
-
-void WindowHistory::rescale(const Window& window, double factor) {
-  for (MapLandmark& landmark : landmarks_) {
-    if (!window.keyframes.empty() && landmark.frame >= window.keyframes.front().frame) {
-      landmark.position *= static_cast<float>(factor);
-    }
   }
 }
 

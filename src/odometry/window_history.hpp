@@ -25,6 +25,9 @@ struct RefinedMotion {
 /// What the window leaves behind. Motions are kept, not poses: the window is rescaled and moved as
 /// a whole later on, and what has left must not be torn from it. For the same reason a landmark is
 /// kept in the camera of the last keyframe that saw it.
+///
+/// Lengths are those of the time when the frame came: the map's scale drifts from frame to frame,
+/// and what puts the newest frames right would stretch the older ones, which are right already.
 class WindowHistory {
  public:
   /// The newest keyframe of the window saw this image (the input, gray or RGB).
@@ -32,8 +35,10 @@ class WindowHistory {
 
   /// A keyframe is about to leave the window for the one that comes.
   void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
-  /// The window is rescaled, and with it what left from between its keyframes.
-  void rescale(const Window& window, double factor);
+  /// The window is rescaled.
+  void rescale(double factor) { scale_ *= factor; }
+  /// The next frame, which began in 0, has its final pose.
+  void end_frame() { scale_of_frame_.push_back(scale_); }
   /// The whole window is about to be dropped; nothing will connect with it.
   void close(const Window& window);
 
@@ -49,6 +54,9 @@ class WindowHistory {
     double max_parallax_rad = 0.0;
     std::array<std::uint8_t, 3> rgb{};
   };
+  /// Units when the frame came per unit now; 1 of a frame that has not ended.
+  [[nodiscard]] double units_of(int frame) const;
+  void keep_motion(int prev, int cur, Rigid3 prev_from_cur);
   void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
   void keep_motions(const Keyframe& prev, const Keyframe& cur);
   void keep_followers(const Keyframe& keyframe);
@@ -56,6 +64,8 @@ class WindowHistory {
   std::vector<RefinedMotion> motions_;
   std::vector<MapLandmark> landmarks_;
   std::map<int, Track> tracks_;
+  double scale_ = 1.0;  ///< of the window, by all that rescaled it
+  std::vector<double> scale_of_frame_;
 };
 
 /// Poses of all frames, with look-ahead: by their refined motion where there is one, else from the

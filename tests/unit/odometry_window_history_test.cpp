@@ -70,7 +70,7 @@ TEST(WindowHistory, WhatHasLeftIsNotRescaledWithTheWindow) {
   }
 }
 
-TEST(WindowHistory, WhatLeavesTheMiddleIsRescaledWithTheWindow) {
+TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
   Window window;
   WindowHistory history;
   const cv::Mat image(200, 200, CV_8UC1, cv::Scalar(7));
@@ -87,9 +87,26 @@ TEST(WindowHistory, WhatLeavesTheMiddleIsRescaledWithTheWindow) {
   history.leave(window, 1, coming);
   ASSERT_EQ(history.landmarks().size(), 1U);
   rescale(window, 2.0, Eigen::Vector3d::Zero());
-  history.rescale(window, 2.0);
-  EXPECT_NEAR(history.landmarks().front().position.z(), 8.0, 1e-6);
-  EXPECT_NEAR(history.landmarks().front().position.x(), -2.0, 1e-6);
+  history.rescale(2.0);
+  EXPECT_NEAR(history.landmarks().front().position.z(), 4.0, 1e-6);
+  EXPECT_NEAR(history.landmarks().front().position.x(), -1.0, 1e-6);
+}
+
+TEST(WindowHistory, LengthsAreThoseOfTheTimeWhenTheFrameCame) {
+  Window window;
+  WindowHistory history;
+  for (int i = 0; i < 4; ++i) {  // a unit from the one before, then all is found 1.5 times as long
+    const Rigid3 last = i == 0 ? step(-1.0) : window.keyframes.back().world_from_camera;
+    window.keyframes.push_back({i, last * step(1.0), {}, {}});
+    rescale(window, 1.5, window.keyframes.back().world_from_camera.translation);
+    history.rescale(1.5);
+    history.end_frame();
+  }
+  history.close(window);
+  ASSERT_EQ(history.motions().size(), 3U);
+  for (const RefinedMotion& motion : history.motions()) {
+    EXPECT_NEAR(motion.prev_from_cur.translation.norm(), 1.5, 1e-12) << motion.cur;
+  }
 }
 
 double rms_step_error(const std::vector<Rigid3>& poses, const DriveTracks& drive, double unit_m) {
