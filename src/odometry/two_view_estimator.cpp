@@ -28,6 +28,9 @@ constexpr RobustEstimator kRecordEstimator = RobustEstimator::kRansac;
 /// The slowest steps that can be seen have 10 and more.
 constexpr double kNoiseParallax = 5.0;
 
+/// After a cut, points are found by chance here and there; some motion fits a quarter of them.
+constexpr double kMinInlierShare = 0.3;
+
 }  // namespace
 
 void add_scores(const MeasuredMotion& motion, FrameResult& result) {
@@ -115,7 +118,8 @@ void TwoViewEstimator::refine(const PixelPairs& pairs, MeasuredMotion& result) c
     cur = select(pairs.cur_uv, result.inlier_mask);
   }
   result.num_inliers = static_cast<int>(prev.size());
-  if (result.num_inliers < odometry_.min_inliers) {
+  const double share = static_cast<double>(prev.size()) / static_cast<double>(pairs.size());
+  if (result.num_inliers < odometry_.min_inliers || share < kMinInlierShare) {
     result.cur_from_prev = {};
     result.state = FrameState::kLost;
     return;
