@@ -26,8 +26,8 @@ differ in nothing but the channel, and orb and sift, matched between pairs of fr
 Every step has its true length (--set scale.source=camera_height: metres from the road instead).
 
 --out receives robustness.csv (a line per disturbance, strength, channel and drive), robustness.json
-(with the verdicts), robustness.txt (the tables) and robustness.png, written after every row. The table
-shows r_rel in degrees per 100 m, in brackets the share of frames with a measured motion where some have
+(with the verdicts), robustness.txt (the tables) and report.html (figures, for a browser), written after every
+row. The table shows r_rel in degrees per 100 m, in brackets the share of frames with a measured motion where some have
 none, and how many times as large the channel's rotation error is as a control's over segments of an
 eighth of the path, from every frame on, with the 95 % interval; * where the interval leaves out 1, else
 the two cannot be told apart; - where there are too few segments. A second table sums up
@@ -64,6 +64,7 @@ int run(Arguments& arguments) {
   std::ranges::for_each(report->warnings, print_warning);
   if (!arguments.is_quiet) {
     print(robustness::format_table(*report));
+    print(fmt::format("report: {}\n", (request.out_dir / "report.html").string()));
   }
   if (report->interrupted) {
     print_warning("interrupted; the rows that were finished are written");

@@ -9,7 +9,6 @@
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "report/frame_image.hpp"
 #include "robustness/contenders.hpp"
 #include "robustness/disturbance.hpp"
 #include "text/text_file.hpp"
@@ -78,7 +77,7 @@ Status write_report(const std::filesystem::path& folder, const RobustnessReport&
       return written;
     }
   }
-  return write_image(folder / "robustness.png", draw_figure(report));
+  return write_page(folder / "report.html", report);
 }
 
 class Robustness {

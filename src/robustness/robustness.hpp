@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include <opencv2/core.hpp>
-
 #include "config/config.hpp"
 #include "dataset/sequence.hpp"
 #include "evaluation/paired_ratio.hpp"
@@ -58,9 +56,10 @@ struct RobustnessReport {
 };
 
 /// Runs all contenders on all drives under all disturbances, each frame's step having its true
-/// length (unless the configuration says otherwise). OUT gets robustness.csv, .json, .txt and .png,
-/// written after every row. A run that is refused leaves its outcome empty, with a warning. Errors:
-/// no ground truth, an unknown kind or control, whatever is refused before the first run.
+/// length (unless the configuration says otherwise). OUT gets robustness.csv, .json, .txt and
+/// report.html, written after every row. A run that is refused leaves its outcome empty, with a
+/// warning. Errors: no ground truth, an unknown kind or control, whatever is refused before the
+/// first run.
 [[nodiscard]] Expected<RobustnessReport> run_robustness(const RobustnessRequest& request);
 
 /// Rows of one group, or all (`group` "all"), judged against one control.
@@ -91,7 +90,8 @@ struct Summary {
 /// A line per row, drive and contender.
 [[nodiscard]] std::string format_csv(const RobustnessReport& report);
 [[nodiscard]] std::string format_json(const RobustnessReport& report);
-/// Error over strength, a panel per disturbance. CV_8UC3, RGB.
-[[nodiscard]] cv::Mat draw_figure(const RobustnessReport& report);
+/// A page for a browser: ratios with their intervals, error over strength. Error: cannot be
+/// written.
+[[nodiscard]] Status write_page(const std::filesystem::path& file, const RobustnessReport& report);
 
 }  // namespace stemvo::robustness
