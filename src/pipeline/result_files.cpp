@@ -34,12 +34,12 @@ std::string describe_numbers(const MetricsReport& report) {
   std::string text = fmt::format("scale: {}", report.scale_source);
   if (report.metrics) {
     const Alignment alignment = report.metrics->alignment;
-    text += fmt::format("   path {:.0f} m   ", report.metrics->path_length_m);
+    text += fmt::format(", path {:.0f} m, ", report.metrics->path_length_m);
     text += alignment == Alignment::kNone ? "no alignment:"
                                           : fmt::format("fitted by {}:", to_string(alignment));
     text += fmt::format(" average offset {:.2f} m", report.metrics->average_offset_m);
     if (report.metrics->t_rel_percent) {
-      text += fmt::format("   t_rel {:.2f} %", *report.metrics->t_rel_percent);
+      text += fmt::format(", t_rel {:.2f} %", *report.metrics->t_rel_percent);
     }
   }
   return text;
