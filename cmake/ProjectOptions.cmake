@@ -21,14 +21,16 @@ if(STEMVO_SANITIZE_THREAD)
   target_link_options(stemvo_options INTERFACE -fsanitize=thread)
 endif()
 
-# What is shipped stops where memory is written beyond its end; measured to cost nothing (docs/performance.md).
-function(stemvo_harden)
-  if(NOT CMAKE_BUILD_TYPE STREQUAL "Release")
-    return()
-  endif()
-  add_compile_options(-fstack-protector-strong -U_FORTIFY_SOURCE -D_FORTIFY_SOURCE=3 -fPIE)
-  add_link_options(-pie -Wl,-z,relro,-z,now)
-endfunction()
+# What is shipped stops where memory is written beyond its end (docs/reliability.md). Not for a project that includes
+# this one.
+if(PROJECT_IS_TOP_LEVEL)
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+  include(CheckPIESupported)
+  check_pie_supported(LANGUAGES CXX)
+  add_compile_options($<$<CONFIG:Release>:-fstack-protector-strong> $<$<CONFIG:Release>:-fno-semantic-interposition>
+                      $<$<CONFIG:Release>:-U_FORTIFY_SOURCE> $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=3>)
+  add_link_options($<$<CONFIG:Release>:-Wl,-z,relro,-z,now>)
+endif()
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM AND PROJECT_IS_TOP_LEVEL AND NOT CMAKE_CXX_COMPILER_LAUNCHER)

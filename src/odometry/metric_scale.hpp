@@ -21,6 +21,11 @@ class MetricScale {
 
   [[nodiscard]] bool is_enabled() const { return road_.has_value(); }
 
+  /// Of the last frame given: its lengths are metres.
+  [[nodiscard]] bool has_scale() const {
+    return state_ == RoadState::kMeasured || state_ == RoadState::kHeld;
+  }
+
   /// The first image, or one that nothing connects with the ones before.
   void restart(const RoadImage* road);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the

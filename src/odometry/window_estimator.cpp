@@ -298,11 +298,12 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
     const RoadImage road = frame.road ? seen_by(*frame.road, camera_) : RoadImage{};
+    const bool is_first = !scale_.has_scale();
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
-      history_.rescale(factor);
+      history_.rescale(window_, factor, is_first);
       calibration_.rescale(factor, center);
       for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);

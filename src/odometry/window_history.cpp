@@ -99,6 +99,16 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
   }
 }
 
+void WindowHistory::rescale(const Window& window, double factor, bool is_first) {
+  scale_ *= factor;
+  if (is_first && !window.keyframes.empty()) {
+    for (auto frame = static_cast<std::size_t>(window.keyframes.front().frame);
+         frame < scale_of_frame_.size(); ++frame) {
+      scale_of_frame_[frame] *= factor;
+    }
+  }
+}
+
 void WindowHistory::close(const Window& window) {
   for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
     keep_motions(window.keyframes[i - 1], window.keyframes[i]);

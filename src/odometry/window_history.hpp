@@ -35,8 +35,9 @@ class WindowHistory {
 
   /// A keyframe is about to leave the window for the one that comes.
   void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
-  /// The window is rescaled.
-  void rescale(double factor) { scale_ *= factor; }
+  /// The window is rescaled. `is_first`: before, it had a scale of its own; then what is in it
+  /// takes the new one.
+  void rescale(const Window& window, double factor, bool is_first);
   /// The next frame, which began in 0, has its final pose.
   void end_frame() { scale_of_frame_.push_back(scale_); }
   /// The whole window is about to be dropped; nothing will connect with it.

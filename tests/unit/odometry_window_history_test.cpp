@@ -87,7 +87,7 @@ TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
   history.leave(window, 1, coming);
   ASSERT_EQ(history.landmarks().size(), 1U);
   rescale(window, 2.0, Eigen::Vector3d::Zero());
-  history.rescale(2.0);
+  history.rescale(window, 2.0, false);
   EXPECT_NEAR(history.landmarks().front().position.z(), 4.0, 1e-6);
   EXPECT_NEAR(history.landmarks().front().position.x(), -1.0, 1e-6);
 }
@@ -99,7 +99,7 @@ TEST(WindowHistory, LengthsAreThoseOfTheTimeWhenTheFrameCame) {
     const Rigid3 last = i == 0 ? step(-1.0) : window.keyframes.back().world_from_camera;
     window.keyframes.push_back({i, last * step(1.0), {}, {}});
     rescale(window, 1.5, window.keyframes.back().world_from_camera.translation);
-    history.rescale(1.5);
+    history.rescale(window, 1.5, false);
     history.end_frame();
   }
   history.close(window);
