@@ -112,7 +112,7 @@ void register_stems(const std::filesystem::path& models) {
   };
   StemOptions options;
   add("default", options);
-  for (const int sampling_px : {1, 2, 4}) {
+  for (const int sampling_px : {1, 2}) {
     options.sampling_px = sampling_px;
     add("default/every_" + std::to_string(sampling_px) + "_px", options);
   }
