@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <type_traits>
 
 #include <dlfcn.h>
 #include <nanobind/stl/filesystem.h>
@@ -88,7 +89,7 @@ class SafeOdometry {
     return value_or_raise(std::move(made));
   }
   template <typename F>
-  auto call(F f) {
+  std::invoke_result_t<F, Odometry&> call(F f) {
     const nb::gil_scoped_release release;
     const std::scoped_lock lock(mutex_);
     return f(odometry_);
