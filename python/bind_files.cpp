@@ -114,7 +114,9 @@ void bind_files(nb::module_& module) {
       .def("__getitem__", &frame_of, "index"_a)
       .def_prop_ro("camera", [](const FrameSource& s) { return s.camera(); })
       .def_prop_ro("camera_height_m", [](const FrameSource& s) { return s.camera_height_m(); })
-      .def_prop_ro("timestamps", [](const FrameSource& s) { return array_of(s.timestamps_s()); })
+      .def_prop_ro(
+          "timestamps", [](const FrameSource& s) { return array_of(s.timestamps_s()); },
+          nb::rv_policy::move)
       .def_prop_ro("ground_truth", &truth_of,
                    nb::sig("def ground_truth(self) -> numpy.typing.NDArray[numpy.float64] | None"),
                    "Nx4x4 of the frames that have a true pose");

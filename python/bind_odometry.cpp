@@ -136,7 +136,7 @@ void bind_result(nb::module_& module) {
   nb::class_<Result>(module, "Result", "A frame's pose and how it came about")
       .def_prop_ro(
           "world_from_camera", [](const Result& r) { return array_of(r.frame.world_from_camera); },
-          "4x4")
+          nb::rv_policy::move, "4x4")
       .def_prop_ro("state", [](const Result& r) { return std::string(to_string(r.frame.state)); })
       .def_prop_ro("is_measured", [](const Result& r) { return is_measured(r.frame.state); })
       .def_ro("timestamp", &Result::timestamp, "As given")
