@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#include "arrays.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+
+#include <fmt/format.h>
+
+namespace stemvo::python {
+namespace {
+
+template <typename T>
+nb::ndarray<nb::numpy, T> owned(std::unique_ptr<T[]> data,
+                                std::initializer_list<std::size_t> shape) {
+  T* const values = data.get();
+  nb::capsule owner(values, [](void* p) noexcept { delete[] static_cast<T*>(p); });
+  data.release();
+  return {values, shape, owner};
+}
+
+std::string shape_of(const AnyArray& array) {
+  std::string text;
+  for (std::size_t i = 0; i < array.ndim(); ++i) {
+    text += fmt::format("{}{}", i == 0 ? "" : "x", array.shape(i));
+  }
+  return text.empty() ? "one number" : text;
+}
+
+void write_pose(const Rigid3& pose, double* to) {
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(to);
+  matrix.setIdentity();
+  matrix.topRows<3>() = pose.matrix();
+}
+
+}  // namespace
+
+Expected<ImageView> view_of(const AnyArray& array) {
+  const bool is_color = array.ndim() == 3 && array.shape(2) == 3;
+  if (array.dtype() != nb::dtype<std::uint8_t>() || !(array.ndim() == 2 || is_color)) {
+    return fail(fmt::format("image: expected HxW (gray) or HxWx3 (RGB) uint8, found {} of {} bits",
+                            shape_of(array), array.dtype().bits));
+  }
+  if (std::max(array.shape(0), array.shape(1)) > std::size_t{kMaxImageSide_px}) {
+    return fail(fmt::format("image: expected at most {} pixels a side, found {}", kMaxImageSide_px,
+                            shape_of(array)));
+  }
+  const auto height = static_cast<int>(array.shape(0));
+  const auto width = static_cast<int>(array.shape(1));
+  const std::int64_t channels = is_color ? 3 : 1;
+  const bool is_empty = height == 0 || width == 0;
+  if (!is_empty &&
+      ((width > 1 && array.stride(1) != channels) || (is_color && array.stride(2) != 1) ||
+       (height > 1 && array.stride(0) < width * channels))) {
+    return fail(
+        "image: expected pixels side by side in memory, found a view that flips, skips or swaps "
+        "them "
+        "(numpy.ascontiguousarray makes a copy)");
+  }
+  const int type = is_color ? CV_8UC3 : CV_8UC1;
+  if (is_empty) {
+    return ImageView{cv::Mat(height, width, type), is_color ? PixelOrder::kRgb : PixelOrder::kGray};
+  }
+  // cv::Mat has no constant pixels; process() only reads.
+  auto* const pixels = const_cast<std::uint8_t*>(static_cast<const std::uint8_t*>(array.data()));
+  const std::size_t step =
+      height > 1 ? static_cast<std::size_t>(array.stride(0)) : cv::Mat::AUTO_STEP;
+  return ImageView{cv::Mat(height, width, type, pixels, step),
+                   is_color ? PixelOrder::kRgb : PixelOrder::kGray};
+}
+
+ByteArray array_of(const cv::Mat& image) {
+  const auto rows = static_cast<std::size_t>(image.rows);
+  const auto columns = static_cast<std::size_t>(image.cols);
+  auto data = std::make_unique<std::uint8_t[]>(image.total() * image.elemSize());
+  cv::Mat copy(image.rows, image.cols, image.type(), data.get());
+  image.copyTo(copy);
+  return image.channels() == 1 ? owned(std::move(data), {rows, columns})
+                               : owned(std::move(data), {rows, columns, 3});
+}
+
+Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& name) {
+  const bool is_poses =
+      array.ndim() == 3 && (array.shape(1) == 3 || array.shape(1) == 4) && array.shape(2) == 4;
+  if (array.dtype() != nb::dtype<double>() || !is_poses || array.shape(0) == 0) {
+    return fail(fmt::format("{}: expected Nx4x4 float64, found {} of {} bits", name,
+                            shape_of(array), array.dtype().bits));
+  }
+  Trajectory poses;
+  const auto* const data = static_cast<const double*>(array.data());
+  for (std::size_t i = 0; i < array.shape(0); ++i) {
+    Matrix34d matrix;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 4; ++column) {
+        matrix(row, column) = data[static_cast<std::int64_t>(i) * array.stride(0) +
+                                   row * array.stride(1) + column * array.stride(2)];
+      }
+    }
+    const Eigen::Matrix3d r = matrix.leftCols<3>();
+    if (!matrix.allFinite() || !((r.transpose() * r).isIdentity(1e-3)) ||
+        !(r.determinant() > 0.0)) {
+      return fail(
+          fmt::format("{}[{}]: expected a rotation and a finite translation, found none", name, i));
+    }
+    poses.push_back(Rigid3::from_matrix(matrix));
+  }
+  return poses;
+}
+
+DoubleArray array_of(const Rigid3& pose) {
+  auto data = std::make_unique<double[]>(16);
+  write_pose(pose, data.get());
+  return owned(std::move(data), {4, 4});
+}
+
+DoubleArray array_of(std::span<const Rigid3> trajectory) {
+  auto data = std::make_unique<double[]>(16 * trajectory.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    write_pose(trajectory[i], data.get() + 16 * i);
+  }
+  return owned(std::move(data), {trajectory.size(), 4, 4});
+}
+
+DoubleArray array_of(std::span<const double> numbers) {
+  auto data = std::make_unique<double[]>(numbers.size());
+  std::copy(numbers.begin(), numbers.end(), data.get());
+  return owned(std::move(data), {numbers.size()});
+}
+
+}  // namespace stemvo::python

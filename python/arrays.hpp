@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <string>
+#include <utility>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <opencv2/core.hpp>
+
+#include "evaluation/trajectory.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/odometry.hpp"
+
+namespace stemvo::python {
+
+namespace nb = nanobind;
+
+using AnyArray = nb::ndarray<nb::ro, nb::device::cpu>;
+using DoubleArray = nb::ndarray<nb::numpy, double>;
+using ByteArray = nb::ndarray<nb::numpy, std::uint8_t>;
+
+/// The value, or a ValueError with the library's message. The GIL is held.
+template <typename T>
+T value_or_raise(Expected<T> result) {
+  if (!result) {
+    throw nb::value_error(result.error().message.c_str());
+  }
+  if constexpr (!std::is_void_v<T>) {
+    return *std::move(result);
+  }
+}
+
+struct ImageView {
+  cv::Mat pixels;  ///< the array's own
+  PixelOrder order = PixelOrder::kGray;
+};
+/// HxW or HxWx3 uint8 whose rows may lie apart (a cropped view) but whose pixels may not. Else an
+/// error.
+[[nodiscard]] Expected<ImageView> view_of(const AnyArray& array);
+/// A copy, HxW or HxWx3.
+[[nodiscard]] ByteArray array_of(const cv::Mat& image);
+
+/// Nx4x4 or Nx3x4 float64, each a rigid motion. Else an error that calls it `name`.
+[[nodiscard]] Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& name);
+[[nodiscard]] DoubleArray array_of(const Rigid3& pose);                  ///< 4x4
+[[nodiscard]] DoubleArray array_of(std::span<const Rigid3> trajectory);  ///< Nx4x4
+[[nodiscard]] DoubleArray array_of(std::span<const double> numbers);
+
+void bind_odometry(nb::module_& module);
+void bind_files(nb::module_& module);
+
+}  // namespace stemvo::python

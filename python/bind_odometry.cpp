@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+// Camera, Options, Odometry, Result: the public headers in Python.
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <type_traits>
+
+#include <dlfcn.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+
+#include "arrays.hpp"
+#include "config/config.hpp"
+#include "models/manifest.hpp"
+
+namespace stemvo::python {
+namespace {
+
+using namespace nb::literals;
+
+/// models/ beside this module.
+std::filesystem::path models_folder() {
+  Dl_info info{};
+  const bool found = dladdr(reinterpret_cast<const void*>(&models_folder), &info) != 0;
+  return std::filesystem::path(found ? info.dli_fname : "").parent_path() / "models";
+}
+
+/// As --set takes it.
+std::string text_of(nb::handle value) {
+  if (value.is_none()) {
+    throw nb::value_error("options: expected a value, found None");
+  }
+  return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false")
+                                   : nb::str(value).c_str();
+}
+
+void apply(Config& config, const nb::dict& values) {
+  for (const auto& [key, value] : values) {
+    const Status status =
+        apply_override(config, std::string(nb::str(key).c_str()) + "=" + text_of(value));
+    if (!status) {
+      const std::string& message = status.error().message;
+      constexpr std::string_view kProgram = "--set ";
+      throw nb::value_error(
+          message.substr(message.starts_with(kProgram) ? kProgram.size() : 0).c_str());
+    }
+  }
+  value_or_raise(validate(config));
+}
+
+struct Result {
+  FrameResult frame;
+  std::optional<double> timestamp;
+};
+
+/// Odometry is used by one thread at a time; Python may call from several.
+class SafeOdometry {
+ public:
+  SafeOdometry(const Camera& camera, const Config& config) : odometry_(create(camera, config)) {}
+
+  Result process(const std::optional<AnyArray>& image, std::optional<double> timestamp) {
+    if (!image) {
+      return call([&](Odometry& o) { return Result{o.process_missing(), timestamp}; });
+    }
+    const ImageView view = value_or_raise(view_of(*image));
+    auto frame = call([&](Odometry& o) { return o.process(view.pixels, view.order); });
+    return {value_or_raise(std::move(frame)), timestamp};
+  }
+  DoubleArray refined_trajectory() {
+    return array_of(call([](Odometry& o) { return o.refined_trajectory(); }));
+  }
+  ByteArray channel_image() {
+    return array_of(call([](Odometry& o) { return o.channel_image(); }));
+  }
+
+ private:
+  static Odometry create(const Camera& camera, const Config& config) {
+    auto made = [&]() -> Expected<Odometry> {
+      const nb::gil_scoped_release release;
+      Options options = config;
+      const auto stem = with_network(options.stem, models_folder());
+      if (!stem) {
+        return stem.error();
+      }
+      options.stem = *stem;
+      return Odometry::create(camera, options);
+    }();
+    return value_or_raise(std::move(made));
+  }
+  template <typename F>
+  std::invoke_result_t<F, Odometry&> call(F f) {
+    const nb::gil_scoped_release release;
+    const std::scoped_lock lock(mutex_);
+    return f(odometry_);
+  }
+
+  std::mutex mutex_;
+  Odometry odometry_;
+};
+
+void bind_camera(nb::module_& module) {
+  nb::class_<Camera>(module, "Camera", "Pinhole camera without distortion, in pixels")
+      .def(
+          "__init__",
+          [](Camera* self, double fx, double fy, double cx, double cy, int width, int height) {
+            new (self) Camera{fx, fy, cx, cy, width, height};
+          },
+          "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
+      .def_ro("fx", &Camera::fx_px)
+      .def_ro("fy", &Camera::fy_px)
+      .def_ro("cx", &Camera::cx_px)
+      .def_ro("cy", &Camera::cy_px)
+      .def_ro("width", &Camera::width_px)
+      .def_ro("height", &Camera::height_px);
+}
+
+void bind_options(nb::module_& module) {
+  nb::class_<Config>(module, "Options", "The keys of `stemvo --dump-config`")
+      .def(
+          "__init__",
+          [](Config* self, const nb::dict& values) {
+            Config config;
+            apply(config, values);
+            new (self) Config(std::move(config));
+          },
+          "values"_a = nb::dict(), "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
+      .def_static(
+          "load",
+          [](const std::filesystem::path& file) { return value_or_raise(load_config(file)); },
+          "file"_a, "A configuration file of the program")
+      .def("__str__", &dump_config, "All keys as YAML");
+}
+
+void bind_result(nb::module_& module) {
+  nb::class_<Result>(module, "Result", "A frame's pose and how it came about")
+      .def_prop_ro(
+          "world_from_camera", [](const Result& r) { return array_of(r.frame.world_from_camera); },
+          nb::rv_policy::move, "4x4")
+      .def_prop_ro("state", [](const Result& r) { return std::string(to_string(r.frame.state)); })
+      .def_prop_ro("is_measured", [](const Result& r) { return is_measured(r.frame.state); })
+      .def_ro("timestamp", &Result::timestamp, "As given")
+      .def_prop_ro("num_matches", [](const Result& r) { return r.frame.num_matches; })
+      .def_prop_ro("num_inliers", [](const Result& r) { return r.frame.num_inliers; })
+      .def_prop_ro("road", [](const Result& r) { return std::string(to_string(r.frame.road)); })
+      .def_prop_ro(
+          "scale_sigma", [](const Result& r) { return r.frame.scale_sigma; },
+          "Of log(metres per unit)")
+      .def_prop_ro(
+          "camera", [](const Result& r) { return r.frame.camera; }, "With what was learnt so far")
+      .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; });
+}
+
+}  // namespace
+
+void bind_odometry(nb::module_& module) {
+  bind_camera(module);
+  bind_options(module);
+  bind_result(module);
+  nb::class_<SafeOdometry>(module, "Odometry", "Images in, poses out, one at a time")
+      .def(
+          "__init__",
+          [](SafeOdometry* self, const Camera& camera, const nb::object& options) {
+            Config config;
+            if (nb::isinstance<Config>(options)) {
+              config = nb::cast<Config>(options);
+            } else if (nb::isinstance<nb::dict>(options)) {
+              apply(config, nb::cast<nb::dict>(options));
+            } else if (!options.is_none()) {
+              throw nb::type_error("options: expected Options or a dict");
+            }
+            new (self) SafeOdometry(camera, config);
+          },
+          "camera"_a, "options"_a = nb::none(),
+          nb::sig("def __init__(self, camera: Camera, options: Options | dict[str, object] | None "
+                  "= None) -> None"))
+      .def("process", &SafeOdometry::process, "image"_a.noconvert().none(),
+           "timestamp"_a = nb::none(),
+           "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")
+      .def("refined_trajectory", &SafeOdometry::refined_trajectory, "Nx4x4, with look-ahead")
+      .def("channel_image", &SafeOdometry::channel_image,
+           "What points of the last image were tracked on");
+}
+
+}  // namespace stemvo::python

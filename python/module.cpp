@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT
+#include "arrays.hpp"
+#include "stemvo/version.hpp"
+
+NB_MODULE(_core, module) {
+  module.doc() = "Monocular visual odometry: images in, poses out";
+  module.attr("__version__") = std::string(stemvo::version()).c_str();
+  stemvo::python::bind_odometry(module);
+  stemvo::python::bind_files(module);
+}
