@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "internal_check.hpp"
 
@@ -13,6 +14,8 @@ namespace {
 /// A kept landmark: seen from so many keyframes, under so large an angle between two of them.
 constexpr int kMinKeyframes = 3;
 constexpr double kMinParallax_rad = 1.5 * std::numbers::pi / 180.0;
+/// Lengths are the mean of so many frames' before and after.
+constexpr int kScaleFrames = 5;
 
 double parallax_rad(const Eigen::Vector3d& point, const Keyframe& a, const Keyframe& b) {
   const Eigen::Vector3d from_a = point - a.world_from_camera.translation;
@@ -53,8 +56,15 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
 }
 
 double WindowHistory::units_of(int frame) const {
-  const auto index = static_cast<std::size_t>(frame);
-  return index < scale_of_frame_.size() ? scale_of_frame_[index] / scale_ : 1.0;
+  const auto last = static_cast<int>(scale_of_frame_.size()) - 1;
+  if (frame > last) {
+    return 1.0;
+  }
+  const bool is_after_first = frame >= first_scaled_frame_;
+  const int from = std::max(frame - kScaleFrames, is_after_first ? first_scaled_frame_ : 0);
+  const int to = std::min(frame + kScaleFrames, is_after_first ? last : first_scaled_frame_ - 1);
+  const auto at = [&](int index) { return scale_of_frame_.begin() + index; };
+  return std::accumulate(at(from), at(to + 1), 0.0) / ((to + 1 - from) * scale_);
 }
 
 void WindowHistory::keep_motion(int prev, int cur, Rigid3 prev_from_cur) {
@@ -102,8 +112,9 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
 void WindowHistory::rescale(const Window& window, double factor, bool is_first) {
   scale_ *= factor;
   if (is_first && !window.keyframes.empty()) {
-    for (auto frame = static_cast<std::size_t>(window.keyframes.front().frame);
-         frame < scale_of_frame_.size(); ++frame) {
+    first_scaled_frame_ = window.keyframes.front().frame;
+    for (auto frame = static_cast<std::size_t>(first_scaled_frame_); frame < scale_of_frame_.size();
+         ++frame) {
       scale_of_frame_[frame] *= factor;
     }
   }

@@ -26,8 +26,9 @@ struct RefinedMotion {
 /// a whole later on, and what has left must not be torn from it. For the same reason a landmark is
 /// kept in the camera of the last keyframe that saw it.
 ///
-/// Lengths are those of the time when the frame came: the map's scale drifts from frame to frame,
-/// and what puts the newest frames right would stretch the older ones, which are right already.
+/// Lengths are those of the time when the frame came, give or take a few frames: the map's scale
+/// drifts from frame to frame, and what puts the newest frames right would stretch the older ones,
+/// which are right already.
 class WindowHistory {
  public:
   /// The newest keyframe of the window saw this image (the input, gray or RGB).
@@ -55,7 +56,8 @@ class WindowHistory {
     double max_parallax_rad = 0.0;
     std::array<std::uint8_t, 3> rgb{};
   };
-  /// Units when the frame came per unit now; 1 of a frame that has not ended.
+  /// Units when the frame came, as the mean over its neighbours, per unit now; 1 of a frame that
+  /// has not ended.
   [[nodiscard]] double units_of(int frame) const;
   void keep_motion(int prev, int cur, Rigid3 prev_from_cur);
   void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
@@ -67,6 +69,7 @@ class WindowHistory {
   std::map<int, Track> tracks_;
   double scale_ = 1.0;  ///< of the window, by all that rescaled it
   std::vector<double> scale_of_frame_;
+  int first_scaled_frame_ = 0;  ///< before it, lengths are in units of their own
 };
 
 /// Poses of all frames, with look-ahead: by their refined motion where there is one, else from the

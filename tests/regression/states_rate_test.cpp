@@ -47,7 +47,7 @@ void expect_accurate_drive(const StateRun& result, const StateDrive& drive, int 
   const int num_frames = static_cast<int>(result.poses.size());
   for (const Trajectory* poses : result.trajectories()) {
     // With look-ahead the lengths are those of the single frames, whose noise the rate multiplies.
-    const double share = poses == &result.poses ? 0.05 : 0.1;
+    const double share = poses == &result.poses ? 0.05 : 0.07;
     test::expect_accurate(*poses, drive, 10 * kRate, drive.event_begin, share, 0.3 * kDeg,
                           10 * kRate);
     test::expect_accurate(*poses, drive, after, num_frames, share, 0.3 * kDeg, 10 * kRate);

@@ -95,17 +95,26 @@ TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
 TEST(WindowHistory, LengthsAreThoseOfTheTimeWhenTheFrameCame) {
   Window window;
   WindowHistory history;
-  for (int i = 0; i < 4; ++i) {  // a unit from the one before, then all is found 1.5 times as long
+  for (int i = 0; i < 24; ++i) {  // from frame 12 on all is found 1.5 times as long
     const Rigid3 last = i == 0 ? step(-1.0) : window.keyframes.back().world_from_camera;
-    window.keyframes.push_back({i, last * step(1.0), {}, {}});
-    rescale(window, 1.5, window.keyframes.back().world_from_camera.translation);
-    history.rescale(window, 1.5, false);
+    window.keyframes.push_back({i, last * step(i <= 12 ? 1.0 : 1.5), {}, {}});
+    if (i == 12) {
+      rescale(window, 1.5, window.keyframes.back().world_from_camera.translation);
+      history.rescale(window, 1.5, false);
+    }
     history.end_frame();
   }
   history.close(window);
-  ASSERT_EQ(history.motions().size(), 3U);
+  ASSERT_EQ(history.motions().size(), 23U);
+  double last_length = 1.0;
   for (const RefinedMotion& motion : history.motions()) {
-    EXPECT_NEAR(motion.prev_from_cur.translation.norm(), 1.5, 1e-12) << motion.cur;
+    const double length = motion.prev_from_cur.translation.norm();
+    if (motion.cur <= 6 || motion.cur >= 18) {
+      EXPECT_NEAR(length, motion.cur <= 6 ? 1.0 : 1.5, 1e-12) << motion.cur;
+    }
+    EXPECT_GE(length, last_length - 1e-12) << motion.cur << ": no jump, no wave";
+    EXPECT_LE(length, last_length + 0.1) << motion.cur;
+    last_length = length;
   }
 }
 
