@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Lines and branches of src/ that the unit tests reach, in all and for each room (`tools/setup.sh coverage`
-# installs gcovr). What was counted before is dropped. build/coverage/report/index.html shows each line.
+# installs gcovr). What was counted before is dropped (coverage.sh --keep: a new report of it). build/coverage/report/index.html shows each line.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -11,9 +11,10 @@ readonly GCOVR=build/venv-coverage/bin/gcovr
 
 mkdir -p "$BUILD/report"
 cmake --preset coverage --log-level=WARNING >"$BUILD/configure.log" || { cat "$BUILD/configure.log" >&2; exit 1; }
-cmake --build --preset coverage --target stemvo_unit_tests >"$BUILD/build.log" || { tail -n 40 "$BUILD/build.log" >&2; exit 1; }
-if [[ "${1:-}" != --keep ]]; then # --keep: the report of a run before
-  find "$BUILD" -name '*.gcda' -delete
+[[ "${1:-}" == --keep ]] || find "$BUILD" -name '*.gcda' -delete # of other sources: counts would not fit
+cmake --build --preset coverage --target stemvo_unit_tests >"$BUILD/build.log" 2>&1 || { tail -n 40 "$BUILD/build.log" >&2; exit 1; }
+if [[ "${1:-}" != --keep ]]; then
+  find "$BUILD" -name '*.gcda' -delete # of the build's list of tests
   ctest --preset coverage --parallel "$(nproc)" >"$BUILD/ctest.log" || { tail -n 40 "$BUILD/ctest.log" >&2; exit 1; }
 fi
 

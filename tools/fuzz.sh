@@ -25,7 +25,7 @@ total=0
 for target; do
   program=$BUILD/tests/fuzz/fuzz_$target
   log=$BUILD/$target.log
-  # A folder of its own for each find; what libraries print of broken input (2: stderr) is not shown.
+  # What libraries print of broken input is not shown (2: the program's stderr; reports stay).
   if ! "$program" "$BUILD/corpora/$target" -max_total_time="$SECONDS_EACH" "${LIMITS[@]}" -close_fd_mask=2 \
     -artifact_prefix="$FINDS/${target}_" -print_final_stats=1 2>"$log"; then
     failed=1
