@@ -2,6 +2,7 @@
 option(STEMVO_WARNINGS_AS_ERRORS "Treat warnings as errors (set by the presets)" OFF)
 option(STEMVO_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 option(STEMVO_SANITIZE_THREAD "Thread sanitizer; of the tests only those of work in several threads are built" OFF)
+option(STEMVO_FUZZ "Build tests/fuzz (clang's libFuzzer) in place of the other tests" OFF)
 
 add_library(stemvo_options INTERFACE)
 target_compile_options(stemvo_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
@@ -9,9 +10,15 @@ target_compile_options(stemvo_options INTERFACE -Wall -Wextra -Wpedantic -Wshado
 if(STEMVO_WARNINGS_AS_ERRORS)
   target_compile_options(stemvo_options INTERFACE -Werror)
 endif()
+if(STEMVO_FUZZ)
+  # Counted branches for the fuzzer; a number that does not fit what it is cast to is an error too.
+  target_compile_options(stemvo_options INTERFACE -fsanitize=fuzzer-no-link,float-cast-overflow)
+endif()
 if(STEMVO_SANITIZE)
   # GCC's manual: the sanitizers bring false positives of this one (std::regex is full of them).
-  target_compile_options(stemvo_options INTERFACE -Wno-maybe-uninitialized)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(stemvo_options INTERFACE -Wno-maybe-uninitialized)
+  endif()
   target_compile_options(stemvo_options INTERFACE -fsanitize=address,undefined
                                                   -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(stemvo_options INTERFACE -fsanitize=address,undefined)

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, plotly.js, a Python environment.
 # Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
-# `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`.
+# `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`,
+# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -205,6 +206,19 @@ if [[ "${1:-}" == browser ]]; then
   PACKAGES=(chromium)
   install_packages
   make_venv build/venv-browser "$LOGS/venv-browser.log" tools/requirements-browser.txt
+  exit
+fi
+
+# clang with libFuzzer: another compiler than the program's.
+if [[ "${1:-}" == fuzz ]]; then
+  mkdir -p "$LOGS"
+  PACKAGES=(clang-16 libclang-rt-16-dev)
+  install_packages
+  exit
+fi
+if [[ "${1:-}" == coverage ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-coverage "$LOGS/venv-coverage.log" tools/requirements-coverage.txt
   exit
 fi
 

@@ -17,12 +17,18 @@ void flatten(YAML::Node map, const char* key) {
   }
   if (value.IsMap() && value["data"]) {
     map[key] = value["data"];
-  } else if (value.IsSequence() && value.size() > 0 && value[0].IsSequence()) {
-    YAML::Node numbers = value[0];
+  } else if (value.IsSequence() && value.size() > 0 &&
+             std::all_of(value.begin(), value.end(),
+                         [](const YAML::Node& row) { return row.IsSequence(); })) {
+    std::vector<YAML::Node> others;  // first of all: a row may be an alias of the first
     for (std::size_t row = 1; row < value.size(); ++row) {
       for (const YAML::Node& number : value[row]) {
-        numbers.push_back(number);
+        others.push_back(number);
       }
+    }
+    YAML::Node numbers = value[0];  // which has a line
+    for (const YAML::Node& number : others) {
+      numbers.push_back(number);
     }
     map[key] = numbers;
   }

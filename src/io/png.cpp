@@ -73,20 +73,28 @@ bool is_plain_header(const Chunk& chunk, bool as_color) {
 }
 
 /// The parts of the zlib stream, one behind the other. False: a chunk that is damaged or may change
-/// pixels.
+/// pixels, or something between those of the pixels, which libpng does not take.
 bool collect_pixel_data(Bytes rest, std::vector<std::uint8_t>& packed) {
   /// Chunks that say something about the image and change no pixel of it.
   static constexpr std::array<std::string_view, 7> kHarmless = {"tEXt", "tIME", "pHYs", "gAMA",
                                                                 "cHRM", "sRGB", "bKGD"};
   packed.clear();
-  for (Chunk chunk = next_chunk(rest); chunk.type != "IEND"; chunk = next_chunk(rest)) {
-    if (chunk.type == "IDAT" && chunk.is_sound()) {
+  std::string_view before;
+  bool has_pixels = false;
+  for (Chunk chunk = next_chunk(rest); chunk.is_sound(); chunk = next_chunk(rest)) {
+    if (chunk.type == "IEND") {
+      return chunk.data.empty();
+    }
+    const bool is_pixels = chunk.type == "IDAT" && (before == "IDAT" || !has_pixels);
+    if (is_pixels) {
       packed.insert(packed.end(), chunk.data.begin(), chunk.data.end());
+      has_pixels = true;
     } else if (std::find(kHarmless.begin(), kHarmless.end(), chunk.type) == kHarmless.end()) {
       return false;
     }
+    before = chunk.type;
   }
-  return true;
+  return false;
 }
 
 /// One row: the filtered bytes, the row above, and where the row goes.

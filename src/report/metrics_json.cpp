@@ -34,7 +34,7 @@ struct Reader {
     if constexpr (std::is_same_v<Value, double>) {
       value = found.is_null() ? std::numeric_limits<double>::quiet_NaN() : found.get<double>();
     } else {
-      found.get_to(value);
+      read_value(found, value);
     }
   }
 };

@@ -1,12 +1,37 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <concepts>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "evaluation/metrics.hpp"
+
+namespace stemvo {
+
+/// As get_to, but a number that is no whole number, or out of the type's range, is an exception of
+/// the library too, where get_to casts it as it is.
+template <typename Json, typename T>
+void read_value(const Json& json, T& value) {
+  if constexpr (std::integral<T> && !std::same_as<T, bool>) {
+    const bool fits =
+        json.is_number_unsigned()
+            ? std::in_range<T>(json.template get<std::uint64_t>())
+            : json.is_number_integer() && std::in_range<T>(json.template get<std::int64_t>());
+    if (!fits) {
+      const std::string found = json.is_number() ? json.dump() : json.type_name();
+      throw nlohmann::json::other_error::create(
+          501, "expected a whole number in range, found " + found, &json);
+    }
+  }
+  json.get_to(value);
+}
+
+}  // namespace stemvo
 
 /// What may be missing is null in JSON.
 template <typename T>
@@ -17,7 +42,10 @@ struct nlohmann::adl_serializer<std::optional<T>> {
   }
   template <typename Json>
   static void from_json(const Json& json, std::optional<T>& value) {
-    value = json.is_null() ? std::nullopt : std::optional<T>(json.template get<T>());
+    value.reset();
+    if (!json.is_null()) {
+      stemvo::read_value(json, value.emplace());
+    }
   }
 };
 

@@ -20,14 +20,16 @@
 
 using Json = nlohmann::ordered_json;
 
-/// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order.
+/// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order, and
+/// with numbers that fit their members.
+#define STEMVO_JSON_FROM(member) read_value(nlohmann_json_j.at(#member), nlohmann_json_t.member);
 #define STEMVO_LIST(...) __VA_ARGS__
-#define STEMVO_JSON_MEMBERS(Type, members)                                             \
-  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {                   \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, STEMVO_LIST members))   \
-  }                                                                                    \
-  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {          \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, STEMVO_LIST members)) \
+#define STEMVO_JSON_MEMBERS(Type, members)                                           \
+  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {                 \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, STEMVO_LIST members)) \
+  }                                                                                  \
+  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {        \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(STEMVO_JSON_FROM, STEMVO_LIST members)) \
   }
 
 namespace stemvo::search {
@@ -159,12 +161,14 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
       json.get_to(record.key);
       return add_record(std::move(record), records);
     }
-    if (json.at("stemvo_search") == records.identity.stemvo_search) {
+    int format = 0;
+    read_value(json.at("stemvo_search"), format);
+    if (format == records.identity.stemvo_search) {
       json.get_to(records.identity);
       return check_identity(records.identity);
     }
     return fail(fmt::format("expected records of format {}, found {}",
-                            records.identity.stemvo_search, json["stemvo_search"].dump()));
+                            records.identity.stemvo_search, format));
   } catch (const Json::exception& error) {
     return fail(fmt::format("expected {}, found: {}",
                             is_first ? "the identity of a search" : "the record of a filter",

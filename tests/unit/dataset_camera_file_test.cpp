@@ -277,6 +277,13 @@ TEST_F(CameraFileTest, KalibrsChain) {
   expect_refused(text, {"camera.yaml:8: camera_model: expected one of pinhole, found 'omni'"});
 }
 
+TEST_F(CameraFileTest, OddRowsOfAMatrix) {
+  const std::string row = "cam0: {T_cam_imu: [[1, 0, 0, 0], ";
+  expect_refused(row + "{a: 1}, [0, 0, 1, 0]]}\n", {"camera.yaml:1: T_cam_imu"});
+  expect_refused(row + "0, [0, 0, 1, 0]]}\n", {"camera.yaml:1: T_cam_imu"});
+  expect_refused("cam0: {T_cam_imu: [&row [1, 0, 0, 0], *row, *row]}\n", {"camera.yaml"});
+}
+
 TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
   for (const char* text : {kOpenCv, kRos}) {
     const auto file = read_camera_file(folder_.file("camera.yaml", text));

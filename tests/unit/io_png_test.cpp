@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -193,6 +194,28 @@ TEST_P(PlainPng, ChunksThatMayChangePixelsAreLeftToOpenCv) {
   EXPECT_TRUE(is_same(decode_plain_png(encoded(png), is_color), image));
   png.extra = {{"tRNS", Bytes(is_color ? 6 : 2, 0)}};
   EXPECT_TRUE(decode_plain_png(encoded(png), is_color).empty());
+}
+
+/// Where libpng refuses a file, or reads it in another way.
+TEST_P(PlainPng, WhatLibpngDoesNotTakeIsLeftToOpenCv) {
+  const cv::Mat image = test_image(GetParam(), 5, 7);
+  const bool is_color = image.channels() == 3;
+  const Bytes sound = encoded(png_of(image, {1}));
+  ASSERT_FALSE(decode_plain_png(sound, is_color).empty());
+  Bytes damaged_end = sound;
+  damaged_end.back() ^= 1U;
+  EXPECT_TRUE(decode_plain_png(damaged_end, is_color).empty());
+  EXPECT_FALSE(decode_png(damaged_end, "a.png", is_color));
+  constexpr std::size_t kEnd = 12;
+  Bytes full_end(sound.begin(), sound.end() - kEnd);
+  add_chunk(full_end, "IEND", {1});
+  EXPECT_TRUE(decode_plain_png(full_end, is_color).empty());
+  const std::string type = "IDAT";
+  const auto second = std::find_end(sound.begin(), sound.end(), type.begin(), type.end()) - 4;
+  Bytes parted(sound.begin(), second);
+  add_chunk(parted, "tEXt", {'a', 0, 'b'});
+  parted.insert(parted.end(), second, sound.end());
+  EXPECT_TRUE(decode_plain_png(parted, is_color).empty()) << "pixels in two places";
 }
 
 INSTANTIATE_TEST_SUITE_P(GrayAndColor, PlainPng, ::testing::Values(CV_8UC1, CV_8UC3));

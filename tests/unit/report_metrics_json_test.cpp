@@ -124,6 +124,23 @@ TEST(MetricsJson, IsReadBackAsItWasWritten) {
   EXPECT_FALSE(read_metrics_json(folder / "nothing.json"));
 }
 
+TEST(MetricsJson, WholeNumbersAreWholeAndInRange) {
+  const TempFolder folder;
+  ASSERT_TRUE(write_metrics_json(folder / "a.json", example()));
+  nlohmann::json json = nlohmann::json::parse(read_all(folder / "a.json"));
+  const nlohmann::json good = json;
+  for (const char* key : {"first_frame", "filter", "segments"}) {
+    for (const nlohmann::json& value : {nlohmann::json(1e300), nlohmann::json(-1e300),
+                                        nlohmann::json(1.5), nlohmann::json("1")}) {
+      json = good;
+      json[key] = value;
+      const auto read = read_metrics_json(folder.file("odd.json", json.dump()));
+      ASSERT_FALSE(read) << key << " " << value;
+      EXPECT_THAT(read.error().message, HasSubstr("expected a whole number in range, found "));
+    }
+  }
+}
+
 TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();

@@ -135,6 +135,8 @@ TEST_F(Records, WhatNoSearchWritesIsLeftOutAndTheRestKept) {
       {R"("t_rel_percent":1.5)", R"("t_rel_percent":"1.5")"},
       {R"("sequence":"00")", R"("sequence":"01")"},
       {R"("frames":100)", R"("frames":101)"},
+      {R"("frames":100)", R"("frames":1e300)"},
+      {R"("filter":1)", R"("filter":1.5)"},
       {R"("block":2)", R"("block":0)"},
       {R"("held_out":null)", R"("held_out":3)"},
       {R"("drives":[{)", R"("drives":[],"rives":[{)"},
@@ -162,6 +164,8 @@ TEST_F(Records, AnIdentityThatIsNoneIsAnError) {
                                  std::pair(R"("sequences":[{)", R"("sequences":[],"equences":[{)"),
                                  std::pair(R"("last":3)", R"("last":0)"),
                                  std::pair(R"("frame_share":1.0)", R"("frame_share":1e300)"),
+                                 std::pair(R"("stemvo_search":4)", R"("stemvo_search":1e300)"),
+                                 std::pair(R"("only_sequence":null)", R"("only_sequence":1e300)"),
                                  std::pair(R"("held_out":false)", R"("held_out":true)"),
                                  std::pair(R"("only_sequence":null)", R"("only_sequence":5)")}) {
     const std::size_t at = good.find(from);
@@ -171,6 +175,14 @@ TEST_F(Records, AnIdentityThatIsNoneIsAnError) {
     ASSERT_FALSE(content) << to;
     EXPECT_THAT(content.error().message, HasSubstr("records.jsonl:1: ")) << to;
   }
+}
+
+/// Lists in lists, as deep as no stack is.
+TEST_F(Records, ADeepIdentityIsAnError) {
+  const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');
+  const auto content = read_records(folder_.file("deep", "{\"stemvo_search\":" + deep + "}\n"));
+  ASSERT_FALSE(content);
+  EXPECT_THAT(content.error().message, HasSubstr("deep:1: expected the identity of a search"));
 }
 
 TEST_F(Records, OneWriterAtATime) {

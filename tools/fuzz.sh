@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# fuzz.sh SECONDS [TARGET..]: every fuzzer of tests/fuzz (or those named) for that time, with clang 16
+# (`tools/setup.sh fuzz`). Ends with 1 and the file of the find, with the command that repeats it.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+readonly BUILD=build/fuzz
+readonly FINDS=$BUILD/finds
+readonly LIMITS=(-rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=10)
+
+[[ "${1:-}" =~ ^[1-9][0-9]*$ ]] || { echo "usage: tools/fuzz.sh SECONDS [TARGET..]" >&2; exit 2; }
+readonly SECONDS_EACH=$1
+shift
+
+mkdir -p "$FINDS"
+cmake --preset fuzz --log-level=WARNING >"$BUILD/configure.log" || { cat "$BUILD/configure.log" >&2; exit 1; }
+cmake --build --preset fuzz >"$BUILD/build.log" || { tail -n 40 "$BUILD/build.log" >&2; exit 1; }
+# Seeds are made again each time; what the fuzzers added to build/fuzz/corpora stays.
+"$BUILD/tests/fuzz/fuzz_make_corpora" . "$BUILD/corpora"
+
+(($# > 0)) || set -- $(sed -n 's/^set(targets \(.*\))$/\1/p' tests/fuzz/CMakeLists.txt)
+failed=0
+total=0
+for target; do
+  program=$BUILD/tests/fuzz/fuzz_$target
+  log=$BUILD/$target.log
+  # What libraries print of broken input is not shown (2: the program's stderr; reports stay).
+  if ! "$program" "$BUILD/corpora/$target" -max_total_time="$SECONDS_EACH" "${LIMITS[@]}" -close_fd_mask=2 \
+    -artifact_prefix="$FINDS/${target}_" -print_final_stats=1 2>"$log"; then
+    failed=1
+    find_file=$(sed -n 's/.*Test unit written to //p' "$log" | tail -n 1)
+    echo "fuzz: $target: $(grep -m1 -E 'ERROR:|runtime error|broken promise' "$log" || echo failed) (log: $log)" >&2
+    echo "fuzz: repeat: $program ${find_file:-"$FINDS/${target}_*"}" >&2
+    continue
+  fi
+  count=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
+  total=$((total + count))
+  echo "$target: $count executions"
+done
+echo "$total executions in all"
+exit "$failed"
