@@ -127,4 +127,29 @@ DoubleArray array_of(std::span<const double> numbers) {
   return owned(std::move(data), {numbers.size()});
 }
 
+std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
+                                            std::span<const Rigid3> trajectory) {
+  const std::size_t n = landmarks.size();
+  auto positions = std::make_unique<double[]>(3 * n);
+  auto colors = std::make_unique<std::uint8_t[]>(3 * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const MapLandmark& landmark = landmarks[i];
+    Eigen::Map<Eigen::Vector3d>(positions.get() + 3 * i) =
+        trajectory[static_cast<std::size_t>(landmark.frame)] * landmark.position.cast<double>();
+    std::ranges::copy(landmark.rgb, colors.get() + 3 * i);
+  }
+  return {owned(std::move(positions), {n, 3}), owned(std::move(colors), {n, 3})};
+}
+
+std::pair<DoubleArray, BoolArray> arrays_of(std::span<const TrackedPoint> points) {
+  const std::size_t n = points.size();
+  auto places = std::make_unique<double[]>(4 * n);
+  auto are_inliers = std::make_unique<bool[]>(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    Eigen::Map<Eigen::Vector4d>(places.get() + 4 * i) << points[i].prev_uv, points[i].uv;
+    are_inliers[i] = points[i].is_inlier;
+  }
+  return {owned(std::move(places), {n, 4}), owned(std::move(are_inliers), {n})};
+}
+
 }  // namespace stemvo::python

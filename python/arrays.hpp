@@ -20,6 +20,7 @@ namespace nb = nanobind;
 using AnyArray = nb::ndarray<nb::ro, nb::device::cpu>;
 using DoubleArray = nb::ndarray<nb::numpy, double>;
 using ByteArray = nb::ndarray<nb::numpy, std::uint8_t>;
+using BoolArray = nb::ndarray<nb::numpy, bool>;
 
 /// The value, or a ValueError with the library's message. The GIL is held.
 template <typename T>
@@ -47,6 +48,11 @@ struct ImageView {
 [[nodiscard]] DoubleArray array_of(const Rigid3& pose);                  ///< 4x4
 [[nodiscard]] DoubleArray array_of(std::span<const Rigid3> trajectory);  ///< Nx4x4
 [[nodiscard]] DoubleArray array_of(std::span<const double> numbers);
+/// In the world, Nx3, and their colours, Nx3. `trajectory` is the one they refer to.
+[[nodiscard]] std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
+                                                          std::span<const Rigid3> trajectory);
+/// Last and present place in the image, Nx4 (u, v, u, v), and whether they fit the motion, N.
+[[nodiscard]] std::pair<DoubleArray, BoolArray> arrays_of(std::span<const TrackedPoint> points);
 
 void bind_odometry(nb::module_& module);
 void bind_files(nb::module_& module);

@@ -4,10 +4,12 @@
 #include <mutex>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include <dlfcn.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 
 #include "arrays.hpp"
@@ -69,6 +71,14 @@ class SafeOdometry {
   }
   DoubleArray refined_trajectory() {
     return array_of(call([](Odometry& o) { return o.refined_trajectory(); }));
+  }
+  std::pair<DoubleArray, ByteArray> landmarks() {
+    const auto [landmarks, poses] =
+        call([](Odometry& o) { return std::pair(o.landmarks(), o.refined_trajectory()); });
+    return arrays_of(landmarks, poses);
+  }
+  std::pair<DoubleArray, BoolArray> tracked_points() {
+    return arrays_of(call([](Odometry& o) { return o.tracked_points(); }));
   }
   ByteArray channel_image() {
     return array_of(call([](Odometry& o) { return o.channel_image(); }));
@@ -178,6 +188,10 @@ void bind_odometry(nb::module_& module) {
            "timestamp"_a = nb::none(),
            "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")
       .def("refined_trajectory", &SafeOdometry::refined_trajectory, "Nx4x4, with look-ahead")
+      .def("landmarks", &SafeOdometry::landmarks,
+           "Nx3 in the world, and Nx3 colours: well seen ones, with look-ahead")
+      .def("tracked_points", &SafeOdometry::tracked_points,
+           "Of the last image: Nx4 (u, v before; u, v now), and N: fits the motion")
       .def("channel_image", &SafeOdometry::channel_image,
            "What points of the last image were tracked on");
 }

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""A result of `stemvo run`, or a recording while it is tracked, in rerun's viewer (docs/python.md).
+
+    pip install '.[view]'
+    python -m stemvo.view RESULT [--recording RECORDING]
+    python -m stemvo.view --live RECORDING [--set KEY=VALUE ..]
+"""
+
+import argparse
+import csv
+import pathlib
+import sys
+
+import numpy as np
+
+import stemvo
+
+INLIER, OUTLIER, PATH, TRUTH = (0, 158, 115), (213, 94, 0), (0, 114, 178), (150, 150, 150)
+JPEG_QUALITY = 75
+MAP_EVERY = 10  # frames: the map is sent whole each time
+PIECE = 100  # frames of path that are sent again with each
+
+
+def read_poses(file):
+    """KITTI's format -> Nx4x4."""
+    try:
+        rows = np.loadtxt(file, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{file}: {error}") from None
+    if rows.ndim != 2 or rows.shape[1] != 12:
+        raise ValueError(f"{file}: expected 12 numbers a line, found {rows.shape[-1]}")
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3] = rows.reshape(-1, 3, 4)
+    return poses
+
+
+class View:
+    """Where things stand in rerun: world (path, truth, map, camera/image with points), channel, plots."""
+
+    def __init__(self, rr, truth):
+        self.rr = rr
+        self.path, self.piece = [], []
+        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Y_DOWN, static=True)
+        if truth is not None:
+            # The truth of all frames, as it would be seen from the first one.
+            start = np.linalg.inv(truth[0])
+            rr.log("world/truth", rr.LineStrips3D([(start @ truth)[:, :3, 3]], colors=[TRUTH]), static=True)
+
+    def at(self, frame, timestamp):
+        self.rr.set_time("frame", sequence=frame)
+        if timestamp is not None:
+            self.rr.set_time("time", duration=timestamp)
+
+    def pose(self, world_from_camera):
+        if len(self.path) % PIECE == 0:
+            self.piece = self.path[-1:]
+        self.path.append(world_from_camera[:3, 3])
+        self.piece.append(self.path[-1])
+        self.rr.log("world/camera", self.rr.Transform3D(translation=world_from_camera[:3, 3],
+                                                        mat3x3=world_from_camera[:3, :3]))
+        self.rr.log(f"world/path/{(len(self.path) - 1) // PIECE}", self.rr.LineStrips3D([self.piece], colors=[PATH]))
+
+    def image(self, image, camera):
+        self.rr.log("world/camera/image", self.rr.Pinhole(
+            focal_length=(camera.fx, camera.fy), principal_point=(camera.cx, camera.cy),
+            width=camera.width, height=camera.height))
+        self.rr.log("world/camera/image", self.rr.Image(image).compress(jpeg_quality=JPEG_QUALITY))
+
+    def points(self, tracks, is_inlier):
+        strips = tracks.reshape(-1, 2, 2)
+        colors = [INLIER if inlier else OUTLIER for inlier in is_inlier]
+        self.rr.log("world/camera/image/points", self.rr.LineStrips2D(strips, colors=colors))
+
+    def landmarks(self, positions, colors):
+        self.rr.log("world/map", self.rr.Points3D(positions, colors=colors, radii=0.03))
+
+    def channel(self, image):
+        self.rr.log("channel", self.rr.Image(image).compress(jpeg_quality=JPEG_QUALITY))
+
+    def number(self, name, value):
+        if value is not None:
+            self.rr.log(f"plots/{name}", self.rr.Scalars(value))
+
+    def state(self, text, last):
+        if text != last:
+            self.rr.log("state", self.rr.TextLog(text))
+
+
+def show_live(rr, recording, options):
+    odometry = stemvo.Odometry(recording.camera, options)
+    view = View(rr, recording.ground_truth)
+    state = None
+    for frame, (image, timestamp) in enumerate(recording):
+        result = odometry.process(image, timestamp)
+        view.at(frame, timestamp)
+        view.pose(result.world_from_camera)
+        view.image(image, result.camera)
+        view.points(*odometry.tracked_points())
+        view.channel(odometry.channel_image())
+        view.number("matches", result.num_matches)
+        view.number("inliers", result.num_inliers)
+        view.number("scale_sigma", result.scale_sigma)
+        view.state(result.state, state)
+        state = result.state
+        if frame % MAP_EVERY == MAP_EVERY - 1 or frame == len(recording) - 1:
+            view.landmarks(*odometry.landmarks())
+    refined = odometry.refined_trajectory()
+    rr.log("world/path_refined", rr.LineStrips3D([refined[:, :3, 3]]))
+
+
+def show_result(rr, folder, recording):
+    poses = read_poses(folder / "trajectory_kitti.txt")
+    with open(folder / "frames.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if len(rows) != len(poses):
+        raise ValueError(f"{folder}: expected a row of frames.csv per pose, found {len(rows)} of {len(poses)}")
+    view = View(rr, recording.ground_truth if recording else None)
+    if (folder / "map.ply").exists():
+        rr.log_file_from_path(folder / "map.ply", entity_path_prefix="world", static=True)
+    state = None
+    for row, pose in zip(rows, poses):
+        frame = int(row["frame"])
+        view.at(frame, float(row["timestamp_s"]))
+        view.pose(pose)
+        if recording and frame < len(recording):
+            view.image(recording[frame][0], recording.camera)
+        for name in ("matches", "inliers", "r_h", "scale_sigma", "stem_ms", "features_ms", "pose_ms"):
+            view.number(name, float(row[name]) if row.get(name) else None)
+        view.state(row["state"], state)
+        state = row["state"]
+
+
+def options_of(pairs):
+    values = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise ValueError(f"--set {pair}: expected KEY=VALUE")
+        values[key] = value
+    return values
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="python -m stemvo.view", description=__doc__.partition("\n")[0])
+    parser.add_argument("result", nargs="?", type=pathlib.Path, metavar="RESULT", help="the --out of `stemvo run`")
+    parser.add_argument("--recording", type=pathlib.Path, help="its frames, shown beside")
+    parser.add_argument("--live", type=pathlib.Path, metavar="RECORDING", help="track these frames and watch")
+    parser.add_argument("--camera", type=pathlib.Path, help="camera file of the recording")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="with --live")
+    parser.add_argument("--save", type=pathlib.Path, metavar="FILE.rrd", help="write this in place of a window")
+    given = parser.parse_args(arguments)
+    if (given.result is None) == (given.live is None):
+        parser.error("expected RESULT or --live RECORDING")
+    try:
+        import rerun as rr
+    except ImportError:
+        sys.exit("error: expected the package rerun-sdk: pip install '.[view]'")
+    try:
+        folder = given.live or given.recording
+        recording = stemvo.read_recording(folder, given.camera) if folder else None
+        rr.init("stemvo", spawn=given.save is None)
+        if given.save:
+            rr.save(given.save)
+        if given.live:
+            show_live(rr, recording, options_of(given.set))
+        else:
+            show_result(rr, given.result, recording)
+    except (OSError, ValueError, KeyError) as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()
