@@ -39,13 +39,15 @@ struct StemNetwork {
   std::optional<FoldedFilter> folded;
 };
 
-/// Size of the image that points are tracked on. kAuto: kHalf for patches and KLT where the focal
-/// length is 500 px or more, else kBicubic.
+/// Size of the image that points are tracked on. kAuto: for patches and KLT kHalf where the focal
+/// length is 500 px or more, else kFrame; for descriptors kBicubic.
 enum class Upsample {
   kAuto,
   kBicubic,  ///< the input's
-  kHalf,     ///< half the input's; the channel's where its sampling is odd and above 1
-  kNative,   ///< the channel's
+  kFrame,   ///< the input's, where the sampling is even: not the channel is enlarged but the frame,
+            ///< so that a filter sees the angle it was learned for; else as kBicubic
+  kHalf,    ///< half the input's; the channel's where its sampling is odd and above 1
+  kNative,  ///< the channel's
 };
 
 /// Keys `stem.*`: the filter channel a frame is seen through.

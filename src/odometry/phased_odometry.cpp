@@ -18,23 +18,26 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   }
   // A network that cannot take this camera's images is found before work starts.
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  if (const Expected<Channel> channel = stem->apply(blank); !channel) {
+  const int zoom =
+      stem->frame_zoom(choose_upsample(options.stem.upsample, options.features.method, camera));
+  if (const Expected<Channel> channel = stem->apply(blank, zoom); !channel) {
     return channel.error();
   }
-  return PhasedOdometry(camera, options, mask, *std::move(stem));
+  return PhasedOdometry(camera, options, mask, *std::move(stem), zoom);
 }
 
-PhasedOdometry::PhasedOdometry(const Camera& camera,
-                               const Options& options,
-                               const cv::Mat& mask,
-                               Stem stem)
-    : camera_(camera), stem_(std::move(stem)), channel_odometry_(options, camera, mask) {}
+PhasedOdometry::PhasedOdometry(
+    const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
+    : camera_(camera),
+      stem_(std::move(stem)),
+      zoom_(zoom),
+      channel_odometry_(options, camera, mask) {}
 
 PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
   STEMVO_CHECK(image.cols == camera_.width_px && image.rows == camera_.height_px,
                "the image has the camera's size");
   Stopwatch watch;
-  const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image); });
+  const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image, zoom_); });
   const double stem_ms = watch.lap_ms();
   PreparedFrame prepared;
   if (!channel) {

@@ -44,10 +44,12 @@ class PhasedOdometry {
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 
  private:
-  PhasedOdometry(const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem);
+  PhasedOdometry(
+      const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom);
 
   Camera camera_;
   Stem stem_;
+  int zoom_;  ///< Stem::frame_zoom
   ChannelOdometry channel_odometry_;
 };
 

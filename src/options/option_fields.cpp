@@ -36,7 +36,7 @@ std::vector<Field> stem_fields(StemOptions& o) {
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
       {"stem", "upsample", enum_value(&o.upsample),
-       Rule::one_of({"auto", "bicubic", "half", "native"}),
+       Rule::one_of({"auto", "bicubic", "frame", "half", "native"}),
        "size of the image to track on: bicubic (the input's), half (of the input's), "
        "native (the channel's), or auto: half for "
        "patch and klt where the focal length is 500 px or more, else bicubic"},

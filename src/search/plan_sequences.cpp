@@ -83,15 +83,16 @@ std::string fit_layer(const SearchRequest& request,
                       const Camera& camera,
                       PlanLayer& layer) {
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1);
+  const int zoom = frame_zoom(layer, camera);
+  const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1, zoom);
   if (!channels) {
     return channels.error().message;
   }
   const cv::Size size = channels->front().values.size();
   const Upsample upsample =
       choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera);
-  const double factor =
-      static_cast<double>(identity.sampling_px) / image_sampling_px(upsample, identity.sampling_px);
+  const int sampling_px = identity.sampling_px / zoom;
+  const double factor = static_cast<double>(sampling_px) / image_sampling_px(upsample, sampling_px);
   const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
   const std::size_t bytes = bytes_in_flight(size, cv::Size2d(size) * factor, num_run);
   layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);

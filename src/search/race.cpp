@@ -251,7 +251,8 @@ struct Race {
       }
       const int first = plan.candidates[group.front()].key.filter;
       const int last = plan.candidates[group.back()].key.filter;
-      auto channels = plan.layers[layer].stem.apply_range(*frame, first, last + 1);
+      auto channels = plan.layers[layer].stem.apply_range(
+          *frame, first, last + 1, frame_zoom(plan.layers[layer], sequence.camera()));
       if (!channels) {
         warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
                          channels.error().message));

@@ -20,6 +20,13 @@ struct PlanLayer {
   std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
 };
 
+/// Stem::frame_zoom of a layer on frames of this camera.
+[[nodiscard]] inline int frame_zoom(const PlanLayer& layer, const Camera& camera) {
+  const Config& config = layer.config;
+  return layer.stem.frame_zoom(
+      choose_upsample(config.stem.upsample, config.features.method, camera));
+}
+
 struct Candidate {
   FilterKey key;
   std::size_t layer = 0;  ///< index

@@ -117,9 +117,10 @@ Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& cam
   if (asked != Upsample::kAuto) {
     return asked;
   }
-  const bool is_tracked = method == FeatureMethod::kPatch || method == FeatureMethod::kKlt;
-  return is_tracked && camera.mean_focal_px() >= kLongFocal_px ? Upsample::kHalf
-                                                               : Upsample::kBicubic;
+  if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
+    return Upsample::kBicubic;
+  }
+  return camera.mean_focal_px() >= kLongFocal_px ? Upsample::kHalf : Upsample::kFrame;
 }
 
 int image_sampling_px(Upsample upsample, int sampling_px) {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
 #include "stem/foreign_model.hpp"
@@ -114,7 +115,12 @@ Expected<StemNetwork> network_of(const StemOptions& options) {
       options.model));
 }
 
-Expected<FilterBank> open_bank(const StemNetwork& network, bool is_built_in, int sampling) {
+struct OpenedBank {
+  FilterBank bank;
+  bool takes_any_size;
+};
+
+Expected<OpenedBank> open_bank(const StemNetwork& network, bool is_built_in, int sampling) {
   auto session =
       is_built_in ? internal::open_built_in_model(network) : internal::open_model(network);
   if (!session) {
@@ -128,7 +134,28 @@ Expected<FilterBank> open_bank(const StemNetwork& network, bool is_built_in, int
         "found {}",
         network.stride_px, file, sampling));
   }
-  return internal::make_network_layer(file, *std::move(session), plan);
+  const bool takes_any_size = session->fixed_size().empty() && !network.native_sampling_only;
+  return OpenedBank{internal::make_network_layer(file, *std::move(session), plan), takes_any_size};
+}
+
+/// Pixel u of the frame is pixel zoom * (u + 0.5) - 0.5 of the enlarged one.
+Expected<std::vector<Channel>> apply_enlarged(
+    const FilterBank& bank, const cv::Mat& frame, int first, int last, int zoom) {
+  if (zoom == 1) {
+    return bank(frame, first, last);
+  }
+  cv::Mat enlarged;
+  cv::resize(frame, enlarged, {}, zoom, zoom, cv::INTER_CUBIC);
+  auto channels = bank(enlarged, first, last);
+  if (!channels) {
+    return fail(fmt::format("{} (a frame of {}x{} enlarged {} times)", channels.error().message,
+                            frame.cols, frame.rows, zoom));
+  }
+  for (Channel& channel : *channels) {
+    channel.map.scale /= zoom;
+    channel.map.offset_px = ((channel.map.offset_px.array() + 0.5) / zoom - 0.5).matrix();
+  }
+  return channels;
 }
 
 void check_frame(const cv::Mat& frame) {
@@ -153,12 +180,12 @@ Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
   if (!filter) {
     return filter.error();
   }
-  const StemInfo info = {.model = network->name,
-                         .layer = network->layer,
-                         .sha256 = network->sha256,
-                         .filter = *filter,
-                         .num_filters = network->num_filters,
-                         .sampling_px = *sampling};
+  StemInfo info = {.model = network->name,
+                   .layer = network->layer,
+                   .sha256 = network->sha256,
+                   .filter = *filter,
+                   .num_filters = network->num_filters,
+                   .sampling_px = *sampling};
   if (auto hand_made = internal::hand_made_bank(options.model)) {
     return Stem(info, std::move(hand_made->bank), true);
   }
@@ -169,28 +196,32 @@ Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
   if (!bank) {
     return bank.error();
   }
-  return Stem(info, *std::move(bank), has_all);
+  info.takes_any_size = bank->takes_any_size;
+  return Stem(info, std::move(bank->bank), has_all);
 }
 
 Expected<Stem> Stem::create(const StemOptions& options) { return load(options, false); }
 Expected<Stem> Stem::create_all(const StemOptions& options) { return load(options, true); }
 
-Expected<Channel> Stem::apply(const cv::Mat& frame) const {
+Expected<Channel> Stem::apply(const cv::Mat& frame, int zoom) const {
   check_frame(frame);
   const int index = has_all_ ? info_.filter : 0;
-  auto channels = bank_(frame, index, index + 1);
+  auto channels = apply_enlarged(bank_, frame, index, index + 1, zoom);
   if (!channels) {
     return channels.error();
   }
   return std::move(channels->front());
 }
 
-Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame, int first, int last) const {
+Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame,
+                                                 int first,
+                                                 int last,
+                                                 int zoom) const {
   check_frame(frame);
   STEMVO_CHECK(0 <= first && first < last && last <= info_.num_filters,
                "a range of filters lies inside the layer");
   STEMVO_CHECK(has_all_, "the stem was made with all filters");
-  return bank_(frame, first, last);
+  return apply_enlarged(bank_, frame, first, last, zoom);
 }
 
 }  // namespace stemvo

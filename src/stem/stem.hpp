@@ -23,6 +23,7 @@ struct StemInfo {
   int filter = 0;      ///< the one chosen, never -1
   int num_filters = 1;
   int sampling_px = 1;
+  bool takes_any_size = true;  ///< else frames of one size, or one channel pixel for each stride
 };
 
 namespace internal {
@@ -48,8 +49,13 @@ class Stem {
   [[nodiscard]] static Expected<Stem> create_all(const StemOptions& options);
 
   [[nodiscard]] const StemInfo& info() const { return info_; }
+  /// How many times larger (bicubic) the frame is made for the filters: 2 or 1.
+  [[nodiscard]] int frame_zoom(Upsample upsample) const {
+    const bool is_asked = upsample == Upsample::kFrame && info_.takes_any_size;
+    return is_asked && info_.sampling_px % 2 == 0 ? 2 : 1;
+  }
   /// The one filter chosen.
-  [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame) const;
+  [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame, int zoom = 1) const;
   /// All filters of the layer from one pass, in order. Of a stem made by create_all, as
   /// apply_range.
   [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const {
@@ -59,7 +65,8 @@ class Stem {
   /// 0 <= first < last <= info().num_filters.
   [[nodiscard]] Expected<std::vector<Channel>> apply_range(const cv::Mat& frame,
                                                            int first,
-                                                           int last) const;
+                                                           int last,
+                                                           int zoom = 1) const;
 
  private:
   Stem(StemInfo info, internal::FilterBank bank, bool has_all)
@@ -71,8 +78,8 @@ class Stem {
   bool has_all_;  ///< else `bank_` is the one chosen, in a file of its own
 };
 
-/// What kAuto stands for: kHalf for tracked points where half the size still has many pixels per
-/// degree (a focal length of 500 px and more in the input), else kBicubic.
+/// What kAuto stands for: for tracked points kHalf where half the size still has many pixels per
+/// degree (a focal length of 500 px and more in the input), else kFrame; for others kBicubic.
 [[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera);
 
 /// Input pixels per pixel of the image made from a channel of `sampling_px`.
@@ -85,7 +92,7 @@ class Stem {
 /// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
 class ChannelStretch {
  public:
-  /// Of `options.upsample`, kAuto stands for kBicubic: see choose_upsample.
+  /// Of `options.upsample`, kAuto and kFrame stand for kBicubic: see choose_upsample.
   explicit ChannelStretch(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 

@@ -243,11 +243,11 @@ TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
   for (const FeatureMethod method : {FeatureMethod::kPatch, FeatureMethod::kKlt}) {
     EXPECT_EQ(choose_upsample(kAuto, method, camera(718)), kHalf);
     EXPECT_EQ(choose_upsample(kAuto, method, camera(500)), kHalf);
-    EXPECT_EQ(choose_upsample(kAuto, method, camera(499)), kBicubic);
+    EXPECT_EQ(choose_upsample(kAuto, method, camera(499)), kFrame);
   }
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, camera(718)), kBicubic);
   EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, camera(718)), kBicubic);
-  for (const Upsample asked : {kBicubic, kHalf, kNative}) {
+  for (const Upsample asked : {kBicubic, kFrame, kHalf, kNative}) {
     EXPECT_EQ(choose_upsample(asked, FeatureMethod::kKlt, camera(718)), asked);
     EXPECT_EQ(choose_upsample(asked, FeatureMethod::kOrb, camera(300)), asked);
   }

@@ -141,6 +141,35 @@ TEST(Stem, SameBytesForAnyNumberOfThreadsAndAnyHistory) {
   cv::setNumThreads(threads_before);
 }
 
+TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
+  cv::Mat ramp(40, 60, CV_8UC1);
+  for (int y = 0; y < ramp.rows; ++y) {
+    for (int x = 0; x < ramp.cols; ++x) {
+      ramp.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(2 * x + 3 * y);
+    }
+  }
+  StemOptions options;
+  options.model = "gray";
+  const Stem gray = Stem::create(options).value();
+  const Channel channel = gray.apply(ramp, 2).value();
+  ASSERT_EQ(channel.values.size(), 2 * ramp.size());
+  for (int row = 8; row < channel.values.rows - 8; ++row) {
+    for (int column = 8; column < channel.values.cols - 8; ++column) {
+      const Eigen::Vector2d uv = channel.map.to_input(Eigen::Vector2d(column, row));
+      ASSERT_NEAR(channel.values.at<float>(row, column), 2.0 * uv.x() + 3.0 * uv.y(), 0.51);
+    }
+  }
+  EXPECT_EQ(gray.frame_zoom(Upsample::kFrame), 1) << "its sampling is odd: nothing to gain";
+
+  const Stem learned = Stem::create({}).value();
+  EXPECT_EQ(learned.frame_zoom(Upsample::kBicubic), 1);
+  ASSERT_EQ(learned.frame_zoom(Upsample::kFrame), 2);
+  const Channel fine = learned.apply(ramp, 2).value();
+  EXPECT_EQ(fine.values.size(), ramp.size());
+  EXPECT_EQ(fine.map.scale, Eigen::Vector2d::Ones());
+  EXPECT_EQ(fine.map.offset_px, Eigen::Vector2d::Zero());
+}
+
 TEST(Stem, InputLayerAndGray) {
   StemOptions options;
   options.model = "input_layer";
