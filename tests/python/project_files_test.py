@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -25,6 +26,25 @@ class Citation(unittest.TestCase):
         self.assertEqual(str(citation["version"]), VERSION)
         for key in ("message", "title", "abstract"):
             self.assertIsInstance(citation[key], str)
+
+
+class Evaluation(unittest.TestCase):
+    """examples/evaluate.py: the truth has no error, what is no trajectory is refused with the program's own line."""
+
+    def evaluate(self, *arguments):
+        environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"}
+        return subprocess.run([sys.executable, ROOT / "examples/evaluate.py", *arguments], env=environment, capture_output=True, text=True,
+                              check=False)
+
+    def test_evaluates_without_a_run(self):
+        with tempfile.TemporaryDirectory() as folder:
+            poses = pathlib.Path(folder) / "poses.txt"
+            poses.write_text("".join(f"1 0 0 {i % 3} 0 1 0 0 0 0 1 {i}\n" for i in range(30)))
+            done = self.evaluate(poses, poses)
+            self.assertEqual((done.returncode, done.stdout), (0, f"{poses}: ATE 0.0000 m, RPE 0.0000 deg/frame\n"), done.stderr)
+            refused = self.evaluate(poses, ROOT / "LICENSE")
+        self.assertEqual((refused.returncode, refused.stdout), (1, ""))
+        self.assertRegex(refused.stderr, "^error: .*LICENSE:1: [^\n]+\n$")
 
 
 class ContinuousIntegration(unittest.TestCase):
