@@ -5,6 +5,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "benchmark/benchmark.hpp"
 #include "commands.hpp"
@@ -69,6 +70,7 @@ int benchmark(Arguments& arguments) {
   }
   std::ranges::for_each(summary->failures, print_error);
   std::ranges::for_each(summary->warnings, print_warning);
+  print_json(nlohmann::ordered_json::parse(summary->json));
   if (summary->interrupted) {
     print_warning("interrupted; what is done is kept, the same command goes on from there");
     return kExitInterrupted;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "calibration/calibrate.hpp"
 #include "commands.hpp"
@@ -32,6 +33,21 @@ struct Arguments {
   bool is_quiet = false;
 };
 
+nlohmann::ordered_json document(const Arguments& arguments, const CalibrationReport& report) {
+  auto parameters = nlohmann::ordered_json::array();
+  for (const CalibratedParameter& one : report.parameters) {
+    parameters.push_back({{"name", one.name},
+                          {"given", one.given},
+                          {"refined", one.refined},
+                          {"sigma", one.sigma},
+                          {"determined", one.is_determined}});
+  }
+  return {{"written", report.written},
+          {"file", arguments.request.out_file.string()},
+          {"runs", report.num_runs},
+          {"parameters", parameters}};
+}
+
 int report(const Arguments& arguments, const CalibrationReport& report) {
   const std::string file = arguments.request.out_file.string();
   for (const std::string& warning : report.warnings) {
@@ -44,6 +60,7 @@ int report(const Arguments& arguments, const CalibrationReport& report) {
   if (!arguments.is_quiet) {
     print(format_calibration_table(report));
   }
+  print_json(document(arguments, report));
   if (!report.written) {
     print_error(
         fmt::format("{}: not written: expected a drive that determines the focal length "

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -43,6 +44,9 @@ Expected<int> draw(Arguments& arguments) {
     return written.error();
   }
   print(fmt::format("{} images in {}\n", *written, arguments.request.out_dir.string()));
+  print_json({{"images", *written},
+              {"out_dir", arguments.request.out_dir.string()},
+              {"interrupted", is_interrupted()}});
   return is_interrupted() ? kExitInterrupted : kExitDone;
 }
 

@@ -3,9 +3,12 @@
 #include <memory>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "commands.hpp"
 #include "console.hpp"
 #include "report/check.hpp"
+#include "report/metrics_keys.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -24,6 +27,17 @@ struct Arguments {
   std::filesystem::path thresholds;
 };
 
+nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
+  auto bounds = nlohmann::ordered_json::array();
+  for (const ThresholdResult& result : results) {
+    bounds.push_back({{"key", result.key},
+                      {"value", result.number},
+                      {result.is_max ? "max" : "min", result.limit},
+                      {"passed", result.passed}});
+  }
+  return {{"passed", all_passed(results)}, {"bounds", bounds}};
+}
+
 Expected<int> check(const Arguments& arguments) {
   const Expected<std::vector<ThresholdResult>> results =
       check_metrics(arguments.metrics, arguments.thresholds);
@@ -31,6 +45,7 @@ Expected<int> check(const Arguments& arguments) {
     return results.error();
   }
   print(format_check_table(*results));
+  print_json(document(*results));
   return all_passed(*results) ? kExitDone : kExitFailed;
 }
 

@@ -16,12 +16,20 @@
 
 #include "commands.hpp"
 #include "exceptions.hpp"
+#include "report/metrics_keys.hpp"
 
 namespace stemvo::apps {
 namespace {
 
 std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
 int first_failure = 0;        // errno of the first write to standard output that failed
+bool is_json = false;
+
+void write_out(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && first_failure == 0) {
+    first_failure = errno;
+  }
+}
 
 void print_labelled(std::string_view label, std::string_view message) {
   std::string line = label.empty() ? std::string(message) : fmt::format("{}: {}", label, message);
@@ -65,8 +73,16 @@ void prepare_console() {
 void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size(), console); }
 
 void print(std::string_view text) {
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && first_failure == 0) {
-    first_failure = errno;
+  if (!is_json) {
+    write_out(text);
+  }
+}
+
+void choose_json() { is_json = true; }
+
+void print_json(const nlohmann::ordered_json& document) {
+  if (is_json) {
+    write_out(to_text(document));
   }
 }
 

@@ -5,14 +5,20 @@
 #include <string>
 #include <string_view>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace stemvo::apps {
 
 /// Keeps files away from a closed standard output, a closed pipe from ending the program, and what
 /// libraries print (libpng, libjpeg) from standard error, which is ours.
 void prepare_console();
 
-/// Results, to standard output. A failure is told by flush_console.
+/// Results for people, to standard output; nothing with --json. A failure is told by flush_console.
 void print(std::string_view text);
+/// --json: what print_json gets is all of standard output.
+void choose_json();
+/// A command's result as one document; nothing without --json. Once, and not after an error.
+void print_json(const nlohmann::ordered_json& document);
 /// "error: ..." on one line of standard error.
 void print_error(std::string_view message);
 /// "warning: ..." on one line of standard error.

@@ -23,7 +23,7 @@ With KITTI:
 With your own camera (see 'stemvo run --help'):
   stemvo run drive/images --camera camera.yaml --out result
 
-'stemvo COMMAND --help' explains a command. Every configuration key is explained by
+'stemvo COMMAND --help' explains a command; with --json it prints its result for a program. Every configuration key is explained by
   stemvo --dump-config > my.yaml                      edit it, then: stemvo run ... --config my.yaml
 
 Exit codes: 0 done, 1 something is wrong with a file, model or key (one line says what), 2 wrong
@@ -67,6 +67,10 @@ int run_program(int argc, char** argv) {
                          add_models, add_benchmark, add_robustness, add_search}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
+    if (command->get_option_no_throw("--json") == nullptr) {  // evaluate's takes a file
+      command->add_flag_callback("--json", choose_json,
+                                 "The result as one JSON document on standard output");
+    }
   }
   app.require_subcommand(0, 1);
   try {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -29,6 +30,20 @@ std::string describe(const ModelEntry& entry, const Status& status) {
   return text;
 }
 
+nlohmann::ordered_json document(const ModelEntry& entry, const Status& status) {
+  return {{"name", entry.name},
+          {"sound", status.has_value()},
+          {"network", entry.network},
+          {"layer", entry.layer},
+          {"filters", entry.num_filters},
+          {"default_filter", entry.default_filter},
+          {"kernel_px", {entry.kernel_px[1], entry.kernel_px[0]}},
+          {"stride_px", entry.stride_px},
+          {"file", entry.file.string()},
+          {"licence", entry.licence},
+          {"made_by", entry.command}};
+}
+
 /// `model` empty: all.
 Expected<int> list_models(const std::string& model) {
   const auto folder = data_folder("models");
@@ -38,14 +53,17 @@ Expected<int> list_models(const std::string& model) {
     return entries.error();
   }
   int exit_code = kExitDone;
+  auto json = nlohmann::ordered_json::array();
   for (const ModelEntry& entry : *entries) {
     const Status status = check_model(entry);
     print(describe(entry, status));
+    json.push_back(document(entry, status));
     if (!status) {
       print_error(status.error().message);
       exit_code = kExitFailed;
     }
   }
+  print_json({{"models", json}});
   return exit_code;
 }
 

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -66,6 +67,7 @@ int run(Arguments& arguments) {
     print(robustness::format_table(*report));
     print(fmt::format("report: {}\n", (request.out_dir / "report.html").string()));
   }
+  print_json(nlohmann::ordered_json::parse(robustness::format_json(*report)));
   if (report->interrupted) {
     print_warning("interrupted; the rows that were finished are written");
     return kExitInterrupted;

@@ -3,6 +3,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -10,6 +11,7 @@
 #include "options.hpp"
 #include "pipeline/run.hpp"
 #include "progress.hpp"
+#include "report/metrics_keys.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -108,6 +110,10 @@ Expected<int> run(Arguments& arguments) {
     return summary->written.error();
   }
   print_summary(arguments, *summary);
+  nlohmann::ordered_json json = metrics_document(summary->report);
+  json["out_dir"] = summary->out_dir.string();
+  json["interrupted"] = summary->interrupted;
+  print_json(json);
   return summary->interrupted ? kExitInterrupted : kExitDone;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -82,6 +83,7 @@ int run(Arguments& arguments) {
   if (!arguments.is_quiet) {
     print(report->text);
   }
+  print_json(nlohmann::ordered_json::parse(report->json));
   if (report->interrupted) {
     print_warning("interrupted; what is done is kept, --resume goes on from there");
     return kExitInterrupted;

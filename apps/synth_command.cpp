@@ -5,6 +5,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
@@ -43,8 +44,11 @@ int render(const Arguments& arguments) {
     print_error(status.error().message);
     return kExitFailed;
   }
-  print(fmt::format("sequence: {}\n",
-                    (arguments.out_dir / "sequences" / arguments.options.name).string()));
+  const std::string& name = arguments.options.name;
+  const std::string sequence = (arguments.out_dir / "sequences" / name).string();
+  print(fmt::format("sequence: {}\n", sequence));
+  print_json({{"sequence", sequence},
+              {"poses", (arguments.out_dir / "poses" / (name + ".txt")).string()}});
   return kExitDone;
 }
 

@@ -190,6 +190,7 @@ class Benchmark {
         break;
       }
     }
+    summary_.json = to_text(report_);
     return summary_;
   }
 

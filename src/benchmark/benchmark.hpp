@@ -34,6 +34,7 @@ struct BenchmarkRequest {
 struct BenchmarkSummary {
   std::vector<std::string> failures;  ///< sequences that cannot be read, runs that failed
   std::vector<std::string> warnings;  ///< of the runs done now
+  std::string json;                   ///< what benchmark.json holds
   bool interrupted = false;
 };
 

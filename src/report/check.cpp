@@ -123,11 +123,15 @@ std::string shown(double value, double limit) {
 }
 
 ThresholdResult hold_against(const Bound& bound, const nlohmann::json& metric) {
-  ThresholdResult result{bound.key, fmt::format("{} {}", bound.is_max ? "<=" : ">=", bound.limit),
-                         "null", false};
+  ThresholdResult result{
+      bound.key,    fmt::format("{} {}", bound.is_max ? "<=" : ">=", bound.limit),
+      "null",       false,
+      bound.is_max, bound.limit,
+      std::nullopt};
   if (metric.is_number()) {
     const double value = metric.get<double>();
     result.value = shown(value, bound.limit);
+    result.number = value;
     result.passed = bound.is_max ? value <= bound.limit : value >= bound.limit;  // NaN fails both
   }
   return result;

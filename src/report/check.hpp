@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@ struct ThresholdResult {
   std::string bound;  ///< e.g. "<= 1"
   std::string value;  ///< as found, or "null"
   bool passed = false;
+  bool is_max = true;  ///< of `limit`
+  double limit = 0.0;
+  std::optional<double> number;  ///< `value`; nullopt: null
 };
 
 /// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, `tracked_fraction: {min: 0.99}`, nested keys

@@ -141,7 +141,7 @@ std::string format_evaluation_table(const EvaluationReport& report) {
       table.str(), segments, unmatched);
 }
 
-Status write_evaluation_json(const std::filesystem::path& file, const EvaluationReport& report) {
+nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {
   nlohmann::ordered_json json;
   json["ground_truth"] = report.ground_truth;
   json["poses"] = report.num_poses;
@@ -151,7 +151,11 @@ Status write_evaluation_json(const std::filesystem::path& file, const Evaluation
     json["estimates"].push_back(row_json(row));
   }
   json["never_moves"] = row_json(report.zero_motion);
-  return write_text_file(file, to_text(json));
+  return json;
+}
+
+Status write_evaluation_json(const std::filesystem::path& file, const EvaluationReport& report) {
+  return write_text_file(file, to_text(evaluation_document(report)));
 }
 
 Expected<Alignment> parse_alignment(const std::string& text) {

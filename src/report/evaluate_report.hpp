@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "evaluation/metrics.hpp"
 #include "evaluation/pose_file.hpp"
 #include "stemvo/error.hpp"
@@ -54,6 +56,7 @@ struct EvaluationReport {
 /// never_moves: {...}}, with the keys of metrics.json. Error: the file cannot be written.
 [[nodiscard]] Status write_evaluation_json(const std::filesystem::path& file,
                                            const EvaluationReport& report);
+[[nodiscard]] nlohmann::ordered_json evaluation_document(const EvaluationReport& report);
 
 /// `none`, `scale`, `se3`, `sim3`. Error: another word (lists the known ones).
 [[nodiscard]] Expected<Alignment> parse_alignment(const std::string& text);

@@ -149,7 +149,7 @@ std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
-Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
+Json metrics_document(const MetricsReport& report) {
   Json json;
   visit_run(report, Writer{json});
   json["alignment"] = report.metrics ? Json(to_string(report.metrics->alignment)) : Json();
@@ -161,7 +161,11 @@ Status write_metrics_json(const std::filesystem::path& file, const MetricsReport
   if (report.timing) {
     json["timing"] = *report.timing;
   }
-  return write_text_file(file, to_text(json));
+  return json;
+}
+
+Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
+  return write_text_file(file, to_text(metrics_document(report)));
 }
 
 Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file) {

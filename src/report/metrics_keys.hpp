@@ -51,6 +51,10 @@ struct nlohmann::adl_serializer<std::optional<T>> {
 
 namespace stemvo {
 
+struct MetricsReport;
+/// What metrics.json holds.
+[[nodiscard]] nlohmann::ordered_json metrics_document(const MetricsReport& report);
+
 /// Adds the keys of metrics.json that need ground truth; all null without metrics.
 void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& metrics);
 

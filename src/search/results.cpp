@@ -262,6 +262,7 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
     report.text = fmt::format(
         "part: {} filters on one sequence; 'stemvo search --merge' joins it with the others\n",
         identity.num_rows());
+    report.json = to_text({{"part", true}, {"filters", identity.num_rows()}});
     return report;
   }
   const fs::path config_file = out_dir / "config.yaml";
@@ -273,9 +274,9 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
     return config.error();
   }
   const Results results = {out_dir, models_dir, identity, *config, rank_filters(identity, records)};
+  report.json = format_json(results, work, !report.interrupted);
   std::vector<std::pair<const char*, std::string>> files = {
-      {"filters.csv", format_csv(identity, results.rows)},
-      {"filters.json", format_json(results, work, !report.interrupted)}};
+      {"filters.csv", format_csv(identity, results.rows)}, {"filters.json", report.json}};
   if (!results.rows.empty() && results.rows.front().status == FilterStatus::kRanked) {
     files.emplace_back("best.yaml", format_best(results));
   }

@@ -45,6 +45,7 @@ struct SearchRequest {
 
 struct SearchReport {
   std::string text;  ///< for people: the table and the work it took, or what a part holds
+  std::string json;  ///< what filters.json holds; of a part {"part": true, "filters": N}
   std::vector<std::string> warnings;
   bool interrupted = false;
 };

@@ -1,5 +1,5 @@
 # Installs into BINARY_DIR/package, moves the installed tree (it must not know where it was made), and
-# builds and runs the program of the README against it, on frames of a rendered drive.
+# builds and runs the examples against it, on frames of a rendered drive.
 # cmake -D BINARY_DIR=... -D VERSION=... -P install_and_consume.cmake
 set(work "${BINARY_DIR}/package")
 set(prefix "${work}/moved prefix")
@@ -24,11 +24,15 @@ endif()
 run("installed models" "${prefix}/bin/stemvo" models)
 
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH tests)
+set(examples "${tests}/../examples")
+# README shows the example, without the licence line.
 file(READ "${tests}/../README.md" readme)
-if(NOT readme MATCHES "```cpp\n([^`]+)```")
-  message(FATAL_ERROR "README.md: expected a program in a block of cpp, found none")
+file(READ "${examples}/images_to_poses.cpp" example)
+string(REPLACE "// SPDX-License-Identifier: MIT\n" "```cpp\n" example "${example}")
+string(FIND "${readme}" "${example}```" at)
+if(at EQUAL -1)
+  message(FATAL_ERROR "README.md: expected the program of examples/images_to_poses.cpp in a block of cpp, found another or none")
 endif()
-file(WRITE "${work}/readme_program.cpp" "${CMAKE_MATCH_1}")
 
 file(GLOB_RECURSE headers RELATIVE "${prefix}/include" "${prefix}/include/stemvo/*.hpp")
 list(LENGTH headers count)
@@ -41,25 +45,36 @@ file(WRITE "${work}/all_headers.cpp" "${all_headers}")
 
 # Makefiles, because they leave the files that list each object's includes.
 run("configure" ${CMAKE_COMMAND} -S "${CMAKE_CURRENT_LIST_DIR}" -B "${work}/build" -G "Unix Makefiles"
-    -D CMAKE_BUILD_TYPE=Release -D "CMAKE_PREFIX_PATH=${prefix}" -D "STEMVO_ALL_HEADERS=${work}/all_headers.cpp"
-    -D "STEMVO_README_PROGRAM=${work}/readme_program.cpp")
+    -D CMAKE_BUILD_TYPE=Release -D "CMAKE_PREFIX_PATH=${prefix}" -D "STEMVO_ALL_HEADERS=${work}/all_headers.cpp")
 run("build" ${CMAKE_COMMAND} --build "${work}/build" --parallel 2)
+run("configure the examples" ${CMAKE_COMMAND} -S "${examples}" -B "${work}/examples" -G "Unix Makefiles" -D CMAKE_BUILD_TYPE=Release
+    "-D CMAKE_PREFIX_PATH=${prefix}")
+run("build the examples" ${CMAKE_COMMAND} --build "${work}/examples" --parallel 2)
 run("render" "${BINARY_DIR}/stemvo" synth "${work}/drive" --frames 4)
 file(GLOB frames "${work}/drive/sequences/00/image_2/*.png")
 list(SORT frames)
-run("run" "${work}/build/consumer" ${frames})
+run("images_to_poses" "${work}/examples/images_to_poses" ${frames})
 string(REGEX MATCHALL "[^\n]+\n" positions "${output}")
 list(LENGTH positions count)
 list(GET positions 3 last)
 # x right, y down, z forward: a car drives some metres forward.
 if(NOT count EQUAL 4 OR NOT last MATCHES " ([0-9.]+)\n$" OR CMAKE_MATCH_1 LESS 1 OR CMAKE_MATCH_1 GREATER 10)
-  message(FATAL_ERROR "README's program: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
+  message(FATAL_ERROR "images_to_poses: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
 endif()
 
-file(GLOB_RECURSE dependency_files "${work}/build/*.o.d")
+# The same frames as raw gray pixels.
+run("raw frames" "${tests}/../build/venv/bin/python" -c
+    "import sys\nfrom PIL import Image\nopen(sys.argv[1], 'wb').write(b''.join(Image.open(f).convert('L').tobytes() for f in sys.argv[2:]))"
+    "${work}/frames.raw" ${frames})
+run("own_source" "${work}/examples/own_source" 1241 376 718.86 718.86 607.19 185.22 INPUT_FILE "${work}/frames.raw")
+if(NOT output MATCHES "^first +0 +0 +0\n([a-z_]+ [^\n]+\n)([a-z_]+ [^\n]+\n)([a-z_]+ [^\n]+\n)$")
+  message(FATAL_ERROR "own_source: expected 4 states and positions, found:\n${output}")
+endif()
+
+file(GLOB_RECURSE dependency_files "${work}/build/*.o.d" "${work}/examples/*.o.d")
 list(LENGTH dependency_files count)
-if(NOT count EQUAL 3)
-  message(FATAL_ERROR "expected the include lists of 3 objects, found ${count}")
+if(NOT count EQUAL 4)
+  message(FATAL_ERROR "expected the include lists of 4 objects, found ${count}")
 endif()
 foreach(file IN LISTS dependency_files)
   file(READ "${file}" includes)

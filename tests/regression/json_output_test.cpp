@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "support/program_test.hpp"
+
+namespace stemvo {
+namespace {
+
+using Json = nlohmann::json;
+
+/// What the program's help lists.
+std::set<std::string> commands() {
+  const std::string help = run_stemvo({"--help"}).out;
+  const std::size_t begin = std::min(help.find("\nSubcommands:"), help.size());
+  const std::string list = help.substr(begin, help.find("\n\n", begin) - begin);
+  std::set<std::string> names;
+  const std::regex line("\n  ([a-z]+) ");
+  for (std::sregex_iterator at(list.begin(), list.end(), line), end; at != end; ++at) {
+    names.insert((*at)[1]);
+  }
+  return names;
+}
+
+class JsonOutput : public ::testing::Test {
+ protected:
+  /// The document, which is all of standard output.
+  static Json document(std::vector<std::string> arguments, int exit_code = 0) {
+    const ProgramResult result = run_stemvo(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << arguments.front() << ": " << result.err;
+    Json json = Json::parse(result.out, nullptr, /*allow_exceptions=*/false);
+    EXPECT_TRUE(json.is_object()) << arguments.front() << ": " << result.out;
+    return json;
+  }
+  [[nodiscard]] Json file(const std::string& name) const {
+    return Json::parse(read_file(folder_ / name), nullptr, false);
+  }
+
+  TempFolder folder_;
+  fs::path drive_ = test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
+  std::string sequence_ = drive_ / "sequences/00";
+};
+
+// What each command is called with, and a key that its document must have. A command that the help
+// lists and this table does not is a failure.
+TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
+  const std::string run = folder_ / "run";
+  const std::string bounds = folder_ / "bounds.yaml";
+  write_file(bounds, "tracked_fraction: {min: 0.1}\n");
+  const std::string truth = drive_ / "poses/00.txt";
+  struct Call {
+    std::string command;
+    std::vector<std::string> arguments;
+    std::string key;
+    int exit_code = 0;
+  };
+  const std::vector<Call> calls = {
+      {"run", {sequence_, "--out", run, "--timing", "--map", "--json"}, "out_dir"},
+      {"evaluate", {"--gt", truth, run + "/trajectory_kitti.txt", "--json", "-"}, "estimates"},
+      {"check", {run + "/metrics.json", "--against", bounds, "--json"}, "passed"},
+      {"channel", {sequence_, "--out", folder_ / "images", "--json"}, "images"},
+      {"synth",
+       {folder_ / "d", "--frames", "2", "--width", "64", "--height", "48", "--json"},
+       "sequence"},
+      // The drive does not tell of the camera: a result, and a failure.
+      {"calibrate", {sequence_, "--out", folder_ / "calib.txt", "--json"}, "parameters", 1},
+      {"models", {"--json"}, "models"},
+      {"benchmark", {drive_, "--out", folder_ / "bench", "--json"}, "sequences"},
+      {"robustness",
+       {sequence_, "--out", folder_ / "rob", "--kinds", "none", "--controls", "gray", "--json"},
+       "rows"},
+      {"search", {sequence_, "--out", folder_ / "search", "--filters", "0:2", "--json"}, "filters"},
+  };
+  std::set<std::string> called;
+  for (const Call& call : calls) {
+    std::vector<std::string> arguments = {call.command};
+    arguments.insert(arguments.end(), call.arguments.begin(), call.arguments.end());
+    EXPECT_TRUE(document(arguments, call.exit_code).contains(call.key)) << call.command;
+    called.insert(call.command);
+  }
+  EXPECT_EQ(called, commands());
+}
+
+// --quiet asks for less to read, not for no result.
+TEST_F(JsonOutput, HoldsWhatTheFileHolds) {
+  const std::string out = folder_ / "out";
+  Json json = document({"run", sequence_, "--out", out, "--quiet", "--json"});
+  EXPECT_EQ(json["out_dir"], out);
+  EXPECT_EQ(json["interrupted"], false);
+  json.erase("out_dir");
+  json.erase("interrupted");
+  EXPECT_EQ(json, file("out/metrics.json"));
+}
+
+TEST_F(JsonOutput, BoundThatIsPassedIsInTheDocument) {
+  write_file(folder_ / "metrics.json", R"({"t_rel_percent": 2.5, "r_rel_deg_per_100m": null})");
+  write_file(folder_ / "bounds.yaml",
+             "t_rel_percent: {max: 1, min: 0}\nr_rel_deg_per_100m: {max: 1}\n");
+  const Json json = document(
+      {"check", folder_ / "metrics.json", "--against", folder_ / "bounds.yaml", "--json"}, 1);
+  EXPECT_EQ(json, Json::parse(R"({"passed": false, "bounds": [
+    {"key": "t_rel_percent", "value": 2.5, "max": 1.0, "passed": false},
+    {"key": "t_rel_percent", "value": 2.5, "min": 0.0, "passed": true},
+    {"key": "r_rel_deg_per_100m", "value": null, "max": 1.0, "passed": false}]})"));
+}
+
+TEST_F(JsonOutput, IsNothingAfterAnError) {
+  expect_error(run_stemvo({"run", folder_ / "none", "--out", folder_ / "o", "--json"}), 1,
+               {"none"});
+  expect_error(run_stemvo({"models", "none.onnx", "--json"}), 1, {"none.onnx"});
+}
+
+}  // namespace
+}  // namespace stemvo
