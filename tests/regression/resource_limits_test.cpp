@@ -60,7 +60,7 @@ TEST_F(ResourceLimits, TooLittleMemory) {
   ASSERT_FALSE(first.empty()) << probe.err;
   for (int kib = std::stoi(first), end = kib + 96000; kib < end; kib += 12000) {
     expect_said("ulimit -v " + std::to_string(kib),
-                "out of memory|out of threads|bad_alloc|Cannot allocate memory");
+                "out of memory|out of threads|no thread|bad_alloc|Cannot allocate memory");
   }
 }
 

@@ -118,7 +118,8 @@ TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
       test::rendered_drive({.frames = 30, .width_px = 160, .height_px = 48}) / "sequences/00";
   const ProgramResult program =
       run_stemvo({"search", small.string(), "--exhaustive", "--no-baselines", "--model", "paper",
-                  "--filters", "0:2", "--set", "stem.sampling_px=4", "--out", folder_ / "small"});
+                  "--filters", "0:2", "--set", "stem.sampling_px=4", "--set",
+                  "stem.upsample=bicubic", "--out", folder_ / "small"});
   ASSERT_EQ(program.exit_code, 0) << program.err;
   EXPECT_THAT(program.out, HasSubstr("pose not detected: channel 40x12"));
   // It never ran, so there are no numbers that could look good.

@@ -152,7 +152,7 @@ TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
   options.model = "gray";
   const Stem gray = Stem::create(options).value();
   const Channel channel = gray.apply(ramp, 2).value();
-  ASSERT_EQ(channel.values.size(), 2 * ramp.size());
+  ASSERT_EQ(channel.values.size(), ramp.size() * 2);
   for (int row = 8; row < channel.values.rows - 8; ++row) {
     for (int column = 8; column < channel.values.cols - 8; ++column) {
       const Eigen::Vector2d uv = channel.map.to_input(Eigen::Vector2d(column, row));
@@ -270,9 +270,13 @@ TEST_F(StemErrors, SmallFramesAndFixedSizes) {
   EXPECT_EQ(stem.apply(cv::Mat1b(5, 6, 1))->values.size(), cv::Size(2, 1));
   EXPECT_THAT(stem.apply(cv::Mat1b(3, 9, 1)).error().message,
               HasSubstr("expected frames of at least 4x4, found 9x3"));
+  EXPECT_EQ(stem.frame_zoom(Upsample::kFrame), 2);
+  EXPECT_THAT(stem.apply(cv::Mat1b(1, 9, 1), 2).error().message,
+              AllOf(HasSubstr("at least 4x4, found 18x2"), HasSubstr("a frame of 9x1 enlarged")));
   const testing::TempFolder other;
   testing::write_models(other, testing::kFixed4);
   const Stem fixed = make_stem(other, testing::kFixed4, 2);
+  EXPECT_EQ(fixed.frame_zoom(Upsample::kFrame), 1);
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
   EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
               HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
