@@ -25,7 +25,7 @@ def read_poses(file):
     """KITTI's format -> Nx4x4."""
     try:
         rows = np.loadtxt(file, ndmin=2)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise ValueError(f"{file}: {error}") from None
     if rows.ndim != 2 or rows.shape[1] != 12:
         raise ValueError(f"{file}: expected 12 numbers a line, found {rows.shape[-1]}")

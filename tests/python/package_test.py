@@ -84,7 +84,7 @@ class Package(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         call(sys.executable, "-m", "venv", cls.folder / "venv")
         cls.python = cls.folder / "venv/bin/python"
-        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", ROOT,
+        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[view]",
              env={**os.environ, "PYTHONPATH": "", "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count())})
         call(PROGRAM, "synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
 
@@ -106,6 +106,28 @@ class Package(unittest.TestCase):
         said = self.run_python(program)
         self.assertIn("tracking", said)
         self.assertIn("ate_rmse_m", said)
+
+    def view(self, *arguments):
+        return subprocess.run(list(map(str, [self.python, "-I", "-m", "stemvo.view", *arguments])),
+                              capture_output=True, text=True, cwd=self.folder, timeout=300)
+
+    def test_view(self):
+        sequence = self.folder / "drive/sequences/00"
+        call(PROGRAM, "run", sequence, "--out", self.folder / "seen", "--map")
+        for name, arguments in {"live": ["--live", sequence],
+                                "result": [self.folder / "seen", "--recording", sequence]}.items():
+            file = self.folder / f"{name}.rrd"
+            done = self.view(*arguments, "--save", file)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            written = file.read_bytes()
+            for entity in (b"/world/camera/image", b"/world/path/0", b"/plots/inliers", b"/state"):
+                self.assertIn(entity, written, name)
+        for arguments, text in ((["/nowhere"], "/nowhere/trajectory_kitti.txt"), ([], "expected RESULT"),
+                                (["--live", sequence, "--set", "stem.filtre=1"], "stem.filtre: unknown key")):
+            done = self.view(*arguments, "--save", self.folder / "bad.rrd")
+            self.assertNotEqual(done.returncode, 0)
+            self.assertIn(text, done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
 
     def test_bad_input(self):
         self.run_python(BAD_INPUT)
