@@ -4,6 +4,7 @@
 #include <new>
 #include <system_error>
 
+#include <execinfo.h>
 #include <opencv2/core.hpp>
 
 namespace stemvo::apps {
@@ -13,6 +14,11 @@ constexpr const char* kNoMemory =
     "out of memory: expected more than there is, or than 'ulimit -v' allows";
 
 }  // namespace
+
+void prepare_exceptions() {
+  void* frame = nullptr;
+  backtrace(&frame, 1);
+}
 
 std::string describe(const std::exception_ptr& error) {
   try {

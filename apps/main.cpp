@@ -96,6 +96,7 @@ int run_program(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   stemvo::apps::process_start();
+  stemvo::apps::prepare_exceptions();
   stemvo::apps::prepare_console();
   stemvo::apps::catch_interrupts();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell

@@ -2,14 +2,15 @@
 #include "io/image_file.hpp"
 
 #include <memory>
+#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <turbojpeg.h>
 
+#include "internal_check.hpp"
 #include "io/png.hpp"
 #include "text/text_file.hpp"
 
@@ -66,7 +67,7 @@ bool is_color_jpeg(Bytes bytes) {
   return frame && *frame + kNumComponents < bytes.size() && bytes[*frame + kNumComponents] > 1;
 }
 
-/// By TurboJPEG, which tells damaged data from sound; the pixels are OpenCV's. Error: damaged.
+/// By TurboJPEG, which tells damaged data from sound.
 class JpegDecoder {
  public:
   explicit JpegDecoder(Bytes bytes) : bytes_(bytes) {
@@ -75,10 +76,8 @@ class JpegDecoder {
                                                   &width_, &height_, &subsampling_, &colors_) == 0;
   }
 
-  /// Not of a kind that it does not take (CMYK), and with a header that it understands.
-  [[nodiscard]] bool takes() const {
-    return is_known_ && colors_ != TJCS_CMYK && colors_ != TJCS_YCCK;
-  }
+  /// For a printer's four colours: no camera's.
+  [[nodiscard]] bool is_print() const { return colors_ == TJCS_CMYK || colors_ == TJCS_YCCK; }
   [[nodiscard]] Status check_size(const std::string& name) const {
     return is_known_ ? check_num_pixels(name, static_cast<std::uint64_t>(width_),
                                         static_cast<std::uint64_t>(height_))
@@ -86,6 +85,9 @@ class JpegDecoder {
   }
   /// Empty: damaged.
   [[nodiscard]] cv::Mat decode(bool as_color) {
+    if (!is_known_) {
+      return {};
+    }
     cv::Mat image(height_, width_, as_color ? CV_8UC3 : CV_8UC1);
     const int done = tjDecompress2(handle_.get(), bytes_.data(), bytes_.size(), image.data, width_,
                                    static_cast<int>(image.step), height_,
@@ -120,16 +122,19 @@ Expected<cv::Mat> decode_jpeg(Bytes bytes, const std::string& name, bool as_colo
   if (const Status status = decoder.check_size(name); !status) {
     return status.error();
   }
-  cv::Mat image = decoder.takes()
-                      ? decoder.decode(as_color)
-                      : decode_by_opencv(bytes, as_color, cv::IMREAD_IGNORE_ORIENTATION);
+  if (decoder.is_print()) {
+    return fail(fmt::format("{}: expected a JPEG image in gray or RGB, found CMYK", name));
+  }
+  cv::Mat image = decoder.decode(as_color);
   if (image.empty()) {
     return fail(fmt::format("{}: expected a sound JPEG image, found damaged data", name));
   }
   return image;
 }
 
-Expected<cv::Mat> decode(Bytes bytes, const std::string& name, bool as_color) {
+}  // namespace
+
+Expected<cv::Mat> decode_image(Bytes bytes, const std::string& name, bool as_color) {
   if (is_png(bytes)) {
     return decode_png(bytes, name, as_color);
   }
@@ -140,19 +145,36 @@ Expected<cv::Mat> decode(Bytes bytes, const std::string& name, bool as_color) {
                           bytes.empty() ? "an empty file" : "another kind of file"));
 }
 
-}  // namespace
-
 Expected<ImageKind> read_image_kind(const fs::path& file) {
   return with_bytes(file, [&](Bytes bytes) {
     const bool is_color = is_png(bytes) ? is_color_png(bytes) : is_color_jpeg(bytes);
-    return decode(bytes, file.string(), is_color).map([&](const cv::Mat& image) {
+    return decode_image(bytes, file.string(), is_color).map([&](const cv::Mat& image) {
       return ImageKind{image.size(), is_color};
     });
   });
 }
 
 Expected<cv::Mat> read_image(const fs::path& file, bool as_color) {
-  return with_bytes(file, [&](Bytes bytes) { return decode(bytes, file.string(), as_color); });
+  return with_bytes(file,
+                    [&](Bytes bytes) { return decode_image(bytes, file.string(), as_color); });
+}
+
+std::string encode_jpeg(const cv::Mat& image, int quality) {
+  STEMVO_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3, "an 8-bit image, gray or RGB");
+  const bool is_color = image.channels() == 3;
+  const std::unique_ptr<void, decltype(&tjDestroy)> handle(tjInitCompress(), &tjDestroy);
+  const int sampling = is_color ? TJSAMP_420 : TJSAMP_GRAY;
+  std::string bytes(tjBufSize(image.cols, image.rows, sampling), '\0');
+  auto* out = reinterpret_cast<unsigned char*>(bytes.data());
+  unsigned long size = bytes.size();
+  if (handle == nullptr ||
+      tjCompress2(handle.get(), image.data, image.cols, static_cast<int>(image.step), image.rows,
+                  is_color ? TJPF_RGB : TJPF_GRAY, &out, &size, sampling, quality,
+                  TJFLAG_NOREALLOC) != 0) {
+    throw std::bad_alloc();  // nothing else can fail
+  }
+  bytes.resize(size);
+  return bytes;
 }
 
 Expected<cv::Mat> read_png(const fs::path& file, bool as_color) {

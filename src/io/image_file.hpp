@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
+#include <string>
 
 #include <opencv2/core.hpp>
 
@@ -22,7 +25,15 @@ struct ImageKind {
 [[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
 /// The same as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`.
 [[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file, bool as_color);
+/// The same of a file's bytes; `name` starts its errors.
+[[nodiscard]] Expected<cv::Mat> decode_image(std::span<const std::uint8_t> bytes,
+                                             const std::string& name,
+                                             bool as_color);
 /// The same where only a PNG is expected.
 [[nodiscard]] Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color);
+
+/// 8-bit image, gray or RGB -> the bytes of a JPEG file (baseline, colours at half the size).
+/// `quality`: 1 to 100. Throws std::bad_alloc.
+[[nodiscard]] std::string encode_jpeg(const cv::Mat& image, int quality);
 
 }  // namespace stemvo::io

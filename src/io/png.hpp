@@ -24,8 +24,13 @@ using Bytes = std::span<const std::uint8_t>;
 /// (checksums are compared). RGB order.
 [[nodiscard]] cv::Mat decode_plain_png(Bytes bytes, bool as_color);
 
-/// Every format and kind that OpenCV knows; empty: damaged. `flags` beside gray or colour.
-[[nodiscard]] cv::Mat decode_by_opencv(Bytes bytes, bool as_color, int flags = 0);
+/// Every kind of PNG, by libpng: palettes, 16 bits a value, transparency (left out), interlaced.
+/// Empty: damaged. Throws std::bad_alloc.
+[[nodiscard]] cv::Mat decode_any_png(Bytes bytes, bool as_color);
+
+/// 8-bit image, gray or RGB -> the bytes of a PNG file. `is_fast`: larger, sooner. Throws
+/// std::bad_alloc.
+[[nodiscard]] std::string encode_png(const cv::Mat& image, bool is_fast = false);
 
 /// Error, starting with `name`: more pixels than any camera has. Asked before memory is.
 [[nodiscard]] Status check_num_pixels(const std::string& name,

@@ -7,10 +7,11 @@
 #include <iterator>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
+#include "io/image_file.hpp"
+#include "io/png.hpp"
 #include "report/plot_layout.hpp"
 #include "text/text_file.hpp"
 
@@ -277,31 +278,18 @@ cv::Mat draw_channel_sheet(const cv::Mat& frame,
 }
 
 std::string encode_jpeg(const cv::Mat& image, int width) {
-  cv::Mat bgr;
-  cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
-  if (image.cols > width) {
-    cv::resize(bgr, bgr, {width, std::max(1, cvRound(image.rows * (1.0 * width / image.cols)))}, 0,
-               0, cv::INTER_AREA);
-  }
   constexpr int kQuality = 80;
-  std::vector<uchar> bytes;
-  STEMVO_CHECK(cv::imencode(".jpg", bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality}),
-               "an image that has pixels");
-  return {bytes.begin(), bytes.end()};
+  if (image.cols <= width) {
+    return io::encode_jpeg(image, kQuality);
+  }
+  const int height = std::max(1, cvRound(image.rows * (1.0 * width / image.cols)));
+  cv::Mat smaller;
+  cv::resize(image, smaller, {width, height}, 0, 0, cv::INTER_AREA);
+  return io::encode_jpeg(smaller, kQuality);
 }
 
 Status write_image(const std::filesystem::path& file, const cv::Mat& image) {
-  cv::Mat bgr = image;
-  if (image.channels() == 3) {
-    bgr = cv::Mat();  // else the caller's pixels would be converted in place
-    cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
-  }
-  std::vector<uchar> bytes;
-  if (bgr.empty() || !cv::imencode(".png", bgr, bytes)) {
-    return fail(fmt::format("{}: cannot encode an image of {} x {} pixels", file.string(),
-                            image.cols, image.rows));
-  }
-  return write_text_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return write_text_file(file, io::encode_png(image));
 }
 
 }  // namespace stemvo

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <numbers>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
+#include "io/image_file.hpp"
 #include "robustness/disturbance.hpp"
 
 namespace stemvo::robustness {
@@ -156,17 +156,12 @@ void motion_blur(cv::Mat& image, double strength, const EffectContext& context) 
 }
 
 void jpeg(cv::Mat& image, double strength, const EffectContext& /*context*/) {
-  const bool is_color = image.channels() == 3;
-  if (is_color) {  // what OpenCV encodes is BGR
-    cv::cvtColor(image, image, cv::COLOR_RGB2BGR);
-  }
-  std::vector<uchar> bytes;
-  const std::vector<int> options = {cv::IMWRITE_JPEG_QUALITY, static_cast<int>(strength)};
-  STEMVO_CHECK(cv::imencode(".jpg", image, bytes, options), "an 8-bit image can be a JPEG");
-  image = cv::imdecode(bytes, is_color ? cv::IMREAD_COLOR : cv::IMREAD_GRAYSCALE);
-  if (is_color) {
-    cv::cvtColor(image, image, cv::COLOR_BGR2RGB);
-  }
+  const std::string bytes = io::encode_jpeg(image, static_cast<int>(strength));
+  const auto decoded =
+      io::decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "jpeg",
+                       image.channels() == 3);
+  STEMVO_CHECK(decoded, "what was just encoded");
+  image = *decoded;
 }
 
 /// Over a flat road 1.65 m below the camera, between walls 40 m away (Koschmieder's law: contrast

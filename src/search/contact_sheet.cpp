@@ -3,10 +3,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "dataset/sequence.hpp"
+#include "io/image_file.hpp"
 #include "models/manifest.hpp"
 #include "report/frame_image.hpp"
 #include "report/trajectory_plot.hpp"
@@ -118,11 +118,11 @@ Status write_contact_sheet(const Results& results, std::vector<std::string>& war
   if (!channels) {
     return no_sheet(channels.error());
   }
-  cv::Mat plot = cv::imread(plot_file.string(), cv::IMREAD_COLOR);
-  if (plot.empty()) {
-    return fail(fmt::format("{}: cannot be read back", plot_file.string()));
+  const Expected<cv::Mat> as_drawn = io::read_png(plot_file, true);
+  if (!as_drawn) {
+    return as_drawn.error();
   }
-  cv::cvtColor(plot, plot, cv::COLOR_BGR2RGB);
+  cv::Mat plot = *as_drawn;
   const double zoom = static_cast<double>(channels->cols) / plot.cols;
   cv::resize(plot, plot, {channels->cols, cvRound(zoom * plot.rows)}, 0, 0, cv::INTER_AREA);
   cv::vconcat(*channels, plot, plot);

@@ -24,18 +24,18 @@ float gaussian(std::uint64_t bits) {
 }
 
 /// What lens and chip do to light: a point spread of 0.4 px, corners 12 % darker, noise of about
-/// 1.8 gray levels per channel, 8 bits. BGR.
+/// 1.8 gray levels per channel, 8 bits. RGB.
 cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
   cv::Mat blurred;
   const cv::Matx13f spread(0.08F, 0.84F, 0.08F);  // variance 0.16 px^2
   cv::sepFilter2D(light, blurred, CV_32F, spread, spread, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
-  cv::Mat bgr(light.size(), CV_8UC3);
+  cv::Mat rgb(light.size(), CV_8UC3);
   const float cx = 0.5F * static_cast<float>(light.cols - 1);
   const float cy = 0.5F * static_cast<float>(light.rows - 1);
   const float corner2 = std::max(cx * cx + cy * cy, 1.0F);
   for (int y = 0; y < light.rows; ++y) {
     const auto* from = blurred.ptr<cv::Vec3f>(y);
-    auto* to = bgr.ptr<cv::Vec3b>(y);
+    auto* to = rgb.ptr<cv::Vec3b>(y);
     const float dy = static_cast<float>(y) - cy;
     for (int x = 0; x < light.cols; ++x) {
       const float dx = static_cast<float>(x) - cx;
@@ -46,11 +46,11 @@ cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
         const float level = std::max(0.0F, gain * from[x][c]);
         const float noise = (kReadNoise + kPhotonNoise * std::sqrt(level)) *
                             gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
-        to[x][2 - c] = cv::saturate_cast<uchar>(level + noise);
+        to[x][c] = cv::saturate_cast<uchar>(level + noise);
       }
     }
   }
-  return bgr;
+  return rgb;
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ struct PaintedFrame {
                                        const Textures& textures);
 
 struct RenderedFrame {
-  cv::Mat bgr;      ///< CV_8UC3, ready to be written
+  cv::Mat rgb;      ///< CV_8UC3
   cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
 };
 

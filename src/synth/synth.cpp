@@ -12,9 +12,9 @@
 
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "internal_check.hpp"
+#include "io/png.hpp"
 #include "pipeline/folder_lock.hpp"
 #include "pipeline/out_folder.hpp"
 #include "synth/renderer.hpp"
@@ -143,14 +143,10 @@ struct Output {
   }
 
   /// image_2/%06d.png. May be called from several threads for different frames.
-  [[nodiscard]] Status write_image(std::size_t index, const cv::Mat& bgr) const {
+  [[nodiscard]] Status write_image(std::size_t index, const cv::Mat& rgb) const {
     const fs::path file = sequence_dir / "image_2" / fmt::format("{:06}.png", index);
-    std::vector<uchar> bytes;
     // Noise does not compress: the fastest level costs a few per cent of size.
-    if (!cv::imencode(".png", bgr, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
-      return fail(fmt::format("{}: cannot encode the image", file.string()));
-    }
-    return write_text_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    return write_text_file(file, io::encode_png(rgb, true));
   }
 
   /// depth/%06d.npy: NumPy format 1.0, little-endian float32, rows first; metres along z.
@@ -297,7 +293,7 @@ Status render_frames(const synth::Renderer& renderer,
     for (int i = range.start; i < range.end; ++i) {
       const auto index = static_cast<std::size_t>(i);
       const synth::RenderedFrame frame = renderer.render(index);
-      const Status written = output.write_image(index, frame.bgr);
+      const Status written = output.write_image(index, frame.rgb);
       results[static_cast<std::size_t>(i - frames.start)] =
           written && with_depth ? output.write_depth(index, frame.depth_m) : written;
     }

@@ -186,7 +186,7 @@ TEST_P(PlainPng, WrongContentsUnderRightChecksumsAreNoImage) {
   }
 }
 
-TEST_P(PlainPng, ChunksThatMayChangePixelsAreLeftToOpenCv) {
+TEST_P(PlainPng, ChunksThatMayChangePixelsAreLeftToLibpng) {
   const cv::Mat image = test_image(GetParam());
   const bool is_color = image.channels() == 3;
   Png png = png_of(image, {4});
@@ -197,7 +197,7 @@ TEST_P(PlainPng, ChunksThatMayChangePixelsAreLeftToOpenCv) {
 }
 
 /// Where libpng refuses a file, or reads it in another way.
-TEST_P(PlainPng, WhatLibpngDoesNotTakeIsLeftToOpenCv) {
+TEST_P(PlainPng, WhatLibpngDoesNotTakeIsLeftToLibpng) {
   const cv::Mat image = test_image(GetParam(), 5, 7);
   const bool is_color = image.channels() == 3;
   const Bytes sound = encoded(png_of(image, {1}));
@@ -220,7 +220,7 @@ TEST_P(PlainPng, WhatLibpngDoesNotTakeIsLeftToOpenCv) {
 
 INSTANTIATE_TEST_SUITE_P(GrayAndColor, PlainPng, ::testing::Values(CV_8UC1, CV_8UC3));
 
-TEST(PngFile, EveryOtherKindIsReadAsBefore) {
+TEST(PngFile, EveryOtherKindHasThePixelsOpenCvGives) {
   const TempFolder folder;
   const cv::Mat color = test_image(CV_8UC3);
   const cv::Mat gray = test_image(CV_8UC1);
@@ -228,8 +228,10 @@ TEST(PngFile, EveryOtherKindIsReadAsBefore) {
   gray.convertTo(deep, CV_16U, 257.0);
   cv::Mat with_alpha;
   cv::cvtColor(color, with_alpha, cv::COLOR_BGR2BGRA);
+  Png linear = png_of(color, {1});
+  linear.extra = {{"gAMA", {0, 1, 134, 160}}, {"tRNS", Bytes(6, 0)}};
   Png palette{8, 3, 2, 2, {0, 0, 1, 0, 1, 0}, {{"PLTE", {255, 0, 0, 0, 255, 9}}}};
-  std::vector<Bytes> files = {encoded(palette)};
+  std::vector<Bytes> files = {encoded(palette), encoded(linear)};
   for (const cv::Mat& image : {color, gray, deep, with_alpha}) {
     cv::imencode(".png", image, files.emplace_back());
   }
@@ -239,6 +241,20 @@ TEST(PngFile, EveryOtherKindIsReadAsBefore) {
       const Expected<cv::Mat> image = read_png(file, as_color);
       ASSERT_TRUE(image) << image.error().message;
       EXPECT_TRUE(is_same(*image, by_opencv(png, as_color))) << png.size();
+    }
+  }
+}
+
+TEST(PngFile, WhatIsEncodedHasThePixels) {
+  for (const int type : {CV_8UC1, CV_8UC3}) {
+    const cv::Mat image = test_image(type);
+    for (const bool is_fast : {false, true}) {
+      const std::string png = encode_png(image, is_fast);
+      const Expected<cv::Mat> decoded =
+          decode_png({reinterpret_cast<const std::uint8_t*>(png.data()), png.size()}, "a.png",
+                     type == CV_8UC3);
+      ASSERT_TRUE(decoded) << decoded.error().message;
+      EXPECT_TRUE(is_same(*decoded, image));
     }
   }
 }

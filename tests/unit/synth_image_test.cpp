@@ -28,7 +28,7 @@ Camera kitti_camera(double scale) {
 
 cv::Mat gray_of(const RenderedFrame& frame) {
   cv::Mat gray;
-  cv::cvtColor(frame.bgr, gray, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(frame.rgb, gray, cv::COLOR_RGB2GRAY);
   return gray;
 }
 
