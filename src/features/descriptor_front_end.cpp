@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "features/grid_quota.hpp"
+#include "features/state_archive.hpp"
 #include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -117,6 +118,24 @@ std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,
     }
   }
   return pairs;
+}
+
+void DescriptorFrontEnd::write_state(StateWriter& writer) const {
+  const bool has_image = last_ != nullptr;
+  writer(has_image, last_frame_, track_ids_, matched_, num_tracks_);
+  if (has_image) {
+    writer(last_->channel);
+  }
+}
+
+void DescriptorFrontEnd::read_state(StateReader& reader) {
+  bool has_image = false;
+  reader(has_image, last_frame_, track_ids_, matched_, num_tracks_);
+  if (has_image) {
+    ChannelImage channel;
+    reader(channel);
+    last_ = std::dynamic_pointer_cast<const Described>(prepare(channel));
+  }
 }
 
 }  // namespace stemvo

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "features/state_fwd.hpp"
 #include "stem/channel.hpp"
 #include "stemvo/options.hpp"
 
@@ -50,6 +51,10 @@ class FrontEnd {
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
   /// not followed further.
   virtual void keep(const std::vector<char>& is_good) = 0;
+
+  /// What it knows between process() and keep(); one of the same options goes on from there.
+  virtual void write_state(StateWriter& writer) const = 0;
+  virtual void read_state(StateReader& reader) = 0;
 
  protected:
   /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.

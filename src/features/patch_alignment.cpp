@@ -162,10 +162,10 @@ bool is_plausible(const Similarity& warp, const BorderedImage& image, const Simi
 }
 
 /// A translation first, until it has nearly converged; then the similarity.
-Alignment align_fine(const Patch& patch, const BorderedImage& image, const Similarity& start) {
+PatchMatch align_fine(const Patch& patch, const BorderedImage& image, const Similarity& start) {
   const PatchKernels& kernels = patch_kernels();
   constexpr float kNumPixels = kFineSide * kFineSide;
-  Alignment result{start, 0.0F};
+  PatchMatch result{start, 0.0F};
   bool only_translates = true;
   for (int i = 0; i < kFineIterations; ++i) {
     if (!is_plausible(result.warp, image, start)) {
@@ -189,7 +189,7 @@ Alignment align_fine(const Patch& patch, const BorderedImage& image, const Simil
     }
     only_translates = only_translates && length > kTranslated_px;
   }
-  return is_plausible(result.warp, image, start) ? result : Alignment{result.warp, 0.0F};
+  return is_plausible(result.warp, image, start) ? result : PatchMatch{result.warp, 0.0F};
 }
 
 /// Correlation of the surroundings, which the finest level does not see.
@@ -231,10 +231,10 @@ bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch) {
   return true;
 }
 
-Alignment align_patch(const Patch& patch,
-                      Pyramid pyramid,
-                      const Similarity& start,
-                      int first_level) {
+PatchMatch align_patch(const Patch& patch,
+                       Pyramid pyramid,
+                       const Similarity& start,
+                       int first_level) {
   Similarity warp = start;
   for (int level = std::min({first_level, static_cast<int>(pyramid.size()) - 1, Patch::kNumCoarse});
        level > 0; --level) {
@@ -248,12 +248,12 @@ Alignment align_patch(const Patch& patch,
     warp.x = x / scale;
     warp.y = y / scale;
   }
-  const Alignment found = align_fine(patch, pyramid.front(), warp);
+  const PatchMatch found = align_fine(patch, pyramid.front(), warp);
   const bool is_alone = pyramid.size() < 2 || found.correlation <= 0.0F;
   const bool is_there =
       is_alone || coarse_correlation(patch.coarse[0], pyramid[1], 0.5F * found.warp.x,
                                      0.5F * found.warp.y) >= kMinCoarseCorrelation;
-  return is_there ? found : Alignment{found.warp, 0.0F};
+  return is_there ? found : PatchMatch{found.warp, 0.0F};
 }
 
 }  // namespace stemvo

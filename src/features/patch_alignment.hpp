@@ -32,15 +32,15 @@ inline constexpr int kPatchBorder_px = 24;
 /// False: too little texture to be aligned.
 [[nodiscard]] bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch);
 
-struct Alignment {
+struct PatchMatch {
   Similarity warp;           ///< pixels of level 0, from the patch's own
   float correlation = 0.0F;  ///< 0: left the image, or did not converge
 };
 
 /// Aligns from `start`, at levels `first_level` down to 0.
-[[nodiscard]] Alignment align_patch(const Patch& patch,
-                                    Pyramid pyramid,
-                                    const Similarity& start,
-                                    int first_level);
+[[nodiscard]] PatchMatch align_patch(const Patch& patch,
+                                     Pyramid pyramid,
+                                     const Similarity& start,
+                                     int first_level);
 
 }  // namespace stemvo

@@ -9,6 +9,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "features/state_archive.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -130,7 +131,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
                        first_level);
   };
   // First the points that were tracked to here: they tell the others where to look.
-  std::vector<Alignment> found(from.points.size());
+  std::vector<PatchMatch> found(from.points.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Point& point = from.points[i];
     const Track& track = tracks_.at(point.id);
@@ -154,7 +155,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
       }
     }
   }
-  const auto is_found = [](const Alignment& one) { return one.correlation >= kMinCorrelation; };
+  const auto is_found = [](const PatchMatch& one) { return one.correlation >= kMinCorrelation; };
   const auto num_found = static_cast<double>(std::ranges::count_if(found, is_found));
   const bool is_far =
       top < Patch::kNumCoarse && num_found < kFewFound * static_cast<double>(found.size());
@@ -175,7 +176,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
 }
 
 bool PatchFrontEnd::accept(
-    const Alignment& found, const PatchImage& image, int frame, const Point& from, Track& track) {
+    const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track) {
   if (found.correlation < kMinCorrelation) {
     return false;
   }
@@ -202,5 +203,9 @@ void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
     return !has(last, track.first) && !has(good, track.first);
   });
 }
+
+void PatchFrontEnd::write_tracks(StateWriter& writer) const { writer(tracks_); }
+
+void PatchFrontEnd::read_tracks(StateReader& reader) { reader(tracks_); }
 
 }  // namespace stemvo

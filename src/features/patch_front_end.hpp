@@ -29,14 +29,20 @@ class PatchFrontEnd final : public PointFrontEnd {
     Similarity warp;     ///< from the patch to the last image it was found in
     cv::Point2f motion;  ///< to there, from the image before
     int frame = -1;      ///< the number of that image; -1: it is new
+    template <typename Archive>
+    void serialize(Archive& archive) {
+      archive(patch, warp, motion, frame);
+    }
   };
 
   [[nodiscard]] bool begin_track(const TrackingImage& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
+  void write_tracks(StateWriter& writer) const override;
+  void read_tracks(StateReader& reader) override;
   void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) override;
   [[nodiscard]] static bool accept(
-      const Alignment& found, const PatchImage& image, int frame, const Point& from, Track& track);
+      const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track);
 
   std::map<int, Track> tracks_;  ///< by id
 };

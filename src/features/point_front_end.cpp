@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/grid_quota.hpp"
+#include "features/state_archive.hpp"
 #include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -183,6 +184,32 @@ void PointFrontEnd::replenish(View& view) {
       ++next_id_;
     }
   }
+}
+
+void PointFrontEnd::write_state(StateWriter& writer) const {
+  for (const View* view : {&last_, &last_good_}) {
+    const bool has_image = view->image != nullptr;
+    writer(has_image, view->points, view->frame);
+    if (has_image) {
+      writer(view->image->channel);
+    }
+  }
+  writer(next_id_);
+  write_tracks(writer);
+}
+
+void PointFrontEnd::read_state(StateReader& reader) {
+  for (View* view : {&last_, &last_good_}) {
+    bool has_image = false;
+    reader(has_image, view->points, view->frame);
+    if (has_image) {
+      ChannelImage channel;
+      reader(channel);
+      view->image = std::dynamic_pointer_cast<const TrackingImage>(prepare(channel));
+    }
+  }
+  reader(next_id_);
+  read_tracks(reader);
 }
 
 }  // namespace stemvo

@@ -18,6 +18,8 @@ class PointFrontEnd : public FrontEnd {
   using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
+  void write_state(StateWriter& writer) const override;
+  void read_state(StateReader& reader) override;
 
  protected:
   /// With the pyramid that the derived class tracks on.
@@ -30,6 +32,10 @@ class PointFrontEnd : public FrontEnd {
   struct Point {
     cv::Point2f uv;
     int id = -1;
+    template <typename Archive>
+    void serialize(Archive& archive) {
+      archive(uv, id);
+    }
   };
   struct View {
     std::shared_ptr<const TrackingImage> image;
@@ -50,6 +56,9 @@ class PointFrontEnd : public FrontEnd {
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              const View& to) = 0;
+  /// What the derived class knows of the tracks.
+  virtual void write_tracks(StateWriter& /*writer*/) const {}
+  virtual void read_tracks(StateReader& /*reader*/) {}
   /// No track but those of these two, each ordered by id, goes on.
   virtual void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) = 0;
 

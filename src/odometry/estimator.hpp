@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
+#include "features/state_fwd.hpp"
 #include "geometry/bundle.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
@@ -52,6 +53,10 @@ class Estimator {
   }
   /// See Odometry::landmarks().
   [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
+
+  /// What it knows between two frames; one of the same options goes on from there.
+  virtual void write_state(StateWriter& writer) const = 0;
+  virtual void read_state(StateReader& reader) = 0;
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.

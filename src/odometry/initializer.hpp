@@ -48,6 +48,12 @@ class Initializer {
   /// A frame that did not decide: localized once the window is open.
   void wait(View view);
 
+  /// Its state, for state_archive.hpp.
+  template <typename Archive>
+  void serialize(Archive& archive) {
+    archive(reference_, waiting_);
+  }
+
  private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "odometry/state_archive.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -173,5 +175,9 @@ double PairEstimator::measure_length(const TrackedFrame& frame) {
                      Rigid3(direction.rotation, num_frames * last_step_ * direction.translation));
   return num_frames * last_step_;
 }
+
+void PairEstimator::write_state(StateWriter& writer) const { writer(*this); }
+
+void PairEstimator::read_state(StateReader& reader) { reader(*this); }
 
 }  // namespace stemvo

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/phased_odometry.hpp"
 
+#include <sstream>
 #include <utility>
 
 #include "internal_check.hpp"
+#include "odometry/state_archive.hpp"
 #include "odometry/stopwatch.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -47,6 +49,19 @@ PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
   prepared = channel_odometry_.prepare(*channel, image);
   prepared.stem_ms += stem_ms;
   return prepared;
+}
+
+std::string PhasedOdometry::state() const {
+  std::ostringstream bytes;
+  StateWriter writer(bytes);
+  channel_odometry_.write_state(writer);
+  return std::move(bytes).str();
+}
+
+void PhasedOdometry::set_state(const std::string& state) {
+  std::istringstream bytes(state);
+  StateReader reader(bytes);
+  channel_odometry_.read_state(reader);
 }
 
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
 #include <utility>
 
 #include <opencv2/core.hpp>
@@ -38,6 +39,12 @@ class PhasedOdometry {
   [[nodiscard]] FrameResult process(PreparedFrame frame) {
     return channel_odometry_.process(std::move(frame));
   }
+
+  /// Everything known between track() and localize() of a frame, while no other phase but prepare()
+  /// runs. One created alike goes on from it with localize(), and prepare() of the next frame.
+  [[nodiscard]] std::string state() const;
+  /// `state`: as it was given by this program; throws if it is not.
+  void set_state(const std::string& state);
 
   /// Of the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }

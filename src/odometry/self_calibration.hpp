@@ -41,6 +41,12 @@ class SelfCalibration {
   /// Of the estimate; nullopt: nothing is refined.
   [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 
+  /// Its state, for state_archive.hpp.
+  template <typename Archive>
+  void serialize(Archive& archive) {
+    archive(camera_, believed_, mean_, information_, num_runs_, run_);
+  }
+
  private:
   void measure(const BundleAdjustmentOptions& options);
   void approach_believed();

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "odometry/state_archive.hpp"
 #include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -348,5 +349,9 @@ WindowHistory WindowEstimator::closed_history() const {
   history.close(window_);
   return history;
 }
+
+void WindowEstimator::write_state(StateWriter& writer) const { writer(*this); }
+
+void WindowEstimator::read_state(StateReader& reader) { reader(*this); }
 
 }  // namespace stemvo

@@ -66,6 +66,12 @@ double stretch_at(std::span<const Rigid3> refined,
   return before > 0.0 ? path_length(written, begin, end) / before : 1.0;
 }
 
+/// "frames 10:20 of 03", in the folder's numbering.
+std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
+  const std::size_t begin = sequence.range().begin;
+  return one_line(fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence.name()));
+}
+
 class ResultWriter {
  public:
   ResultWriter(const RunRequest& request,
@@ -146,7 +152,8 @@ class ResultWriter {
 
   [[nodiscard]] MetricsReport make_report() const {
     const std::chrono::duration<double> elapsed =
-        std::chrono::steady_clock::now() - request_.started;
+        std::chrono::steady_clock::now() - request_.started +
+        std::chrono::duration<double>(drive_.elapsed_before_s);
     const Config& config = request_.config;
     const auto num_frames = static_cast<double>(trajectory_.size());
     MetricsReport report;
@@ -179,30 +186,8 @@ class ResultWriter {
     return report;
   }
 
-  /// "frames 10:20 of 03", in the folder's numbering.
-  [[nodiscard]] std::string describe_frames(std::size_t num_frames) const {
-    const std::size_t begin = sequence_.range().begin;
-    return one_line(fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence_.name()));
-  }
-
   [[nodiscard]] std::string config_text() const {
-    const StemInfo& stem = odometry_.stem_info();
-    std::string text =
-        fmt::format("# stemvo {}\n# {}\n", version(),
-                    describe_frames(sequence_.stream() ? trajectory_.size() : sequence_.size()));
-    text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
-                        stem.num_filters, stem.sampling_px,
-                        stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
-    if (const auto& calibration = sequence_.given_calibration()) {
-      text += fmt::format("# calibration {}\n", one_line(calibration->string()));
-    }
-    // With what auto, -1 and 0 stand for, which may change with the manifest.
-    Config effective = request_.config;
-    effective.stem.upsample =
-        choose_upsample(effective.stem.upsample, effective.features.method, sequence_.camera());
-    effective.stem.filter = stem.filter;
-    effective.stem.sampling_px = stem.sampling_px;
-    return text + "\n" + dump_config(effective);
+    return pipeline::config_text(request_, sequence_, odometry_, trajectory_.size());
   }
 
   /// The landmarks in the world of trajectory_refined_kitti.txt: where steps were rescaled, they
@@ -224,7 +209,7 @@ class ResultWriter {
   /// Against the ground truth where there is one.
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
     TrajectoryPlot plot;
-    plot.title = describe_frames(trajectory_.size());
+    plot.title = describe_frames(sequence_, trajectory_.size());
     plot.subtitle = describe_numbers(report);
     plot.estimate = trajectory_;
     if (truth_) {
@@ -264,6 +249,29 @@ Trajectory as_written(const RunRequest& request,
              ? rescale_steps(trajectory,
                              std::span(*sequence.ground_truth()).first(trajectory.size()))
              : trajectory;
+}
+
+std::string config_text(const RunRequest& request,
+                        const FrameSource& sequence,
+                        const PhasedOdometry& odometry,
+                        std::size_t num_frames) {
+  const StemInfo& stem = odometry.stem_info();
+  std::string text =
+      fmt::format("# stemvo {}\n# {}\n", version(),
+                  describe_frames(sequence, sequence.stream() ? num_frames : sequence.size()));
+  text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
+                      stem.num_filters, stem.sampling_px,
+                      stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
+  if (const auto& calibration = sequence.given_calibration()) {
+    text += fmt::format("# calibration {}\n", one_line(calibration->string()));
+  }
+  // With what auto, -1 and 0 stand for, which may change with the manifest.
+  Config effective = request.config;
+  effective.stem.upsample =
+      choose_upsample(effective.stem.upsample, effective.features.method, sequence.camera());
+  effective.stem.filter = stem.filter;
+  effective.stem.sampling_px = stem.sampling_px;
+  return text + "\n" + dump_config(effective);
 }
 
 Status write_results(const RunRequest& request,

@@ -26,7 +26,8 @@ struct Drive {
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
   bool interrupted = false;
-  Status written;  ///< of frames.csv and the images
+  double elapsed_before_s = 0.0;  ///< in the runs that this one goes on from
+  Status written;                 ///< of frames.csv and the images
 };
 
 /// The trajectory of the first frames of a run as its files hold it: of scale.source=ground_truth
@@ -35,11 +36,17 @@ struct Drive {
                                     const FrameSource& sequence,
                                     Trajectory trajectory);
 
+/// What config.yaml holds: the effective configuration under comments that say which program,
+/// frames and model made the results. `num_frames`: of a stream, those read.
+[[nodiscard]] std::string config_text(const RunRequest& request,
+                                      const FrameSource& sequence,
+                                      const PhasedOdometry& odometry,
+                                      std::size_t num_frames);
+
 /// Everything that is written at the end but metrics.json, for which it makes `report`:
 /// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
-/// trajectory, what an earlier run left there is removed), config.yaml (the effective configuration
-/// under comments that say which program, frames and model made the results; `stemvo run --config`
-/// takes it as it is), map.ply where it is asked for, trajectory.png and .svg.
+/// trajectory, what an earlier run left there is removed), config.yaml (`stemvo run --config` takes
+/// it as it is), map.ply where it is asked for, trajectory.png and .svg.
 [[nodiscard]] Status write_results(const RunRequest& request,
                                    const FrameSource& sequence,
                                    const PhasedOdometry& odometry,

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "pipeline/checkpoint.hpp"
 #include "report/frames_csv.hpp"
 #include "text/text_file.hpp"
 
@@ -35,6 +36,21 @@ Status ResultKeeper::start() {
   return {};
 }
 
+void ResultKeeper::go_on(std::string csv, Trajectory trajectory) {
+  csv_ = std::move(csv);
+  trajectory_ = std::move(trajectory);
+}
+
+std::string ResultKeeper::csv() {
+  const std::lock_guard lock(mutex_);
+  return csv_;
+}
+
+void ResultKeeper::keep_checkpoint(std::string bytes) {
+  const std::lock_guard lock(mutex_);
+  checkpoint_ = std::move(bytes);
+}
+
 void ResultKeeper::add(std::string_view csv_row, const Rigid3& world_from_camera) {
   const std::lock_guard lock(mutex_);
   csv_ += csv_row;
@@ -43,7 +59,9 @@ void ResultKeeper::add(std::string_view csv_row, const Rigid3& world_from_camera
 
 Status ResultKeeper::finish() {
   stop();
-  return write_text_file(out_dir_ / "frames.csv", csv_);
+  Status written = write_text_file(out_dir_ / "frames.csv", csv_);
+  return written && !checkpoint_.empty() ? write_text_file(checkpoint_file(out_dir_), checkpoint_)
+                                         : written;
 }
 
 void ResultKeeper::stop() {
@@ -61,11 +79,15 @@ void ResultKeeper::keep(const std::stop_token& token) {
     }
     const std::string csv = csv_;
     Trajectory trajectory = trajectory_;
+    const std::string checkpoint = std::exchange(checkpoint_, {});
     lock.unlock();
     // What cannot be written now is written, or reported, at the end.
     static_cast<void>(write_text_file(out_dir_ / "frames.csv", csv));
     static_cast<void>(write_kitti_trajectory(out_dir_ / "trajectory_kitti.txt",
                                              finished_(std::move(trajectory))));
+    if (!checkpoint.empty()) {
+      static_cast<void>(write_text_file(checkpoint_file(out_dir_), checkpoint));
+    }
     lock.lock();
   }
 }

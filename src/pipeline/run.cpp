@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/run.hpp"
 
-#include <bit>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/checkpoint.hpp"
+#include "pipeline/drive_loop.hpp"
 #include "pipeline/frame_pipeline.hpp"
+#include "pipeline/input_hashes.hpp"
 #include "pipeline/input_notes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/result_keeper.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "report/frame_image.hpp"
-#include "report/frames_csv.hpp"
 #include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
@@ -63,77 +64,44 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// The frame last done, its channel and tracks.
-cv::Mat draw_frame(const PhasedOdometry& odometry,
-                   const cv::Mat& frame,
-                   std::size_t number,
-                   const FrameResult& result) {
-  const std::string caption =
-      fmt::format("frame {}: {}, {} of {} matches", number, to_string(result.state),
-                  result.num_inliers, result.num_matches);
-  return draw_frame_image(frame, odometry.frames().image(), odometry.frames().matches(),
-                          odometry.frames().inlier_mask(), caption);
-}
-
-/// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
-/// the one before where n is not known (0).
-bool is_in_report(std::size_t i, std::size_t n) {
-  constexpr std::size_t kImages = 6;
-  return n == 0 ? i >= kImages && std::has_single_bit(i) : (i + 1) * kImages / n > i * kImages / n;
-}
-
-pipeline::Drive drive(const RunRequest& request,
-                      const FrameSource& sequence,
-                      PhasedOdometry& odometry,
-                      pipeline::ResultKeeper& keeper,
-                      const RunProgress& progress) {
-  pipeline::Drive result;
-  const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-    const std::size_t number = sequence.range().begin + i;
-    if (!frame) {
-      result.warnings.push_back(frame.error().message);
-    }
-    if (!pose.problem.empty()) {
-      result.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
-    }
-    result.trajectory.push_back(pose.world_from_camera);
-    result.frames.push_back(pose);
-    result.num_measured += is_measured(pose.state) ? 1 : 0;
-    result.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
-    const StageTimer timer(Stage::kFrameFiles);
-    keeper.add(frames_csv_row(number, sequence.time_s(i), pose), pose.world_from_camera);
-    const std::size_t expected = pipeline::expected_frames(sequence, i + 1);
-    const bool is_asked_for =
-        request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
-    if (is_asked_for || is_in_report(i, expected)) {
-      const cv::Mat image = draw_frame(odometry, frame.value_or(cv::Mat()), number, pose);
-      if (is_asked_for) {
-        const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
-        pipeline::keep_first(result.written, write_image(file, image));
-      }
-      if (is_in_report(i, expected)) {
-        constexpr int kReportWidth_px = 720;
-        result.images.push_back(
-            {fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
-      }
-    }
-    result.interrupted = progress && !progress(i + 1, expected) && i + 1 < sequence.size();
-    return !result.interrupted;
-  };
-  pipeline::run_frames(sequence, odometry, visit);
-  if (sequence.stream()) {
-    pipeline::end_stream(sequence, progress, result);
+/// What the results depend on: a checkpoint of anything else is not gone on from.
+Expected<std::string> identity_of(const RunRequest& request,
+                                  const FrameSource& sequence,
+                                  const PhasedOdometry& odometry) {
+  const auto program = pipeline::hash_program();
+  if (!program) {
+    return program.error();
   }
-  pipeline::keep_first(result.written, keeper.finish());
-  return result;
+  const Camera& c = sequence.camera();
+  return fmt::format("{}\n{} {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
+                     request.sequence_dir.string(), sequence.kind(), c.fx_px, c.fy_px, c.cx_px,
+                     c.cy_px, c.width_px, c.height_px, fmt::join(request.masks, " "),
+                     pipeline::config_text(request, sequence, odometry, 0));
 }
 
-/// The folder and what an earlier run left in it, before work starts.
-Expected<pipeline::FolderLock> prepare_out_folder(const RunRequest& request) {
-  auto lock = pipeline::open_out_folder(request.out_dir);
-  const Status status =
-      lock && request.image_every > 0 ? pipeline::prepare_pictures(request.out_dir) : Status();
-  return status ? std::move(lock) : status.error();
+/// What an earlier run left in the folder is removed, unless this one goes on from it.
+Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunRequest& request,
+                                                                 const std::string& identity) {
+  std::optional<pipeline::Checkpoint> checkpoint;
+  if (request.resume) {
+    auto found = pipeline::read_checkpoint(request.out_dir, identity);
+    if (!found) {
+      return found.error();
+    }
+    checkpoint = *std::move(found);
+  }
+  Status status;
+  if (!checkpoint) {
+    status = pipeline::remove_checkpoint(request.out_dir);
+  }
+  if (status && request.image_every > 0) {
+    status = checkpoint ? pipeline::create_out_folder(request.out_dir / "pictures")
+                        : pipeline::prepare_pictures(request.out_dir);
+  }
+  if (!status) {
+    return status.error();
+  }
+  return checkpoint;
 }
 
 /// The configuration of an earlier run may be that of the next, in the same folder.
@@ -147,7 +115,8 @@ Status check_inputs_are_spared(const RunRequest& request, const FrameSource& seq
   std::vector<std::filesystem::path> results;
   for (const char* name :
        {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt", "report.html",
-        "trajectory.png", "trajectory.svg", "frames.csv", "metrics.json", "config.yaml"}) {
+        "trajectory.png", "trajectory.svg", "frames.csv", "metrics.json", "config.yaml",
+        "checkpoint"}) {
     results.push_back(request.out_dir / name);
   }
   Config config = request.config;
@@ -177,14 +146,22 @@ Expected<RunSummary> run_source(const RunRequest& request,
     return odometry.error();
   }
   const auto lock = check_inputs_are_spared(request, sequence).and_then([&] {
-    return prepare_out_folder(request);
+    return pipeline::open_out_folder(request.out_dir);
   });
-  if (!lock) {
-    return lock.error();
+  const auto identity = identity_of(request, sequence, *odometry);
+  if (!lock || !identity) {
+    return lock ? identity.error() : lock.error();
+  }
+  auto checkpoint = prepare_out_folder(request, *identity);
+  if (!checkpoint) {
+    return checkpoint.error();
   }
   pipeline::ResultKeeper keeper(request.out_dir, [&](Trajectory so_far) {
     return pipeline::as_written(request, sequence, std::move(so_far));
   });
+  if (*checkpoint) {
+    keeper.go_on((*checkpoint)->csv, (*checkpoint)->drive.trajectory);
+  }
   if (const Status status = keeper.start(); !status) {
     return status.error();
   }
@@ -194,7 +171,12 @@ Expected<RunSummary> run_source(const RunRequest& request,
     recorder.emplace();
   }
   pipeline::note_input(request, sequence);
-  pipeline::Drive done = drive(request, sequence, *odometry, keeper, progress);
+  if (*checkpoint && request.note) {
+    request.note(fmt::format("goes on at frame {}", sequence.range().begin + (*checkpoint)->frame));
+  }
+  pipeline::Drive done =
+      pipeline::DriveLoop(request, sequence, *odometry, keeper, progress, *identity)
+          .run(*std::move(checkpoint));
   if (done.trajectory.empty()) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
                             request.sequence_dir.string()));
@@ -211,6 +193,9 @@ Expected<RunSummary> run_source(const RunRequest& request,
   pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
   pipeline::keep_first(written,
                        pipeline::write_report_page(request, sequence, *odometry, done, report));
+  if (!done.interrupted && written) {
+    written = pipeline::remove_checkpoint(request.out_dir);
+  }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};
 }
@@ -228,6 +213,9 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   const auto sequence = open_sequence(request);
   if (!sequence) {
     return sequence.error();
+  }
+  if (request.resume && sequence->stream() && sequence->stream()->is_live) {
+    return fail("--resume: expected a recording, found a live camera");
   }
   RunRequest effective = request;
   effective.config = with_camera_height(request.config, *sequence);

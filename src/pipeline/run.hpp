@@ -27,6 +27,7 @@ struct RunRequest : FrameSourceRequest {
   int num_threads = 0;         ///< 0: all cores
   int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
+  bool resume = false;         ///< go on from what an interrupted run left in out_dir, if it did
   bool measure_times = false;  ///< RunSummary::report.timing
   std::string command;         ///< that repeats the run, for report.html; may be empty
   /// Told before work starts, and of a stream's ground truth after it: what the input was taken
@@ -52,7 +53,8 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
 /// else an old one is removed, frames.csv, config.yaml, metrics.json,
-/// report.html, trajectory.png, trajectory.svg, map.ply, pictures/%06d.png). A wrong request
+/// report.html, trajectory.png, trajectory.svg, map.ply, pictures/%06d.png; until the end also
+/// checkpoint). A wrong request
 /// (configuration, sequence, ground truth that scale.source needs, model, out_dir that cannot be
 /// written) is an error before work starts. A frame that cannot be read is a warning and gets a
 /// pose. When a result cannot be written the others still are; `written` says so. One run with

@@ -74,20 +74,20 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
                "a channel is one plane of floats");
   std::vector<float> samples = sample(channel.values);
   if (!samples.empty()) {
-    const double margin = kMargin * (high_ - low_);
-    const double low = percentile(samples, options_.stretch_low_percent, low_ + margin);
-    const double high = percentile(samples, options_.stretch_high_percent, high_ - margin);
+    const double margin = kMargin * (limits_.high - limits_.low);
+    const double low = percentile(samples, options_.stretch_low_percent, limits_.low + margin);
+    const double high = percentile(samples, options_.stretch_high_percent, limits_.high - margin);
     if (has_contrast(low, high)) {
-      const double change = std::max(std::abs(low - low_), std::abs(high - high_));
-      const bool has_jumped = change > kJump * (high_ - low_);
-      const double memory = has_limits_ && !has_jumped ? options_.stretch_memory : 0.0;
-      low_ = memory * low_ + (1.0 - memory) * low;
-      high_ = memory * high_ + (1.0 - memory) * high;
-      has_limits_ = true;
+      const double change = std::max(std::abs(low - limits_.low), std::abs(high - limits_.high));
+      const bool has_jumped = change > kJump * (limits_.high - limits_.low);
+      const double memory = limits_.are_known && !has_jumped ? options_.stretch_memory : 0.0;
+      limits_.low = memory * limits_.low + (1.0 - memory) * low;
+      limits_.high = memory * limits_.high + (1.0 - memory) * high;
+      limits_.are_known = true;
     }
   }
-  const double gain = has_limits_ ? 255.0 / (high_ - low_) : 0.0;
-  const double bias = has_limits_ ? -gain * low_ : kMiddleGray;
+  const double gain = limits_.are_known ? 255.0 / (limits_.high - limits_.low) : 0.0;
+  const double bias = limits_.are_known ? -gain * limits_.low : kMiddleGray;
 
   const int sampling = static_cast<int>(std::lround(channel.map.scale.x()));
   STEMVO_CHECK(channel.map.scale.x() == sampling && channel.map.scale.y() == sampling,

@@ -96,11 +96,18 @@ class ChannelStretch {
   explicit ChannelStretch(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 
+  /// What it remembers of the channels before.
+  struct Limits {
+    bool are_known = false;
+    double low = 0.0;
+    double high = 1.0;
+  };
+  [[nodiscard]] const Limits& limits() const { return limits_; }
+  void set_limits(const Limits& limits) { limits_ = limits; }
+
  private:
   StemOptions options_;
-  bool has_limits_ = false;
-  double low_ = 0.0;
-  double high_ = 1.0;
+  Limits limits_;
   cv::Mat resized_;  ///< buffer
 };
 

@@ -95,7 +95,7 @@ std::vector<double> errors_px(const View& view, float off_px) {
       const Similarity& w = view.warp;
       const float true_x = w.x + w.a * x - w.b * y;
       const float true_y = w.y + w.b * x + w.a * y;
-      const Alignment found =
+      const PatchMatch found =
           align_patch(patch, after.levels, {true_x + off_px, true_y - off_px, 1.0F, 0.0F}, 1);
       errors.push_back(found.correlation < 0.7F
                            ? 10.0

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+// How the state of a front end becomes bytes and is made of them again, by cereal. Only source
+// files include this; a class with a state has a template `serialize` of its own.
+
+#include <type_traits>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cereal/archives/binary.hpp>
+#include <cereal/types/map.hpp>
+#include <cereal/types/vector.hpp>
+#include <opencv2/core.hpp>
+
+#include "features/front_end.hpp"
+#include "features/patch_alignment.hpp"
+
+namespace Eigen {
+
+template <typename Archive, typename Scalar, int kRows, int kCols>
+  requires(kRows > 0 && kCols > 0)
+void serialize(Archive& archive, Matrix<Scalar, kRows, kCols>& matrix) {
+  archive(cereal::binary_data(matrix.data(), sizeof(Scalar) * kRows * kCols));
+}
+
+template <typename Archive>
+void serialize(Archive& archive, Quaterniond& rotation) {
+  archive(rotation.coeffs());
+}
+
+}  // namespace Eigen
+
+namespace cv {
+
+template <typename Archive>
+void save(Archive& archive, const Mat& mat) {
+  archive(mat.rows, mat.cols, mat.type());
+  for (int row = 0; row < mat.rows; ++row) {
+    archive(cereal::binary_data(mat.ptr(row), mat.elemSize() * static_cast<std::size_t>(mat.cols)));
+  }
+}
+
+template <typename Archive>
+void load(Archive& archive, Mat& mat) {
+  int rows = 0;
+  int cols = 0;
+  int type = 0;
+  archive(rows, cols, type);
+  mat = Mat(rows, cols, type);
+  for (int row = 0; row < rows; ++row) {
+    archive(cereal::binary_data(mat.ptr(row), mat.elemSize() * static_cast<std::size_t>(cols)));
+  }
+}
+
+template <typename Archive>
+void serialize(Archive& archive, Point2f& point) {
+  archive(point.x, point.y);
+}
+
+}  // namespace cv
+
+namespace stemvo {
+
+/// Numbers only, no pointers.
+template <typename Archive, typename T>
+  requires(std::is_trivially_copyable_v<T>)
+void serialize_bytes(Archive& archive, T& value) {
+  archive(cereal::binary_data(&value, sizeof(T)));
+}
+
+template <typename Archive>
+void serialize(Archive& archive, PixelMap& map) {
+  archive(map.scale, map.offset_px);
+}
+template <typename Archive>
+void serialize(Archive& archive, ChannelImage& image) {
+  archive(image.pixels, image.map);
+}
+template <typename Archive>
+void serialize(Archive& archive, Patch& patch) {
+  serialize_bytes(archive, patch);
+}
+template <typename Archive>
+void serialize(Archive& archive, Similarity& warp) {
+  serialize_bytes(archive, warp);
+}
+template <typename Archive>
+void serialize(Archive& archive, Matches& matches) {
+  archive(matches.prev_uv, matches.cur_uv, matches.track_ids, matches.prev_frame,
+          matches.num_keypoints);
+}
+
+}  // namespace stemvo

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+// The same of an odometry's state.
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <cereal/types/array.hpp>
+#include <cereal/types/deque.hpp>
+#include <cereal/types/memory.hpp>
+#include <cereal/types/optional.hpp>
+#include <cereal/types/string.hpp>
+
+#include "features/state_archive.hpp"
+#include "odometry/initializer.hpp"
+#include "odometry/road/image.hpp"
+#include "odometry/window_history.hpp"
+#include "stem/stem.hpp"
+#include "stemvo/frame_result.hpp"
+
+namespace cereal {
+
+// What says why something was not done: the same few constants again and again.
+
+template <typename Archive>
+void save(Archive& archive, const std::string_view& reason) {
+  archive(std::string(reason));
+}
+
+template <typename Archive>
+void load(Archive& archive, std::string_view& reason) {
+  static std::set<std::string> known;  // kept: views of them are
+  std::string text;
+  archive(text);
+  reason = *known.insert(std::move(text)).first;
+}
+
+}  // namespace cereal
+
+namespace stemvo {
+
+template <typename Archive>
+void serialize(Archive& archive, Rigid3& pose) {
+  archive(pose.rotation, pose.translation);
+}
+template <typename Archive>
+void serialize(Archive& archive, Camera& camera) {
+  serialize_bytes(archive, camera);
+}
+template <typename Archive>
+void serialize(Archive& archive, TrackPoint& point) {
+  archive(point.track_id, point.uv);
+}
+template <typename Archive>
+void serialize(Archive& archive, RoadImage::Level& level) {
+  archive(level.camera, level.first_row, level.values);
+}
+template <typename Archive>
+void serialize(Archive& archive, RoadImage& road) {
+  archive(road.pixels, road.map, road.full);
+}
+template <typename Archive>
+void serialize(Archive& archive, View& view) {
+  archive(view.frame, view.world_from_camera, view.points, view.road);
+}
+template <typename Archive>
+void serialize(Archive& archive, FrameBetween& frame) {
+  archive(frame.frame, frame.keyframe_from_camera);
+}
+template <typename Archive>
+void serialize(Archive& archive, Keyframe& keyframe) {
+  archive(keyframe.frame, keyframe.world_from_camera, keyframe.points, keyframe.followers);
+}
+template <typename Archive>
+void serialize(Archive& archive, Window& window) {
+  archive(window.keyframes, window.landmarks);
+}
+template <typename Archive>
+void serialize(Archive& archive, RefinedMotion& motion) {
+  archive(motion.prev, motion.cur, motion.prev_from_cur);
+}
+template <typename Archive>
+void serialize(Archive& archive, MapLandmark& landmark) {
+  archive(landmark.frame, landmark.position, landmark.rgb);
+}
+template <typename Archive>
+void serialize(Archive& archive, StageTimes& times) {
+  serialize_bytes(archive, times);
+}
+template <typename Archive>
+void serialize(Archive& archive, ChannelStretch::Limits& limits) {
+  archive(limits.are_known, limits.low, limits.high);
+}
+template <typename Archive>
+void serialize(Archive& archive, FrameResult& result) {
+  archive(result.state, result.world_from_camera, result.num_matches, result.num_inliers,
+          result.homography_score, result.fundamental_score, result.homography_ratio, result.model,
+          result.road, result.road_reason, result.camera, result.principal_point_sigma_px,
+          result.scale_sigma, result.times, result.problem);
+}
+
+}  // namespace stemvo

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include "pipeline/checkpoint.hpp"
+
+#include <sstream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+#include <libdeflate.h>
+
+#include "odometry/state_archive.hpp"
+#include "text/text_file.hpp"
+
+namespace stemvo {
+
+namespace html {
+template <typename Archive>
+void serialize(Archive& archive, CaptionedImage& image) {
+  archive(image.caption, image.jpeg);
+}
+}  // namespace html
+
+namespace pipeline {
+
+template <typename Archive>
+void serialize(Archive& archive, Drive& drive) {
+  archive(drive.trajectory, drive.num_measured, drive.num_road_measured, drive.frames, drive.images,
+          drive.warnings, drive.elapsed_before_s);
+}
+template <typename Archive>
+void serialize(Archive& archive, Checkpoint& checkpoint) {
+  archive(checkpoint.frame, checkpoint.odometry, checkpoint.drive, checkpoint.csv);
+}
+
+namespace {
+
+/// The file's first line: a mark, and the CRC-32 of all behind it.
+std::string first_line(std::string_view rest) {
+  return fmt::format("stemvo checkpoint {:08x}\n", libdeflate_crc32(0, rest.data(), rest.size()));
+}
+
+}  // namespace
+
+std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir) {
+  return out_dir / "checkpoint";
+}
+
+std::string pack(const Checkpoint& checkpoint, const std::string& identity) {
+  std::ostringstream bytes;
+  StateWriter writer(bytes);
+  writer(identity, checkpoint);
+  return first_line(bytes.view()).append(bytes.view());
+}
+
+Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& out_dir,
+                                                    const std::string& identity) {
+  const std::filesystem::path file = checkpoint_file(out_dir);
+  std::error_code code;
+  if (!std::filesystem::exists(file, code)) {
+    return std::optional<Checkpoint>();
+  }
+  const auto text = read_text_file(file);
+  if (!text) {
+    return fail("--resume: " + text.error().message);
+  }
+  const std::size_t start = text->find('\n') + 1;
+  if (!text->starts_with(first_line(std::string_view(*text).substr(start)))) {
+    return fail(
+        fmt::format("--resume: {}: expected a checkpoint, found damaged data; without "
+                    "--resume the run starts over",
+                    file.string()));
+  }
+  std::istringstream bytes(text->substr(start));
+  StateReader reader(bytes);
+  std::string found;
+  reader(found);
+  if (found != identity) {
+    return fail(
+        fmt::format("--resume: {}: expected the checkpoint of this program, input and "
+                    "configuration, found another one's; give another --out, or what it "
+                    "was; without --resume the run starts over",
+                    file.string()));
+  }
+  std::optional<Checkpoint> checkpoint(std::in_place);
+  reader(*checkpoint);
+  return checkpoint;
+}
+
+Status remove_checkpoint(const std::filesystem::path& out_dir) {
+  std::error_code code;
+  std::filesystem::remove(checkpoint_file(out_dir), code);
+  return code ? Status(fail(fmt::format("{}: cannot be removed ({})",
+                                        checkpoint_file(out_dir).string(), code.message())))
+              : Status();
+}
+
+}  // namespace pipeline
+}  // namespace stemvo

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "pipeline/result_files.hpp"
+#include "stemvo/error.hpp"
+
+namespace stemvo::pipeline {
+
+/// What a run goes on from: OUT_DIR/checkpoint.
+struct Checkpoint {
+  std::size_t frame = 0;  ///< it is tracked, those before it are done
+  std::string odometry;   ///< PhasedOdometry::state
+  Drive drive;            ///< of the frames before
+  std::string csv;        ///< of the same
+};
+
+[[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir);
+
+/// The file's contents. `identity`: the program and everything the results depend on.
+[[nodiscard]] std::string pack(const Checkpoint& checkpoint, const std::string& identity);
+
+/// Nullopt: there is none. Error, starting with "--resume: ": damaged, or of another identity.
+[[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(
+    const std::filesystem::path& out_dir, const std::string& identity);
+/// Error: there is one, and it cannot be removed.
+[[nodiscard]] Status remove_checkpoint(const std::filesystem::path& out_dir);
+
+}  // namespace stemvo::pipeline

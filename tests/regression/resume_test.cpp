@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: MIT
+// `run --resume` ends with the bytes of a run that was not interrupted.
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "support/program_test.hpp"
+
+namespace stemvo {
+namespace {
+
+class Resume : public ::testing::Test {
+ protected:
+  static constexpr int kNumFrames = 240;
+
+  /// A drive there and back again, so that it lasts; one frame is no image.
+  Resume() {
+    const fs::path drive = test::rendered_drive() / "sequences/00";
+    fs::create_directories(sequence_ / "image_2");
+    fs::copy(drive / "calib.txt", sequence_ / "calib.txt");
+    std::ofstream times(sequence_ / "times.txt");
+    for (int i = 0; i < kNumFrames; ++i) {
+      times << 0.1 * i << "\n";
+      if (i != 33) {
+        fs::create_symlink(drive / frame_name(i % 120 < 60 ? i % 120 : 119 - i % 120),
+                           sequence_ / frame_name(i));
+      } else {
+        std::ofstream(sequence_ / frame_name(i)) << "no image";
+      }
+    }
+  }
+
+  static std::string frame_name(int i) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    return name;
+  }
+  [[nodiscard]] std::vector<std::string> run(const std::string& out,
+                                             std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"run", sequence_.string(), "--out", folder_ / out,
+                                          "--map"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+  /// What must not depend on the interrupt: of frames.csv all columns but the times.
+  [[nodiscard]] std::string results(const std::string& out) const {
+    std::string bytes;
+    for (const char* name : {"trajectory_kitti.txt", "trajectory_tum.txt",
+                             "trajectory_refined_kitti.txt", "map.ply"}) {
+      bytes += read_file(folder_ / out / name);
+    }
+    std::ifstream rows(folder_ / out / "frames.csv");
+    for (std::string row; std::getline(rows, row);) {
+      std::vector<std::string> fields;
+      std::stringstream line(row);
+      for (std::string field; std::getline(line, field, ',');) {
+        fields.push_back(field);
+      }
+      fields.erase(fields.begin() + 9, fields.begin() + 12);
+      for (const std::string& field : fields) {
+        bytes += field + ",";
+      }
+    }
+    return bytes;
+  }
+  /// Runs the program, sends the signal `after` its first result is there. False: it ended before.
+  [[nodiscard]] bool is_stopped(const std::string& out,
+                                const std::vector<std::string>& arguments,
+                                int signal,
+                                std::chrono::milliseconds after) const {
+    fs::remove(folder_ / out / "frames.csv");
+    test::RunningProgram program(STEMVO_PROGRAM, arguments);
+    for (int i = 0; i < 2000 && !fs::exists(folder_ / out / "frames.csv"); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    std::this_thread::sleep_for(after);
+    program.send(signal);
+    const ProgramResult result = program.wait();
+    EXPECT_THAT(result.exit_code, ::testing::AnyOf(0, 130, 128 + SIGKILL)) << result.err;
+    return result.exit_code != 0;
+  }
+
+  TempFolder folder_;
+  fs::path sequence_ = folder_.path() / "sequences/00";
+};
+
+TEST_F(Resume, InterruptedAtAnyMomentEndsWithTheSameBytes) {
+  ASSERT_EQ(test::run_program(STEMVO_PROGRAM, run("whole")).exit_code, 0);
+  const std::string whole = results("whole");
+  std::mt19937 random(7);
+  int num_stops = 0;
+  for (const char* threads : {"1", "4"}) {
+    const std::string out = std::string("stopped_") + threads;
+    const auto arguments = run(out, {"--resume", "--threads", threads});
+    for (int i = 0; i < 4; ++i) {
+      const std::chrono::milliseconds after(random() % 300);
+      num_stops += is_stopped(out, arguments, i % 2 == 0 ? SIGINT : SIGTERM, after) ? 1 : 0;
+    }
+    const ProgramResult last = test::run_program(STEMVO_PROGRAM, arguments);
+    ASSERT_EQ(last.exit_code, 0) << last.err;
+    EXPECT_TRUE(results(out) == whole) << out;
+    EXPECT_FALSE(fs::exists(folder_ / out / "checkpoint"));
+    EXPECT_THAT(last.err, HasSubstr("goes on at frame "));
+  }
+  EXPECT_GT(num_stops, 4);
+}
+
+TEST_F(Resume, KilledGoesOnFromTheLastCheckpoint) {
+  ASSERT_EQ(test::run_program(STEMVO_PROGRAM, run("whole")).exit_code, 0);
+  // Pictures take time: the run lasts beyond its first checkpoint.
+  const auto arguments = run("killed", {"--resume", "--threads", "1", "--pictures", "4"});
+  ASSERT_TRUE(is_stopped("killed", arguments, SIGKILL, std::chrono::milliseconds(2500)));
+  EXPECT_TRUE(fs::exists(folder_ / "killed/checkpoint"));
+  const ProgramResult last = test::run_program(STEMVO_PROGRAM, arguments);
+  ASSERT_EQ(last.exit_code, 0) << last.err;
+  EXPECT_THAT(last.err, HasSubstr("goes on at frame "));
+  EXPECT_TRUE(results("killed") == results("whole"));
+  for (int i = 0; i < kNumFrames; i += 4) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "pictures/%06d.png", i);
+    EXPECT_TRUE(fs::exists(folder_ / "killed" / name)) << i;
+  }
+}
+
+TEST_F(Resume, AVideoGoesOnToo) {
+  const std::string file = folder_ / "drive.avi";
+  const std::string camera = folder_ / "camera.yaml";
+  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
+                         {620, 188});
+  for (int i = 0; i < kNumFrames; ++i) {
+    const cv::Mat image = cv::imread((sequence_ / frame_name(i == 33 ? 32 : i)).string());
+    writer.write(image);
+  }
+  writer.release();
+  std::ofstream(camera) << "image_width: 620\nimage_height: 188\ndistortion_model: none\n"
+                           "intrinsics: [360, 360, 305, 92]\n";
+  const auto arguments = [&](const std::string& out) {
+    return std::vector<std::string>{"run",   file,          "--camera", camera,
+                                    "--out", folder_ / out, "--resume", "--map"};
+  };
+  ASSERT_EQ(test::run_program(STEMVO_PROGRAM, arguments("whole")).exit_code, 0);
+  ASSERT_TRUE(is_stopped("stopped", arguments("stopped"), SIGINT, std::chrono::milliseconds(150)));
+  const ProgramResult last = test::run_program(STEMVO_PROGRAM, arguments("stopped"));
+  ASSERT_EQ(last.exit_code, 0) << last.err;
+  EXPECT_THAT(last.err, HasSubstr("goes on at frame "));
+  EXPECT_TRUE(results("stopped") == results("whole"));
+}
+
+TEST_F(Resume, WhatCannotBeGoneOnFromIsNamed) {
+  ASSERT_TRUE(is_stopped("out", run("out"), SIGINT, std::chrono::milliseconds(100)));
+  const fs::path file = folder_.path() / "out/checkpoint";
+  const std::string sound = read_file(file);
+  ASSERT_FALSE(sound.empty());
+  const auto expect_refused = [&](const std::vector<std::string>& more, const std::string& what) {
+    const ProgramResult result = test::run_program(STEMVO_PROGRAM, run("out", more));
+    EXPECT_EQ(result.exit_code, 1) << what;
+    EXPECT_THAT(result.err, HasSubstr("--resume: " + file.string() + ": expected "));
+    EXPECT_THAT(result.err, HasSubstr(what));
+    EXPECT_TRUE(fs::exists(file));
+  };
+  expect_refused({"--resume", "--set", "features.max_features=300"}, "found another one's");
+  expect_refused({"--resume", "--frames", "0:200"}, "found another one's");
+  for (const std::size_t size : {std::size_t{0}, std::size_t{5}, sound.size() / 2}) {
+    std::ofstream(file, std::ios::binary) << sound.substr(0, size);
+    expect_refused({"--resume"}, "found damaged data");
+  }
+  std::string damaged = sound;
+  damaged[sound.size() / 2] ^= 1;
+  std::ofstream(file, std::ios::binary) << damaged;
+  expect_refused({"--resume"}, "found damaged data");
+
+  const ProgramResult anew = test::run_program(STEMVO_PROGRAM, run("out"));
+  EXPECT_EQ(anew.exit_code, 0) << anew.err;
+  EXPECT_FALSE(fs::exists(file));
+  EXPECT_THAT(anew.err, Not(HasSubstr("goes on")));
+}
+
+}  // namespace
+}  // namespace stemvo

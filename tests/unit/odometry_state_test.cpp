@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// An odometry that goes on from another one's state gives what that one would have given.
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "config/config.hpp"
+#include "dataset/sequence.hpp"
+#include "odometry/phased_odometry.hpp"
+#include "pipeline/frame_pipeline.hpp"
+#include "support/drives.hpp"
+
+namespace stemvo {
+namespace {
+
+struct Variant {
+  std::string name;
+  std::vector<std::string> overrides;
+};
+
+class OdometryState : public ::testing::TestWithParam<Variant> {
+ protected:
+  static constexpr std::size_t kNumFrames = 40;
+  /// Could not be read; the tracks end there and go on behind it.
+  static bool is_broken(std::size_t frame) { return frame == 21; }
+
+  [[nodiscard]] PhasedOdometry odometry() const {
+    Config config;
+    for (const std::string& text : GetParam().overrides) {
+      EXPECT_TRUE(apply_override(config, text)) << text;
+    }
+    return pipeline::create_odometry(config, sequence_.camera(), STEMVO_SOURCE_DIR "/models")
+        .value();
+  }
+  void track(PhasedOdometry& odometry, std::size_t frame) const {
+    odometry.track(is_broken(frame) ? PreparedFrame()
+                                    : odometry.prepare(sequence_.read(frame).value()));
+  }
+  /// All that is known after the frame, times left out.
+  static std::string described(const FrameResult& r) {
+    std::string text =
+        fmt::format("{} {} {} {} {} {} {}", to_string(r.state), r.num_matches, r.num_inliers,
+                    to_string(r.road), r.road_reason, r.scale_sigma.value_or(-1.0), r.camera.cx_px);
+    for (const double value : r.world_from_camera.matrix().reshaped()) {
+      text += fmt::format(" {:a}", value);
+    }
+    return text;
+  }
+
+  KittiSequence sequence_ =
+      KittiSequence::open(
+          test::rendered_drive({.frames = kNumFrames, .width_px = 413, .height_px = 125}) /
+              "sequences/00",
+          {})
+          .value();
+};
+
+TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
+  PhasedOdometry whole = odometry();
+  std::vector<std::string> states;
+  std::vector<std::string> expected;
+  for (std::size_t i = 0; i < kNumFrames; ++i) {
+    track(whole, i);
+    states.push_back(whole.state());
+    whole.localize();
+    expected.push_back(described(whole.optimize()));
+  }
+  for (const std::size_t first : {0, 1, 2, 7, 20, 21, 22, 23, 39}) {
+    PhasedOdometry again = odometry();
+    again.set_state(states[first]);
+    EXPECT_TRUE(again.state() == states[first]) << first;
+    for (std::size_t i = first; i < kNumFrames; ++i) {
+      if (i > first) {
+        track(again, i);
+      }
+      again.localize();
+      ASSERT_EQ(described(again.optimize()), expected[i]) << "from " << first << ", frame " << i;
+    }
+    const Estimator& a = whole.frames().estimator();
+    const Estimator& b = again.frames().estimator();
+    const auto refined = a.refined_trajectory();
+    ASSERT_EQ(b.refined_trajectory().size(), refined.size());
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      EXPECT_EQ(b.refined_trajectory()[i].matrix(), refined[i].matrix()) << first << ", " << i;
+    }
+    ASSERT_EQ(b.landmarks().size(), a.landmarks().size());
+    for (std::size_t i = 0; i < a.landmarks().size(); ++i) {
+      EXPECT_EQ(b.landmarks()[i].position, a.landmarks()[i].position);
+      EXPECT_EQ(b.landmarks()[i].rgb, a.landmarks()[i].rgb);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Options,
+    OdometryState,
+    ::testing::Values(Variant{"map", {}},
+                      Variant{"camera", {"camera.refine=all"}},
+                      Variant{"no_road", {"scale.source=none"}},
+                      Variant{"klt", {"features.method=klt"}},
+                      Variant{"orb", {"features.method=orb"}},
+                      Variant{"two_frame", {"odometry.mode=two_frame", "features.method=sift"}}),
+    [](const auto& variant) { return variant.param.name; });
+
+}  // namespace
+}  // namespace stemvo
