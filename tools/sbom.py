@@ -13,12 +13,18 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-HEADERS_ONLY = ("libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev")
+HEADERS_ONLY = ("libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev", "libcereal-dev")
 # Debian's short names of licences; what is not here is left open (NOASSERTION) and named in licenseComments.
 LICENCES = {
     "apache-2.0": "Apache-2.0", "apache-2": "Apache-2.0", "expat": "MIT", "mit": "MIT", "mpl-2": "MPL-2.0",
     "mpl-2.0": "MPL-2.0", "bsd-2-clause": "BSD-2-Clause", "bsd-3-clause": "BSD-3-Clause", "zlib": "Zlib",
     "lgpl-2.1": "LGPL-2.1-only", "lgpl-2.1+": "LGPL-2.1-or-later", "gpl-3": "GPL-3.0-only",
+}  # fmt: skip
+# Where Debian's file is in no such form, or names more than the library is under: what it says in words.
+DECLARED = {
+    "libc6": "LGPL-2.1-or-later", "libcairo": "LGPL-2.1-only OR MPL-1.1", "libfmt": "MIT", "libyaml-cpp": "MIT",
+    "libgcc-s": "GPL-3.0-or-later WITH GCC-exception-3.1", "libstdc++": "GPL-3.0-or-later WITH GCC-exception-3.1",
+    "libpng16": "libpng-2.0", "libturbojpeg": "IJG AND BSD-3-Clause AND Zlib",
 }  # fmt: skip
 # As their own licence files beside them say.
 DOWNLOADS = {"onnxruntime": "MIT", "plotly": "MIT"}
@@ -82,6 +88,7 @@ def debian_entry(package):
         "dpkg-query", "--show", "--showformat=${Version} ${Architecture}", package
     ).split()
     licence, debian_name = licence_of(package)
+    licence = licence or next((DECLARED[name] for name in DECLARED if package.startswith(name)), None)
     more = {} if licence or not debian_name else {"licenseComments": f"Debian's copyright file: {debian_name}"}
     distribution = re.search(r"^ID=(\w+)", pathlib.Path("/etc/os-release").read_text(), re.MULTILINE)[1]
     quoted = version.replace("+", "%2B").replace(":", "%3A")

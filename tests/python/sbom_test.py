@@ -43,10 +43,11 @@ class Bill(unittest.TestCase):
 
     def test_names_what_the_program_is_made_of(self):
         for wanted in ("libopencv-core", "libyaml-cpp", "libfmt", "libcairo", "libdeflate", "libssl|libcrypto",
-                       "libturbojpeg", "libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev", "stemvo"):  # fmt: skip
+                       "libturbojpeg", "libpng", "libcereal-dev", "libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev", "stemvo"):  # fmt: skip
             self.assertTrue(any(re.match(wanted, name) for name in self.packages), wanted)
         for package in self.packages.values():
             self.assertTrue(package["versionInfo"], package["name"])
+            self.assertNotEqual(package["licenseDeclared"], "NOASSERTION", package["name"])
 
     def test_downloads_have_the_version_and_the_hash_that_are_pinned(self):
         setup = (TOOL.parent / "setup.sh").read_text()

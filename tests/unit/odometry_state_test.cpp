@@ -22,9 +22,9 @@ struct Variant {
 
 class OdometryState : public ::testing::TestWithParam<Variant> {
  protected:
-  static constexpr std::size_t kNumFrames = 40;
+  static constexpr std::size_t kNumFrames = 30;
   /// Could not be read; the tracks end there and go on behind it.
-  static bool is_broken(std::size_t frame) { return frame == 21; }
+  static bool is_broken(std::size_t frame) { return frame == 17; }
 
   [[nodiscard]] PhasedOdometry odometry() const {
     Config config;
@@ -51,7 +51,7 @@ class OdometryState : public ::testing::TestWithParam<Variant> {
 
   KittiSequence sequence_ =
       KittiSequence::open(
-          test::rendered_drive({.frames = kNumFrames, .width_px = 413, .height_px = 125}) /
+          test::rendered_drive({.frames = kNumFrames, .width_px = 310, .height_px = 94}) /
               "sequences/00",
           {})
           .value();
@@ -67,7 +67,7 @@ TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
     whole.localize();
     expected.push_back(described(whole.optimize()));
   }
-  for (const std::size_t first : {0, 1, 2, 7, 20, 21, 22, 23, 39}) {
+  for (const std::size_t first : {0, 6, 17, 18, 19, 29}) {
     PhasedOdometry again = odometry();
     again.set_state(states[first]);
     EXPECT_TRUE(again.state() == states[first]) << first;
@@ -93,16 +93,14 @@ TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Options,
-    OdometryState,
-    ::testing::Values(Variant{"map", {}},
-                      Variant{"camera", {"camera.refine=all"}},
-                      Variant{"no_road", {"scale.source=none"}},
-                      Variant{"klt", {"features.method=klt"}},
-                      Variant{"orb", {"features.method=orb"}},
-                      Variant{"two_frame", {"odometry.mode=two_frame", "features.method=sift"}}),
-    [](const auto& variant) { return variant.param.name; });
+INSTANTIATE_TEST_SUITE_P(Options,
+                         OdometryState,
+                         ::testing::Values(Variant{"map", {"camera.refine=all"}},
+                                           Variant{"klt",
+                                                   {"features.method=klt", "scale.source=none"}},
+                                           Variant{"orb", {"features.method=orb"}},
+                                           Variant{"two_frame", {"odometry.mode=two_frame"}}),
+                         [](const auto& variant) { return variant.param.name; });
 
 }  // namespace
 }  // namespace stemvo
