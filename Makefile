@@ -2,7 +2,7 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build demo test test-all test-long bench test-frameworks cluster format check-format lint clean
+.PHONY: help setup build demo test test-all test-long bench test-frameworks cluster format check-format lint docs clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
@@ -14,6 +14,7 @@ help:
 	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
 	@echo "make format        rewrite the C++ sources in the project's format"
 	@echo "make check-format  fail where a source is not in that format or names no licence"
+	@echo "make docs          the documentation as a site: build/docs/index.html"
 	@echo "make lint          run clang-tidy over the library and the program"
 	@echo "make clean         remove what was built (build/venv* and ONNX Runtime stay)"
 
@@ -40,6 +41,7 @@ test-all: test test-long
 
 test-long:
 	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
+	@tools/setup.sh docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS)
 
@@ -60,6 +62,9 @@ format: setup
 
 check-format: setup
 	@tools/format.sh --check
+
+docs: setup
+	@tools/docs.sh
 
 lint: setup
 	@tools/lint.sh

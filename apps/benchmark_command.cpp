@@ -24,8 +24,8 @@ the default configuration and the paper's, each with metres from the camera's he
 truth, no alignment) and with per-step ground-truth scale (the paper's
 protocol).
 
---out receives benchmark.md and benchmark.json, a figure NN.png per sequence, speed.json, and all files
-of every run under runs/. The paper's and other published numbers stand beside a sequence where all of
+--out receives benchmark.md and benchmark.json, report.html, speed.json, and all files of
+every run under runs/. The paper's and other published numbers stand beside a sequence where all of
 its official frames ran.
 
 Stopped with Ctrl-C, the same command goes on where it was: a run is repeated only where its
@@ -76,7 +76,8 @@ int benchmark(Arguments& arguments) {
     return kExitInterrupted;
   }
   if (!arguments.is_quiet) {
-    print(fmt::format("report: {}\n", (request.out_dir / "benchmark.md").string()));
+    print(fmt::format("table: {}\nreport: {}\n", (request.out_dir / "benchmark.md").string(),
+                      (request.out_dir / "report.html").string()));
   }
   return summary->failures.empty() ? kExitDone : kExitFailed;
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include "console.hpp"
@@ -20,6 +21,29 @@ std::string describe_time(double seconds) {
   const auto whole = static_cast<long>(seconds + 0.5);
   return whole < 60 ? fmt::format("{} s", whole)
                     : fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+/// Of the terminal; 0: not known.
+std::size_t num_columns() {
+  winsize size{};
+  return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+/// A line that stays one: cut to the terminal, with a bar where there is room for it.
+std::string fitted(std::string text, double share) {
+  constexpr std::size_t kMinBar = 10;
+  constexpr std::size_t kMaxBar = 30;
+  const std::size_t columns = num_columns();
+  if (columns == 0) {
+    return text;
+  }
+  const std::size_t room = columns - 1 > text.size() + 3 ? columns - 1 - text.size() - 3 : 0;
+  if (room >= kMinBar && share >= 0.0) {
+    const std::size_t bar = std::min(room, kMaxBar);
+    const auto full = static_cast<std::size_t>(share * static_cast<double>(bar));
+    return fmt::format("[{:=<{}}{:{}}] {}", "", full, "", bar - full, text);
+  }
+  return text.substr(0, columns - 1);
 }
 
 }  // namespace
@@ -51,8 +75,9 @@ bool Progress::update(std::size_t done, std::size_t total) {
     const std::string text =
         fmt::format("{}{} {}, {:.1f} {}/s, {}", done, of, unit_, per_s, unit_, rest);
     // \r and "erase to the end" keep a terminal's cursor on one line until the last.
+    const double share = total == 0 ? -1.0 : static_cast<double>(done) / static_cast<double>(total);
     const std::string line =
-        is_terminal_ ? "\r" + text + "\x1b[K" + (is_last ? "\n" : "") : text + "\n";
+        is_terminal_ ? "\r" + fitted(text, share) + "\x1b[K" + (is_last ? "\n" : "") : text + "\n";
     print_note(line);
     last_ = now;
   }

@@ -43,7 +43,7 @@ undistorted, and over 1.5 megapixels made smaller. Without camera_height the pat
 
 --out (results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
 poses), trajectory_refined_kitti.txt (odometry.mode map: the same with look-ahead), report.html (all
-there is to look at, for a browser), trajectory.png and .svg (the path drawn), metrics.json (the
+there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the
 numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
 Until the run is complete also checkpoint, from which --resume goes on.
 

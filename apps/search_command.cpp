@@ -27,7 +27,7 @@ t_rel. --kinds has disturbed sequences count too. Ground truth is needed. Hopele
 early (successive halving); --exhaustive runs all to the end.
 
 --out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
-best.yaml (for 'stemvo run --config'), sheet.png (best, median and worst) and records.jsonl, from which
+best.yaml (for 'stemvo run --config'), report.html, sheet.png (best, median and worst) and records.jsonl, from which
 --resume goes on after Ctrl-C or a crash.
 
 Examples:
@@ -48,7 +48,8 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   search::SearchRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   if (!arguments.merge.empty()) {
-    return search::merge_searches(arguments.merge, request.out_dir, request.models_dir);
+    return search::merge_searches(arguments.merge, request.out_dir, request.models_dir,
+                                  command_line());
   }
   const Expected<Config> config = read_config(arguments.config, search::search_defaults());
   if (!config) {
@@ -64,6 +65,7 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
     }
   }
   request.config = *config;
+  request.command = command_line();
   Progress progress("filter-frames", arguments.is_quiet);
   return search::run_search(request, std::bind_front(&Progress::update, &progress));
 }

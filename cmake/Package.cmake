@@ -1,5 +1,5 @@
 # `cpack -G DEB` in the build folder: one package with the program, the library, its headers, a man page and
-# completions for bash. Its dependencies are those of the files in it (dpkg-shlibdeps).
+# completions for bash, zsh and fish. Its dependencies are those of the files in it (dpkg-shlibdeps).
 if(TARGET stemvo_app)
   set(man_page ${PROJECT_BINARY_DIR}/install/stemvo.1)
   install(CODE "execute_process(COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:stemvo_app> -D OUT=${man_page}
@@ -7,6 +7,8 @@ if(TARGET stemvo_app)
                                 COMMAND_ERROR_IS_FATAL ANY)")
   install(FILES ${man_page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
   install(FILES cmake/package/completions.bash DESTINATION share/bash-completion/completions RENAME stemvo)
+  install(FILES cmake/package/completions.zsh DESTINATION share/zsh/vendor-completions RENAME _stemvo)
+  install(FILES cmake/package/completions.fish DESTINATION share/fish/vendor_completions.d RENAME stemvo.fish)
 endif()
 
 set(CPACK_GENERATOR DEB)

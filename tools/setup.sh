@@ -3,7 +3,7 @@
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, plotly.js, a Python environment.
 # Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
 # `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`,
-# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh.
+# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh, `setup.sh docs` what `make docs` needs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -214,6 +214,14 @@ if [[ "${1:-}" == fuzz ]]; then
   mkdir -p "$LOGS"
   PACKAGES=(clang-16 libclang-rt-16-dev)
   install_packages
+  exit
+fi
+# The generators of the site.
+if [[ "${1:-}" == docs ]]; then
+  mkdir -p "$LOGS"
+  PACKAGES=(doxygen)
+  install_packages
+  make_venv build/venv-docs "$LOGS/venv-docs.log" tools/requirements-docs.txt
   exit
 fi
 if [[ "${1:-}" == coverage ]]; then

@@ -13,7 +13,6 @@
 #include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/metrics_keys.hpp"
-#include "report/trajectory_plot.hpp"
 #include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
@@ -173,7 +172,7 @@ class Benchmark {
                                     {"official_frames", official.value("frames", Json())},
                                     {"is_complete", is_complete},
                                     {"runs", runs},
-                                    {"never_moving", {{"average_offset_m", nullptr}}},
+                                    {"zero_motion", {{"average_offset_m", nullptr}}},
                                     {"published", is_complete ? publications : Json::array()}});
   }
 
@@ -183,7 +182,14 @@ class Benchmark {
         complete(sequence, request_.configurations[i / 2].second, sequence["runs"][i]);
       }
       report_["interrupted"] = summary_.interrupted;
-      if (const Status written = write_files(sequence); !written) {
+      auto paths = paths_of(sequence);
+      if (!paths) {
+        return paths.error();
+      }
+      if (!paths->runs.empty()) {
+        paths_.push_back(*std::move(paths));
+      }
+      if (const Status written = write_files(); !written) {
         return written.error();
       }
       if (summary_.interrupted) {
@@ -241,7 +247,7 @@ class Benchmark {
     run["tracked_fraction"] = report->tracked_fraction;
     add_metrics(run, report->metrics);
     if (report->metrics) {
-      sequence["never_moving"]["average_offset_m"] = report->metrics->null_offset_m;
+      sequence["zero_motion"]["average_offset_m"] = report->metrics->null_offset_m;
     }
     speed_.push_back({{"sequence", sequence["name"]},
                       {"configuration", run["configuration"]},
@@ -304,7 +310,7 @@ class Benchmark {
     return write_text_file(one.out_dir / kInputsFile, inputs.dump(2) + '\n');
   }
 
-  [[nodiscard]] Status write_files(const Json& last) const {
+  [[nodiscard]] Status write_files() const {
     for (const auto& [name, text] : {std::pair("benchmark.md", benchmark::format_markdown(report_)),
                                      std::pair("benchmark.json", to_text(report_)),
                                      std::pair("speed.json", to_text(speed_))}) {
@@ -312,47 +318,34 @@ class Benchmark {
         return written;
       }
     }
-    return write_figure(last);
+    return benchmark::write_page(request_.out_dir / "report.html", report_, paths_);
   }
 
-  /// NN.png: the truth and, of each configuration, the trajectory without ground truth for the
-  /// first and with per-step ground-truth scale for the others; the other one where it is not done.
-  [[nodiscard]] Status write_figure(const Json& sequence) const {
-    const std::string& name = text_of(sequence["name"]);
-    const fs::path file = request_.out_dir / (name + ".png");
-    std::error_code ignored;
-    fs::remove(file, ignored);  // an older one must not pass for this one's
-    TrajectoryPlot plot;
-    plot.title = fmt::format("{}, {}", name, benchmark::describe_frames(sequence));
-    const Json& runs = sequence["runs"];
-    for (std::size_t i = 0; i < runs.size(); i += 2) {
-      const std::size_t wanted = i == 0 ? 0 : i + 1;
-      const Json& run = runs[wanted]["state"] == "done" ? runs[wanted] : runs[wanted ^ 1U];
+  /// Of the runs that are done.
+  [[nodiscard]] Expected<benchmark::SequencePaths> paths_of(const Json& sequence) const {
+    benchmark::SequencePaths paths;
+    paths.sequence = text_of(sequence["name"]);
+    for (const Json& run : sequence["runs"]) {
       if (run["state"] == "done") {
         auto poses = read_kitti_trajectory(run_dir(sequence, run) / kPosesFile);
         if (!poses) {
           return poses.error();
         }
-        plot.others.push_back({text_of(run["configuration"]), std::move(*poses)});
-        plot.subtitle += (plot.subtitle.empty() ? "" : "   ") + plot.others.back().name + ": " +
-                         benchmark::words_for(run["scale_source"]);
+        paths.runs.push_back(
+            {text_of(run["configuration"]) + ", " + benchmark::words_for(run["scale_source"]),
+             *std::move(poses)});
       }
     }
-    if (plot.others.empty()) {
-      return {};
+    if (const auto opened = KittiSequence::open(sequence_dir(paths.sequence))) {
+      paths.ground_truth = opened->ground_truth();
     }
-    plot.estimate_name = plot.others.front().name;
-    plot.estimate = std::move(plot.others.front().trajectory);
-    plot.others.erase(plot.others.begin());
-    if (const auto opened = KittiSequence::open(sequence_dir(name))) {
-      plot.ground_truth = opened->ground_truth();
-    }
-    return write_trajectory_png(file, plot);
+    return paths;
   }
 
   const BenchmarkRequest& request_;
   Json report_ = {{"stemvo_version", version()}, {"interrupted", false}};
   Json speed_ = Json::array();
+  std::vector<benchmark::SequencePaths> paths_;
   std::size_t num_runs_ = 0;
   std::size_t num_begun_ = 0;
   BenchmarkSummary summary_;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "config/config.hpp"
+#include "evaluation/trajectory.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
@@ -41,11 +43,11 @@ struct BenchmarkSummary {
 /// Runs every sequence under every configuration, with metres from the road (scale.source
 /// camera_height) and with per-step ground-truth scale (ground_truth, the paper's protocol);
 /// neither aligns anything afterwards. OUT gets runs/NN/NAME_SOURCE (all files of run_sequence),
-/// benchmark.md, benchmark.json (no times in either), speed.json and a figure NN.png per sequence;
-/// they are written after each sequence and when stopped. A run whose configuration, program,
-/// model, frames (names, sizes), calib, times and pose file are those of a result in OUT is not
-/// repeated. A sequence or run that fails is a row with its reason. Errors: no folder
-/// kitti_root/sequences, none in it, `published` cannot be read, OUT cannot be written.
+/// benchmark.md, benchmark.json (no times in either), report.html and speed.json; they are written
+/// after each sequence and when stopped. A run whose configuration, program, model, frames (names,
+/// sizes), calib, times and pose file are those of a result in OUT is not repeated. A sequence or
+/// run that fails is a row with its reason. Errors: no folder kitti_root/sequences, none in it,
+/// `published` cannot be read, OUT cannot be written.
 [[nodiscard]] Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request);
 
 namespace benchmark {
@@ -59,6 +61,21 @@ namespace benchmark {
 /// benchmark.json for people: a table over all sequences, then one per sequence with the
 /// zero-motion baseline and, where all official frames ran, the published numbers.
 [[nodiscard]] std::string format_markdown(const nlohmann::ordered_json& report);
+
+struct NamedTrajectory {
+  std::string name;
+  Trajectory trajectory;
+};
+/// What the runs of a sequence that are done drove.
+struct SequencePaths {
+  std::string sequence;
+  std::optional<Trajectory> ground_truth;
+  std::vector<NamedTrajectory> runs;
+};
+/// report.html: benchmark.json as figures. Error: the file cannot be written.
+[[nodiscard]] Status write_page(const std::filesystem::path& file,
+                                const nlohmann::ordered_json& report,
+                                const std::vector<SequencePaths>& paths);
 
 }  // namespace benchmark
 }  // namespace stemvo

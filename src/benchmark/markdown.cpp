@@ -85,7 +85,7 @@ std::string overview(const Json& report) {
       }
       rows[i].push_back(short_cell(run));
     }
-    const Json& offset_m = sequence["never_moving"]["average_offset_m"];
+    const Json& offset_m = sequence["zero_motion"]["average_offset_m"];
     baseline.push_back(offset_m.is_null() ? "-" : "- / - / " + number(offset_m, 2));
   }
   if (baseline.size() == 1) {

@@ -109,9 +109,7 @@ class ResultWriter {
     if (request_.write_map) {
       keep_first(written, write_map_ply(folder / "map.ply", map_points(), *refined_));
     }
-    const TrajectoryPlot plot = make_plot(report);
-    keep_first(written, write_trajectory_png(folder / "trajectory.png", plot));
-    keep_first(written, write_trajectory_svg(folder / "trajectory.svg", plot));
+    keep_first(written, write_trajectory_png(folder / "trajectory.png", make_plot(report)));
     keep_first(written, matched_);
     if (request_.note && truth_ && sequence_.stream()) {
       request_.note("ground truth" +

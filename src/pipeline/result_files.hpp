@@ -46,7 +46,7 @@ struct Drive {
 /// Everything that is written at the end but metrics.json, for which it makes `report`:
 /// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
 /// trajectory, what an earlier run left there is removed), config.yaml (`stemvo run --config` takes
-/// it as it is), map.ply where it is asked for, trajectory.png and .svg.
+/// it as it is), map.ply where it is asked for, trajectory.png.
 [[nodiscard]] Status write_results(const RunRequest& request,
                                    const FrameSource& sequence,
                                    const PhasedOdometry& odometry,

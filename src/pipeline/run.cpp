@@ -115,8 +115,7 @@ Status check_inputs_are_spared(const RunRequest& request, const FrameSource& seq
   std::vector<std::filesystem::path> results;
   for (const char* name :
        {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt", "report.html",
-        "trajectory.png", "trajectory.svg", "frames.csv", "metrics.json", "config.yaml",
-        "checkpoint"}) {
+        "trajectory.png", "frames.csv", "metrics.json", "config.yaml", "checkpoint"}) {
     results.push_back(request.out_dir / name);
   }
   Config config = request.config;

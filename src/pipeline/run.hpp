@@ -53,7 +53,7 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
 /// else an old one is removed, frames.csv, config.yaml, metrics.json,
-/// report.html, trajectory.png, trajectory.svg, map.ply, pictures/%06d.png; until the end also
+/// report.html, trajectory.png, map.ply, pictures/%06d.png; until the end also
 /// checkpoint). A wrong request
 /// (configuration, sequence, ground truth that scale.source needs, model, out_dir that cannot be
 /// written) is an error before work starts. A frame that cannot be read is a warning and gets a

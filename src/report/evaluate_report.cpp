@@ -150,7 +150,7 @@ nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {
   for (const EvaluationRow& row : report.rows) {
     json["estimates"].push_back(row_json(row));
   }
-  json["never_moves"] = row_json(report.zero_motion);
+  json["zero_motion"] = row_json(report.zero_motion);
   return json;
 }
 

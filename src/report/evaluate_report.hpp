@@ -53,7 +53,7 @@ struct EvaluationReport {
 /// newline.
 [[nodiscard]] std::string format_evaluation_table(const EvaluationReport& report);
 /// The same as JSON: {ground_truth, poses, alignment, estimates: [{file, t_rel_percent, ...}],
-/// never_moves: {...}}, with the keys of metrics.json. Error: the file cannot be written.
+/// zero_motion: {...}}, with the keys of metrics.json. Error: the file cannot be written.
 [[nodiscard]] Status write_evaluation_json(const std::filesystem::path& file,
                                            const EvaluationReport& report);
 [[nodiscard]] nlohmann::ordered_json evaluation_document(const EvaluationReport& report);

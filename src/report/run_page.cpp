@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "html/figures.hpp"
 #include "internal_check.hpp"
 
 namespace stemvo {
@@ -42,8 +43,6 @@ json coordinates(const Trajectory& trajectory, int axis, double sign = 1.0) {
 
 /// Whether a homography was scored against a fundamental matrix.
 bool is_scored(const FrameResult& r) { return r.homography_score + r.fundamental_score > 0.0; }
-
-json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
 
 class RunFigures {
  public:
@@ -93,8 +92,8 @@ class RunFigures {
                       {"y", coordinates(run_.estimate, 2)}});
     json layout = {{"large", true},
                    {"dragmode", "pan"},
-                   {"xaxis", titled("x (right), " + run_.unit)},
-                   {"yaxis", titled("z (forward), " + run_.unit)}};
+                   {"xaxis", html::titled("x (right), " + run_.unit)},
+                   {"yaxis", html::titled("z (forward), " + run_.unit)}};
     layout["yaxis"]["scaleanchor"] = "x";
     add({"Path from above", "Drag to move, wheel to zoom, double click to see all.", traces, layout,
          static_cast<int>(traces.size()) - 1});
@@ -120,9 +119,9 @@ class RunFigures {
                          {"scene",
                           {{"aspectmode", "data"},
                            {"camera", {{"eye", {{"x", -1.0}, {"y", -2.0}, {"z", 1.0}}}}},
-                           {"xaxis", titled("right, " + run_.unit)},
-                           {"yaxis", titled("forward, " + run_.unit)},
-                           {"zaxis", titled("up, " + run_.unit)}}}};
+                           {"xaxis", html::titled("right, " + run_.unit)},
+                           {"yaxis", html::titled("forward, " + run_.unit)},
+                           {"zaxis", html::titled("up, " + run_.unit)}}}};
     add({"Path in space", "", traces, layout, static_cast<int>(traces.size()) - 1});
   }
 
@@ -149,7 +148,7 @@ class RunFigures {
     add({"Error over distance",
          "",
          traces,
-         {{"xaxis", titled("true path, m")}, {"yaxis", titled("error, m")}},
+         {{"xaxis", html::titled("true path, m")}, {"yaxis", html::titled("error, m")}},
          0});
   }
 
@@ -182,10 +181,10 @@ class RunFigures {
       }
     }
     json layout = {{"grid", {{"rows", 1}, {"columns", 2}, {"pattern", "independent"}}},
-                   {"xaxis", titled("segment, m")},
-                   {"xaxis2", titled("segment, m")},
-                   {"yaxis", titled("t_rel, %")},
-                   {"yaxis2", titled("r_rel, degrees per 100 m")}};
+                   {"xaxis", html::titled("segment, m")},
+                   {"xaxis2", html::titled("segment, m")},
+                   {"yaxis", html::titled("t_rel, %")},
+                   {"yaxis2", html::titled("r_rel, degrees per 100 m")}};
     add({"Error by segment length", "KITTI's segments, from every tenth frame.", each, layout});
   }
 
@@ -202,8 +201,8 @@ class RunFigures {
         over_frames(
             "state", "y", [](const FrameResult& r) { return to_string(r.state); }, "markers")};
     json layout = stacked(3);
-    layout["yaxis3"].update(titled("tracks"));
-    layout["yaxis2"].update(titled("R_H"));
+    layout["yaxis3"].update(html::titled("tracks"));
+    layout["yaxis2"].update(html::titled("R_H"));
     layout["yaxis"]["type"] = "category";
     add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
          traces, layout, 0});
@@ -235,9 +234,9 @@ class RunFigures {
                                    })}};
     }
     json layout = stacked(3);
-    layout["yaxis3"].update(titled("step, " + run_.unit));
-    layout["yaxis2"].update(titled("sigma, %"));
-    layout["yaxis"].update(titled("moved by, px"));
+    layout["yaxis3"].update(html::titled("step, " + run_.unit));
+    layout["yaxis2"].update(html::titled("sigma, %"));
+    layout["yaxis"].update(html::titled("moved by, px"));
     add({"Scale and camera", "Bars: one sigma, where the principal point is learnt.", traces,
          layout, 0});
   }
@@ -253,7 +252,9 @@ class RunFigures {
     add({"Time per stage",
          "Stages of different frames overlap: they do not add up to a frame's time.",
          traces,
-         {{"xaxis", titled("frame")}, {"yaxis", titled("ms")}, {"hovermode", "x unified"}},
+         {{"xaxis", html::titled("frame")},
+          {"yaxis", html::titled("ms")},
+          {"hovermode", "x unified"}},
          0});
   }
 
@@ -290,7 +291,7 @@ class RunFigures {
 
   /// y (the lowest), y2, .. above one x axis of frames.
   static json stacked(int rows) {
-    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", titled("frame")}};
+    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", html::titled("frame")}};
     layout["xaxis"]["anchor"] = "y";
     constexpr double kGap = 0.06;
     for (int i = 0; i < rows; ++i) {

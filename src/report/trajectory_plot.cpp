@@ -2,12 +2,11 @@
 #include "report/trajectory_plot.hpp"
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <numbers>
-#include <string_view>
+#include <vector>
 
-#include <cairo-svg.h>
+#include <cairo.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -35,9 +34,6 @@ constexpr Color kTruth{0.62, 0.62, 0.62};
 constexpr Color kEstimate{0.0, 114.0 / 255.0, 178.0 / 255.0};
 constexpr Color kStart{0.0, 158.0 / 255.0, 115.0 / 255.0};
 constexpr Color kEnd{213.0 / 255.0, 94.0 / 255.0, 0.0};
-constexpr Color kOthers[] = {{204.0 / 255.0, 121.0 / 255.0, 167.0 / 255.0},
-                             {230.0 / 255.0, 159.0 / 255.0, 0.0},
-                             {86.0 / 255.0, 180.0 / 255.0, 233.0 / 255.0}};
 
 // The truth is a broad gray road under the thin estimate: both stay visible where they agree.
 constexpr double kTruthWidth_px = 9.0;
@@ -83,11 +79,7 @@ std::vector<Path> paths_of(const TrajectoryPlot& plot) {
   if (plot.ground_truth) {
     paths.push_back({&*plot.ground_truth, "ground truth", kTruth, kTruthWidth_px});
   }
-  paths.push_back({&plot.estimate, plot.estimate_name, kEstimate, kEstimateWidth_px});
-  for (std::size_t i = 0; i < plot.others.size(); ++i) {
-    paths.push_back({&plot.others[i].trajectory, plot.others[i].name,
-                     kOthers[i % std::size(kOthers)], kEstimateWidth_px});
-  }
+  paths.push_back({&plot.estimate, "estimate", kEstimate, kEstimateWidth_px});
   return paths;
 }
 
@@ -99,7 +91,6 @@ PlotLayout layout_of(const std::vector<Path>& paths) {
   return make_plot_layout(trajectories);
 }
 
-/// The one drawing for every kind of surface.
 class Drawing {
  public:
   explicit Drawing(const TrajectoryPlot& plot)
@@ -109,7 +100,6 @@ class Drawing {
 
   [[nodiscard]] cairo_status_t draw(cairo_surface_t* surface) {
     cairo_.reset(cairo_create(surface));
-    // Without hinting text has the same shape and width on both kinds of surface.
     const std::unique_ptr<cairo_font_options_t, CairoDelete> options(cairo_font_options_create());
     cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);
     cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
@@ -122,10 +112,7 @@ class Drawing {
     draw_titles();
     draw_legend();
     draw_grid();
-    const auto estimates = paths_.begin() + (plot_.ground_truth ? 1 : 0);
-    std::for_each(paths_.begin(), estimates, [&](const Path& path) { draw_path(path); });
-    std::for_each(paths_.rbegin(), std::reverse_iterator(estimates),
-                  [&](const Path& path) { draw_path(path); });
+    std::ranges::for_each(paths_, [&](const Path& path) { draw_path(path); });
     draw_markers();
     return cairo_status(cairo_.get());
   }
@@ -154,15 +141,14 @@ class Drawing {
     stroke(kRim_px);
   }
 
-  void start_marker(double x, double y, double zoom) const {
+  void start_marker(double x, double y) const {
     cairo_new_path(cairo_.get());
-    cairo_arc(cairo_.get(), x, y, kStart_px * zoom, 0.0, 2.0 * std::numbers::pi);
+    cairo_arc(cairo_.get(), x, y, kStart_px, 0.0, 2.0 * std::numbers::pi);
     fill_marker(kStart);
   }
 
-  void end_marker(double x, double y, double zoom) const {
-    const double radius_px = kEnd_px * zoom;
-    cairo_rectangle(cairo_.get(), x - radius_px, y - radius_px, 2.0 * radius_px, 2.0 * radius_px);
+  void end_marker(double x, double y) const {
+    cairo_rectangle(cairo_.get(), x - kEnd_px, y - kEnd_px, 2.0 * kEnd_px, 2.0 * kEnd_px);
     fill_marker(kEnd);
   }
 
@@ -206,38 +192,27 @@ class Drawing {
     fitting_text(108.0, plot_.subtitle, kSubtitle_px, false);
   }
 
-  [[nodiscard]] double legend_width() const {
-    double width_px = 2.0 * (kStart_px + kEnd_px + kAfterMarker_px) + kAfterText_px +
-                      text_width("start") + text_width("end");
-    for (const Path& path : paths_) {
-      width_px += kSwatch_px + text_width(path.name) + kAfterText_px;
-    }
-    return width_px;
-  }
-
-  /// One line above the plot, where it can hide no data; shrinks until it fits the figure.
+  /// One line above the plot, where it can hide no data.
   void draw_legend() const {
     set_font(kTick_px);
-    const double zoom = std::min(1.0, room_px() / legend_width());
-    set_font(kTick_px * zoom);
     const double y = PlotLayout::kTop_px - 30.0;
     double x = PlotLayout::kLeft_px;
     const auto label = [&](const std::string& name) {
       set_color(kInk);
-      text(x, y + 0.36 * kTick_px * zoom, name, 0.0);
-      x += text_width(name) + kAfterText_px * zoom;
+      text(x, y + 0.36 * kTick_px, name, 0.0);
+      x += text_width(name) + kAfterText_px;
     };
     for (const Path& path : paths_) {
       set_color(path.color);
-      line(x + 5.0 * zoom, y, x + 59.0 * zoom, y, path.width_px);
-      x += kSwatch_px * zoom;
+      line(x + 5.0, y, x + 59.0, y, path.width_px);
+      x += kSwatch_px;
       label(path.name);
     }
-    start_marker(x + kStart_px * zoom, y, zoom);
-    x += (2.0 * kStart_px + kAfterMarker_px) * zoom;
+    start_marker(x + kStart_px, y);
+    x += 2.0 * kStart_px + kAfterMarker_px;
     label("start");
-    end_marker(x + kEnd_px * zoom, y, zoom);
-    x += (2.0 * kEnd_px + kAfterMarker_px) * zoom;
+    end_marker(x + kEnd_px, y);
+    x += 2.0 * kEnd_px + kAfterMarker_px;
     label("end");
   }
 
@@ -299,9 +274,8 @@ class Drawing {
     }
     const auto last = std::find_if(path.rbegin(), path.rend(), is_finite);
     // On a loop both fall together: the square's corners stay visible around the disk.
-    end_marker(layout_.to_px_x(last->translation.x()), layout_.to_px_y(last->translation.z()), 1.0);
-    start_marker(layout_.to_px_x(first->translation.x()), layout_.to_px_y(first->translation.z()),
-                 1.0);
+    end_marker(layout_.to_px_x(last->translation.x()), layout_.to_px_y(last->translation.z()));
+    start_marker(layout_.to_px_x(first->translation.x()), layout_.to_px_y(first->translation.z()));
   }
 
   const TrajectoryPlot& plot_;
@@ -313,36 +287,6 @@ class Drawing {
 cairo_status_t append_bytes(void* text, const unsigned char* data, unsigned int size) {
   static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(data), size);
   return CAIRO_STATUS_SUCCESS;
-}
-
-Status write_bytes(const std::filesystem::path& file,
-                   cairo_status_t status,
-                   const std::string& bytes) {
-  if (status != CAIRO_STATUS_SUCCESS) {
-    return fail(fmt::format("{}: cannot draw: {}", file.string(), cairo_status_to_string(status)));
-  }
-  return write_text_file(file, bytes);
-}
-
-/// cairo numbers its surfaces over the life of the process: numbers them anew in order of
-/// appearance, so that the same plot gives the same bytes.
-std::string with_own_surface_numbers(const std::string& svg) {
-  constexpr std::string_view kName = "surface";
-  std::string result;
-  std::map<std::string, std::size_t> numbers;
-  std::size_t copied = 0;
-  for (std::size_t at = svg.find(kName); at != std::string::npos; at = svg.find(kName, copied)) {
-    const std::size_t begin = at + kName.size();
-    const std::size_t end = std::min(svg.find_first_not_of("0123456789", begin), svg.size());
-    result += svg.substr(copied, begin - copied);
-    if (end > begin) {
-      const std::size_t number =
-          numbers.try_emplace(svg.substr(begin, end - begin), numbers.size()).first->second;
-      result += std::to_string(number);
-    }
-    copied = end;
-  }
-  return result + svg.substr(copied);
 }
 
 }  // namespace
@@ -357,21 +301,10 @@ Status write_trajectory_png(const std::filesystem::path& file, const TrajectoryP
   if (status == CAIRO_STATUS_SUCCESS) {
     status = cairo_surface_write_to_png_stream(surface.get(), append_bytes, &bytes);
   }
-  return write_bytes(file, status, bytes);
-}
-
-Status write_trajectory_svg(const std::filesystem::path& file, const TrajectoryPlot& plot) {
-  Drawing drawing(plot);
-  std::string bytes;
-  const CairoSurface surface(cairo_svg_surface_create_for_stream(
-      append_bytes, &bytes, drawing.layout().width_px(), drawing.layout().height_px()));
-  cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
-  cairo_status_t status = drawing.draw(surface.get());
-  cairo_surface_finish(surface.get());
-  if (status == CAIRO_STATUS_SUCCESS) {
-    status = cairo_surface_status(surface.get());
+  if (status != CAIRO_STATUS_SUCCESS) {
+    return fail(fmt::format("{}: cannot draw: {}", file.string(), cairo_status_to_string(status)));
   }
-  return write_bytes(file, status, with_own_surface_numbers(bytes));
+  return write_text_file(file, bytes);
 }
 
 }  // namespace stemvo

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "html/figures.hpp"
 #include "robustness/robustness.hpp"
 
 namespace stemvo::robustness {
@@ -16,15 +17,6 @@ using nlohmann::json;
 std::string label_of(const Row& row) {
   return row.disturbance == kUndisturbed ? "as the frames are"
                                          : fmt::format("{} {:g}", row.disturbance, row.strength);
-}
-
-json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
-
-json logarithmic(const std::string& title) {
-  json axis = titled(title);
-  axis["type"] = "log";
-  axis["tickformat"] = "~g";
-  return axis;
 }
 
 /// The judged channel's rotation error over each control's, a row per disturbance and strength.
@@ -60,7 +52,7 @@ void add_ratios(const RobustnessReport& report, html::Page& page) {
   }
   json layout = {{"height", 130 + 19 * report.rows.size()},
                  {"dragmode", "pan"},
-                 {"xaxis", logarithmic("rotation error, times the control's")},
+                 {"xaxis", html::logarithmic("rotation error, times the control's")},
                  {"yaxis", {{"autorange", "reversed"}}}};
   layout["shapes"] = {{{"type", "line"},
                        {"yref", "paper"},
@@ -96,7 +88,7 @@ void add_panel(const RobustnessReport& report,
                       {"x", x},
                       {"y", y}});
   }
-  json layout = {{"small", true}, {"yaxis", logarithmic("degrees per 100 m")}};
+  json layout = {{"small", true}, {"yaxis", html::logarithmic("degrees per 100 m")}};
   layout["xaxis"]["type"] = "category";
   page.add_figure(
       {rows.back()->disturbance == kUndisturbed ? "as the frames are" : rows.back()->disturbance,

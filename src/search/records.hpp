@@ -15,8 +15,10 @@
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
+#include <opencv2/core.hpp>
 
 #include "evaluation/paired_ratio.hpp"
+#include "evaluation/trajectory.hpp"
 #include "search/search.hpp"
 
 /// records.jsonl: the identity of a search in the first line, then a FilterRecord a line. Members
@@ -210,13 +212,14 @@ struct FilterRow : FilterRecord {
                                      const std::vector<FilterRow>& rows);
 
 /// Ranks the records and writes the files of run_search, of which filters.json says what was
-/// searched, how, and the work it took. A sheet whose frames or models are not where they were is a
-/// warning, one that cannot be written an error. Where records are missing the search was
-/// interrupted. Of a part with one sequence nothing is written.
+/// searched, how, and the work it took; without sheet.png, with a warning, where frames or models
+/// are not where they were. `command`, which may be empty, is for report.html. Where records are
+/// missing the search was interrupted. Of a part with one sequence nothing is written.
 [[nodiscard]] Expected<SearchReport> write_results(const std::filesystem::path& out_dir,
                                                    const std::filesystem::path& models_dir,
                                                    const SearchIdentity& identity,
-                                                   const FilterRecords& records);
+                                                   const FilterRecords& records,
+                                                   const std::string& command);
 
 /// Best, median and worst of the filters (no baselines) whose pose was detected, those that halving
 /// stopped behind the others, the later the better; the same filter once.
@@ -232,12 +235,22 @@ struct Results {
   Config config;  ///< of all rows
   std::vector<FilterRow> rows;
 };
-/// sheet.png: the input and the channels of the filters of choose_rows on the middle frame of the
-/// first sequence, above their trajectories (trajectories.png), and where they were stopped.
-/// Nothing where there is none; where the sequence or the model is not where it was, a warning.
-/// Error: it cannot be written.
-[[nodiscard]] Status write_contact_sheet(const Results& results,
-                                         std::vector<std::string>& warnings);
+/// What a search's results show of its first sequence.
+struct Pictures {
+  cv::Mat sheet;  ///< RGB; empty: nothing was found. The input and the channels of choose_rows
+  std::optional<Trajectory> ground_truth;
+};
+/// Error: the sequence or a model is not where it was.
+[[nodiscard]] Expected<Pictures> draw_pictures(const Results& results);
+
+struct PageTexts {
+  std::string table;    ///< as the program prints it
+  std::string command;  ///< that repeats the search; may be empty
+};
+/// report.html. Error: it cannot be written.
+[[nodiscard]] Status write_page(const Results& results,
+                                const Pictures& pictures,
+                                const PageTexts& texts);
 
 void to_json(nlohmann::ordered_json& json, const FilterKey& key);
 void to_json(nlohmann::ordered_json& json, const DriveScore& score);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "models/manifest.hpp"
+#include "report/frame_image.hpp"
 #include "report/metrics_keys.hpp"
 #include "search/records.hpp"
 #include "stemvo/version.hpp"
@@ -252,7 +253,8 @@ std::string format_csv(const SearchIdentity& identity, const std::vector<FilterR
 Expected<SearchReport> write_results(const fs::path& out_dir,
                                      const fs::path& models_dir,
                                      const SearchIdentity& identity,
-                                     const FilterRecords& records) {
+                                     const FilterRecords& records,
+                                     const std::string& command) {
   const Json work = work_of(identity, records);
   const auto num_done = std::ranges::count(records, identity.rungs.size() - 1, &FilterRecord::rung);
   SearchReport report;
@@ -285,13 +287,23 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
       return status.error();
     }
   }
-  if (const Status status = write_contact_sheet(results, report.warnings); !status) {
-    return status.error();
+  report.text = format_table(results.rows);
+  const Expected<Pictures> pictures = draw_pictures(results);
+  if (!pictures) {
+    report.warnings.push_back("no sheet.png: " + pictures.error().message);
+  } else if (!pictures->sheet.empty()) {
+    if (const Status status = write_image(out_dir / "sheet.png", pictures->sheet); !status) {
+      return status.error();
+    }
+  }
+  const Status page =
+      write_page(results, pictures ? *pictures : Pictures(), {report.text, command});
+  if (!page) {
+    return page.error();
   }
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();
   const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
-  report.text = format_table(results.rows);
   if (num_equal > 1) {
     report.text += fmt::format(
         "filters 1 to {} cannot be told from the best (over best: errors over its errors, 95 % "
@@ -299,11 +311,13 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
         num_equal);
   }
   report.text += fmt::format(
-      "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\n",
+      "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\nreport: "
+      "{}\n",
       num_frames,
       100.0 * static_cast<double>(num_frames) /
           static_cast<double>(std::max<std::size_t>(num_exhaustive, 1)),
-      work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string());
+      work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string(),
+      (out_dir / "report.html").string());
   return report;
 }
 

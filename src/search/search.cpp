@@ -139,8 +139,8 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!warnings) {
     return warnings.error();
   }
-  auto report =
-      write_results(request.out_dir, request.models_dir, plan->identity, records->records());
+  auto report = write_results(request.out_dir, request.models_dir, plan->identity,
+                              records->records(), request.command);
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
     report->warnings.insert(report->warnings.begin(), records->warnings().begin(),
@@ -151,7 +151,8 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
 
 Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                       const std::filesystem::path& out_dir,
-                                      const std::filesystem::path& models_dir) {
+                                      const std::filesystem::path& models_dir,
+                                      const std::string& command) {
   SearchIdentity identity;
   Scores scores;
   std::vector<std::string> warnings;
@@ -184,7 +185,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   if (!written) {
     return written.error();
   }
-  auto report = write_results(out_dir, models_dir, identity, *records);
+  auto report = write_results(out_dir, models_dir, identity, *records, command);
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings.begin(), warnings.end());
   }

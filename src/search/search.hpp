@@ -37,8 +37,9 @@ struct SearchRequest {
   /// Index of a sequence: as they are, then under each of `kinds`, the held-out one last. Runs it
   /// alone, as a part for merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
   std::optional<std::size_t> only_sequence;
-  bool resume = false;  ///< go on from what out_dir holds
-  int num_threads = 0;  ///< 0: all cores
+  bool resume = false;       ///< go on from what out_dir holds
+  int num_threads = 0;       ///< 0: all cores
+  std::string command = {};  ///< that repeats the search, for report.html; may be empty
   /// Filters in flight, which a kill may lose; 0: a layer's, as far as 1 GB of odometries allows.
   int block = 0;
 };
@@ -55,9 +56,9 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Ranks the filters, in parallel. out_dir receives records.jsonl (appended as blocks of filters
 /// end, what `resume` reads), filters.csv, filters.json, config.yaml (of all rows), best.yaml (what
-/// repeats the first row) and, where the frames can be read, sheet.png and trajectories.png. Tables
-/// do not depend on threads, blocks or interruptions. Errors, before work starts: unknown model or
-/// layer (lists the known ones), filters outside, no ground truth, a path too short for a segment,
+/// repeats the first row), report.html and, where the frames can be read, sheet.png. Tables do not
+/// depend on threads, blocks or interruptions. Errors, before work starts: unknown model or layer
+/// (lists the known ones), filters outside, no ground truth, a path too short for a segment,
 /// out_dir holds another search, or with `resume` one of other inputs (says what changed).
 [[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
                                                 const SearchProgress& progress = {});
@@ -68,6 +69,7 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 /// two different results or none on a sequence.
 [[nodiscard]] Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                                     const std::filesystem::path& out_dir,
-                                                    const std::filesystem::path& models_dir);
+                                                    const std::filesystem::path& models_dir,
+                                                    const std::string& command = {});
 
 }  // namespace stemvo::search

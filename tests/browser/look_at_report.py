@@ -39,15 +39,8 @@ def middle_of_path(page):
     }})()""")
 
 
-def look(browser, report, screenshot):
-    found = {"errors": [], "requests": []}
-    page = open_page(browser, report, found, viewport={"width": 1200, "height": 900}, color_scheme="light")
-    found["title"] = page.title()
-    found["headings"] = page.locator("h2, summary").all_text_contents()
-    found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
-    found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
-    found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
-
+def use(page, found):
+    """What a page with a slider over frames does by keyboard, mouse and wheel."""
     page.focus(SLIDER)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
@@ -63,6 +56,19 @@ def look(browser, report, screenshot):
         page.mouse.wheel(0, -100)
         page.wait_for_timeout(200)
     found["zoom"] = [before, x_range(page)]
+
+
+def look(browser, report, screenshot):
+    found = {"errors": [], "requests": []}
+    page = open_page(browser, report, found, viewport={"width": 1200, "height": 900}, color_scheme="light")
+    found["title"] = page.title()
+    found["headings"] = page.locator("h2, summary").all_text_contents()
+    found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
+    found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
+    found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    if page.locator(SLIDER).is_visible():
+        use(page, found)
     if screenshot:
         page.screenshot(path=screenshot, full_page=True)
     page.close()

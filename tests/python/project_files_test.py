@@ -74,6 +74,14 @@ class ContinuousIntegration(unittest.TestCase):
         thresholds.write_text(thresholds.read_text().replace("{min: 10}", "{min: 10000}"))
         self.assertEqual(self.run_step("Check").returncode, 1)
 
+    def test_the_image_is_built_by_the_commands_of_the_readme(self):
+        dockerfile = (ROOT / "Dockerfile").read_text()
+        self.assertIn("RUN make build && cd build/release && cpack -G DEB", dockerfile)
+        self.assertIn("make build && (cd build/release && cpack -G DEB)", (ROOT / "README.md").read_text())
+        ignored = (ROOT / ".gitignore").read_text().split()
+        for name in (ROOT / ".dockerignore").read_text().split():
+            self.assertIn(f"/{name}".rstrip("/"), [line.rstrip("/") for line in ignored])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""report.html of a rendered drive in Chromium: it draws without a network, hover, wheel and keyboard work."""
+"""report.html of run, search and benchmark in Chromium: it draws without a network, hover, wheel and keyboard work."""
 
 import json
 import os
@@ -14,23 +14,54 @@ BROWSER = ROOT / "build/venv-browser/bin/python"
 FRAMES = 30
 
 
+def call(*arguments):
+    subprocess.run(list(map(str, [PROGRAM, *arguments])), check=True, capture_output=True)
+
+
+def look_at(report):
+    look = subprocess.run([BROWSER, ROOT / "tests/browser/look_at_report.py", report], capture_output=True, text=True, check=False)
+    if look.returncode != 0:
+        raise AssertionError(look.stderr)
+    return json.loads(look.stdout)
+
+
 @unittest.skipUnless(BROWSER.exists() and pathlib.Path("/usr/bin/chromium").exists(), "tools/setup.sh browser has not run")
 class ReportPage(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
-        drive, out = pathlib.Path(folder.name) / "drive", pathlib.Path(folder.name) / "result"
-        subprocess.run([PROGRAM, "synth", drive, "--frames", str(FRAMES), "--width", "620", "--height", "188"], check=True, capture_output=True)
-        subprocess.run([PROGRAM, "run", drive / "sequences/00", "--out", out, "--quiet"], check=True, capture_output=True)
-        look = subprocess.run([BROWSER, ROOT / "tests/browser/look_at_report.py", out / "report.html"], capture_output=True, text=True, check=False)
-        if look.returncode != 0:
-            raise AssertionError(look.stderr)
-        cls.found = json.loads(look.stdout)
+        cls.folder = pathlib.Path(folder.name)
+        call("synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
+        call("run", cls.folder / "drive/sequences/00", "--out", cls.folder / "result", "--quiet")
+        cls.found = look_at(cls.folder / "result/report.html")
+
+    def expect_a_sound_page(self, found):
+        self.assertEqual(found["errors"], [])
+        self.assertEqual([url for url in found["requests"] if not url.startswith(("file:", "data:", "blob:"))], [])
+        self.assertTrue(all(count > 0 for count in found["points"]), found["points"])
+        self.assertNotEqual(found["light"], found["dark"])
+        self.assertLessEqual(found["phone_width"], 380)
+
+    def test_search(self):
+        out = self.folder / "search"
+        call("search", self.folder / "drive/sequences/00", "--out", out, "--filters", "0:4", "--exhaustive")
+        found = look_at(out / "report.html")
+        self.expect_a_sound_page(found)
+        self.assertIn("Best filter: ", found["title"])
+        self.assertEqual(found["headings"], ["Filters by rank", "Error and matches", "Paths from above", "Channels", "All filters", "Command",
+                                             "Configuration of all rows"])
+        self.assertEqual(len(found["images"]), 1)
+
+    def test_benchmark(self):
+        out = self.folder / "benchmark"
+        call("benchmark", self.folder / "drive", "--out", out)
+        found = look_at(out / "report.html")
+        self.expect_a_sound_page(found)
+        self.assertIn(f"00, frames 0:{FRAMES}", found["headings"])
 
     def test_draws_everything_without_errors_or_a_network(self):
-        self.assertEqual(self.found["errors"], [])
-        self.assertEqual([url for url in self.found["requests"] if not url.startswith(("file:", "data:", "blob:"))], [])
+        self.expect_a_sound_page(self.found)
         self.assertIn(f"frames 0:{FRAMES} of 00", self.found["title"])
         self.assertEqual(self.found["figures"], 7)
         self.assertEqual(len(self.found["images"]), 6)
@@ -44,10 +75,6 @@ class ReportPage(unittest.TestCase):
         self.assertIn(self.found["hover"], self.found["by_hover"])
         (left, right), (zoomed_left, zoomed_right) = self.found["zoom"]
         self.assertLess(zoomed_right - zoomed_left, 0.9 * (right - left))
-
-    def test_dark_and_narrow(self):
-        self.assertNotEqual(self.found["light"], self.found["dark"])
-        self.assertLessEqual(self.found["phone_width"], 380)
 
 
 if __name__ == "__main__":

@@ -38,8 +38,8 @@ class Faults : public ::testing::Test {
     if (fs::exists(out_ / "metrics.json")) {
       EXPECT_TRUE(nlohmann::json::accept(read_file(out_ / "metrics.json")));
     }
-    if (fs::exists(out_ / "trajectory.svg")) {
-      EXPECT_THAT(read_file(out_ / "trajectory.svg"), ::testing::EndsWith("</svg>\n"));
+    if (fs::exists(out_ / "report.html")) {
+      EXPECT_THAT(read_file(out_ / "report.html"), ::testing::EndsWith("</html>\n"));
     }
     for (const auto& entry : fs::recursive_directory_iterator(out_)) {
       if (entry.path().extension() == ".png") {

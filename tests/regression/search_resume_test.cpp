@@ -113,7 +113,7 @@ TEST_F(Search, ADamagedRecordIsNamedAndRunAgain) {
 }
 
 TEST_F(Search, ASheetThatCannotBeWrittenIsAnError) {
-  for (const char* name : {"sheet.png", "trajectories.png"}) {
+  for (const char* name : {"sheet.png", "report.html"}) {
     fs::remove(folder_ / "out" / name);  // which the search before this wrote
     fs::create_directories(folder_ / "out" / name);
     expect_error(search("out", {"--exhaustive", "--filters", "0:1", "--no-baselines", "--resume"}),

@@ -46,7 +46,7 @@ Json sequence(const std::string& name, const Json& runs) {
           {"official_frames", nullptr},
           {"is_complete", false},
           {"runs", runs},
-          {"never_moving", {{"average_offset_m", 345.5}}},
+          {"zero_motion", {{"average_offset_m", 345.5}}},
           {"published", Json::array()}};
 }
 

@@ -117,11 +117,11 @@ TEST_F(BenchmarkRuns, RunsEachSequenceUnderEachConfigurationAndProtocolOnce) {
                           "5/8 street, one, camera_height", "6/8 street, one, ground_truth",
                           "7/8 street, two, camera_height", "8/8 street, two, ground_truth"));
   EXPECT_THAT(summary.failures, SizeIs(0));
-  EXPECT_TRUE(fs::exists(request_.out_dir / "03.png"));
+  EXPECT_TRUE(fs::exists(request_.out_dir / "report.html"));
   EXPECT_TRUE(fs::exists(request_.out_dir / "runs/street/two_ground_truth/trajectory_kitti.txt"));
   const std::string first = written();
   EXPECT_THAT(first, AllOf(HasSubstr("all 5 frames"), HasSubstr("frames 0:5")));
-  EXPECT_EQ(report()["sequences"][0]["never_moving"]["average_offset_m"], 1.0);
+  EXPECT_EQ(report()["sequences"][0]["zero_motion"]["average_offset_m"], 1.0);
   // No times where reports are compared.
   EXPECT_THAT(first, Not(HasSubstr("fps")));
   EXPECT_EQ(nlohmann::json::parse(read_all(request_.out_dir / "speed.json")).size(), 8U);

@@ -183,7 +183,7 @@ TEST(EvaluateFiles, TableAndJsonSayTheSame) {
   EXPECT_EQ(json["estimates"][0]["file"], files.kitti.string());
   EXPECT_EQ(json["estimates"][0]["t_rel_percent"].get<double>(),
             report->rows[0].metrics.t_rel_percent.value());
-  EXPECT_EQ(json["never_moves"]["average_offset_m"].get<double>(),
+  EXPECT_EQ(json["zero_motion"]["average_offset_m"].get<double>(),
             report->zero_motion.metrics.null_offset_m);
 }
 

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// report.html of a benchmark.
+#include "html/page.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "benchmark/benchmark.hpp"
+#include "html/figures.hpp"
+
+namespace stemvo::benchmark {
+namespace {
+
+using nlohmann::json;
+using Json = nlohmann::ordered_json;
+
+std::string text_of(const Json& value) { return value.get<std::string>(); }
+
+/// "default, camera height".
+std::string name_of(const Json& run) {
+  return text_of(run["configuration"]) + ", " + words_for(run["scale_source"]);
+}
+
+/// One measure of every sequence, a bar per run; published numbers beside them.
+void add_bars(const Json& report, const char* key, const std::string& title, html::Page& page) {
+  std::vector<std::string> order;
+  json bars = json::object();
+  const auto add = [&](const std::string& name, const Json& sequence, const Json& value) {
+    if (!value.is_number()) {
+      return;
+    }
+    if (!bars.contains(name)) {
+      order.push_back(name);
+      bars[name] = {{"name", name}, {"type", "bar"}, {"x", json::array()}, {"y", json::array()}};
+    }
+    bars[name]["x"].push_back(text_of(sequence["name"]) + ", " + describe_frames(sequence));
+    bars[name]["y"].push_back(value.get<double>());
+  };
+  for (const Json& sequence : report["sequences"]) {
+    for (const Json& run : sequence["runs"]) {
+      add(name_of(run), sequence, run.value(key, Json()));
+    }
+    for (const Json& row : sequence["published"]) {
+      add(row.value("method", std::string("published")), sequence, row.value(key, Json()));
+    }
+  }
+  json traces = json::array();
+  for (const std::string& name : order) {
+    traces.push_back(bars[name]);
+  }
+  if (!traces.empty()) {
+    const json layout = {{"yaxis", html::logarithmic(title)}, {"xaxis", {{"type", "category"}}}};
+    page.add_figure({title, "", traces, layout});
+  }
+}
+
+void add_paths(const Json& sequence,
+               const Trajectory* ground_truth,
+               const std::vector<NamedTrajectory>& runs,
+               html::Page& page) {
+  const auto path_of = [](const std::string& name, const Trajectory& trajectory) {
+    html::PathFromAbove path{name, {}};
+    for (const Rigid3& pose : trajectory) {
+      path.xz_m.push_back({pose.translation.x(), pose.translation.z()});
+    }
+    return path;
+  };
+  std::vector<html::PathFromAbove> paths;
+  if (ground_truth != nullptr) {
+    paths.push_back(path_of("ground truth", *ground_truth));
+    paths.back().is_ground_truth = true;
+  }
+  for (const NamedTrajectory& run : runs) {
+    paths.push_back(path_of(run.name, run.trajectory));
+  }
+  html::add_paths_from_above(
+      page, fmt::format("{}, {}", text_of(sequence["name"]), describe_frames(sequence)),
+      "Nothing is aligned afterwards.", paths);
+}
+
+}  // namespace
+
+Status write_page(const std::filesystem::path& file,
+                  const nlohmann::ordered_json& report,
+                  const std::vector<SequencePaths>& paths) {
+  html::Page page("Benchmark", fmt::format("stemvo {}{}", text_of(report["stemvo_version"]),
+                                           report["interrupted"] == true ? ", interrupted" : ""));
+  add_bars(report, "t_rel_percent", "t_rel, %", page);
+  add_bars(report, "r_rel_deg_per_100m", "r_rel, degrees per 100 m", page);
+  for (const SequencePaths& one : paths) {
+    for (const Json& sequence : report["sequences"]) {
+      if (text_of(sequence["name"]) == one.sequence) {
+        add_paths(sequence, one.ground_truth ? &*one.ground_truth : nullptr, one.runs, page);
+      }
+    }
+  }
+  page.add_folded_text("All numbers", format_markdown(report));
+  return page.write(file);
+}
+
+}  // namespace stemvo::benchmark

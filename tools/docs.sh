@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# docs.sh: build/docs, the documentation as a site that needs no network. Broken links and warnings of Doxygen are errors.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+readonly PAGES=build/docs_pages
+tools/setup.sh docs
+rm -rf "$PAGES" build/docs
+mkdir -p "$PAGES"
+cp -r docs/*.md docs/images tools/docs/api.md "$PAGES"
+cp README.md "$PAGES/index.md"
+cp CHANGELOG.md "$PAGES/changelog.md"
+cp CONTRIBUTING.md "$PAGES/contributing.md"
+cp examples/README.md "$PAGES/examples.md"
+# Links as they are in the repository, to pages of the site; files that are no pages are named only.
+sed -i -E -e 's#\]\((\.\./)?docs/#](#g' -e 's#\]\((\.\./)?CHANGELOG\.md#](changelog.md#g' -e 's#\]\((\.\./)?CONTRIBUTING\.md#](contributing.md#g' \
+  -e 's#\]\((\.\./)?examples/README\.md#](examples.md#g' -e 's#\]\((\.\./)?README\.md#](index.md#g' \
+  -e 's#\[([^]]*)\]\((\.\./)?(config|examples|bench|tests|tools|src|include|models)/[^)]*\)#\1#g' "$PAGES"/*.md
+
+# Doxygen first: pages link to it. mkdocs empties the folder it writes to.
+build/venv-docs/bin/mkdocs --quiet build --config-file tools/docs/mkdocs.yml
+doxygen tools/docs/Doxyfile
+if grep -rlE '<(script|link|img)[^>]+(src|href)="(https?:)?//' build/docs --include='*.html'; then
+  echo "docs: the pages above fetch something from the network" >&2
+  exit 1
+fi
+echo "docs: build/docs/index.html"
