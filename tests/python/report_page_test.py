@@ -58,7 +58,7 @@ class ReportPage(unittest.TestCase):
         call("benchmark", self.folder / "drive", "--out", out)
         found = look_at(out / "report.html")
         self.expect_a_sound_page(found)
-        self.assertIn(f"00, frames 0:{FRAMES}", found["headings"])
+        self.assertIn(f"00, clip 0:{FRAMES} of 4541", found["headings"])
 
     def test_draws_everything_without_errors_or_a_network(self):
         self.expect_a_sound_page(self.found)
