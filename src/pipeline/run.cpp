@@ -73,9 +73,10 @@ Expected<std::string> identity_of(const RunRequest& request,
     return program.error();
   }
   const Camera& c = sequence.camera();
-  return fmt::format("{}\n{} {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
-                     request.sequence_dir.string(), sequence.kind(), c.fx_px, c.fy_px, c.cx_px,
-                     c.cy_px, c.width_px, c.height_px, fmt::join(request.masks, " "),
+  return fmt::format("{}\n{} {} {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
+                     request.sequence_dir.string(), sequence.kind(),
+                     request.times.value_or("").string(), c.fx_px, c.fy_px, c.cx_px, c.cy_px,
+                     c.width_px, c.height_px, fmt::join(request.masks, " "),
                      pipeline::config_text(request, sequence, odometry, 0));
 }
 
