@@ -42,6 +42,7 @@ test-all: test test-long
 test-long:
 	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
 	@tools/setup.sh docs
+	@tools/setup.sh evo
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS)
 

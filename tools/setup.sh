@@ -216,6 +216,12 @@ if [[ "${1:-}" == fuzz ]]; then
   install_packages
   exit
 fi
+# What others measure trajectories with.
+if [[ "${1:-}" == evo ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-evo "$LOGS/venv-evo.log" tools/requirements-evo.txt
+  exit
+fi
 # The generators of the site.
 if [[ "${1:-}" == docs ]]; then
   mkdir -p "$LOGS"
