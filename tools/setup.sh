@@ -216,6 +216,12 @@ if [[ "${1:-}" == fuzz ]]; then
   install_packages
   exit
 fi
+# What puts the system's libraries into a wheel.
+if [[ "${1:-}" == wheel ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-wheel "$LOGS/venv-wheel.log" tools/requirements-wheel.txt
+  exit
+fi
 # What others measure trajectories with.
 if [[ "${1:-}" == evo ]]; then
   mkdir -p "$LOGS"

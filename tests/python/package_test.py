@@ -129,6 +129,23 @@ class Package(unittest.TestCase):
             self.assertIn(text, done.stderr)
             self.assertNotIn("Traceback", done.stderr)
 
+    def test_a_wheel_that_needs_no_library_of_the_system(self):
+        wheels = self.folder / "wheels"
+        call(ROOT / "tools/wheel.sh", wheels)
+        (wheel,) = wheels.glob("*.whl")
+        self.assertIn("manylinux", wheel.name)
+        call(sys.executable, "-m", "venv", self.folder / "clean")
+        python = self.folder / "clean/bin/python"
+        call(python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", wheel)
+        code = "import stemvo; print(len(stemvo.read_recording(%r))); print(open('/proc/self/maps').read())" % str(self.folder / "drive/sequences/00")
+        done = subprocess.run([python, "-I", "-c", code], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(done.stdout.startswith(f"{FRAMES}\n"), done.stdout[:100])
+        for name in ("libopencv_core", "libavcodec", "libonnxruntime", "libdeflate"):
+            loaded = [line for line in done.stdout.splitlines() if name in line]
+            self.assertTrue(loaded, name)
+            self.assertTrue(all(str(self.folder) in line for line in loaded), loaded[0])
+
     def test_bad_input(self):
         self.run_python(BAD_INPUT)
 
