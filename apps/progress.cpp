@@ -29,13 +29,18 @@ std::size_t num_columns() {
   return ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
 }
 
-/// A line that stays one: cut to the terminal, with a bar where there is room for it.
+/// A line that stays one in the terminal: with a bar where there is room for it, without its last
+/// parts where there is too little.
 std::string fitted(std::string text, double share) {
   constexpr std::size_t kMinBar = 10;
   constexpr std::size_t kMaxBar = 30;
   const std::size_t columns = num_columns();
   if (columns == 0) {
     return text;
+  }
+  for (std::size_t end = text.rfind(", "); text.size() >= columns && end != std::string::npos;
+       end = text.rfind(", ")) {
+    text.resize(end);
   }
   const std::size_t room = columns - 1 > text.size() + 3 ? columns - 1 - text.size() - 3 : 0;
   if (room >= kMinBar && share >= 0.0) {

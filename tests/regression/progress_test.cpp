@@ -57,6 +57,7 @@ TEST(Progress, FitsTheTerminal) {
       EXPECT_LT(line.size(), columns) << line;
     }
     EXPECT_THAT(lines.back(), HasSubstr("60/60 frames")) << columns;
+    EXPECT_THAT(lines.back(), ::testing::ContainsRegex(columns == 20 ? "frames$" : "(/s|in all)$"));
   }
   EXPECT_THAT(progress_lines(shown(120)).back(),
               StartsWith("[==============================] 60/60 frames, "));
