@@ -31,7 +31,10 @@ void expect_event(const StateRun& result, const StateDrive& drive, const std::st
   const Trajectory& truth = drive.world_from_camera;
   ASSERT_EQ(result.states.size(), truth.size());
   for (int i = 1; i < static_cast<int>(truth.size()); ++i) {
-    if (i >= drive.event_begin && i < drive.event_end) {
+    if (i == drive.event_begin && event == "rotating") {
+      // The last steps before it may be too short to be seen one by one: they are caught up here.
+      result.expect_states(i, i + 1, {event, "tracking"});
+    } else if (i >= drive.event_begin && i < drive.event_end) {
       result.expect_states(i, i + 1, {event});
     } else if (step_m(truth, static_cast<std::size_t>(i)) < kSlow_m) {
       result.expect_states(i, i + 1,
@@ -81,7 +84,14 @@ TEST(StatesAtThirtyFrames, TurningOnTheSpot) {
   ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
   const Rigid3 turned = motion_between(result, drive.event_begin - 1, drive.event_end - 1);
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
-  EXPECT_LE(turned.translation.norm(), 1e-6);
+  EXPECT_LE(motion_between(result, drive.event_begin, drive.event_end - 1).translation.norm(),
+            1e-6);
+  const auto begin = static_cast<std::size_t>(drive.event_begin);
+  const double braked_m =
+      (drive.world_from_camera[begin - 10].inverse() * drive.world_from_camera[begin])
+          .translation.norm();
+  EXPECT_NEAR(motion_between(result, drive.event_begin - 10, drive.event_begin).translation.norm(),
+              braked_m, 0.05 * braked_m);
   expect_accurate_drive(result, drive, drive.event_end - 1);
 }
 
