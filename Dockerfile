@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# docker build -t stemvo . && docker run --rm -v "$PWD:/work" stemvo run RECORDING --out result
+# docker build -t stemvo . && docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" stemvo run RECORDING --out result
 FROM debian:12 AS build
 RUN apt-get update && apt-get install -y --no-install-recommends git make
 WORKDIR /stemvo

@@ -16,11 +16,12 @@ cp examples/README.md "$PAGES/examples.md"
 # Links as they are in the repository, to pages of the site; files that are no pages are named only.
 sed -i -E -e 's#\]\((\.\./)?docs/#](#g' -e 's#\]\((\.\./)?CHANGELOG\.md#](changelog.md#g' -e 's#\]\((\.\./)?CONTRIBUTING\.md#](contributing.md#g' \
   -e 's#\]\((\.\./)?examples/README\.md#](examples.md#g' -e 's#\]\((\.\./)?README\.md#](index.md#g' \
-  -e 's#\[([^]]*)\]\((\.\./)?(config|examples|bench|tests|tools|src|include|models)/[^)]*\)#\1#g' "$PAGES"/*.md
+  -e 's#\[([^]]*)\]\((\.\./)?(config|examples|bench|tests|tools|src|include|models|ci)/[^)]*\)#\1#g' \
+  -e 's#\[([^]]*)\]\([a-z_]+\.(cpp|py|txt)\)#\1#g' "$PAGES"/*.md
 
-# Doxygen first: pages link to it. mkdocs empties the folder it writes to.
-build/venv-docs/bin/mkdocs --quiet build --config-file tools/docs/mkdocs.yml
+# Doxygen first: a page links to it. (mkdocs --quiet would not count warnings.)
 doxygen tools/docs/Doxyfile
+build/venv-docs/bin/mkdocs build --config-file tools/docs/mkdocs.yml
 if grep -rlE '<(script|link|img)[^>]+(src|href)="(https?:)?//' build/docs --include='*.html'; then
   echo "docs: the pages above fetch something from the network" >&2
   exit 1

@@ -52,6 +52,9 @@ Drive DriveLoop::run(std::optional<Checkpoint> from) {
     return visit(i, frame, pose);
   };
   run_frames(sequence_, odometry_, frames);
+  if (can_go_on() && !is_stopped_) {
+    drive_.interrupted = false;  // it came with the last frame
+  }
   if (sequence_.stream()) {
     end_stream(sequence_, progress_, drive_);
   }
@@ -104,6 +107,10 @@ void DriveLoop::keep_image(std::size_t i, const Expected<cv::Mat>& frame, const 
 
 bool DriveLoop::may_localize(std::size_t i) {
   const auto now = std::chrono::steady_clock::now();
+  if (!drive_.written) {  // from the last checkpoint it is written again
+    is_stopped_ = drive_.interrupted;
+    return !is_stopped_;
+  }
   if (!can_go_on() || i == 0 || (!drive_.interrupted && now - last_checkpoint_ < period_)) {
     return true;
   }
@@ -115,7 +122,8 @@ bool DriveLoop::may_localize(std::size_t i) {
   // Never more than a hundredth of the time.
   period_ = std::max(std::min(2.0 * period_, kMaxPeriod),
                      std::chrono::duration<double>(100 * (last_checkpoint_ - now)));
-  return !drive_.interrupted;
+  is_stopped_ = drive_.interrupted;
+  return !is_stopped_;
 }
 
 }  // namespace stemvo::pipeline

@@ -59,9 +59,10 @@ void ResultKeeper::add(std::string_view csv_row, const Rigid3& world_from_camera
 
 Status ResultKeeper::finish() {
   stop();
-  Status written = write_text_file(out_dir_ / "frames.csv", csv_);
-  return written && !checkpoint_.empty() ? write_text_file(checkpoint_file(out_dir_), checkpoint_)
-                                         : written;
+  const Status written = write_text_file(out_dir_ / "frames.csv", csv_);
+  const Status kept =
+      checkpoint_.empty() ? Status() : write_text_file(checkpoint_file(out_dir_), checkpoint_);
+  return written ? kept : written;
 }
 
 void ResultKeeper::stop() {

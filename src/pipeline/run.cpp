@@ -5,7 +5,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/checkpoint.hpp"
@@ -17,6 +16,7 @@
 #include "pipeline/result_files.hpp"
 #include "pipeline/result_keeper.hpp"
 #include "pipeline/thread_scope.hpp"
+#include "stem/model_file.hpp"
 #include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
@@ -64,6 +64,16 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
+/// Which file it is, and which version of it.
+std::string version_of(const std::filesystem::path& file) {
+  std::error_code code;
+  const auto size = std::filesystem::file_size(file, code);
+  const auto time = std::filesystem::last_write_time(file, code).time_since_epoch().count();
+  return code ? file.string() + " is not there"
+              : fmt::format("{} {} {}", std::filesystem::weakly_canonical(file, code).string(),
+                            size, time);
+}
+
 /// What the results depend on: a checkpoint of anything else is not gone on from.
 Expected<std::string> identity_of(const RunRequest& request,
                                   const FrameSource& sequence,
@@ -72,12 +82,22 @@ Expected<std::string> identity_of(const RunRequest& request,
   if (!program) {
     return program.error();
   }
+  std::string files;
+  for (const std::filesystem::path& file : pipeline::input_files(sequence, request.config)) {
+    files += version_of(file) + '\n';
+  }
+  for (const auto& file : {request.times, request.camera_file}) {
+    files += file ? version_of(*file) + '\n' : "";
+  }
+  for (const std::string& mask : request.masks) {
+    files += mask + ' ' + version_of(mask) + '\n';
+  }
   const Camera& c = sequence.camera();
-  return fmt::format("{}\n{} {} {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
-                     request.sequence_dir.string(), sequence.kind(),
-                     request.times.value_or("").string(), c.fx_px, c.fy_px, c.cx_px, c.cy_px,
-                     c.width_px, c.height_px, fmt::join(request.masks, " "),
-                     pipeline::config_text(request, sequence, odometry, 0));
+  return fmt::format("{}\n{}\n{} {} frames, pictures {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
+                     cv::getCPUFeaturesLine(), sequence.kind(), sequence.size(),
+                     request.image_every, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.width_px,
+                     c.height_px, pipeline::config_text(request, sequence, odometry, 0),
+                     internal::sha256_hex(files));
 }
 
 /// What an earlier run left in the folder is removed, unless this one goes on from it.
@@ -92,12 +112,12 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
     checkpoint = *std::move(found);
   }
   Status status;
-  if (!checkpoint) {
-    status = pipeline::remove_checkpoint(request.out_dir);
-  }
-  if (status && request.image_every > 0) {
+  if (request.image_every > 0) {
     status = checkpoint ? pipeline::create_out_folder(request.out_dir / "pictures")
                         : pipeline::prepare_pictures(request.out_dir);
+  }
+  if (status && !checkpoint) {
+    status = pipeline::remove_checkpoint(request.out_dir);
   }
   if (!status) {
     return status.error();
@@ -171,8 +191,11 @@ Expected<RunSummary> run_source(const RunRequest& request,
     recorder.emplace();
   }
   pipeline::note_input(request, sequence);
-  if (*checkpoint && request.note) {
-    request.note(fmt::format("goes on at frame {}", sequence.range().begin + (*checkpoint)->frame));
+  if (request.resume && request.note) {
+    request.note(
+        *checkpoint
+            ? fmt::format("goes on at frame {}", sequence.range().begin + (*checkpoint)->frame)
+            : "starts at the first frame: no checkpoint in " + request.out_dir.string());
   }
   pipeline::Drive done =
       pipeline::DriveLoop(request, sequence, *odometry, keeper, progress, *identity)
