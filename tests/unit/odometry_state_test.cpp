@@ -10,7 +10,8 @@
 #include "dataset/sequence.hpp"
 #include "odometry/phased_odometry.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "support/drives.hpp"
+#include "support/temp_folder.hpp"
+#include "synth/synth.hpp"
 
 namespace stemvo {
 namespace {
@@ -22,7 +23,7 @@ struct Variant {
 
 class OdometryState : public ::testing::TestWithParam<Variant> {
  protected:
-  static constexpr std::size_t kNumFrames = 30;
+  static constexpr int kNumFrames = 30;
   /// Could not be read; the tracks end there and go on behind it.
   static bool is_broken(std::size_t frame) { return frame == 17; }
 
@@ -49,19 +50,21 @@ class OdometryState : public ::testing::TestWithParam<Variant> {
     return text;
   }
 
-  KittiSequence sequence_ =
-      KittiSequence::open(
-          test::rendered_drive({.frames = kNumFrames, .width_px = 310, .height_px = 94}) /
-              "sequences/00",
-          {})
-          .value();
+  [[nodiscard]] KittiSequence rendered() const {
+    const SyntheticDriveOptions options{.num_frames = kNumFrames, .width_px = 310, .height_px = 94};
+    EXPECT_TRUE(render_synthetic_drive(folder_.path(), options));
+    return KittiSequence::open(folder_.path() / "sequences/00", {}).value();
+  }
+
+  testing::TempFolder folder_;
+  KittiSequence sequence_ = rendered();
 };
 
 TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
   PhasedOdometry whole = odometry();
   std::vector<std::string> states;
   std::vector<std::string> expected;
-  for (std::size_t i = 0; i < kNumFrames; ++i) {
+  for (std::size_t i = 0; i < std::size_t{kNumFrames}; ++i) {
     track(whole, i);
     states.push_back(whole.state());
     whole.localize();
@@ -71,7 +74,7 @@ TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
     PhasedOdometry again = odometry();
     again.set_state(states[first]);
     EXPECT_TRUE(again.state() == states[first]) << first;
-    for (std::size_t i = first; i < kNumFrames; ++i) {
+    for (std::size_t i = first; i < std::size_t{kNumFrames}; ++i) {
       if (i > first) {
         track(again, i);
       }
