@@ -44,7 +44,8 @@ class OdometryState : public ::testing::TestWithParam<Variant> {
     std::string text =
         fmt::format("{} {} {} {} {} {} {}", to_string(r.state), r.num_matches, r.num_inliers,
                     to_string(r.road), r.road_reason, r.scale_sigma.value_or(-1.0), r.camera.cx_px);
-    for (const double value : r.world_from_camera.matrix().reshaped()) {
+    const Matrix34d pose = r.world_from_camera.matrix();
+    for (const double value : pose.reshaped()) {
       text += fmt::format(" {:a}", value);
     }
     return text;
