@@ -48,9 +48,12 @@ std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir) {
 
 std::string pack(const Checkpoint& checkpoint, const std::string& identity) {
   std::ostringstream bytes;
+  bytes << first_line({});  // its room
   StateWriter writer(bytes);
   writer(identity, checkpoint);
-  return first_line(bytes.view()).append(bytes.view());
+  std::string text = std::move(bytes).str();  // megabytes: never twice
+  const std::size_t start = text.find('\n') + 1;
+  return text.replace(0, start, first_line(std::string_view(text).substr(start)));
 }
 
 Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& out_dir,

@@ -45,7 +45,7 @@ class DriveLoop {
   Drive drive_;
   bool is_stopped_ = false;  ///< before a frame that is there
   /// Between two checkpoints; the first come sooner.
-  std::chrono::duration<double> period_{1.0};
+  std::chrono::duration<double> period_{0.25};
   std::chrono::steady_clock::time_point last_checkpoint_ = std::chrono::steady_clock::now();
 };
 
