@@ -13,6 +13,14 @@
 
 namespace stemvo {
 
+/// A track seen in a frame.
+struct TrackPoint {
+  int track_id = -1;
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
+};
+/// Of one frame, ordered by track id.
+using TrackPoints = std::vector<TrackPoint>;
+
 /// Correspondences of two frames, in input pixels.
 struct Matches {
   std::vector<Eigen::Vector2d> prev_uv;
@@ -51,6 +59,10 @@ class FrontEnd {
   /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
   /// not followed further.
   virtual void keep(const std::vector<char>& is_good) = 0;
+  /// Tracks that ended but are worth finding again, where they should be in the last image (also
+  /// outside of it); process() looks for them there before it looks for new corners. Called after
+  /// keep(); a track that is not named is forgotten.
+  virtual void look_for(TrackPoints /*expected*/) {}
 
   /// What it knows between process() and keep(); one of the same options goes on from there.
   virtual void write_state(StateWriter& writer) const = 0;

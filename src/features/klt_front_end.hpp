@@ -24,7 +24,9 @@ class KltFrontEnd final : public PointFrontEnd {
   [[nodiscard]] bool begin_track(const TrackingImage&, const Point&) override { return true; }
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
-  void end_other_tracks(const std::vector<Point>&, const std::vector<Point>&) override {}
+  void end_other_tracks(const std::vector<Point>&,
+                        const std::vector<Point>&,
+                        const TrackPoints&) override {}
 };
 
 }  // namespace stemvo

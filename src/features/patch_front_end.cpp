@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -20,6 +21,8 @@ constexpr float kMinCorrelation = 0.7F;
 /// Less, or a scale beyond this: it is cut out anew.
 constexpr float kGoodCorrelation = 0.85F;
 constexpr float kMaxScale = 1.4F;
+/// A track that ended is where the map has it, within so many pixels, or nowhere.
+constexpr float kMaxOff_px = 2.0F;
 /// A point whose own motion is not known starts with the median of so many neighbours.
 constexpr std::size_t kNumNeighbours = 5;
 /// Where a motion is known, the level of half the size is coarse enough to begin.
@@ -192,15 +195,36 @@ bool PatchFrontEnd::accept(
   return cut_patch(image.pyramid, found.warp.x, found.warp.y, track.patch);
 }
 
+std::optional<cv::Point2f> PatchFrontEnd::find_again(const TrackingImage& image,
+                                                     const Point& point) {
+  const auto known = tracks_.find(point.id);
+  if (known == tracks_.end()) {
+    return std::nullopt;
+  }
+  Track& track = known->second;
+  const PatchMatch found =
+      align_patch(track.patch, static_cast<const PatchImage&>(image).pyramid,
+                  {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
+  const cv::Point2f uv(found.warp.x, found.warp.y);
+  const cv::Point2f off = uv - point.uv;
+  if (found.correlation < kGoodCorrelation || off.dot(off) > kMaxOff_px * kMaxOff_px) {
+    tracks_.erase(known);
+    return std::nullopt;
+  }
+  track.warp = found.warp;
+  return uv;
+}
+
 void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
-                                     const std::vector<Point>& good) {
-  const auto has = [](const std::vector<Point>& points, int id) {
-    const auto found = std::lower_bound(points.begin(), points.end(), id,
-                                        [](const Point& point, int i) { return point.id < i; });
-    return found != points.end() && found->id == id;
+                                     const std::vector<Point>& good,
+                                     const TrackPoints& expected) {
+  const auto has = [](const auto& points, auto id_of, int id) {
+    const auto found = std::ranges::lower_bound(points, id, {}, id_of);
+    return found != points.end() && std::invoke(id_of, *found) == id;
   };
   std::erase_if(tracks_, [&](const auto& track) {
-    return !has(last, track.first) && !has(good, track.first);
+    return !has(last, &Point::id, track.first) && !has(good, &Point::id, track.first) &&
+           !has(expected, &TrackPoint::track_id, track.first);
   });
 }
 

@@ -40,7 +40,11 @@ class PatchFrontEnd final : public PointFrontEnd {
                                                                      const View& to) override;
   void write_tracks(StateWriter& writer) const override;
   void read_tracks(StateReader& reader) override;
-  void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) override;
+  [[nodiscard]] std::optional<cv::Point2f> find_again(const TrackingImage& image,
+                                                      const Point& point) override;
+  void end_other_tracks(const std::vector<Point>& last,
+                        const std::vector<Point>& good,
+                        const TrackPoints& expected) override;
   [[nodiscard]] static bool accept(
       const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track);
 

@@ -37,9 +37,11 @@ Matches PointFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, in
       last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
     last_good_ = {};
+    expected_.clear();
   }
   Matches matches;
   View now{std::move(image), {}, frame};
+  end_other_tracks(last_.points, last_good_.points, expected_);
   if (last_.image != nullptr) {
     replenish(last_);
     matches = track(last_, now);
@@ -50,7 +52,6 @@ Matches PointFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, in
     }
   }
   last_ = std::move(now);
-  end_other_tracks(last_.points, last_good_.points);
   return matches;
 }
 
@@ -143,10 +144,29 @@ void PointFrontEnd::count_lost(const View& from,
   count_tracks(TrackFate::kNotFound, num_not_found);
 }
 
+/// Appends those that are found.
+void PointFrontEnd::find_expected(View& view) {
+  const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
+  std::size_t num_found = 0;
+  for (const TrackPoint& expected : std::exchange(expected_, {})) {
+    const Eigen::Vector2d uv = view.image->channel.map.from_input(expected.uv);
+    const cv::Point2f start(static_cast<float>(uv.x()), static_cast<float>(uv.y()));
+    if (!inside.contains(start)) {
+      continue;
+    }
+    if (const auto found = find_again(*view.image, {start, expected.track_id})) {
+      view.points.push_back({*found, expected.track_id});
+      ++num_found;
+    }
+  }
+  count_tracks(TrackFate::kFoundAgain, num_found);
+}
+
 /// Corners are looked for at half the size where that is at hand: the patch that is tracked is
 /// several pixels wide, and any pixel of a corner will do.
 void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
+  find_expected(view);
   const TrackingImage& image = *view.image;
   const cv::Mat& pixels = image.corner_pixels;
   const float to_pixels = image.corner_scale;
@@ -165,13 +185,14 @@ void PointFrontEnd::replenish(View& view) {
     const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
                            std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
     if (mask.at<unsigned char>(center) == 0) {
-      continue;  // tracks that ran into each other: the older one stays; or behind the mask
+      continue;  // ran into another one: the older stays, found again none; or behind the mask
     }
     cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
     quota.take(point.uv);
     kept.push_back(point);
   }
   count_tracks(TrackFate::kMerged, view.points.size() - kept.size());
+  std::ranges::sort(kept, {}, &Point::id);
   view.points = std::move(kept);
 
   std::vector<cv::Point2f> corners;

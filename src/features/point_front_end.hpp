@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -18,6 +19,7 @@ class PointFrontEnd : public FrontEnd {
   using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
+  void look_for(TrackPoints expected) override { expected_ = std::move(expected); }
   void write_state(StateWriter& writer) const override;
   void read_state(StateReader& reader) override;
 
@@ -59,18 +61,27 @@ class PointFrontEnd : public FrontEnd {
   /// What the derived class knows of the tracks.
   virtual void write_tracks(StateWriter& /*writer*/) const {}
   virtual void read_tracks(StateReader& /*reader*/) {}
-  /// No track but those of these two, each ordered by id, goes on.
-  virtual void end_other_tracks(const std::vector<Point>& last, const std::vector<Point>& good) = 0;
+  /// A track that ended, near `point` of the image; nullopt: it is not there.
+  [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const TrackingImage& /*image*/,
+                                                              const Point& /*point*/) {
+    return std::nullopt;
+  }
+  /// No track but those of these, each ordered by id, goes on.
+  virtual void end_other_tracks(const std::vector<Point>& last,
+                                const std::vector<Point>& good,
+                                const TrackPoints& expected) = 0;
 
   [[nodiscard]] Matches track(const View& from, View& to);
   static void count_lost(const View& from, const std::vector<std::optional<cv::Point2f>>& found);
   void track_from_last_good(View& now, Matches& matches);
   [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
   void replenish(View& view);
+  void find_expected(View& view);
 
   FeatureOptions options_;
   View last_;
-  View last_good_;  ///< the one before nearly every track ended; none otherwise
+  View last_good_;        ///< the one before nearly every track ended; none otherwise
+  TrackPoints expected_;  ///< in last_; empty once they were looked for
   int next_id_ = 0;
 };
 

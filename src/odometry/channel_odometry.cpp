@@ -83,6 +83,7 @@ void ChannelOdometry::localize() {
   work.localized = estimator_->localize(work.tracked);
   if (work.tracked.has_image) {
     front_end_->keep(work.localized.inlier_mask);
+    front_end_->look_for(std::move(work.localized.lost_landmarks));
     work.times.pose_ms = watch.lap_ms();
   }
 }

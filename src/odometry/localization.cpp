@@ -70,6 +70,25 @@ SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame
   return seen;
 }
 
+TrackPoints find_lost_landmarks(const Window& window,
+                                const Rigid3& world_from_camera,
+                                const TrackPoints& frame,
+                                const Camera& camera) {
+  const Rigid3 camera_from_world = world_from_camera.inverse();
+  TrackPoints lost;
+  auto seen = frame.begin();
+  for (const auto& [track_id, point_in_world] : window.landmarks) {
+    while (seen != frame.end() && seen->track_id < track_id) {
+      ++seen;
+    }
+    const Eigen::Vector3d point = camera_from_world * point_in_world;
+    if ((seen == frame.end() || seen->track_id != track_id) && point.z() > 0.0) {
+      lost.push_back({track_id, camera.project(point)});
+    }
+  }
+  return lost;
+}
+
 std::optional<Localization> localize(const SeenLandmarks& seen,
                                      const Rigid3& predicted_world_from_camera,
                                      const Camera& camera,

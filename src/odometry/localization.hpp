@@ -22,6 +22,12 @@ struct SeenLandmarks {
 };
 [[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame);
 
+/// Landmarks in front of the camera that are not among the frame's points, where they should be.
+[[nodiscard]] TrackPoints find_lost_landmarks(const Window& window,
+                                              const Rigid3& world_from_camera,
+                                              const TrackPoints& frame,
+                                              const Camera& camera);
+
 struct LocalizationOptions {
   double first_loss_px = 2.0;  ///< Cauchy scale of the first round: the prediction may be far off
   double loss_px = 0.2;        ///< of the second, on the inliers of the first

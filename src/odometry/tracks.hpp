@@ -15,14 +15,6 @@
 
 namespace stemvo {
 
-/// A track seen in a frame.
-struct TrackPoint {
-  int track_id = -1;
-  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
-};
-/// Of one frame, ordered by track id.
-using TrackPoints = std::vector<TrackPoint>;
-
 /// Where the matches end, of those kept (one flag per match).
 [[nodiscard]] TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept);
 

@@ -55,6 +55,10 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
   is_held_ = frame.has_image ? result.state != FrameState::kTracking : is_held_;
   result.num_matches = static_cast<int>(mask.size());
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
+  if (frame.has_image && !is_initializing_) {
+    localized.lost_landmarks =
+        find_lost_landmarks(window_, world_from_camera_, anchor_.points, camera_);
+  }
   return localized;
 }
 

@@ -22,8 +22,8 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "result files"};
 
 constexpr std::array<std::string_view, kNumFates> kFates = {
-    "looked for", "out of view",           "not found",
-    "merged",     "off the epipolar line", "off the projection"};
+    "looked for",         "out of view", "not found", "merged", "off the epipolar line",
+    "off the projection", "found again"};
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 

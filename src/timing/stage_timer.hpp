@@ -42,8 +42,9 @@ enum class TrackFate {
   kMerged,         ///< ran into an older one
   kOffEpipolar,    ///< a point that is no landmark yet, off its epipolar line
   kOffProjection,  ///< off the projection of its landmark
+  kFoundAgain,     ///< looked for where the map has it: goes on, counted in the frame it ended in
 };
-inline constexpr int kNumFates = static_cast<int>(TrackFate::kOffProjection) + 1;
+inline constexpr int kNumFates = static_cast<int>(TrackFate::kFoundAgain) + 1;
 
 /// Collects what StageTimers measure, in any thread, while it lives. One at a time (checked).
 class StageRecorder {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -117,6 +118,53 @@ TEST(KltFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
     }
   }
   EXPECT_GT(num_continued, static_cast<int>(first.track_ids.size()) / 2);
+}
+
+/// Where the matches of this track start; nullopt: it is none of them.
+std::optional<Eigen::Vector2d> start_of(const Matches& matches, int track_id) {
+  const auto found = std::ranges::find(matches.track_ids, track_id);
+  return found == matches.track_ids.end()
+             ? std::nullopt
+             : std::optional(
+                   matches.prev_uv[static_cast<std::size_t>(found - matches.track_ids.begin())]);
+}
+
+TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
+  const auto front_end = create_front_end({});
+  const auto show = [&](double shift_px) {
+    return front_end->process(image_of(textured_image({480, 200}, {shift_px, 0.0}), 2.0, 1.5));
+  };
+  static_cast<void>(show(0.0));
+  const Matches first = show(1.0);
+  const std::size_t n = first.track_ids.size();
+  ASSERT_GT(n, 50U);
+  // Every second track ends. Of those the first and each third after it is expected where it is,
+  // the next too far away, the third not at all.
+  std::vector<char> is_good(n, 1);
+  TrackPoints expected;
+  for (std::size_t i = 0; i < n; i += 2) {
+    is_good[i] = 0;
+    const Eigen::Vector2d off(i % 6 == 0 ? 1.2 : 16.0, -0.8);
+    if (i % 6 != 4) {
+      expected.push_back({first.track_ids[i], first.cur_uv[i] + off});
+    }
+  }
+  front_end->keep(is_good);
+  front_end->look_for(expected);
+  const Matches second = show(2.0);
+  std::size_t num_found = 0;
+  for (std::size_t i = 0; i < n; i += 2) {
+    const auto start = start_of(second, first.track_ids[i]);
+    EXPECT_TRUE(i % 6 == 0 || !start.has_value()) << i;
+    num_found += start.has_value() ? 1 : 0;
+    EXPECT_LT((start.value_or(first.cur_uv[i]) - first.cur_uv[i]).norm(), 0.6) << i;
+  }
+  EXPECT_GT(num_found, n / 8);  // of n / 6
+  EXPECT_TRUE(std::ranges::is_sorted(second.track_ids));
+
+  front_end->keep(std::vector<char>(second.track_ids.size(), 1));
+  front_end->look_for({{first.track_ids[2], first.cur_uv[2] - Eigen::Vector2d(2.0, 0.0)}});
+  EXPECT_FALSE(start_of(show(3.0), first.track_ids[2]).has_value());  // it was not there once
 }
 
 TEST(PatchFrontEnd, WhatLeavesTheImageIsCountedAsOutOfView) {

@@ -73,5 +73,19 @@ TEST(Localization, SeesTheLandmarksThatTheFrameTracks) {
   EXPECT_EQ(seen.uv[1].x(), 9.0);
 }
 
+TEST(Localization, LostLandmarksAreThoseInFrontThatTheFrameDoesNotTrack) {
+  const Camera camera{100.0, 100.0, 50.0, 40.0, 100, 80};
+  Window window;
+  window.landmarks = {
+      {2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {6, {1.0, 0.0, -5.0}}, {9, {1.0, 2.0, 9.0}}};
+  const Rigid3 world_from_camera(Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0});
+  const TrackPoints lost =
+      find_lost_landmarks(window, world_from_camera, {{5, {50.0, 40.0}}}, camera);
+  ASSERT_EQ(lost.size(), 2U);
+  EXPECT_EQ(lost[0].track_id, 2);
+  EXPECT_EQ(lost[1].track_id, 9);
+  EXPECT_LT((lost[1].uv - Eigen::Vector2d(60.0, 60.0)).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace stemvo
