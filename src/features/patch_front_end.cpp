@@ -23,6 +23,7 @@ constexpr float kGoodCorrelation = 0.85F;
 constexpr float kMaxScale = 1.4F;
 /// A track that ended is where the map has it, within so many pixels, or nowhere.
 constexpr float kMaxOff_px = 2.0F;
+constexpr float kMinAgain = 0.8F;  ///< its correlation there
 /// A point whose own motion is not known starts with the median of so many neighbours.
 constexpr std::size_t kNumNeighbours = 5;
 /// Where a motion is known, the level of half the size is coarse enough to begin.
@@ -207,7 +208,7 @@ std::optional<cv::Point2f> PatchFrontEnd::find_again(const TrackingImage& image,
                   {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
   const cv::Point2f uv(found.warp.x, found.warp.y);
   const cv::Point2f off = uv - point.uv;
-  if (found.correlation < kGoodCorrelation || off.dot(off) > kMaxOff_px * kMaxOff_px) {
+  if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
     tracks_.erase(known);
     return std::nullopt;
   }

@@ -215,7 +215,7 @@ void PointFrontEnd::write_state(StateWriter& writer) const {
       writer(view->image->channel);
     }
   }
-  writer(next_id_);
+  writer(next_id_, expected_);
   write_tracks(writer);
 }
 
@@ -229,7 +229,7 @@ void PointFrontEnd::read_state(StateReader& reader) {
       view->image = std::dynamic_pointer_cast<const TrackingImage>(prepare(channel));
     }
   }
-  reader(next_id_);
+  reader(next_id_, expected_);
   read_tracks(reader);
 }
 

@@ -86,6 +86,10 @@ void serialize(Archive& archive, Similarity& warp) {
   serialize_bytes(archive, warp);
 }
 template <typename Archive>
+void serialize(Archive& archive, TrackPoint& point) {
+  archive(point.track_id, point.uv);
+}
+template <typename Archive>
 void serialize(Archive& archive, Matches& matches) {
   archive(matches.prev_uv, matches.cur_uv, matches.track_ids, matches.prev_frame,
           matches.num_keypoints);

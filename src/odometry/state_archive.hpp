@@ -51,10 +51,6 @@ void serialize(Archive& archive, Camera& camera) {
   serialize_bytes(archive, camera);
 }
 template <typename Archive>
-void serialize(Archive& archive, TrackPoint& point) {
-  archive(point.track_id, point.uv);
-}
-template <typename Archive>
 void serialize(Archive& archive, RoadImage::Level& level) {
   archive(level.camera, level.first_row, level.values);
 }

@@ -21,6 +21,8 @@ struct Variant {
   std::vector<std::string> overrides;
 };
 
+void PrintTo(const Variant& variant, std::ostream* out) { *out << variant.name; }
+
 class OdometryState : public ::testing::TestWithParam<Variant> {
  protected:
   static constexpr int kNumFrames = 30;
@@ -103,8 +105,9 @@ INSTANTIATE_TEST_SUITE_P(Options,
                                            Variant{"klt",
                                                    {"features.method=klt", "scale.source=none"}},
                                            Variant{"orb", {"features.method=orb"}},
+                                           Variant{"sift", {"features.method=sift"}},
                                            Variant{"two_frame", {"odometry.mode=two_frame"}}),
-                         [](const auto& variant) { return variant.param.name; });
+                         ::testing::PrintToStringParamName());
 
 }  // namespace
 }  // namespace stemvo

@@ -171,6 +171,11 @@ struct Case {
   Upsample upsample;
 };
 
+void PrintTo(const Case& tested, std::ostream* out) {
+  *out << tested.stem->name << "_at_" << tested.sampling << '_'
+       << static_cast<int>(tested.upsample);
+}
+
 class BrightSpot : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
@@ -229,11 +234,7 @@ INSTANTIATE_TEST_SUITE_P(All,
                                            Case{&testing::kSame3, 2, Upsample::kBicubic},
                                            Case{&testing::kPadded7, 2, Upsample::kBicubic},
                                            Case{&testing::kPadded7, 1, Upsample::kBicubic}),
-                         [](const auto& tested) {
-                           return tested.param.stem->name + "_at_" +
-                                  std::to_string(tested.param.sampling) + "_" +
-                                  std::to_string(static_cast<int>(tested.param.upsample));
-                         });
+                         ::testing::PrintToStringParamName());
 
 TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
   using enum Upsample;

@@ -54,6 +54,10 @@ struct Case {
   int sampling;
 };
 
+void PrintTo(const Case& tested, std::ostream* out) {
+  *out << tested.stem->name << "_at_" << tested.sampling;
+}
+
 class StemSampling : public ::testing::TestWithParam<Case> {};
 
 TEST_P(StemSampling, EqualsTheConvolutionWithTheSmallerStride) {
@@ -100,10 +104,7 @@ INSTANTIATE_TEST_SUITE_P(All,
                                            Case{&testing::kSame3, 1},
                                            Case{&testing::kPadded7, 2},
                                            Case{&testing::kPadded7, 1}),
-                         [](const auto& tested) {
-                           return tested.param.stem->name + "_at_" +
-                                  std::to_string(tested.param.sampling);
-                         });
+                         ::testing::PrintToStringParamName());
 
 TEST(Stem, ShiftedPassesSeeNoPaddingAndNoOtherSide) {
   // On a plain frame every output is the same, the border's too.
