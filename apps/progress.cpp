@@ -69,9 +69,16 @@ bool Progress::update(std::size_t done, std::size_t total) {
   const bool go_on = !is_interrupted();
   const Clock::time_point now = Clock::now();
   const bool is_last = done == total || !go_on;
+  if (!base_) {
+    base_ = done > 1 && !is_last ? std::pair(done, now) : std::pair(std::size_t{0}, start_);
+  }
   if (!is_quiet_ && is_due(now, is_last)) {
     const double elapsed_s = std::max(std::chrono::duration<double>(now - start_).count(), 1e-9);
-    const double per_s = static_cast<double>(done) / elapsed_s;
+    const bool is_begun = done > base_->first;
+    const double since_s = std::chrono::duration<double>(now - base_->second).count();
+    const double per_s = is_begun
+                             ? static_cast<double>(done - base_->first) / std::max(since_s, 1e-9)
+                             : static_cast<double>(done) / elapsed_s;
     const std::string rest =
         is_last      ? fmt::format("{} in all", describe_time(elapsed_s))
         : total == 0 ? describe_time(elapsed_s) + " so far"

@@ -3,7 +3,9 @@
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace stemvo::apps {
 
@@ -27,6 +29,8 @@ class Progress {
   bool is_terminal_;
   Clock::time_point start_;
   Clock::time_point last_;
+  /// What the rate is counted from: not what an earlier call had done (--resume).
+  std::optional<std::pair<std::size_t, Clock::time_point>> base_;
 };
 
 }  // namespace stemvo::apps

@@ -91,11 +91,7 @@ Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path&
 }
 
 Status remove_checkpoint(const std::filesystem::path& out_dir) {
-  std::error_code code;
-  std::filesystem::remove(checkpoint_file(out_dir), code);
-  return code ? Status(fail(fmt::format("{}: cannot be removed ({})",
-                                        checkpoint_file(out_dir).string(), code.message())))
-              : Status();
+  return remove_file(checkpoint_file(out_dir));
 }
 
 }  // namespace pipeline

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -114,16 +115,23 @@ bool DriveLoop::may_localize(std::size_t i) {
   if (!can_go_on() || i == 0 || (!drive_.interrupted && now - last_checkpoint_ < period_)) {
     return true;
   }
-  Drive so_far = drive_;
-  so_far.elapsed_before_s += std::chrono::duration<double>(now - request_.started).count();
-  keeper_.keep_checkpoint(
-      pack({i, odometry_.state(), std::move(so_far), keeper_.csv()}, identity_));
+  keep_checkpoint(i, now);
   last_checkpoint_ = std::chrono::steady_clock::now();
   // Never more than a hundredth of the time.
   period_ = std::max(std::min(2.0 * period_, kMaxPeriod),
                      std::chrono::duration<double>(100 * (last_checkpoint_ - now)));
   is_stopped_ = drive_.interrupted;
   return !is_stopped_;
+}
+
+void DriveLoop::keep_checkpoint(std::size_t frame, std::chrono::steady_clock::time_point now) {
+  try {
+    Drive so_far = drive_;
+    so_far.elapsed_before_s += std::chrono::duration<double>(now - request_.started).count();
+    keeper_.keep_checkpoint(
+        pack({frame, odometry_.state(), std::move(so_far), keeper_.csv()}, identity_));
+  } catch (const std::bad_alloc&) {  // the one before stays; the drive needs no checkpoint
+  }
 }
 
 }  // namespace stemvo::pipeline

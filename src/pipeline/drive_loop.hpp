@@ -31,6 +31,7 @@ class DriveLoop {
   bool visit(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose);
   /// False: the run ends before this frame, and can go on with it.
   bool may_localize(std::size_t i);
+  void keep_checkpoint(std::size_t frame, std::chrono::steady_clock::time_point now);
   void keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose);
   [[nodiscard]] bool can_go_on() const {
     return !sequence_.stream() || !sequence_.stream()->is_live;

@@ -125,6 +125,15 @@ Status check_can_write(const fs::path& file) {
   return status;
 }
 
+Status remove_file(const fs::path& file) {
+  std::error_code code;
+  fs::remove(beside(file), code);
+  fs::remove(file, code);
+  return code ? Status(
+                    fail(fmt::format("{}: cannot be removed ({})", file.string(), code.message())))
+              : Status();
+}
+
 Expected<std::vector<std::string>> read_lines(const fs::path& file) {
   return read_text_file(file).map([](const std::string& text) {
     const std::vector<std::string_view> lines = split_lines(text);

@@ -22,6 +22,9 @@ namespace stemvo {
 /// Proves that write_text_file can, without touching the file.
 [[nodiscard]] Status check_can_write(const std::filesystem::path& file);
 
+/// The file, if there is one, and what a killed write_text_file left of it. Error: it stays.
+[[nodiscard]] Status remove_file(const std::filesystem::path& file);
+
 /// All lines of a file without their ends. Errors: those of read_text_file.
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.

@@ -120,10 +120,13 @@ TEST_F(Resume, KilledGoesOnFromTheLastCheckpoint) {
   const auto arguments = run("killed", {"--resume", "--threads", "1", "--pictures", "4"});
   ASSERT_TRUE(is_stopped("killed", arguments, SIGKILL, std::chrono::milliseconds(2500)));
   EXPECT_TRUE(fs::exists(folder_ / "killed/checkpoint"));
+  const fs::path unfinished = folder_.path() / "killed/checkpoint.unfinished";
+  std::ofstream(unfinished) << "what a kill leaves of a write";
   const ProgramResult last = test::run_program(STEMVO_PROGRAM, arguments);
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_THAT(last.err, HasSubstr("goes on at frame "));
   EXPECT_TRUE(results("killed") == results("whole"));
+  EXPECT_FALSE(fs::exists(unfinished));
   for (int i = 0; i < kNumFrames; i += 4) {
     char name[32];
     std::snprintf(name, sizeof(name), "pictures/%06d.png", i);
@@ -148,7 +151,12 @@ TEST_F(Resume, AVideoGoesOnToo) {
                                     "--out", folder_ / out, "--resume", "--map"};
   };
   ASSERT_EQ(test::run_program(STEMVO_PROGRAM, arguments("whole")).exit_code, 0);
-  ASSERT_TRUE(is_stopped("stopped", arguments("stopped"), SIGINT, std::chrono::milliseconds(150)));
+  // At 0 ms while the video is wound forward to where it goes on.
+  for (const int after : {150, 0, 20, 0}) {
+    ASSERT_TRUE(
+        is_stopped("stopped", arguments("stopped"), SIGINT, std::chrono::milliseconds(after)));
+    EXPECT_TRUE(fs::exists(folder_ / "stopped/checkpoint"));
+  }
   const ProgramResult last = test::run_program(STEMVO_PROGRAM, arguments("stopped"));
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_THAT(last.err, HasSubstr("goes on at frame "));
