@@ -26,6 +26,28 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
+/// plotly.js takes some HTML in names, hover texts and categories: here every letter is itself, and
+/// a new line is one.
+json literal(const json& value) {
+  json result = value;
+  if (value.is_structured()) {
+    for (json& element : result) {
+      element = literal(element);
+    }
+  } else if (value.is_string()) {
+    std::string text;
+    for (const char letter : value.get_ref<const std::string&>()) {
+      text += letter == '&'    ? "&amp;"
+              : letter == '<'  ? "&lt;"
+              : letter == '>'  ? "&gt;"
+              : letter == '\n' ? "<br>"
+                               : std::string(1, letter);
+    }
+    result = std::move(text);
+  }
+  return result;
+}
+
 /// JSON inside a script element: no text in it can end the element.
 std::string script_json(const json& content) {
   std::string text = content.dump(-1, ' ', false, json::error_handler_t::replace);
@@ -61,8 +83,8 @@ void Page::set_frames(const std::vector<std::string>& descriptions) {
 void Page::add_figure(const Figure& figure) {
   (*content_)["sections"].push_back({{"heading", figure.heading},
                                      {"note", figure.note},
-                                     {"traces", figure.traces},
-                                     {"layout", figure.layout},
+                                     {"traces", literal(figure.traces)},
+                                     {"layout", literal(figure.layout)},
                                      {"frame_trace", figure.frame_trace}});
 }
 

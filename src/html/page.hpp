@@ -31,7 +31,7 @@ struct Figure {
 };
 
 /// One HTML file that holds all it needs: opened without a network, it shows the sections in the
-/// order they were added. Texts are UTF-8 and never taken for HTML.
+/// order they were added. Texts are UTF-8 and never taken for HTML, those of figures neither.
 class Page {
  public:
   explicit Page(const std::string& title, const std::string& subtitle = "");

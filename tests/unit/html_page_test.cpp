@@ -68,6 +68,20 @@ TEST_F(HtmlPage, TextFromOutsideStaysText) {
   EXPECT_EQ(content(page)["sections"][0]["text"], readable);
 }
 
+// plotly.js would make the first bold and show an entity's letter for the second.
+TEST_F(HtmlPage, NamesInFiguresAreShownAsTheyAre) {
+  Page page("a drive");
+  const json traces = {
+      {{"name", "<b>a</b> &deg;"}, {"x", {"a & b", 1.5, nullptr}}, {"text", {"a\nb"}}}};
+  const json layout = {{"xaxis", {{"title", {{"text", "x < y"}}}}}};
+  page.add_figure({"a figure", "", traces, layout});
+  const json found = content(page)["sections"][0];
+  EXPECT_EQ(found["traces"][0]["name"], "&lt;b&gt;a&lt;/b&gt; &amp;deg;");
+  EXPECT_EQ(found["traces"][0]["x"], json({"a &amp; b", 1.5, nullptr}));
+  EXPECT_EQ(found["traces"][0]["text"][0], "a<br>b");
+  EXPECT_EQ(found["layout"]["xaxis"]["title"]["text"], "x &lt; y");
+}
+
 TEST_F(HtmlPage, NeedsNothingFromElsewhereAndNamesTheLicence) {
   const std::string text = written(Page("a drive"));
   for (const char* elsewhere : {"src=\"http", "href=\"http", "@import", "url("}) {
