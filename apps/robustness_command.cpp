@@ -54,6 +54,7 @@ int run(Arguments& arguments) {
     return kExitFailed;
   }
   request.config = *config;
+  request.command = command_line();
   request.models_dir = data_folder("models");
   Progress progress("runs", arguments.is_quiet);
   request.progress = std::bind_front(&Progress::update, &progress);

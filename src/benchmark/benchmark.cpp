@@ -318,7 +318,7 @@ class Benchmark {
         return written;
       }
     }
-    return benchmark::write_page(request_.out_dir / "report.html", report_, paths_);
+    return benchmark::write_page(request_.out_dir / "report.html", report_, paths_, request_);
   }
 
   /// Of the runs that are done.

@@ -26,6 +26,7 @@ struct BenchmarkRequest {
   /// What is measured, under names that are also folders', e.g. "default".
   std::vector<std::pair<std::string, Config>> configurations;
   int num_threads = 0;  ///< 0: all cores
+  std::string command;  ///< that repeats it, for report.html; may be empty
   /// Before a run: "2/12 03, default, ground_truth", and why an earlier result does not count any
   /// more. Not called for results that are kept. False stops, here and after a frame.
   std::function<bool(const std::string& run)> on_run = {};
@@ -75,7 +76,8 @@ struct SequencePaths {
 /// report.html: benchmark.json as figures. Error: the file cannot be written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,
                                 const nlohmann::ordered_json& report,
-                                const std::vector<SequencePaths>& paths);
+                                const std::vector<SequencePaths>& paths,
+                                const BenchmarkRequest& request);
 
 }  // namespace benchmark
 }  // namespace stemvo

@@ -82,7 +82,8 @@ void add_paths(const Json& sequence,
 
 Status write_page(const std::filesystem::path& file,
                   const nlohmann::ordered_json& report,
-                  const std::vector<SequencePaths>& paths) {
+                  const std::vector<SequencePaths>& paths,
+                  const BenchmarkRequest& request) {
   html::Page page("Benchmark", fmt::format("stemvo {}{}", text_of(report["stemvo_version"]),
                                            report["interrupted"] == true ? ", interrupted" : ""));
   add_bars(report, "t_rel_percent", "t_rel, %", page);
@@ -95,6 +96,12 @@ Status write_page(const std::filesystem::path& file,
     }
   }
   page.add_folded_text("All numbers", format_markdown(report));
+  std::string configurations;
+  for (const auto& [name, config] : request.configurations) {
+    configurations +=
+        fmt::format("# {}{}\n{}", configurations.empty() ? "" : "\n", name, dump_config(config));
+  }
+  html::add_how_to_repeat(page, request.command, "Configurations", configurations);
   return page.write(file);
 }
 

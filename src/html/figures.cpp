@@ -51,4 +51,14 @@ void add_paths_from_above(Page& page,
   page.add_figure({heading, note, traces, layout});
 }
 
+void add_how_to_repeat(Page& page,
+                       const std::string& command,
+                       const std::string& heading,
+                       const std::string& configuration) {
+  if (!command.empty()) {
+    page.add_text("Command", command);
+  }
+  page.add_folded_text(heading, configuration);
+}
+
 }  // namespace stemvo::html

@@ -28,4 +28,10 @@ void add_paths_from_above(Page& page,
                           const std::string& note,
                           const std::vector<PathFromAbove>& paths);
 
+/// At the end of a page: the command (where there is one), and the configuration folded away.
+void add_how_to_repeat(Page& page,
+                       const std::string& command,
+                       const std::string& heading,
+                       const std::string& configuration);
+
 }  // namespace stemvo::html

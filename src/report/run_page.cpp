@@ -336,10 +336,7 @@ Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
   if (!run.images.empty()) {
     page.add_images("Frames and their channel", run.images);
   }
-  if (!run.command.empty()) {
-    page.add_text("Command", run.command);
-  }
-  page.add_folded_text("Configuration", run.config);
+  html::add_how_to_repeat(page, run.command, "Configuration", run.config);
   return page.write(file);
 }
 

@@ -117,7 +117,9 @@ void add_panels(const RobustnessReport& report, html::Page& page) {
 
 }  // namespace
 
-Status write_page(const std::filesystem::path& file, const RobustnessReport& report) {
+Status write_page(const std::filesystem::path& file,
+                  const RobustnessReport& report,
+                  const RobustnessRequest& request) {
   html::Page page(fmt::format("Robustness of {}", report.contenders.front()),
                   fmt::format("drives {}; rotation errors r_rel", fmt::join(report.drives, ", ")));
   if (report.contenders.size() > 1) {
@@ -125,6 +127,8 @@ Status write_page(const std::filesystem::path& file, const RobustnessReport& rep
   }
   add_panels(report, page);
   page.add_folded_text("All numbers", format_table(report));
+  html::add_how_to_repeat(page, request.command, "Configuration of the judged channel",
+                          dump_config(request.config));
   return page.write(file);
 }
 

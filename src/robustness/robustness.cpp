@@ -69,7 +69,8 @@ std::vector<Verdict> verdicts_of(const Row& row) {
   return result;
 }
 
-Status write_report(const std::filesystem::path& folder, const RobustnessReport& report) {
+Status write_report(const RobustnessReport& report, const RobustnessRequest& request) {
+  const std::filesystem::path& folder = request.out_dir;
   for (const auto& [name, text] : {std::pair("robustness.csv", format_csv(report)),
                                    std::pair("robustness.json", format_json(report)),
                                    std::pair("robustness.txt", format_table(report))}) {
@@ -77,7 +78,7 @@ Status write_report(const std::filesystem::path& folder, const RobustnessReport&
       return written;
     }
   }
-  return write_page(folder / "report.html", report);
+  return write_page(folder / "report.html", report, request);
 }
 
 class Robustness {
@@ -113,7 +114,7 @@ class Robustness {
         row->verdicts = verdicts_of(*row);
         report_.rows.push_back(*std::move(row));
       }
-      if (const Status written = write_report(request_.out_dir, report_); !written) {
+      if (const Status written = write_report(report_, request_); !written) {
         return written.error();
       }
       if (report_.interrupted) {

@@ -25,6 +25,7 @@ struct RobustnessRequest {
   std::filesystem::path out_dir;
   std::filesystem::path models_dir;
   Config config;                      ///< of the channel that is judged
+  std::string command;                ///< that repeats it, for report.html; may be empty
   std::vector<std::string> kinds;     ///< of disturbances, and `none`; empty: all
   std::vector<std::string> controls;  ///< what it is judged against; empty: all_controls()
   int num_threads = 0;                ///< 0: all cores
@@ -92,6 +93,8 @@ struct Summary {
 [[nodiscard]] std::string format_json(const RobustnessReport& report);
 /// A page for a browser: ratios with their intervals, error over strength. Error: cannot be
 /// written.
-[[nodiscard]] Status write_page(const std::filesystem::path& file, const RobustnessReport& report);
+[[nodiscard]] Status write_page(const std::filesystem::path& file,
+                                const RobustnessReport& report,
+                                const RobustnessRequest& request);
 
 }  // namespace stemvo::robustness

@@ -21,7 +21,7 @@ json number(const std::optional<double>& value) { return value ? json(*value) : 
 /// What a filter's points say when they are hovered over.
 std::string described(const FilterRow& row) {
   const auto part = [](const char* name, const std::optional<double>& value, const char* unit) {
-    return value ? fmt::format("<br>{} {:.3g} {}", name, *value, unit) : std::string();
+    return value ? fmt::format("\n{} {:.3g} {}", name, *value, unit) : std::string();
   };
   return to_string(row.key) + part("t_rel", row.mean.t_rel_percent, "%") +
          part("r_rel", row.mean.r_rel_deg_per_100m, "deg/100 m") +
@@ -172,10 +172,8 @@ Status write_page(const Results& results, const Pictures& pictures, const PageTe
                                   io::encode_jpeg(pictures.sheet, kQuality)}});
   }
   page.add_text("All filters", texts.table);
-  if (!texts.command.empty()) {
-    page.add_text("Command", texts.command);
-  }
-  page.add_folded_text("Configuration of all rows", results.identity.configuration);
+  html::add_how_to_repeat(page, texts.command, "Configuration of all rows",
+                          results.identity.configuration);
   return page.write(results.out_dir / "report.html");
 }
 

@@ -44,6 +44,9 @@ TEST_F(Benchmark, InterruptedAndResumedGivesTheSameBytes) {
   for (const char* name : {"report.html", "speed.json"}) {
     EXPECT_TRUE(fs::exists(folder_ / ("whole/" + std::string(name)))) << name;
   }
+  EXPECT_THAT(
+      read_file(folder_ / "whole/report.html"),
+      AllOf(HasSubstr("stemvo benchmark "), HasSubstr("# paper"), HasSubstr("max_features: ")));
   test::RunningProgram program(STEMVO_PROGRAM, command("resumed"));
   const std::string second = folder_ / "resumed/runs/00/default_ground_truth/frames.csv";
   for (int i = 0; i < 6000 && !fs::exists(second); ++i) {

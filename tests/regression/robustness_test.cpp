@@ -54,7 +54,9 @@ TEST_F(Robustness, WritesTableFiguresAndVerdicts) {
   EXPECT_GT(undisturbed[3]["r_rel_deg_per_100m"], undisturbed[0]["r_rel_deg_per_100m"]);  // ORB
   EXPECT_GT(json["rows"][3]["channels"][0]["r_rel_deg_per_100m"],  // noise of 24 gray levels
             undisturbed[0]["r_rel_deg_per_100m"]);
-  EXPECT_THAT(out("report.html"), AllOf(HasSubstr("Robustness of "), HasSubstr("sensor_noise")));
+  EXPECT_THAT(out("report.html"),
+              AllOf(HasSubstr("Robustness of "), HasSubstr("sensor_noise"),
+                    HasSubstr("--controls gray,default:2,orb"), HasSubstr("max_features: ")));
 
   const std::string csv = out("robustness.csv");
   EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + 7 * 4);
