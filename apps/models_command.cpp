@@ -33,6 +33,8 @@ std::string describe(const ModelEntry& entry, const Status& status) {
 nlohmann::ordered_json document(const ModelEntry& entry, const Status& status) {
   return {{"name", entry.name},
           {"sound", status.has_value()},
+          {"problem",
+           status ? nlohmann::ordered_json() : nlohmann::ordered_json(status.error().message)},
           {"network", entry.network},
           {"layer", entry.layer},
           {"filters", entry.num_filters},

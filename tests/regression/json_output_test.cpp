@@ -110,6 +110,16 @@ TEST_F(JsonOutput, BoundThatIsPassedIsInTheDocument) {
     {"key": "r_rel_deg_per_100m", "value": null, "max": 1.0, "passed": false}]})"));
 }
 
+TEST_F(JsonOutput, SaysWhyAModelCannotBeUsed) {
+  const fs::path models = fs::path(STEMVO_SOURCE_DIR) / "models";
+  fs::copy(models / "manifest.yaml", folder_ / "manifest.yaml");
+  write_file(folder_ / "default.onnx", "no model");
+  const Json json = document({"models", folder_ / "default.onnx", "--json"}, 1);
+  EXPECT_EQ(json["models"][0]["sound"], false);
+  EXPECT_THAT(json["models"][0]["problem"].get<std::string>(), HasSubstr("default.onnx"));
+  EXPECT_EQ(document({"models", "default", "--json"})["models"][0]["problem"], Json());
+}
+
 TEST_F(JsonOutput, IsNothingAfterAnError) {
   expect_error(run_stemvo({"run", folder_ / "none", "--out", folder_ / "o", "--json"}), 1,
                {"none"});
