@@ -27,7 +27,7 @@ t_rel. --kinds has disturbed sequences count too. Ground truth is needed. Hopele
 early (successive halving); --exhaustive runs all to the end.
 
 --out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
-best.yaml (for 'stemvo run --config'), report.html, sheet.png (best, median and worst) and records.jsonl, from which
+best.yaml (for 'stemvo run --config'), report.html, sheet.png (best, median, worst, baselines) and records.jsonl, from which
 --resume goes on after Ctrl-C or a crash.
 
 Examples:

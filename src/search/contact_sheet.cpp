@@ -58,13 +58,19 @@ ShownFilters choose_rows(const SearchIdentity& identity, const std::vector<Filte
   }
   ShownFilters shown;
   if (!rows.empty()) {
-    shown.emplace_back("best", rows.front());
+    shown.emplace_back("best filter", rows.front());
   }
   if (rows.size() > 2) {
     shown.emplace_back("median", rows[rows.size() / 2]);
   }
   if (rows.size() > 1) {
     shown.emplace_back("worst", rows.back());
+  }
+  for (const FilterRow& row : all) {
+    if (!shown.empty() && row.status != FilterStatus::kNotDetected &&
+        identity.layer_of(row.key).baseline) {
+      shown.emplace_back("baseline", &row);
+    }
   }
   return shown;
 }

@@ -221,8 +221,8 @@ struct FilterRow : FilterRecord {
                                                    const FilterRecords& records,
                                                    const std::string& command);
 
-/// Best, median and worst of the filters (no baselines) whose pose was detected, those that halving
-/// stopped behind the others, the later the better; the same filter once.
+/// Best, median and worst of the filters whose pose was detected, those that halving stopped behind
+/// the others, the later the better; the same filter once. Then the baselines, by rank.
 using ShownFilters = std::vector<std::pair<const char*, const FilterRow*>>;
 [[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
                                        const std::vector<FilterRow>& rows);

@@ -163,7 +163,7 @@ TEST(Ranking, StoppedFiltersComeAfterThoseThatRanToTheEnd) {
 }
 
 /// Filter 0 ran to the end, 1 to 4 were stopped, 5 was not detected; the best is a baseline.
-TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
+TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectoryBesideTheBaselines) {
   std::vector<FilterRow> rows;
   const auto add = [&rows](int filter, FilterStatus status, const std::string& model = "net") {
     FilterRow& row = rows.emplace_back();
@@ -186,10 +186,11 @@ TEST(ContactSheet, ShowsTheBestMedianAndWorstOfAllFiltersWithATrajectory) {
     layer.baseline = model != "net";
   }
   const auto shown = choose_rows(identity, rows);
-  ASSERT_EQ(shown.size(), 3U);
+  ASSERT_EQ(shown.size(), 4U);
   EXPECT_EQ(shown[0].second, &rows[1]);
   EXPECT_EQ(shown[1].second->key.filter, 2);
   EXPECT_EQ(shown[2].second->key.filter, 4);
+  EXPECT_EQ(shown[3], ShownFilters::value_type("baseline", &rows[0]));
   rows.clear();
   EXPECT_TRUE(choose_rows(identity, rows).empty());
 }
