@@ -4,11 +4,12 @@ the program's own trajectory byte for byte, and bad input."""
 
 import os
 import pathlib
-import re
 import subprocess
 import sys
 import tempfile
 import unittest
+
+import documented
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
@@ -102,8 +103,7 @@ class Package(unittest.TestCase):
         self.assertNotEqual(lines[0], lines[-1])
 
     def test_the_page(self):
-        program = re.search(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(), re.S).group(1)
-        said = self.run_python(program)
+        said = "".join(self.run_python(block.text) for block in documented.blocks("python"))
         self.assertIn("tracking", said)
         self.assertIn("ate_rmse_m", said)
 

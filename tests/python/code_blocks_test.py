@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""Every code block of the site does what it says: commands run on small rendered drives in place of KITTI's, camera files are loaded,
+programs are those that other tests compile and run. A block that is new is run as well; what cannot be is listed with the test that does."""
+
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import documented
+import numpy as np
+import yaml
+from export_stem_test import random_arrays
+
+ROOT = documented.ROOT
+PROGRAM = pathlib.Path(os.environ.get("STEMVO_PROGRAM", ROOT / "build/release/stemvo"))
+FRAMES = 25
+
+# Commands that build, install, fetch, or need hours: how they begin, and what runs them, or their tool, instead.
+RUN_ELSEWHERE = {
+    "make demo": ".ci/run",
+    "make test": ".ci/run",
+    "make build": ".ci/run",
+    "ctest --test-dir": ".ci/run",
+    "cmake --preset": ".ci/run",
+    "make bench": "tests/python/bench_run_test.py",
+    "bench/run.py": "tests/python/bench_run_test.py",
+    "build/bench/stemvo_bench": ".ci/run",
+    "STEMVO_BENCH_": ".ci/run",
+    "cmake -S examples": "tests/package/install_and_consume.cmake",
+    "build/examples/": "tests/package/install_and_consume.cmake",
+    "pip install": "tests/python/package_test.py",
+    "python -m stemvo.view": "tests/python/package_test.py",
+    "tools/ablation.py": "tests/python/ablation_test.py",
+    "tools/long_drives.py": "tests/python/long_drives_test.py",
+    "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",
+    "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
+    "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
+    "stemvo calibrate": "tests/regression/calibrate_test.cpp",  # a short drive does not tell of the camera
+    "tools/search_cluster.py": "tests/python/search_cluster_test.py",
+    "build/venv-ray/bin/ray": "tests/python/cluster_driver_test.py",
+}
+# What a reader puts in the place of a name, and what makes a command short.
+IN_PLACE_OF = [
+    (r"--(held-out-)?frames 0:\d+", rf"--\1frames 0:{FRAMES - 1}"),
+    (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
+    (r"\brobustness (.*?)( --controls \S+)? --out", r"robustness \1 --kinds none --controls gray --out"),
+    (r"--filters 0:16", "--filters 0:2"),
+    (r"--filters 16:32", "--filters 2:4"),
+    (r"--exhaustive --no-baselines", "--exhaustive --no-baselines --filters 0:2"),
+    (r"--merge default \S+ \S+ \S+", "--merge M"),
+    (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
+    (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
+    (r"\bNAME\.onnx", "weights.onnx"),
+    (r"\bWEIGHTS\b", "weights.npz"),
+    (r"\bRECORDING\b", "KITTI/sequences/03"),
+    (r"\[(--sequences 00),02\]", r"\1"),
+    (r"^(memusage|/usr/bin/time -f %R|strace -f -c -e trace=mmap) ", ""),
+]
+
+
+def commands(block):
+    """Lines, without what is continued in the next one."""
+    return block.text.replace("\\\n", " ").splitlines()
+
+
+def is_run_elsewhere(command):
+    return any(command.startswith(begin) for begin in RUN_ELSEWHERE)
+
+
+def shortened(command):
+    for pattern, text in IN_PLACE_OF:
+        command = re.sub(pattern, text, command)
+    return command
+
+
+class CodeBlocks(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.drives = pathlib.Path(folder.name)
+        for options in (["KITTI", "--name", "00"], ["KITTI", "--name", "03", "--seed", "3"]):
+            cls.synth(*options, "--width", "620", "--height", "188")
+        cls.synth("drive", "--width", "640", "--height", "480")
+        (cls.drives / "drive/images").symlink_to("sequences/00/image_2")
+        np.savez(cls.drives / "weights.npz", **random_arrays((4, 4), 4, norm="batch"))
+
+    @classmethod
+    def synth(cls, name, *options):
+        subprocess.run([PROGRAM, "synth", cls.drives / name, "--frames", str(FRAMES), *options], check=True, capture_output=True)
+
+    def new_folder(self, camera):
+        """What a reader's folder holds; blocks of a page follow each other in it."""
+        made = tempfile.TemporaryDirectory()
+        self.addCleanup(made.cleanup)
+        folder = pathlib.Path(made.name)
+        for entry in self.drives.iterdir():
+            (folder / entry.name).symlink_to(entry)
+        (folder / "tools").symlink_to(ROOT / "tools")
+        (folder / "build/release").mkdir(parents=True)
+        (folder / "build/release/stemvo").symlink_to(PROGRAM)
+        (folder / "docs/images").mkdir(parents=True)
+        (folder / "camera.yaml").write_text(camera.text)
+        shutil.copy(ROOT / "examples/ci/thresholds.yaml", folder / "thresholds.yaml")
+        return folder
+
+    def run_script(self, script, folder):
+        shutil.rmtree(folder / "result", ignore_errors=True)
+        return subprocess.run(["bash", "-euo", "pipefail", "-c", script], cwd=folder, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+                              env={**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"})
+
+    def cameras(self):
+        return [block for block in documented.blocks("yaml") if "intrinsics" in yaml.safe_load(block.text)]
+
+    def test_commands(self):
+        (camera,) = self.cameras()
+        num_run = 0
+        folders = {}
+        for block in documented.blocks(""):
+            lines = [shortened(line) for line in commands(block) if not is_run_elsewhere(line)]
+            if not any(lines):
+                continue
+            num_run += 1
+            with self.subTest(block.place):
+                page = block.place.split(":")[0]
+                folders[page] = folders.get(page) or self.new_folder(camera)
+                done = self.run_script("\n".join(lines), folders[page])
+                self.assertEqual(done.returncode, 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}")
+        self.assertGreater(num_run, 15)
+
+    def test_camera_files(self):
+        for block in documented.blocks("yaml"):
+            with self.subTest(block.place):
+                self.assertIn(block, self.cameras(), "a kind of file that this test does not load")
+                done = self.run_script("stemvo run drive/images --camera camera.yaml --frames 0:3 --out result", self.new_folder(block))
+                self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_programs_are_examples_that_are_compiled(self):
+        listed = (ROOT / "examples/CMakeLists.txt").read_text()
+        compiled = {file.read_text().split("\n", 1)[1] for file in (ROOT / "examples").glob("*.cpp") if f" {file.name})" in listed}
+        for block in documented.blocks("cpp"):
+            self.assertIn(block.text, compiled, f"{block.place}: no program of examples/, which the test `package` compiles and runs")
+
+    def test_nothing_else_is_code(self):
+        # python: all of them are run by package_test.py. text and mermaid: nothing to run.
+        self.assertLessEqual({block.language for block in documented.blocks()}, {"", "cpp", "mermaid", "python", "text", "yaml"})
+        self.assertEqual([block.place for block in documented.blocks("text") if re.search(r"\b(stemvo|make|tools|build)\b", block.text)], [])
+
+    def test_what_runs_elsewhere_is_still_there(self):
+        lines = [line for block in documented.blocks("") for line in commands(block)]
+        for begin, test in RUN_ELSEWHERE.items():
+            self.assertTrue(any(line.startswith(begin) for line in lines), f"{begin}: on no page any more")
+            self.assertTrue((ROOT / test).exists(), test)
+
+
+if __name__ == "__main__":
+    unittest.main()
