@@ -99,7 +99,7 @@ Status write_page(const std::filesystem::path& file,
   std::string configurations;
   for (const auto& [name, config] : request.configurations) {
     configurations +=
-        fmt::format("# {}{}\n{}", configurations.empty() ? "" : "\n", name, dump_config(config));
+        fmt::format("{}# {}\n{}", configurations.empty() ? "" : "\n", name, dump_config(config));
   }
   html::add_how_to_repeat(page, request.command, "Configurations", configurations);
   return page.write(file);
