@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "commands.hpp"
@@ -29,6 +33,15 @@ With your own camera (see 'stemvo run --help'):
 Exit codes: 0 done, 1 something is wrong with a file, model or key (one line says what), 2 wrong
 usage, 130 interrupted (what was computed is written).)";
 
+/// "expected a command: run, evaluate, .., found 'runn'"
+std::string expected_command(const CLI::App& app, const std::string& found) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(command->get_name());
+  }
+  return fmt::format("expected a command: {}, found {}", fmt::join(names, ", "), found);
+}
+
 /// Wrong usage on one line, as every other error. --help and --version are no errors.
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) {
@@ -41,6 +54,14 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   }
   constexpr std::size_t kMaxShown = 300;  // the shell may have made a thousand names of a pattern
   std::string message = error.what();
+  if (app.get_subcommands().empty()) {
+    const std::vector<std::string> words = app.remaining();
+    const auto word =
+        std::ranges::find_if(words, [](const std::string& one) { return !one.starts_with('-'); });
+    if (word != words.end()) {
+      message = expected_command(app, "'" + *word + "'");
+    }
+  }
   if (message.size() > kMaxShown) {
     message = message.substr(0, kMaxShown) + " ..; a pattern of files must be quoted";
   }
@@ -79,9 +100,7 @@ int run_program(int argc, char** argv) {
     return report_usage(app, error);
   }
   if (!action) {
-    print_error(
-        "expected a command: run, evaluate, channel, synth, calibrate, check, models, benchmark, "
-        "robustness or search (see 'stemvo --help')");
+    print_error(expected_command(app, "none") + " (see 'stemvo --help')");
     return kExitUsage;
   }
   const Expected<int> exit_code = action();

@@ -88,6 +88,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
       {{"check", "metrics.json"}, "--against"},
       {{"models", "x", "y"}, "y"},
+      {{"runn", "x", "--out", "o"}, "robustness, search, found 'runn'"},
       {{"benchmark", "x"}, "--out"},
   };
   for (const Misuse& misuse : cases) {
