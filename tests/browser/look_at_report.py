@@ -65,6 +65,7 @@ def look(browser, report, screenshot):
     found["headings"] = page.locator("h2, summary").all_text_contents()
     found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
+    found["categories"] = page.locator(".xtick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
     found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     if page.locator(SLIDER).is_visible():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""report.html of run, search and benchmark in Chromium: it draws without a network, hover, wheel and keyboard work."""
+"""report.html of run, search, benchmark and robustness in Chromium: it draws without a network, hover, wheel and keyboard work."""
 
 import json
 import os
@@ -55,10 +55,21 @@ class ReportPage(unittest.TestCase):
 
     def test_benchmark(self):
         out = self.folder / "benchmark"
-        call("benchmark", self.folder / "drive", "--out", out)
+        strange = "<b>a &amp; b"  # plotly.js would make it a bold "a & b"
+        call("synth", self.folder / "drives", "--name", strange, "--frames", 20, "--width", 310, "--height", 94)
+        call("synth", self.folder / "drives", "--frames", FRAMES, "--width", 620, "--height", 188)
+        call("benchmark", self.folder / "drives", "--out", out)
         found = look_at(out / "report.html")
         self.expect_a_sound_page(found)
         self.assertIn(f"00, clip 0:{FRAMES} of 4541", found["headings"])
+        self.assertIn(f"{strange}, frames 0:20", found["categories"])
+
+    def test_robustness(self):
+        out = self.folder / "robustness"
+        call("robustness", self.folder / "drive/sequences/00", "--out", out, "--kinds", "none,jpeg", "--controls", "gray")
+        found = look_at(out / "report.html")
+        self.expect_a_sound_page(found)
+        self.assertEqual(found["headings"][-3:], ["All numbers", "Command", "Configuration of the judged channel"])
 
     def test_draws_everything_without_errors_or_a_network(self):
         self.expect_a_sound_page(self.found)
