@@ -42,6 +42,9 @@ void add_paths_from_above(Page& page,
     traces.push_back({{"name", path.name}, {"mode", "lines"}, {"x", x}, {"y", y}});
     traces.back()["line"] =
         path.is_ground_truth ? json{{"width", 5}, {"color", "#999999"}} : json{{"width", 2}};
+    if (path.is_dotted) {
+      traces.back()["line"]["dash"] = "dot";
+    }
   }
   json layout = {{"large", true},
                  {"dragmode", "pan"},

@@ -21,6 +21,7 @@ struct PathFromAbove {
   std::string name;
   std::vector<std::array<double, 2>> xz_m;
   bool is_ground_truth = false;
+  bool is_dotted = false;  ///< told from another of its colour
 };
 /// Their top views in one figure; hover says which point it is.
 void add_paths_from_above(Page& page,

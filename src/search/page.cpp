@@ -132,8 +132,9 @@ void add_paths(const Results& results, const Trajectory& ground_truth, html::Pag
     paths.front().xz_m.push_back({pose.translation.x(), pose.translation.z()});
   }
   for (const auto& [rank, row] : choose_rows(results.identity, results.rows)) {
-    paths.push_back(
-        {fmt::format("{}: {}", rank, to_string(row->key)), row->drives.front().path_xz_m});
+    paths.push_back({fmt::format("{}: {}", rank, to_string(row->key)),
+                     row->drives.front().path_xz_m, false,
+                     results.identity.layer_of(row->key).baseline});
   }
   html::add_paths_from_above(
       page, "Paths from above",

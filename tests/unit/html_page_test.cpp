@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "html/figures.hpp"
 #include "html/page.hpp"
 #include "support/temp_folder.hpp"
 #include "text/text_file.hpp"
@@ -80,6 +81,15 @@ TEST_F(HtmlPage, NamesInFiguresAreShownAsTheyAre) {
   EXPECT_EQ(found["traces"][0]["x"], json({"a &amp; b", 1.5, nullptr}));
   EXPECT_EQ(found["traces"][0]["text"][0], "a<br>b");
   EXPECT_EQ(found["layout"]["xaxis"]["title"]["text"], "x &lt; y");
+}
+
+// There are more paths than colours.
+TEST_F(HtmlPage, DottedPathsAreToldFromTheOthers) {
+  Page page("a drive");
+  add_paths_from_above(page, "paths", "", {{"a", {{0, 1}}}, {"b", {{0, 1}}, false, true}});
+  const json traces = content(page)["sections"][0]["traces"];
+  EXPECT_FALSE(traces[0]["line"].contains("dash"));
+  EXPECT_EQ(traces[1]["line"]["dash"], "dot");
 }
 
 TEST_F(HtmlPage, NeedsNothingFromElsewhereAndNamesTheLicence) {
