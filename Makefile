@@ -71,4 +71,4 @@ lint: setup
 	@tools/lint.sh
 
 clean:
-	@rm -rf build/release build/dev build/asan build/tsan build/fuzz build/coverage build/bench build/bench-run build/tidy build/demo
+	@rm -rf build/release build/dev build/asan build/tsan build/fuzz build/coverage build/bench-run build/tidy build/demo

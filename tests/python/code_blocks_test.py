@@ -28,7 +28,7 @@ RUN_ELSEWHERE = {
     "cmake --preset": ".ci/run",
     "make bench": "tests/python/bench_run_test.py",
     "bench/run.py": "tests/python/bench_run_test.py",
-    "build/bench/stemvo_bench": ".ci/run",
+    "build/release/stemvo_bench": ".ci/run",
     "STEMVO_BENCH_": ".ci/run",
     "cmake -S examples": "tests/package/install_and_consume.cmake",
     "build/examples/": "tests/package/install_and_consume.cmake",
