@@ -68,6 +68,7 @@ docs: setup
 	@tools/docs.sh
 
 lint: setup
+	@tools/setup.sh lint
 	@tools/lint.sh
 
 clean:

@@ -5,10 +5,10 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <fstream>
 #include <string>
+#include <system_error>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -99,7 +99,8 @@ int flush_console(int exit_code) {
   if (first_failure == 0 || first_failure == EPIPE || exit_code != kExitDone) {
     return exit_code;
   }
-  print_error(fmt::format("standard output: cannot be written ({})", std::strerror(first_failure)));
+  print_error(fmt::format("standard output: cannot be written ({})",
+                          std::generic_category().message(first_failure)));
   return kExitFailed;
 }
 

@@ -3,7 +3,7 @@
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, plotly.js, a Python environment.
 # Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
 # `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`,
-# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh, `setup.sh docs` what `make docs` needs.
+# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh, `setup.sh docs` what `make docs` needs, `setup.sh lint` clang-tidy.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -220,6 +220,11 @@ fi
 if [[ "${1:-}" == wheel ]]; then
   mkdir -p "$LOGS"
   make_venv build/venv-wheel "$LOGS/venv-wheel.log" tools/requirements-wheel.txt
+  exit
+fi
+if [[ "${1:-}" == lint ]]; then
+  mkdir -p "$LOGS"
+  make_venv build/venv-lint "$LOGS/venv-lint.log" tools/requirements-lint.txt
   exit
 fi
 # What others measure trajectories with.

@@ -87,7 +87,7 @@ Status apply_override(Config& config, const std::string& assignment) {
   if (!problem.empty()) {
     return fail(source + ": " + problem);
   }
-  config = changed;
+  config = std::move(changed);
   config.keys_overridden.insert(name);
   return {};
 }

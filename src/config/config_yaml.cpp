@@ -20,7 +20,7 @@ bool parse_decimal(std::string_view text, Number& value) {
     text.remove_prefix(1);
   }
   const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  const auto [stop, error] = std::from_chars(text.data(), end, value);  // NOLINT: it has an end
   return error == std::errc() && stop == end;
 }
 

@@ -68,7 +68,7 @@ namespace stemvo::dataset {
 /// A video file, or a live camera.
 [[nodiscard]] Expected<FrameSource> open_video(const FrameSourceRequest& request);
 /// The same of a stream that is open.
-[[nodiscard]] Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
+[[nodiscard]] Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);
 

@@ -99,7 +99,7 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
     for (int i = 0; i < 12; ++i) {
       text += fmt::format(" {:.12e}", (*row)(i / 4, i % 4));
     }
-    text += "\n";
+    text += '\n';
   }
   return text;
 }

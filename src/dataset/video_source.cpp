@@ -57,7 +57,7 @@ std::optional<int> camera_number(const fs::path& path) {
   return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
 }
 
-Expected<FrameSource> open_stream(std::shared_ptr<VideoStream> stream,
+Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const CameraFile& camera,
                                   const FrameSourceRequest& request) {
   const std::string owner = request.sequence_dir.string();

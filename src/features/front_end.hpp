@@ -62,7 +62,7 @@ class FrontEnd {
   /// Tracks that ended but are worth finding again, where they should be in the last image (also
   /// outside of it); process() looks for them there before it looks for new corners. Called after
   /// keep(); a track that is not named is forgotten.
-  virtual void look_for(TrackPoints /*expected*/) {}
+  virtual void look_for(TrackPoints /*expected*/) {}  // NOLINT: an override keeps it
 
   /// What it knows between process() and keep(); one of the same options goes on from there.
   virtual void write_state(StateWriter& writer) const = 0;

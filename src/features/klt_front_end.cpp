@@ -43,7 +43,8 @@ std::shared_ptr<const PreparedImage> KltFrontEnd::prepare(const ChannelImage& ch
   const StageTimer timer(Stage::kPyramid);
   auto image = std::make_shared<KltImage>(channel);
   const double scale = channel.map.scale.minCoeff();
-  const int reach = std::max(kMinReach_px, static_cast<int>(options().klt_window / 2 / scale));
+  const int half = options().klt_window / 2;
+  const int reach = std::max(kMinReach_px, static_cast<int>(half / scale));
   image->window = cv::Size(2 * reach + 1, 2 * reach + 1);
   cv::buildOpticalFlowPyramid(channel.pixels, image->pyramid, image->window, num_levels(scale) - 1,
                               /*withDerivatives=*/true);

@@ -92,8 +92,9 @@ bool cut_fine(const BorderedImage& image, float x, float y, Patch& patch) {
   kernels.sample_fine(image, {x, y + 1.0F}, after);
   columns.col(1) = 0.5F * (FineVector(after.data()) - FineVector(before.data()));
   for (int i = 0; i < kFineSide * kFineSide; ++i) {
+    const int row = i / kFineSide;
     const float dx = static_cast<float>(i % kFineSide) - 0.5F * (kFineSide - 1);
-    const float dy = static_cast<float>(i / kFineSide) - 0.5F * (kFineSide - 1);
+    const float dy = static_cast<float>(row) - 0.5F * (kFineSide - 1);
     columns(i, 2) = columns(i, 0) * dx + columns(i, 1) * dy;
     columns(i, 3) = columns(i, 1) * dx - columns(i, 0) * dy;
   }

@@ -50,7 +50,7 @@ std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography, cons
     return {};
   }
   const Svd3 svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d d = svd.singularValues();
+  const Eigen::Vector3d& d = svd.singularValues();
   // Negated, so that 0/0 is refused as well.
   if (!(d(0) / d(1) >= kMinRatio && d(0) / d(1) <= kMaxRatio && d(1) / d(2) >= kMinRatio)) {
     return {};

@@ -130,7 +130,7 @@ void DriveLoop::keep_checkpoint(std::size_t frame, std::chrono::steady_clock::ti
     so_far.elapsed_before_s += std::chrono::duration<double>(now - request_.started).count();
     keeper_.keep_checkpoint(
         pack({frame, odometry_.state(), std::move(so_far), keeper_.csv()}, identity_));
-  } catch (const std::bad_alloc&) {  // the one before stays; the drive needs no checkpoint
+  } catch (const std::bad_alloc&) {  // NOLINT: the one before stays; the drive needs no checkpoint
   }
 }
 

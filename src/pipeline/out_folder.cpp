@@ -2,7 +2,6 @@
 #include "pipeline/out_folder.hpp"
 
 #include <cerrno>
-#include <cstring>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -67,7 +66,7 @@ Status create_out_folder(const fs::path& folder) {
   if (file >= 0) {
     ::close(file);
   }
-  return is_written ? Status() : Status(refuse(std::strerror(error)));
+  return is_written ? Status() : Status(refuse(std::generic_category().message(error)));
 }
 
 Expected<FolderLock> open_out_folder(const fs::path& folder) {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <string_view>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -140,7 +140,7 @@ bool is_same(const FilterRecord& a, const FilterRecord& b) {
 }
 
 /// Error: none of the search, or another than an earlier line's.
-Status add_record(FilterRecord record, SearchRecords& records) {
+Status add_record(const FilterRecord& record, SearchRecords& records) {
   if (Status status = check_record(record, records.identity); !status) {
     return status;
   }
@@ -159,7 +159,7 @@ Status parse_line(const std::string& line, bool is_first, SearchRecords& records
     if (!is_first) {
       FilterRecord record = json.get<FilterRecord>();
       json.get_to(record.key);
-      return add_record(std::move(record), records);
+      return add_record(record, records);
     }
     int format = 0;
     read_value(json.at("stemvo_search"), format);
@@ -264,9 +264,10 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
   std::FILE* stream = std::fopen(file.c_str(), resume ? "ae" : "axe");
   if (stream == nullptr) {
     const bool is_there = errno == EEXIST;
-    return fail(fmt::format("{}: expected a {}, found: {}", file.string(),
-                            is_there ? "folder without a search" : "file that can be written",
-                            is_there ? "one; --resume goes on with it" : std::strerror(errno)));
+    return fail(fmt::format(
+        "{}: expected a {}, found: {}", file.string(),
+        is_there ? "folder without a search" : "file that can be written",
+        is_there ? "one; --resume goes on with it" : std::generic_category().message(errno)));
   }
   RecordFile opened;
   opened.file_ = file;
@@ -287,7 +288,8 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
   opened.records_ = std::move(before->records);
   opened.warnings_ = std::move(before->warnings);
   if (::ftruncate(::fileno(stream), static_cast<off_t>(before->num_good_bytes)) != 0) {
-    return fail(fmt::format("{}: cannot be written: {}", file.string(), std::strerror(errno)));
+    return fail(fmt::format("{}: cannot be written: {}", file.string(),
+                            std::generic_category().message(errno)));
   }
   const Status written = opened.write(is_new ? line_of(identity) : std::string());
   return written ? Expected<RecordFile>(opened) : written.error();
@@ -307,7 +309,8 @@ Status RecordFile::append(const std::vector<FilterRecord>& records) {
 Status RecordFile::write(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stream_.get()) != text.size() ||
       std::fflush(stream_.get()) != 0 || ::fsync(::fileno(stream_.get())) != 0) {
-    return fail(fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+    return fail(fmt::format("{}: cannot be written: {}", file_.string(),
+                            std::generic_category().message(errno)));
   }
   return {};
 }

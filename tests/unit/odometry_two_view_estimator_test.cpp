@@ -6,6 +6,7 @@
 
 #include "geometry/median.hpp"
 #include "odometry/two_view_estimator.hpp"
+#include "stemvo/two_view.hpp"
 #include "support/synthetic_scene.hpp"
 
 namespace stemvo {
@@ -47,6 +48,42 @@ TEST(TwoViewEstimator, ExactForwardDriveTurningRight) {
     EXPECT_GT(estimate.translation.z(), 0.9);
     EXPECT_GT(so3_log(estimate.rotation).y(), 0.02);
   }
+}
+
+TEST(TwoViewEstimator, ThePublicFunctionFindsTheMotionFromMatchesAlone) {
+  const Rigid3 prev_from_cur(so3_exp({0.002, 0.03, -0.001}), {0.05, 0.01, 1.0});
+  const Scene scene = drive_scene(prev_from_cur, 0.3, 0.3, 5);
+  const auto motion = estimate_two_view(scene.prev_uv, scene.cur_uv, scene.camera);
+  ASSERT_TRUE(motion) << motion.error().message;
+  ASSERT_EQ(motion->state, FrameState::kTracking);
+  EXPECT_EQ(motion->model, TwoViewModel::kEssential);
+  EXPECT_LT(motion->homography_ratio, 0.4);
+  EXPECT_TRUE(motion->is_decisive);
+  EXPECT_EQ(motion->inlier_mask.size(), scene.prev_uv.size());
+  const Rigid3 estimate = motion->cur_from_prev.inverse();
+  EXPECT_LE(estimate.rotation.angularDistance(prev_from_cur.rotation), 1e-3);
+  EXPECT_LE((estimate.translation - prev_from_cur.translation.normalized()).norm(), 0.02);
+}
+
+TEST(TwoViewEstimator, ThePublicFunctionSaysWhatIsWrongWithItsInput) {
+  const Scene scene = drive_scene({Eigen::Quaterniond::Identity(), {0.0, 0.0, 1.0}}, 0.0, 0.0, 3);
+  const auto problem = [&](std::vector<Eigen::Vector2d> prev_uv, const Camera& camera) {
+    const auto motion = estimate_two_view(prev_uv, scene.cur_uv, camera);
+    return motion ? std::string() : motion.error().message;
+  };
+  EXPECT_EQ(problem({}, scene.camera),
+            "matches: expected as many points in one image as in the other, found 0 and 600");
+  std::vector<Eigen::Vector2d> broken = scene.prev_uv;
+  broken[7].x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(problem(broken, scene.camera).find("expected finite pixels, found (nan"),
+            std::string::npos);
+  EXPECT_NE(problem(scene.prev_uv, Camera{}).find("camera: expected a size"), std::string::npos);
+  Options options;
+  options.two_view.sigma_px = -1.0;
+  EXPECT_FALSE(estimate_two_view(scene.prev_uv, scene.cur_uv, scene.camera, options));
+  const auto none = estimate_two_view({}, {}, scene.camera);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->state, FrameState::kLost);
 }
 
 TEST(TwoViewEstimator, NoiseAndOutliersOver50Seeds) {
