@@ -13,8 +13,8 @@ mkdir -p "$BUILD"
 cmake --preset dev -B "$BUILD" -D CMAKE_DISABLE_PRECOMPILE_HEADERS=ON --log-level=WARNING >"$BUILD/configure.log" ||
   { cat "$BUILD/configure.log" >&2; exit 1; }
 cmake --build "$BUILD" --target stemvo_version >"$BUILD/build.log" || { cat "$BUILD/build.log" >&2; exit 1; } # a generated header
+sources=("$@")
 (($# > 0)) || mapfile -t sources < <(git ls-files 'src/*.cpp' 'apps/*.cpp')
-(($# == 0)) || sources=("$@")
 echo "==> clang-tidy over ${#sources[@]} sources of src and apps"
 failed=0
 # What libstdc++ itself uses although it is deprecated is no finding; nor are counts of warnings in system headers.

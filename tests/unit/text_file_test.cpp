@@ -59,6 +59,20 @@ TEST(WriteTextFile, AFullDiskLeavesTheOldFile) {
   EXPECT_THAT(write_text_file("/dev/full", "x").error().message, HasSubstr("No space left"));
 }
 
+TEST(RemoveFile, TakesWhatAKilledWriteLeftOfItToo) {
+  const TempFolder folder;
+  const fs::path file = folder.path() / "checkpoint";
+  ASSERT_TRUE(write_text_file(file, "whole"));
+  ASSERT_TRUE(write_text_file(file.string() + ".unfinished", "cut o"));
+  EXPECT_TRUE(remove_file(file));
+  EXPECT_EQ(num_files(folder), 0);
+  EXPECT_TRUE(remove_file(file));  // there is none
+  ASSERT_TRUE(fs::create_directories(file / "not empty"));
+  const Status status = remove_file(file);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.error().message.find("checkpoint: cannot be removed ("), std::string::npos);
+}
+
 TEST(WriteTextFile, FollowsALinkToTheFile) {
   const TempFolder folder;
   const fs::path file = folder.file("poses.txt", "old");
