@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -223,7 +224,7 @@ struct FilterRow : FilterRecord {
 
 /// Best, median and worst of the filters whose pose was detected, those that halving stopped behind
 /// the others, the later the better; the same filter once. Then the baselines, by rank.
-using ShownFilters = std::vector<std::pair<const char*, const FilterRow*>>;
+using ShownFilters = std::vector<std::pair<std::string_view, const FilterRow*>>;
 [[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
                                        const std::vector<FilterRow>& rows);
 
