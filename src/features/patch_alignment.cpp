@@ -22,7 +22,7 @@ constexpr float kTranslated_px = 0.1F;
 constexpr float kMinGain = 0.1F;
 /// The finest level may not leave what the coarser ones found by more.
 constexpr float kMaxFineMove_px = 4.0F;
-constexpr float kMaxScale = 1.7F;
+constexpr float kMaxWarpScale = 1.7F;
 /// Of the surroundings, one level up: in another scene the best of a few pixels often looks right.
 constexpr float kMinCoarseCorrelation = 0.5F;
 /// Of a patch about its mean, gray values squared.
@@ -38,7 +38,7 @@ bool is_readable(const BorderedImage& image, float x, float y) {
          y <= static_cast<float>(image.height - 1) + kOutside;
 }
 
-bool is_inside(const BorderedImage& image, float x, float y) {
+bool is_in_image(const BorderedImage& image, float x, float y) {
   return x >= 0.0F && y >= 0.0F && x <= static_cast<float>(image.width - 1) &&
          y <= static_cast<float>(image.height - 1);
 }
@@ -157,9 +157,9 @@ float compose(Similarity& warp, const float* step) {
 /// Inside the image, near the start and of a like size.
 bool is_plausible(const Similarity& warp, const BorderedImage& image, const Similarity& start) {
   const float scale_sq = warp.a * warp.a + warp.b * warp.b;
-  return is_inside(image, warp.x, warp.y) &&
+  return is_in_image(image, warp.x, warp.y) &&
          std::hypot(warp.x - start.x, warp.y - start.y) <= kMaxFineMove_px &&
-         scale_sq < kMaxScale * kMaxScale && scale_sq * kMaxScale * kMaxScale > 1.0F;
+         scale_sq < kMaxWarpScale * kMaxWarpScale && scale_sq * kMaxWarpScale * kMaxWarpScale > 1.0F;
 }
 
 /// A translation first, until it has nearly converged; then the similarity.
@@ -221,7 +221,7 @@ float coarse_correlation(const Patch::Coarse& patch, const BorderedImage& image,
 }  // namespace
 
 bool cut_patch(Pyramid pyramid, float x, float y, Patch& patch) {
-  if (!is_inside(pyramid.front(), x, y) || !cut_fine(pyramid.front(), x, y, patch)) {
+  if (!is_in_image(pyramid.front(), x, y) || !cut_fine(pyramid.front(), x, y, patch)) {
     return false;
   }
   float scale = 1.0F;

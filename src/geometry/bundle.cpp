@@ -22,7 +22,7 @@ using Matrix63 = Eigen::Matrix<double, 6, 3>;
 using Matrix62 = Eigen::Matrix<double, 6, 2>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kMinDepth = 1e-6;
+constexpr double kMinBundleDepth = 1e-6;
 /// More keeps the first steps from where the data hardly pull: where the window bends, and the
 /// camera. With 1e-4 ten steps end half-way there.
 constexpr double kFirstDamping = 1e-7;
@@ -90,9 +90,9 @@ std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
 }
 
 /// The normal equations in blocks. A point's part is damped and eliminated at once.
-class NormalEquations {
+class BundleEquations {
  public:
-  NormalEquations(const Bundle& bundle, const BundleOptions& options)
+  BundleEquations(const Bundle& bundle, const BundleOptions& options)
       : options_(options),
         num_camera_(options.camera ? kCamera : 0),
         size_(6 * (static_cast<int>(bundle.camera_from_world.size()) - options.num_fixed_poses) +
@@ -161,7 +161,7 @@ void for_each_point(const Bundle& bundle, const Use& use) {
   }
 }
 
-void NormalEquations::linearize(const Bundle& bundle,
+void BundleEquations::linearize(const Bundle& bundle,
                                 const std::vector<Reprojection>& at,
                                 double damping) {
   reduced_.setZero();
@@ -179,7 +179,7 @@ void NormalEquations::linearize(const Bundle& bundle,
   });
 }
 
-void NormalEquations::add(const Bundle& bundle,
+void BundleEquations::add(const Bundle& bundle,
                           std::size_t i,
                           const Reprojection& at,
                           const Eigen::Matrix3d& rotation,
@@ -216,7 +216,7 @@ void NormalEquations::add(const Bundle& bundle,
   }
 }
 
-void NormalEquations::eliminate(
+void BundleEquations::eliminate(
     const Bundle& bundle, std::size_t begin, std::size_t end, double damping, PointBlock& point) {
   point.inverse.diagonal() *= 1.0 + damping;
   point.inverse = point.inverse.inverse().eval();
@@ -243,7 +243,7 @@ void NormalEquations::eliminate(
   }
 }
 
-bool NormalEquations::step(double damping,
+bool BundleEquations::step(double damping,
                            const CameraChange& from_prior,
                            Bundle& bundle,
                            CameraChange& camera_change) const {
@@ -288,7 +288,7 @@ bool NormalEquations::step(double damping,
   return true;
 }
 
-CameraInformation NormalEquations::camera_information() const {
+CameraInformation BundleEquations::camera_information() const {
   const int rest = size_ - num_camera_;
   Eigen::MatrixXd poses = reduced_.bottomRightCorner(rest, rest);
   poses.diagonal() += 1e-9 * diagonal_.tail(rest);  // lengths may be free
@@ -311,7 +311,7 @@ double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reproje
   for (const Bundle::Observation& observation : bundle.observations) {
     Reprojection& at = result.emplace_back(bundle, observation,
                                            rotations[static_cast<std::size_t>(observation.pose)]);
-    if (!(at.x.z() > kMinDepth)) {
+    if (!(at.x.z() > kMinBundleDepth)) {
       return std::numeric_limits<double>::infinity();
     }
     at.weight = loss.add(at.error.squaredNorm());
@@ -340,7 +340,7 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
       !std::isfinite(result.cost)) {
     return result;
   }
-  NormalEquations equations(bundle, options);
+  BundleEquations equations(bundle, options);
   std::vector<Reprojection> trial_at;
   trial_at.reserve(at.size());
   BundleState before;

@@ -75,7 +75,7 @@ void serialize(Archive& archive, Window& window) {
   archive(window.keyframes, window.landmarks);
 }
 template <typename Archive>
-void serialize(Archive& archive, RefinedMotion& motion) {
+void serialize(Archive& archive, WindowMotion& motion) {
   archive(motion.prev, motion.cur, motion.prev_from_cur);
 }
 template <typename Archive>

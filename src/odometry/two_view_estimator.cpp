@@ -16,7 +16,7 @@ namespace stemvo {
 namespace {
 
 /// ORB-SLAM2's acceptance, but the share is of all matches here, outliers included.
-constexpr AcceptanceOptions kAcceptance{.min_good_share = 0.5};
+constexpr AcceptanceOptions kPairAcceptance{.min_good_share = 0.5};
 
 /// Once initialised, S_H is only written down: few points of a street lie on one plane, and the
 /// estimator would always use all its iterations, and polish each of them.
@@ -29,7 +29,7 @@ constexpr RobustEstimator kRecordEstimator = RobustEstimator::kRansac;
 constexpr double kNoiseParallax = 5.0;
 
 /// After a cut, points are found by chance here and there; some motion fits a quarter of them.
-constexpr double kMinInlierShare = 0.3;
+constexpr double kMinPairInlierShare = 0.3;
 
 }  // namespace
 
@@ -70,7 +70,7 @@ MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs, bool is_initia
   result.model = motion->model;
   result.cur_from_prev = motion->cur_from_prev;
   result.runner_up_ratio = motion->runner_up_ratio;
-  result.is_decisive = is_decisive(*motion, static_cast<int>(pairs.size()), kAcceptance);
+  result.is_decisive = is_decisive(*motion, static_cast<int>(pairs.size()), kPairAcceptance);
   result.inlier_mask = std::move(motion->test.good_mask);
   refine(pairs, result);
   return result;
@@ -119,7 +119,7 @@ void TwoViewEstimator::refine(const PixelPairs& pairs, MeasuredMotion& result) c
   }
   result.num_inliers = static_cast<int>(prev.size());
   const double share = static_cast<double>(prev.size()) / static_cast<double>(pairs.size());
-  if (result.num_inliers < odometry_.min_inliers || share < kMinInlierShare) {
+  if (result.num_inliers < odometry_.min_inliers || share < kMinPairInlierShare) {
     result.cur_from_prev = {};
     result.state = FrameState::kLost;
     return;

@@ -136,7 +136,7 @@ void WindowHistory::close(const Window& window) {
 }
 
 std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
-                                  std::span<const RefinedMotion> motions) {
+                                  std::span<const WindowMotion> motions) {
   std::vector<Rigid3> poses(world_from_camera.begin(), world_from_camera.end());
   auto motion = motions.begin();
   for (std::size_t i = 1; i < poses.size(); ++i) {

@@ -16,7 +16,7 @@
 namespace stemvo {
 
 /// Motion from a keyframe to the next, or to a frame between them, as it was last refined.
-struct RefinedMotion {
+struct WindowMotion {
   int prev = 0;  ///< frame numbers
   int cur = 0;
   Rigid3 prev_from_cur;
@@ -45,7 +45,7 @@ class WindowHistory {
   void close(const Window& window);
 
   /// Ordered by `cur`.
-  [[nodiscard]] const std::vector<RefinedMotion>& motions() const { return motions_; }
+  [[nodiscard]] const std::vector<WindowMotion>& motions() const { return motions_; }
   /// Well-constrained landmarks that have left.
   [[nodiscard]] const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
 
@@ -74,7 +74,7 @@ class WindowHistory {
   void keep_motions(const Keyframe& prev, const Keyframe& cur);
   void keep_followers(const Keyframe& keyframe);
 
-  std::vector<RefinedMotion> motions_;
+  std::vector<WindowMotion> motions_;
   std::vector<MapLandmark> landmarks_;
   std::map<int, Track> tracks_;
   double scale_ = 1.0;  ///< of the window, by all that rescaled it
@@ -86,6 +86,6 @@ class WindowHistory {
 /// frame before as they came. `motions` are ordered by `cur`; frame numbers count
 /// `world_from_camera`, the poses as they came.
 [[nodiscard]] std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
-                                                std::span<const RefinedMotion> motions);
+                                                std::span<const WindowMotion> motions);
 
 }  // namespace stemvo

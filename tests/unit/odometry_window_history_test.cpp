@@ -28,7 +28,7 @@ TEST(RefinedPoses, KeyframesFollowTheirMotionsAndTheOthersTheirKeyframe) {
   // Frame 2 was no keyframe, frame 5 is after the last one.
   const std::vector<Rigid3> online = metre_steps(6);
   const std::vector<Rigid3> refined = refined_poses(
-      online, std::vector<RefinedMotion>{
+      online, std::vector<WindowMotion>{
                   {0, 1, step(1.1)}, {1, 2, step(1.2)}, {1, 3, step(2.5)}, {3, 4, step(0.9)}});
   ASSERT_EQ(refined.size(), online.size());
   EXPECT_LT(distance(refined[1], step(1.1)), 1e-12);
@@ -61,7 +61,7 @@ TEST(WindowHistory, WhatHasLeftIsNotRescaledWithTheWindow) {
   window.keyframes.push_back(coming);
   rescale(window, 3.0, coming.world_from_camera.translation);
   history.close(window);
-  const std::vector<RefinedMotion>& motions = history.motions();
+  const std::vector<WindowMotion>& motions = history.motions();
   ASSERT_EQ(motions.size(), 5U);  // two keyframes, and a follower of each
   const double lengths[] = {0.5, 1.0, 1.5, 3.0, 1.5};
   for (std::size_t i = 0; i < motions.size(); ++i) {
@@ -107,7 +107,7 @@ TEST(WindowHistory, LengthsAreThoseOfTheTimeWhenTheFrameCame) {
   history.close(window);
   ASSERT_EQ(history.motions().size(), 23U);
   double last_length = 1.0;
-  for (const RefinedMotion& motion : history.motions()) {
+  for (const WindowMotion& motion : history.motions()) {
     const double length = motion.prev_from_cur.translation.norm();
     if (motion.cur <= 6 || motion.cur >= 18) {
       EXPECT_NEAR(length, motion.cur <= 6 ? 1.0 : 1.5, 1e-12) << motion.cur;

@@ -17,20 +17,20 @@ namespace {
 constexpr double kMinTileCorrelation = 0.2;
 constexpr int kMinTiles = 6;
 constexpr double kMinCorrelation = 0.25;
-constexpr double kMaxSigma = 0.2;
+constexpr double kMaxDenseSigma = 0.2;
 constexpr std::size_t kMinSamples = 600;
 /// Fewer than this where pixels are left out: take every pixel.
 constexpr std::size_t kFewSamples = 2400;
 constexpr int kMaxIterations = 5;  ///< per grid
-constexpr double kCoarse = 5.0;    ///< times the last grid's bound of convergence
+constexpr double kCoarseBound = 5.0;    ///< times the last grid's bound of convergence
 /// Of a tile's mean square residual, in normalised images.
 constexpr double kNoiseFloor = 0.05;
-constexpr double kSearchSigma = 0.05;  ///< prior knowledge of log_scale worse than this: search
+constexpr double kSearchScaleSigma = 0.05;  ///< prior knowledge of log_scale worse than this: search
 constexpr double kSearchStep = 0.03;
 constexpr double kMaxSearch = 1.8;
 constexpr int kMinTileSamples = 20;
 /// Residuals beyond the images' own standard deviation count linearly.
-constexpr float kHuber = 1.0F;
+constexpr float kHuberResidual = 1.0F;
 
 double correlation_of(double cc, double pp, double cp) {
   return cc > 0.0 && pp > 0.0 ? cp / std::sqrt(cc * pp) : 0.0;
@@ -153,7 +153,7 @@ Tiles align_road(const RoadImage::Level& prev,
     a.segment<3>(4) = p.cross(g);  // of exp(w) p
     a[7] = value - match.cur;
     const float size = std::abs(a[7]);
-    const Eigen::Matrix<float, 8, 1> weighted = (size <= kHuber ? 1.0F : kHuber / size) * a;
+    const Eigen::Matrix<float, 8, 1> weighted = (size <= kHuberResidual ? 1.0F : kHuberResidual / size) * a;
     tile.sums.topRows<4>().noalias() += a.head<4>() * weighted.transpose();
     tile.sums.bottomRightCorner<4, 4>().noalias() += a.tail<4>() * weighted.tail<4>().transpose();
   });
@@ -261,13 +261,13 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
       }
       correlation = total_correlation(tiles);
       covariance = normal.covariance;
-      if (normal.relative_change < (is_last ? 1.0 : kCoarse) * step.options.convergence) {
+      if (normal.relative_change < (is_last ? 1.0 : kCoarseBound) * step.options.convergence) {
         break;
       }
     }
   }
   RoadMeasurement result = read_road(warp, covariance, step.options.camera_height_m);
-  result.is_valid = correlation > kMinCorrelation && result.sigma < kMaxSigma;
+  result.is_valid = correlation > kMinCorrelation && result.sigma < kMaxDenseSigma;
   result.reason = result.is_valid ? "" : "the images of the road hardly agree";
   return result;
 }
@@ -289,7 +289,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
   std::vector<Grid> grids;
   RoadWarp warp(step.cur_from_prev, step.prior, step.options.camera_height_m);
   // A scale that is known well starts within a pixel: half size is for the search.
-  if (step.prior.log_scale_sigma > kSearchSigma) {
+  if (step.prior.log_scale_sigma > kSearchScaleSigma) {
     const RoadImage::Level half_prev = make_half_level(step.prev);
     const RoadImage::Level half_cur = make_half_level(step.cur);
     if (half_prev.values.empty() || half_cur.values.empty()) {

@@ -30,7 +30,7 @@ constexpr double kMinInlierShare = 0.3;
 /// Of the corners. One in eight finds its way back on nothing but the sensor's noise.
 constexpr double kMinTrackedShare = 0.25;
 constexpr double kMaxSigma = 0.2;
-constexpr int kBorder_px = 24;  ///< room for the tracker's window around the strip
+constexpr int kTrackingBorder_px = 24;  ///< room for the tracker's window around the strip
 
 /// Input pixels -> the image's.
 cv::Size in_pixels_of(const RoadImage& image, cv::Size size) {
@@ -57,7 +57,7 @@ Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptio
     high = {std::max(high.x, sample.u), std::max(high.y, sample.v)};
   }
   strip.box =
-      cv::Rect(low - cv::Point(kBorder_px, kBorder_px), high + cv::Point(kBorder_px, kBorder_px)) &
+      cv::Rect(low - cv::Point(kTrackingBorder_px, kTrackingBorder_px), high + cv::Point(kTrackingBorder_px, kTrackingBorder_px)) &
       cv::Rect({}, cur.pixels.size());
   if (samples.empty() || strip.box.area() == 0) {
     return {};
