@@ -31,17 +31,6 @@ std::vector<Field> fields_of(Config& config) {
   return fields;
 }
 
-/// A list is written as in the file; anything else is taken as it stands, so that a path may hold
-/// any character.
-std::string read_assigned(const std::string& text, const Field& field) {
-  if (!std::holds_alternative<std::vector<double>*>(field.value)) {
-    const std::string problem = config::parse_scalar(field, text);
-    return problem.empty() ? options::violation_of(field) : problem;
-  }
-  const Expected<YAML::Node> value = config::parse_document(text, "value");
-  return value ? config::read_value(*value, field) : value.error().message;
-}
-
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
@@ -83,7 +72,7 @@ Status apply_override(Config& config, const std::string& assignment) {
         source + ": " +
         config::unknown_key(is_section ? section : "", name.substr(name.find('.') + 1), fields));
   }
-  const std::string problem = read_assigned(assignment.substr(equals + 1), *field);
+  const std::string problem = config::read_assigned(assignment.substr(equals + 1), *field);
   if (!problem.empty()) {
     return fail(source + ": " + problem);
   }

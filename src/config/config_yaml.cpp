@@ -107,6 +107,70 @@ std::string read_list(const YAML::Node& node, std::vector<double>& values) {
   return {};
 }
 
+/// Reads one scalar into a field that is no list. Nothing, or "expected ..., found ...".
+std::string parse_scalar(const Field& field, std::string_view text) {
+  const auto parse_as = [text](std::string_view kind, auto* value) {
+    return parse_decimal(text, *value) ? std::string() : expected(kind, text);
+  };
+  return std::visit(
+      Overloaded{
+          [&](const EnumValue& value) { return parse_choice(field.rule, value, text); },
+          [&](std::string* value) {
+            *value = text;
+            return std::string();
+          },
+          [&](bool* value) {
+            *value = text == "true";
+            return *value || text == "false" ? std::string() : expected("true or false", text);
+          },
+          [&](double* value) { return parse_as("a number", value); },
+          [&](int* value) { return parse_as("a whole number", value); },
+          [&](std::uint64_t* value) { return parse_as("a whole number of at least 0", value); },
+          [&](std::vector<double>*) { return expected("a list of numbers like [100, 200]", text); },
+      },
+      field.value);
+}
+
+/// The same of a scalar or a list.
+std::string read_value(const YAML::Node& node, const Field& field) {
+  std::string problem;
+  if (auto* const* list = std::get_if<std::vector<double>*>(&field.value);
+      list != nullptr && node.IsSequence()) {
+    problem = read_list(node, **list);
+  } else if (node.IsScalar()) {
+    problem = parse_scalar(field, node.Scalar());
+  } else {
+    problem = fmt::format("expected {}, found {}",
+                          list != nullptr ? "a list of numbers" : "one value", kind_of(node));
+  }
+  return problem.empty() ? violation_of(field) : problem;
+}
+
+/// Where documents begin.
+class DocumentMarks final : public YAML::EventHandler {
+ public:
+  std::vector<int> lines;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&,
+                const std::string&,
+                YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&,
+                       const std::string&,
+                       YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&,
+                  const std::string&,
+                  YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
 /// Walks one YAML map, top level (section empty) or section.
 class MapReader {
  public:
@@ -177,51 +241,27 @@ class MapReader {
 
 }  // namespace
 
-std::string parse_scalar(const Field& field, std::string_view text) {
-  return std::visit(
-      [&](auto value) -> std::string {
-        using Value = std::remove_pointer_t<decltype(value)>;
-        if constexpr (std::is_same_v<Value, EnumValue>) {
-          return parse_choice(field.rule, value, text);
-        } else if constexpr (std::is_same_v<Value, std::string>) {
-          *value = text;
-          return {};
-        } else if constexpr (std::is_same_v<Value, bool>) {
-          *value = text == "true";
-          return text == "true" || text == "false" ? std::string()
-                                                   : expected("true or false", text);
-        } else if constexpr (std::is_same_v<Value, double>) {
-          return parse_number(text, *value);
-        } else if constexpr (std::is_same_v<Value, int>) {
-          return parse_decimal(text, *value) ? std::string() : expected("a whole number", text);
-        } else if constexpr (std::is_same_v<Value, std::uint64_t>) {
-          return parse_decimal(text, *value) ? std::string()
-                                             : expected("a whole number of at least 0", text);
-        } else {
-          return expected("a list of numbers like [100, 200]", text);
-        }
-      },
-      field.value);
+std::string read_assigned(const std::string& text, const Field& field) {
+  if (!std::holds_alternative<std::vector<double>*>(field.value)) {
+    const std::string problem = parse_scalar(field, text);
+    return problem.empty() ? violation_of(field) : problem;
+  }
+  const Expected<YAML::Node> value = parse_document(text, "value");
+  return value ? read_value(*value, field) : value.error().message;
 }
 
 std::string format_value(const Field& field) {
-  return std::visit(
-      [&](auto value) -> std::string {
-        using Value = std::remove_pointer_t<decltype(value)>;
-        if constexpr (std::is_same_v<Value, EnumValue>) {
-          return std::string(
-              field.rule.choices.at(static_cast<std::size_t>(value.get(value.target))));
-        } else if constexpr (std::is_same_v<Value, std::string>) {
-          return format_text(*value);
-        } else if constexpr (std::is_same_v<Value, double>) {
-          return format_number(*value);
-        } else if constexpr (std::is_same_v<Value, std::vector<double>>) {
-          return format_list(*value);
-        } else {
-          return fmt::format("{}", *value);
-        }
-      },
-      field.value);
+  return std::visit(Overloaded{
+                        [&](const EnumValue& value) {
+                          return std::string(field.rule.choices.at(
+                              static_cast<std::size_t>(value.get(value.target))));
+                        },
+                        [](const std::string* value) { return format_text(*value); },
+                        [](const double* value) { return format_number(*value); },
+                        [](const std::vector<double>* values) { return format_list(*values); },
+                        [](const auto* value) { return fmt::format("{}", *value); },
+                    },
+                    field.value);
 }
 
 std::string unknown_key(std::string_view section,
@@ -246,49 +286,6 @@ std::string unknown_key(std::string_view section,
   const std::string of = section.empty() ? "" : fmt::format(" of {}", section);
   return fmt::format("unknown key; known keys{}: {}", of, fmt::join(known, ", "));
 }
-
-std::string read_value(const YAML::Node& node, const Field& field) {
-  std::string problem;
-  if (auto* const* list = std::get_if<std::vector<double>*>(&field.value);
-      list != nullptr && node.IsSequence()) {
-    problem = read_list(node, **list);
-  } else if (node.IsScalar()) {
-    problem = parse_scalar(field, node.Scalar());
-  } else {
-    problem = fmt::format("expected {}, found {}",
-                          list != nullptr ? "a list of numbers" : "one value", kind_of(node));
-  }
-  return problem.empty() ? violation_of(field) : problem;
-}
-
-namespace {
-
-/// Where documents begin.
-class DocumentMarks final : public YAML::EventHandler {
- public:
-  std::vector<int> lines;
-
-  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&,
-                const std::string&,
-                YAML::anchor_t,
-                const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&,
-                       const std::string&,
-                       YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&,
-                  const std::string&,
-                  YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {}
-  void OnMapEnd() override {}
-};
-
-}  // namespace
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
   try {

@@ -23,17 +23,15 @@ using namespace options;  // NOLINT: the fields are read and written here
                                    std::string_view source,
                                    std::vector<Field>& fields);
 
-/// Reads one value, a scalar or a list. Nothing, or "expected ..., found ...".
-[[nodiscard]] std::string read_value(const YAML::Node& node, const Field& field);
+/// Reads what --set gives: a list as it is written in a file; anything else as it stands, so that a
+/// path may hold any character. Decimal numbers only ("010" is ten). Nothing, or "expected ...,
+/// found ...".
+[[nodiscard]] std::string read_assigned(const std::string& text, const Field& field);
 
 /// "unknown key; known keys of stem: model, filter, ..."
 [[nodiscard]] std::string unknown_key(std::string_view section,
                                       std::string_view key,
                                       const std::vector<Field>& fields);
-
-/// Reads one scalar into a field that is no list. Decimal numbers only ("010" is ten). Returns
-/// nothing, or "expected ..., found ...".
-[[nodiscard]] std::string parse_scalar(const Field& field, std::string_view text);
 
 /// YAML of the value, exact: numbers read back to the same bits.
 [[nodiscard]] std::string format_value(const Field& field);

@@ -13,7 +13,6 @@
 #include <yaml-cpp/yaml.h>
 
 #include "config/config_yaml.hpp"
-#include "dataset/camera_formats.hpp"
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
 
@@ -22,6 +21,84 @@ namespace {
 
 using options::Field;
 using options::Rule;
+
+/// How a kind of camera file says what ours says.
+struct Format {
+  std::string_view intrinsics = "intrinsics";
+  std::size_t num_intrinsics = 4;
+  std::string_view intrinsics_form = "[fx, fy, cx, cy]";
+  std::array<std::size_t, 4> places = {0, 1, 2, 3};  ///< of fx, fy, cx, cy among them
+  std::string_view coefficients = "distortion_coefficients";
+  std::vector<std::string_view> models = {"none", "radial-tangential", "radtan", "equidistant"};
+  std::string_view body = "T_BS";
+  std::vector<const char*> matrices = {"T_BS"};  ///< keys whose value may be one
+  std::vector<std::string_view> known = {};      ///< all that is read; empty: what else is there
+                                                 ///< is an error
+};
+
+const Format kKalibr = {
+    .coefficients = "distortion_coeffs",
+    .body = "T_cam_imu",
+    .matrices = {"T_cam_imu"},
+    .known = {"camera_model", "intrinsics", "distortion_model", "distortion_coeffs", "resolution",
+              "T_cam_imu", "rate_hz", "camera_height"}};
+
+/// OpenCV's and ROS'.
+const Format kMatrices = {
+    .intrinsics = "camera_matrix",
+    .num_intrinsics = 9,
+    .intrinsics_form = "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]",
+    .places = {0, 4, 2, 5},
+    .models = {"plumb_bob", "equidistant", "fisheye", "none"},
+    .matrices = {"camera_matrix", "distortion_coefficients"},
+    .known = {"image_width", "image_height", "camera_matrix", "distortion_model",
+              "distortion_coefficients", "rate_hz", "camera_height"}};
+
+/// A matrix {rows, cols, data: [..]}, or Kalibr's list of rows, becomes the list of its numbers.
+void flatten(YAML::Node map, const char* key) {
+  const YAML::Node value = std::as_const(map)[key];  // the other [] makes what is not there
+  if (!value) {
+    return;
+  }
+  if (value.IsMap() && value["data"]) {
+    map[key] = value["data"];
+  } else if (value.IsSequence() && value.size() > 0 &&
+             std::all_of(value.begin(), value.end(),
+                         [](const YAML::Node& row) { return row.IsSequence(); })) {
+    std::vector<YAML::Node> others;  // first of all: a row may be an alias of the first
+    for (std::size_t row = 1; row < value.size(); ++row) {
+      for (const YAML::Node& number : value[row]) {
+        others.push_back(number);
+      }
+    }
+    YAML::Node numbers = value[0];  // which has a line
+    for (const YAML::Node& number : others) {
+      numbers.push_back(number);
+    }
+    map[key] = numbers;
+  }
+}
+
+void keep_only(YAML::Node map, const std::vector<std::string_view>& known) {
+  std::vector<std::string> others;
+  for (const auto& entry : map) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      others.push_back(key);
+    }
+  }
+  for (const std::string& key : others) {
+    map.remove(key);
+  }
+}
+
+/// Our name for a model of distortion; a name that is not known stays.
+std::string_view model_name(std::string_view name) {
+  if (name == "radtan" || name == "plumb_bob") {
+    return "radial-tangential";
+  }
+  return name == "fisheye" ? "equidistant" : name;
+}
 
 class Reader {
  public:
@@ -58,29 +135,58 @@ class Reader {
     if (!root) {
       return root.error();
     }
-    format_ = format_of_camera(*root);
-    root_ = format_.keys;
-    distortion_model_ = format_.implied_model;
+    choose_format(*root);
     std::vector<Field> fields = this->fields();
     return config::read_document(root_, file_.string(), fields);
   }
 
+  /// Also takes from the camera's keys what is not read, and makes lists of its matrices.
+  void choose_format(const YAML::Node& root) {
+    const bool is_map = root.IsMap();
+    if (is_map && root["cam0"] && root["cam0"].IsMap()) {
+      format_ = kKalibr;
+      root_ = root["cam0"];
+    } else {
+      root_ = root;
+      format_ = is_map && root["camera_matrix"] ? kMatrices : Format();
+    }
+    if (is_of_matrices() && !root["distortion_model"]) {
+      const YAML::Node fisheye = root["fisheye_model"];
+      const bool is_fisheye = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
+      distortion_model_ = is_fisheye ? "equidistant" : "radial-tangential";
+    }
+    if (!is_map) {
+      return;
+    }
+    for (const char* key : format_.matrices) {
+      flatten(root_, key);
+    }
+    if (!format_.known.empty()) {
+      keep_only(root_, format_.known);
+    } else {
+      root_.remove("sensor_type");  // EuRoC's
+      root_.remove("comment");
+    }
+  }
+  [[nodiscard]] bool is_of_matrices() const { return format_.intrinsics == kMatrices.intrinsics; }
+
+  [[nodiscard]] YAML::Node value_of(std::string_view key) const { return root_[std::string(key)]; }
   [[nodiscard]] Error missing(std::string_view expected) const {
     return fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected));
   }
   /// "<file>:<line>: <key>: <problem>"
-  [[nodiscard]] Error refuse(const std::string& key, const std::string& problem) const {
+  [[nodiscard]] Error refuse(std::string_view key, const std::string& problem) const {
     return fail(fmt::format("{}: {}: {}",
-                            at_line(file_, static_cast<std::size_t>(root_[key].Mark().line) + 1),
+                            at_line(file_, static_cast<std::size_t>(value_of(key).Mark().line) + 1),
                             key, problem));
   }
   /// Whether a list has one of these lengths; `expected` names them.
-  [[nodiscard]] Status check_length(const std::string& key,
+  [[nodiscard]] Status check_length(std::string_view key,
                                     const std::vector<double>& numbers,
                                     const std::vector<std::size_t>& lengths,
                                     std::string_view expected) const {
     const bool may_be_absent = std::count(lengths.begin(), lengths.end(), 0U) != 0;
-    if (!root_.IsMap() || !root_[key]) {
+    if (!root_.IsMap() || !value_of(key)) {
       return may_be_absent ? Status() : missing(fmt::format("{}: {}", key, expected));
     }
     if (std::count(lengths.begin(), lengths.end(), numbers.size()) == 0) {
@@ -116,17 +222,13 @@ class Reader {
   }
 
   Status set_intrinsics(Camera& camera) const {
-    const char* key = format_.has_matrix ? "camera_matrix" : "intrinsics";
+    const std::string_view key = format_.intrinsics;
     const std::vector<double>& numbers = intrinsics_;
-    Status status = format_.has_matrix
-                        ? check_length(key, numbers, {9}, "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]")
-                        : check_length(key, numbers, {4}, "[fx, fy, cx, cy]");
+    Status status = check_length(key, numbers, {format_.num_intrinsics}, format_.intrinsics_form);
     if (!status) {
       return status;
     }
-    const std::array<std::size_t, 4> places = format_.has_matrix
-                                                  ? std::array<std::size_t, 4>{0, 4, 2, 5}
-                                                  : std::array<std::size_t, 4>{0, 1, 2, 3};
+    const auto& places = format_.places;
     camera.fx_px = numbers[places[0]];
     camera.fy_px = numbers[places[1]];
     camera.cx_px = numbers[places[2]];
@@ -145,8 +247,8 @@ class Reader {
     if (model.empty()) {
       return missing("distortion_model: none, radial-tangential or equidistant");
     }
-    const char* key = coefficients_key();
-    if (format_.has_matrix) {  // written with the zeros of models that have more
+    const std::string_view key = format_.coefficients;
+    if (is_of_matrices()) {  // written with the zeros of models that have more
       const std::size_t least = model == "equidistant" ? 4U : 5U;
       while (numbers.size() > least && numbers.back() == 0.0) {
         numbers.pop_back();
@@ -174,7 +276,7 @@ class Reader {
     if (transform_.empty()) {
       return {};
     }
-    const char* key = format_.is_kalibr ? "T_cam_imu" : "T_BS";
+    const std::string_view key = format_.body;
     if (const Status status = check_length(key, transform_, {12, 16}, "16 numbers"); !status) {
       return status;
     }
@@ -186,36 +288,27 @@ class Reader {
       return refuse(key, "expected a rotation in the first three columns, found none");
     }
     const Rigid3 transform = Rigid3::from_matrix(matrix);
-    body_from_camera = format_.is_kalibr ? transform.inverse() : transform;
+    body_from_camera = key == kKalibr.body ? transform.inverse() : transform;
     return {};
-  }
-
-  [[nodiscard]] const char* coefficients_key() const {
-    return format_.is_kalibr ? "distortion_coeffs" : "distortion_coefficients";
   }
 
   std::vector<Field> fields() {
     const Rule side = Rule::between(1.0, kMaxImageSide_px);
-    const Rule distortion =
-        format_.has_matrix ? Rule::one_of({"plumb_bob", "equidistant", "fisheye", "none"})
-                           : Rule::one_of({"none", "radial-tangential", "radtan", "equidistant"});
-    const char* intrinsics_key = format_.has_matrix ? "camera_matrix" : "intrinsics";
-    return {
-        {"", "image_width", &width_px_, side, ""},
-        {"", "image_height", &height_px_, side, ""},
-        {"", "resolution", &resolution_, side, ""},
-        {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
-        {"", intrinsics_key, &intrinsics_, Rule::between(-1e6, 1e6), ""},
-        {"", "distortion_model", &distortion_model_, distortion, ""},
-        {"", coefficients_key(), &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
-        {"", format_.is_kalibr ? "T_cam_imu" : "T_BS", &transform_, Rule::between(-1e6, 1e6), ""},
-        {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
-        {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
+    return {{"", "image_width", &width_px_, side, ""},
+            {"", "image_height", &height_px_, side, ""},
+            {"", "resolution", &resolution_, side, ""},
+            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
+            {"", format_.intrinsics, &intrinsics_, Rule::between(-1e6, 1e6), ""},
+            {"", "distortion_model", &distortion_model_, Rule::one_of(format_.models), ""},
+            {"", format_.coefficients, &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
+            {"", format_.body, &transform_, Rule::between(-1e6, 1e6), ""},
+            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
+            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;
-  CameraFormat format_;
-  YAML::Node root_;
+  Format format_;
+  YAML::Node root_;  ///< the camera's keys; lines are those of the file
   // What the keys say; as here where they are absent.
   int width_px_ = 0;
   int height_px_ = 0;

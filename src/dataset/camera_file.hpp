@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "dataset/undistortion.hpp"
+#include "dataset/frame_view.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/rigid3.hpp"
 

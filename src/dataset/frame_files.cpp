@@ -77,26 +77,22 @@ Status add_ground_truth(FrameList& frames,
     return truth.error();
   }
   frames.ground_truth_file = poses;
-  if (!truth->timestamps_s.empty()) {
-    const auto matched = match_by_time(*truth, poses, frames.timestamps_s, tolerance_s);
-    if (!matched) {
-      return matched.error();
-    }
-    frames.ground_truth = matched->poses;
-    if (matched->frames.size() < frames.files.size()) {
-      frames.ground_truth_frames = matched->frames;
-    }
-    return {};
-  }
-  const FrameRange& range = frames.range;
-  const std::size_t num_expected = is_exact ? num_files : range.end;
+  const std::size_t num_expected = is_exact ? num_files : frames.range.end;
   const std::size_t num_found = truth->poses.size();
-  if (num_found < num_expected || (is_exact && num_found > num_expected)) {
+  if (truth->timestamps_s.empty() &&
+      (num_found < num_expected || (is_exact && num_found > num_expected))) {
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
                             poses.string(), num_expected, num_found));
   }
-  frames.ground_truth =
-      relative_to_first(std::span(truth->poses).subspan(range.begin, range.end - range.begin));
+  const auto matched =
+      match_frames(*truth, poses, frames.range.begin, frames.timestamps_s, tolerance_s);
+  if (!matched) {
+    return matched.error();
+  }
+  frames.ground_truth = matched->poses;
+  if (matched->frames.size() < frames.files.size()) {
+    frames.ground_truth_frames = matched->frames;
+  }
   return {};
 }
 

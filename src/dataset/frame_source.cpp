@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
-#include "dataset/image_list.hpp"
 #include "dataset/sequence.hpp"
 #include "internal_check.hpp"
 #include "text/text_file.hpp"
@@ -49,14 +48,8 @@ bool is_file(const fs::path& path) {
 
 /// A listing of images, if it is one that is known.
 std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest& request) {
-  const fs::path& path = request.sequence_dir;
-  for (const dataset::Layout& layout :
-       {dataset::euroc_layout(), dataset::tum_layout(), dataset::own_layout()}) {
-    if (dataset::is_folder(path) && layout.is_layout_of(path)) {
-      return layout.list(path);
-    }
-  }
-  return request.camera_file ? std::optional(dataset::list_plain_images(path)) : std::nullopt;
+  auto found = dataset::find_listing(request.sequence_dir);
+  return !found && request.camera_file ? dataset::list_images(request.sequence_dir) : found;
 }
 
 /// Files that belong to other kinds of recordings.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/ground_truth.hpp"
 
+#include <numeric>
+
 #include <fmt/format.h>
 
 #include "dataset/camera_file.hpp"
@@ -48,17 +50,27 @@ Status check_pairs(const fs::path& truth_file,
       truth_s.back(), times_s.front(), times_s.back()));
 }
 
-Expected<GroundTruth> match_by_time(const PoseFile& truth,
-                                    const fs::path& truth_file,
-                                    const std::vector<double>& times_s,
-                                    double tolerance_s) {
-  const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
-  const Status status =
-      check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s);
-  if (!status) {
-    return status.error();
+Expected<GroundTruth> match_frames(const PoseFile& truth,
+                                   const fs::path& truth_file,
+                                   std::size_t begin,
+                                   const std::vector<double>& times_s,
+                                   double tolerance_s) {
+  if (!truth.timestamps_s.empty()) {
+    const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
+    const Status status =
+        check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s);
+    return status ? Expected<GroundTruth>(
+                        {relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first})
+                  : status.error();
   }
-  return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
+  if (truth.poses.size() < begin + times_s.size()) {
+    return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",
+                            truth_file.string(), begin + times_s.size(), truth.poses.size()));
+  }
+  GroundTruth result{relative_to_first(std::span(truth.poses).subspan(begin, times_s.size())),
+                     std::vector<std::size_t>(times_s.size())};
+  std::iota(result.frames.begin(), result.frames.end(), std::size_t{0});
+  return result;
 }
 
 }  // namespace stemvo::dataset

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -27,10 +28,12 @@ namespace stemvo::dataset {
                                  const TimePairs& pairs,
                                  double tolerance_s);
 
-/// The poses that frames of these times have. Error: fewer than two.
-[[nodiscard]] Expected<GroundTruth> match_by_time(const PoseFile& truth,
-                                                  const std::filesystem::path& truth_file,
-                                                  const std::vector<double>& times_s,
-                                                  double tolerance_s);
+/// The poses that frames have: by their times where the file has times, else one per frame, from
+/// pose `begin` on. Errors: fewer than two of these times; fewer poses than frames.
+[[nodiscard]] Expected<GroundTruth> match_frames(const PoseFile& truth,
+                                                 const std::filesystem::path& truth_file,
+                                                 std::size_t begin,
+                                                 const std::vector<double>& times_s,
+                                                 double tolerance_s);
 
 }  // namespace stemvo::dataset

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/image_list.hpp"
-
 #include <algorithm>
 #include <cctype>
 #include <string>
@@ -11,6 +9,7 @@
 #include <fnmatch.h>
 
 #include "dataset/frame_files.hpp"
+#include "dataset/listing.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -67,8 +66,8 @@ bool is_pattern(const fs::path& path) {
   return path.string().find_first_of("*?") != std::string::npos && !fs::exists(path, code);
 }
 
-Expected<ImageList> list_images(const fs::path& given) {
-  ImageList result{given, {}};
+Expected<Listing> list_images(const fs::path& given) {
+  Listing result{.kind = "images", .folder = given, .name = {}, .files = {}};
   std::string pattern = "*";
   if (is_pattern(given)) {
     result.folder = given.has_parent_path() ? given.parent_path() : fs::path(".");
@@ -98,6 +97,7 @@ Expected<ImageList> list_images(const fs::path& given) {
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());
   });
+  result.name = absolute_folder(result.folder).filename().string();
   return result;
 }
 

@@ -87,6 +87,46 @@ Expected<std::optional<fs::path>> find_ground_truth(const fs::path& absolute,
   return std::optional<fs::path>();
 }
 
+/// Of the file that was asked for, or of the sequence's own, if there is one.
+Status add_truth(const fs::path& absolute,
+                 const SequenceOptions& options,
+                 std::size_t num_images,
+                 FrameList& frames) {
+  const auto file =
+      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
+  if (!file || !*file) {
+    return file ? Status() : Status(file.error());
+  }
+  const Status status = dataset::add_ground_truth(
+      frames, **file, std::nullopt, options.ground_truth_tolerance_s, num_images, false);
+  if (status && !options.ground_truth && frames.ground_truth_frames) {
+    return fail(fmt::format("{}: expected a pose for each of {} frames, found those of {}",
+                            (*file)->string(), frames.files.size(),
+                            frames.ground_truth_frames->size()));
+  }
+  return status;
+}
+
+/// The size that most images have.
+Status set_size(bool is_color, FrameList& frames) {
+  const auto kind = dataset::vote_on_images(frames.files, [is_color](const fs::path& file) {
+    return io::read_png(file, is_color).map([is_color](const cv::Mat& image) {
+      return io::ImageKind{image.size(), is_color};
+    });
+  });
+  if (!kind) {
+    return kind.error();
+  }
+  frames.full_size = kind->size;
+  frames.camera.width_px = kind->size.width;
+  frames.camera.height_px = kind->size.height;
+  const Status status = frames.given_calibration ? dataset::check_center(frames.camera) : Status();
+  return status ? status
+                : Status(fail(fmt::format("{}: {}: a calibration of another image size",
+                                          frames.given_calibration->string(),
+                                          status.error().message)));
+}
+
 }  // namespace
 
 Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
@@ -117,53 +157,21 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
     return times_s.error();
   }
   const fs::path absolute = dataset::absolute_folder(directory);
-  const std::string name = absolute.filename().string();
   FrameList frames = dataset::list_frames(*range, *images, *times_s);
-  const auto truth =
-      options.ground_truth ? options.ground_truth : find_ground_truth(absolute, name);
-  if (!truth) {
-    return truth.error();
-  }
-  if (*truth) {
-    if (const Status status = dataset::add_ground_truth(
-            frames, **truth, std::nullopt, options.ground_truth_tolerance_s, images->size(), false);
-        !status) {
-      return status.error();
-    }
-    if (!options.ground_truth && frames.ground_truth_frames) {
-      return fail(fmt::format("{}: expected a pose for each of {} frames, found those of {}",
-                              (*truth)->string(), frames.files.size(),
-                              frames.ground_truth_frames->size()));
-    }
-  }
   frames.kind = "KITTI sequence";
   frames.is_kitti = true;
-  frames.name = name;
+  frames.name = absolute.filename().string();
   frames.camera = *camera;
   frames.given_calibration = options.calibration;
   const bool is_color = *camera_index >= 2;
-  const auto kind = dataset::vote_on_images(frames.files, [is_color](const fs::path& file) {
-    return io::read_png(file, is_color).map([is_color](const cv::Mat& image) {
-      return io::ImageKind{image.size(), is_color};
-    });
+  const Status status = add_truth(absolute, options, images->size(), frames).and_then([&] {
+    return set_size(is_color, frames);
   });
-  if (!kind) {
-    return kind.error();
-  }
-  frames.camera.width_px = kind->size.width;
-  frames.camera.height_px = kind->size.height;
-  if (options.calibration) {
-    if (const Status status = dataset::check_center(frames.camera); !status) {
-      return fail(fmt::format("{}: {}: a calibration of another image size", calibration.string(),
-                              status.error().message));
-    }
-  }
-  const auto mask = dataset::make_mask(options.masks, kind->size);
-  if (!mask) {
-    return mask.error();
+  const auto mask = dataset::make_mask(options.masks, frames.full_size);
+  if (!status || !mask) {
+    return status ? mask.error() : status.error();
   }
   frames.mask = *mask;
-  frames.full_size = kind->size;
   frames.read = [files = frames.files, is_color, sized = frames.camera](std::size_t index) {
     return dataset::check_size(files[index], io::read_png(files[index], is_color), sized);
   };

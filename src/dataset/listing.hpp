@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stemvo/error.hpp"
@@ -16,30 +17,33 @@ struct Listing {
   std::filesystem::path folder;  ///< of the images
   std::string name;
   std::vector<std::filesystem::path> files;  ///< at least one
-  std::vector<double> times_s;               ///< one per file, or none
+  std::vector<double> times_s = {};          ///< one per file, or none
   std::optional<std::filesystem::path> camera_file = std::nullopt;
   std::optional<std::filesystem::path> times_file = std::nullopt;
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
 };
 
-/// A layout of files that is told by what lies in a folder.
-struct Layout {
-  bool (*is_layout_of)(const std::filesystem::path& folder);
-  Expected<Listing> (*list)(const std::filesystem::path& folder);
-};
-
+/// Of a folder in one of these layouts; nullopt: another one, or none.
 /// EuRoC: `mav0`, its parent, or one camera of it (cam0, cam1): data.csv names the images of
 /// data/ and their times in ns, sensor.yaml is the camera, state_groundtruth_estimate0/data.csv the
 /// ground truth where it exists.
-[[nodiscard]] Layout euroc_layout();
 /// TUM RGB-D: rgb.txt names the images and their times in s, groundtruth.txt the ground truth. It
 /// has no camera file of its own; camera.yaml in the folder is taken.
-[[nodiscard]] Layout tum_layout();
 /// Ours: camera.yaml in a folder of images, or beside its folder `images`; times.txt and poses.txt
 /// where they exist.
-[[nodiscard]] Layout own_layout();
+[[nodiscard]] std::optional<Expected<Listing>> find_listing(const std::filesystem::path& folder);
 
-/// A folder of images or a pattern, with nothing beside them.
-[[nodiscard]] Expected<Listing> list_plain_images(const std::filesystem::path& folder_or_pattern);
+/// The .png, .jpg and .jpeg files of a folder, or those that a pattern names, with nothing beside
+/// them. Hidden files, whose names start with a dot, are none of them. Errors: no such folder;
+/// wildcards elsewhere than in the last part; none found.
+[[nodiscard]] Expected<Listing> list_images(const std::filesystem::path& folder_or_pattern);
+
+/// Whether this is no path that exists and has * or ?.
+[[nodiscard]] bool is_pattern(const std::filesystem::path& path);
+/// `*` stands for any characters, `?` for one.
+[[nodiscard]] bool matches_pattern(std::string_view name, std::string_view pattern);
+/// Whether `a` comes before `b`: character by character, but whole numbers by their value, so that
+/// frame2 comes before frame10. Of equals (frame2, frame02) the order of characters decides.
+[[nodiscard]] bool comes_before(std::string_view a, std::string_view b);
 
 }  // namespace stemvo::dataset

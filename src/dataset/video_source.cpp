@@ -24,26 +24,6 @@ Status check_stream_size(const cv::Size& size, const Camera& camera, const std::
   return {};
 }
 
-/// Poses by the times of frames, or by their number where the file has no times.
-Expected<GroundTruth> match_frames(const PoseFile& truth,
-                                   const fs::path& file,
-                                   const FrameSourceRequest& request,
-                                   const std::vector<double>& times_s) {
-  if (!truth.timestamps_s.empty()) {
-    return match_by_time(truth, file, times_s, request.ground_truth_tolerance_s);
-  }
-  const std::size_t begin = request.frames ? request.frames->begin : 0;
-  if (truth.poses.size() < begin + times_s.size()) {
-    return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",
-                            file.string(), begin + times_s.size(), truth.poses.size()));
-  }
-  GroundTruth result{relative_to_first(std::span(truth.poses).subspan(begin, times_s.size())), {}};
-  for (std::size_t i = 0; i < times_s.size(); ++i) {
-    result.frames.push_back(i);
-  }
-  return result;
-}
-
 }  // namespace
 
 std::optional<int> camera_number(const fs::path& path) {
@@ -94,7 +74,9 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     }
     frames.ground_truth_file = request.ground_truth;
     frames.match = [truth = *truth, request](const std::vector<double>& times_s) {
-      return match_frames(truth, *request.ground_truth, request, times_s);
+      return match_frames(truth, *request.ground_truth,
+                          request.frames.value_or(FrameRangeRequest{}).begin, times_s,
+                          request.ground_truth_tolerance_s);
     };
   }
   status = add_view(

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <type_traits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -14,21 +13,16 @@ namespace {
 
 /// Of what is measured in pixels and must not be zero.
 const Rule kPixels = Rule::between(1e-3, 1000);
+const Rule kAny;
 
 std::vector<Field> stem_fields(StemOptions& o) {
   return {
-      {"stem",
-       "model",
-       &o.model,
-       {},
+      {"stem", "model", &o.model, kAny,
        "name in models/manifest.yaml, path of an .onnx, or made by hand, to compare with: gray, "
        "log "
        "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, "
        "B)"},
-      {"stem",
-       "layer",
-       &o.layer,
-       {},
+      {"stem", "layer", &o.layer, kAny,
        "of a model that has several layers (stemvo models MODEL lists them), or first"},
       {"stem", "filter", &o.filter, Rule::between(-1, 1000000),
        "the one filter whose response is the image; -1: the default_filter of the manifest"},
@@ -93,7 +87,7 @@ std::vector<Field> two_view_fields(TwoViewOptions& o) {
        "of the robust estimator: probability that a good sample was drawn"},
       {"two_view", "max_iterations", &o.max_iterations, Rule::between(1, 10000000),
        "of the robust estimator"},
-      {"two_view", "refine", &o.refine, {}, "nonlinear refinement of the motion on the inliers"},
+      {"two_view", "refine", &o.refine, kAny, "nonlinear refinement of the motion on the inliers"},
       {"two_view", "refine_loss_px", &o.refine_loss_px, kPixels,
        "epipolar distance from which the refinement mistrusts a match, input pixels"},
   };
@@ -153,10 +147,7 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
       {"scale", "estimators", enum_value(&o.estimators), Rule::one_of({"both", "dense", "points"}),
        "camera_height: what measures the road: dense (its image aligned), points (tracked "
        "corners; the first frames are dense all the same), or both"},
-      {"scale",
-       "temporal_filter",
-       &o.temporal_filter,
-       {},
+      {"scale", "temporal_filter", &o.temporal_filter, kAny,
        "camera_height: measurements are filtered over time; false: each frame's stands alone"},
   };
 }
@@ -232,24 +223,17 @@ std::string not_a_choice(const Rule& rule, std::string_view text) {
 std::string violation_of(const Field& field) {
   const Rule& rule = field.rule;
   return std::visit(
-      [&rule](const auto& value) -> std::string {
-        using Value = std::remove_pointer_t<std::remove_cvref_t<decltype(value)>>;
-        if constexpr (std::is_same_v<Value, EnumValue>) {
-          return enum_violation(rule, value);
-        } else if constexpr (std::is_same_v<Value, std::string>) {
-          return text_violation(rule, *value);
-        } else if constexpr (std::is_same_v<Value, int>) {
-          return number_violation(rule, *value, true);
-        } else if constexpr (std::is_same_v<Value, double>) {
-          return number_violation(rule, *value, false);
-        } else if constexpr (std::is_same_v<Value, std::vector<double>>) {
-          for (const double element : *value) {
-            if (std::string text = number_violation(rule, element, false); !text.empty()) {
-              return text;
-            }
-          }
-        }
-        return {};  // true or false, and the seed, have no wrong values
+      Overloaded{
+          [&](const EnumValue& value) { return enum_violation(rule, value); },
+          [&](const std::string* value) { return text_violation(rule, *value); },
+          [&](const int* value) { return number_violation(rule, *value, true); },
+          [&](const double* value) { return number_violation(rule, *value, false); },
+          [&](const std::vector<double>* values) {
+            const auto wrong = std::ranges::find_if_not(
+                *values, [&](double value) { return is_inside(rule, value); });
+            return wrong == values->end() ? std::string() : number_violation(rule, *wrong, false);
+          },
+          [](const auto*) { return std::string(); },  // the seed, and yes or no, are never wrong
       },
       field.value);
 }

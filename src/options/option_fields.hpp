@@ -47,6 +47,12 @@ EnumValue enum_value(Enum* target) {
 using FieldValue = std::
     variant<std::string*, int*, double*, bool*, std::uint64_t*, std::vector<double>*, EnumValue>;
 
+/// One function for std::visit of several, one per type of a FieldValue.
+template <typename... Functions>
+struct Overloaded : Functions... {
+  using Functions::operator()...;
+};
+
 /// One key: everything that reading, writing, checking and explaining it needs.
 struct Field {
   std::string_view section;  ///< empty for the keys of the top level

@@ -25,12 +25,11 @@ namespace pipeline {
 
 template <typename Archive>
 void serialize(Archive& archive, Drive& drive) {
-  archive(drive.trajectory, drive.num_measured, drive.num_road_measured, drive.frames, drive.images,
-          drive.warnings, drive.elapsed_before_s);
+  archive(drive.frames, drive.csv, drive.images, drive.warnings, drive.elapsed_before_s);
 }
 template <typename Archive>
 void serialize(Archive& archive, Checkpoint& checkpoint) {
-  archive(checkpoint.frame, checkpoint.odometry, checkpoint.drive, checkpoint.csv);
+  archive(checkpoint.frame, checkpoint.odometry, checkpoint.drive);
 }
 
 namespace {
@@ -88,10 +87,6 @@ Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path&
   std::optional<Checkpoint> checkpoint(std::in_place);
   reader(*checkpoint);
   return checkpoint;
-}
-
-Status remove_checkpoint(const std::filesystem::path& out_dir) {
-  return remove_file(checkpoint_file(out_dir));
 }
 
 }  // namespace pipeline

@@ -16,7 +16,6 @@ struct Checkpoint {
   std::size_t frame = 0;  ///< it is tracked, those before it are done
   std::string odometry;   ///< PhasedOdometry::state
   Drive drive;            ///< of the frames before
-  std::string csv;        ///< of the same
 };
 
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir);
@@ -27,7 +26,5 @@ struct Checkpoint {
 /// Nullopt: there is none. Error, starting with "--resume: ": damaged, or of another identity.
 [[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(
     const std::filesystem::path& out_dir, const std::string& identity);
-/// Error: there is one, and it cannot be removed.
-[[nodiscard]] Status remove_checkpoint(const std::filesystem::path& out_dir);
 
 }  // namespace stemvo::pipeline

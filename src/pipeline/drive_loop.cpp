@@ -3,21 +3,26 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
+#include <future>
 #include <new>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "pipeline/frame_pipeline.hpp"
-#include "pipeline/input_notes.hpp"
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
+#include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
 namespace {
 
-constexpr std::chrono::duration<double> kMaxPeriod(10.0);
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+constexpr Seconds kMaxPeriod(10.0);
 
 /// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
 /// the one before where n is not known (0).
@@ -26,112 +31,195 @@ bool is_in_report(std::size_t i, std::size_t n) {
   return n == 0 ? i >= kImages && std::has_single_bit(i) : (i + 1) * kImages / n > i * kImages / n;
 }
 
-}  // namespace
-
-DriveLoop::DriveLoop(const RunRequest& request,
-                     const FrameSource& sequence,
-                     PhasedOdometry& odometry,
-                     ResultKeeper& keeper,
-                     const RunProgress& progress,
-                     std::string identity)
-    : request_(request),
-      sequence_(sequence),
-      odometry_(odometry),
-      keeper_(keeper),
-      progress_(progress),
-      identity_(std::move(identity)) {}
-
-Drive DriveLoop::run(std::optional<Checkpoint> from) {
-  FrameRun frames;
-  if (from) {
-    odometry_.set_state(from->odometry);
-    drive_ = std::move(from->drive);
-    frames.tracked = from->frame;
+/// Frames in all, of a stream as its container says; 0: not known, or said wrongly.
+std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
+  if (!sequence.stream()) {
+    return sequence.size();
   }
-  frames.may_localize = [this](std::size_t i) { return may_localize(i); };
-  frames.visit = [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-    return visit(i, frame, pose);
-  };
-  run_frames(sequence_, odometry_, frames);
-  if (can_go_on() && !is_stopped_) {
-    drive_.interrupted = false;  // it came with the last frame
-  }
-  if (sequence_.stream()) {
-    end_stream(sequence_, progress_, drive_);
-  }
-  keep_first(drive_.written, keeper_.finish());
-  return std::move(drive_);
+  const std::size_t told = sequence.stream()->expected_frames;
+  return told > num_done ? told : 0;  // a last frame is known by what comes behind it
 }
 
-bool DriveLoop::visit(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-  const std::size_t number = sequence_.range().begin + i;
-  if (!frame) {
-    drive_.warnings.push_back(frame.error().message);
-  }
-  if (!pose.problem.empty()) {
-    drive_.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
-  }
-  drive_.trajectory.push_back(pose.world_from_camera);
-  drive_.frames.push_back(pose);
-  drive_.num_measured += is_measured(pose.state) ? 1 : 0;
-  drive_.num_road_measured += pose.road == RoadState::kMeasured ? 1 : 0;
-  const StageTimer timer(Stage::kFrameFiles);
-  keeper_.add(frames_csv_row(number, sequence_.time_s(i), pose), pose.world_from_camera);
-  keep_image(i, frame, pose);
-  const std::size_t expected = expected_frames(sequence_, i + 1);
-  drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < sequence_.size();
-  return !drive_.interrupted || can_go_on();
-}
+class DriveLoop {
+ public:
+  DriveLoop(const Run& run, const std::string& identity, const RunProgress& progress)
+      : run_(run), identity_(identity), progress_(progress) {}
 
-void DriveLoop::keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-  const bool is_asked_for =
-      request_.image_every > 0 && i % static_cast<std::size_t>(request_.image_every) == 0;
-  const bool is_reported = is_in_report(i, expected_frames(sequence_, i + 1));
-  if (!is_asked_for && !is_reported) {
-    return;
+  Drive drive(std::optional<Checkpoint> from) {
+    FrameRun frames;
+    drive_.csv = frames_csv_header();
+    if (from) {
+      run_.odometry.set_state(from->odometry);
+      drive_ = std::move(from->drive);
+      frames.tracked = from->frame;
+    }
+    frames.may_localize = [this](std::size_t i) { return may_localize(i); };
+    frames.visit = [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
+      return visit(i, frame, pose);
+    };
+    run_frames(run_.sequence, run_.odometry, frames);
+    if (can_go_on() && !is_stopped_) {
+      drive_.interrupted = false;  // it came with the last frame
+    }
+    if (run_.sequence.stream()) {
+      end_stream(*run_.sequence.stream());
+    }
+    finish_files();
+    return std::move(drive_);
   }
-  const std::size_t number = sequence_.range().begin + i;
-  const ChannelOdometry& seen = odometry_.frames();
-  const cv::Mat image =
-      draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(), seen.inlier_mask(),
-                       fmt::format("frame {}: {}, {} of {} matches", number, to_string(pose.state),
-                                   pose.num_inliers, pose.num_matches));
-  if (is_asked_for) {
-    const auto file = request_.out_dir / "pictures" / fmt::format("{:06}.png", number);
-    keep_first(drive_.written, write_image(file, image));
-  }
-  if (is_reported) {
-    constexpr int kReportWidth_px = 720;
-    drive_.images.push_back({fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
-  }
-}
 
-bool DriveLoop::may_localize(std::size_t i) {
-  const auto now = std::chrono::steady_clock::now();
-  if (!drive_.written) {  // from the last checkpoint it is written again
+ private:
+  /// False: the run ends behind this frame.
+  bool visit(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
+    const std::size_t number = run_.sequence.range().begin + i;
+    if (!frame) {
+      drive_.warnings.push_back(frame.error().message);
+    }
+    if (!pose.problem.empty()) {
+      drive_.warnings.push_back(fmt::format("frame {}: {}", number, pose.problem));
+    }
+    drive_.frames.push_back(pose);
+    const StageTimer timer(Stage::kFrameFiles);
+    drive_.csv += frames_csv_row(number, run_.sequence.time_s(i), pose);
+    keep_files();
+    keep_image(i, frame, pose);
+    const std::size_t expected = expected_frames(run_.sequence, i + 1);
+    drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < run_.sequence.size();
+    return !drive_.interrupted || can_go_on();
+  }
+
+  void keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
+    const RunRequest& request = run_.request;
+    const bool is_asked_for =
+        request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
+    const bool is_reported = is_in_report(i, expected_frames(run_.sequence, i + 1));
+    if (!is_asked_for && !is_reported) {
+      return;
+    }
+    const std::size_t number = run_.sequence.range().begin + i;
+    const ChannelOdometry& seen = run_.odometry.frames();
+    const cv::Mat image = draw_frame_image(
+        frame.value_or(cv::Mat()), seen.image(), seen.matches(), seen.inlier_mask(),
+        fmt::format("frame {}: {}, {} of {} matches", number, to_string(pose.state),
+                    pose.num_inliers, pose.num_matches));
+    if (is_asked_for) {
+      const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
+      keep_first(drive_.written, write_image(file, image));
+    }
+    if (is_reported) {
+      constexpr int kReportWidth_px = 720;
+      drive_.images.push_back(
+          {fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
+    }
+  }
+
+  /// False: the run ends before this frame, and can go on with it.
+  bool may_localize(std::size_t i) {
+    const auto now = Clock::now();
+    if (!drive_.written) {  // from the last checkpoint it is written again
+      is_stopped_ = drive_.interrupted;
+      return !is_stopped_;
+    }
+    if (!can_go_on() || i == 0 || (!drive_.interrupted && now - last_checkpoint_ < period_)) {
+      return true;
+    }
+    keep_checkpoint(i, now);
+    last_checkpoint_ = Clock::now();
+    // Never more than a hundredth of the time.
+    period_ =
+        std::max(std::min(2.0 * period_, kMaxPeriod), Seconds(100 * (last_checkpoint_ - now)));
     is_stopped_ = drive_.interrupted;
     return !is_stopped_;
   }
-  if (!can_go_on() || i == 0 || (!drive_.interrupted && now - last_checkpoint_ < period_)) {
-    return true;
-  }
-  keep_checkpoint(i, now);
-  last_checkpoint_ = std::chrono::steady_clock::now();
-  // Never more than a hundredth of the time.
-  period_ = std::max(std::min(2.0 * period_, kMaxPeriod),
-                     std::chrono::duration<double>(100 * (last_checkpoint_ - now)));
-  is_stopped_ = drive_.interrupted;
-  return !is_stopped_;
-}
 
-void DriveLoop::keep_checkpoint(std::size_t frame, std::chrono::steady_clock::time_point now) {
-  try {
-    Drive so_far = drive_;
-    so_far.elapsed_before_s += std::chrono::duration<double>(now - request_.started).count();
-    keeper_.keep_checkpoint(
-        pack({frame, odometry_.state(), std::move(so_far), keeper_.csv()}, identity_));
-  } catch (const std::bad_alloc&) {  // NOLINT: the one before stays; the drive needs no checkpoint
+  void keep_checkpoint(std::size_t frame, Clock::time_point now) {
+    try {
+      Drive so_far = drive_;
+      so_far.elapsed_before_s += Seconds(now - run_.request.started).count();
+      checkpoint_ = pack({frame, run_.odometry.state(), std::move(so_far)}, identity_);
+    } catch (const std::bad_alloc&) {  // NOLINT: the one before stays; the drive needs none
+    }
   }
+
+  /// The files so far, once a second, while the frames go on.
+  void keep_files() {
+    const bool is_busy =
+        writing_.valid() && writing_.wait_for(Seconds(0)) == std::future_status::timeout;
+    if (is_busy || Clock::now() - last_files_ < std::chrono::seconds(1)) {
+      return;
+    }
+    last_files_ = Clock::now();
+    // What cannot be written now is written, or reported, at the end; so is all where no thread is
+    // to be had.
+    writing_ = std::async([out = run_.request.out_dir, csv = drive_.csv,
+                           trajectory = drive_.trajectory(run_),
+                           checkpoint = std::exchange(checkpoint_, {})] {
+      static_cast<void>(write_text_file(out / "frames.csv", csv));
+      static_cast<void>(write_kitti_trajectory(out / "trajectory_kitti.txt", trajectory));
+      if (!checkpoint.empty()) {
+        static_cast<void>(write_text_file(checkpoint_file(out), checkpoint));
+      }
+    });
+  }
+
+  /// The trajectories are the caller's.
+  void finish_files() {
+    if (writing_.valid()) {
+      writing_.wait();
+    }
+    const std::filesystem::path& out = run_.request.out_dir;
+    keep_first(drive_.written, write_text_file(out / "frames.csv", drive_.csv));
+    if (!checkpoint_.empty()) {
+      keep_first(drive_.written, write_text_file(checkpoint_file(out), checkpoint_));
+    }
+  }
+
+  /// Frames in all are known now. An interrupt is the usual end of a live camera; a video that ends
+  /// long before its container says is a warning.
+  void end_stream(const StreamInfo& stream) {
+    const std::size_t num_done = drive_.frames.size();
+    if (stream.is_live) {
+      drive_.interrupted = false;
+    }
+    if (drive_.interrupted) {
+      return;
+    }
+    if (progress_) {
+      (void)progress_(num_done, num_done);
+    }
+    constexpr double kMinShare = 0.9;  // containers without an index guess
+    const std::size_t told = stream.expected_frames;
+    if (static_cast<double>(num_done) < kMinShare * static_cast<double>(told)) {
+      drive_.warnings.push_back(fmt::format(
+          "{}: the video ends after {} frames where {} were expected: it may be cut off or damaged",
+          run_.sequence.name(), num_done, told));
+    }
+  }
+
+  [[nodiscard]] bool can_go_on() const {
+    return !run_.sequence.stream() || !run_.sequence.stream()->is_live;
+  }
+
+  const Run& run_;
+  const std::string& identity_;
+  const RunProgress& progress_;
+  Drive drive_;
+  bool is_stopped_ = false;  ///< before a frame that is there
+  /// Between two checkpoints; the first come sooner.
+  Seconds period_{0.25};
+  Clock::time_point last_checkpoint_ = Clock::now();
+  std::string checkpoint_;  ///< not written yet
+  Clock::time_point last_files_ = Clock::now();
+  std::future<void> writing_;
+};
+
+}  // namespace
+
+Drive run_drive(const Run& run,
+                const std::string& identity,
+                std::optional<Checkpoint> from,
+                const RunProgress& progress) {
+  return DriveLoop(run, identity, progress).drive(std::move(from));
 }
 
 }  // namespace stemvo::pipeline

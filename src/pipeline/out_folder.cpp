@@ -9,6 +9,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include "dataset/frame_files.hpp"
@@ -69,9 +70,25 @@ Status create_out_folder(const fs::path& folder) {
   return is_written ? Status() : Status(refuse(std::generic_category().message(error)));
 }
 
+Expected<FolderLock> lock_folder(const fs::path& folder) {
+  const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const FolderLock lock(nullptr, [file](void*) {
+    if (file >= 0) {
+      ::close(file);
+    }
+  });
+  if (file >= 0 && ::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    return fail(
+        fmt::format("{}: expected a folder that no other stemvo writes to, found one at "
+                    "work in it",
+                    folder.string()));
+  }
+  return lock;
+}
+
 Expected<FolderLock> open_out_folder(const fs::path& folder) {
   const Status status = create_out_folder(folder);
-  return status ? FolderLock::take(folder) : status.error();
+  return status ? lock_folder(folder) : status.error();
 }
 
 Status prepare_pictures(const fs::path& out_dir) {

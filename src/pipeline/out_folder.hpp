@@ -2,14 +2,22 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
-#include "pipeline/folder_lock.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
+
+/// While one lives no other process writes into the folder, as far as it asks for a lock too. An
+/// advisory lock of the folder itself: nothing lies in it, and the kernel lets go of it however the
+/// process ends.
+using FolderLock = std::shared_ptr<void>;
+/// Of a folder that is there. Error: another one has it. On a file system without locks it is taken
+/// without one.
+[[nodiscard]] Expected<FolderLock> lock_folder(const std::filesystem::path& folder);
 
 /// Creates the folder (and those above it) and proves that files can be written there. Error: the
 /// folder, what was expected, what the system says.

@@ -10,16 +10,17 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <opencv2/core/utility.hpp>
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
-#include "pipeline/input_notes.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/map_ply.hpp"
 #include "report/run_page.hpp"
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
 namespace {
@@ -72,29 +73,42 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   return one_line(fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence.name()));
 }
 
+/// Those of the frames with a road, or a pose, that was measured: of all of them.
+template <typename Predicate>
+double share_of(const std::vector<FrameResult>& frames, const Predicate& is_one) {
+  return static_cast<double>(std::ranges::count_if(frames, is_one)) /
+         static_cast<double>(frames.size());
+}
+
+/// As result files hold it.
+Trajectory as_written(const Run& run, Trajectory trajectory) {
+  return run.request.config.scale.source == ScaleSource::kGroundTruth
+             ? rescale_steps(trajectory,
+                             std::span(*run.sequence.ground_truth()).first(trajectory.size()))
+             : trajectory;
+}
+
 class ResultWriter {
  public:
-  ResultWriter(const RunRequest& request,
-               const FrameSource& sequence,
-               const PhasedOdometry& odometry,
-               const Drive& drive)
-      : request_(request),
-        sequence_(sequence),
-        odometry_(odometry),
+  ResultWriter(const Run& run, const Drive& drive)
+      : request_(run.request),
+        sequence_(run.sequence),
+        run_(run),
         drive_(drive),
-        trajectory_(drive.trajectory) {
-    const auto truth = sequence.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
+        trajectory_(drive.trajectory(run)),
+        config_text_(config_text(run, trajectory_.size())) {
+    const auto truth = sequence_.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
     matched_ = truth ? Status() : truth.error();
     if (truth && *truth && !(*truth)->frames.empty()) {
       truth_ = **truth;
     }
-    trajectory_ = as_written(request, sequence, std::move(trajectory_));
-    if (request.config.odometry.mode == OdometryMode::kMap) {
-      refined_ = as_written(request, sequence, odometry.frames().estimator().refined_trajectory());
+    if (request_.config.odometry.mode == OdometryMode::kMap) {
+      refined_ = as_written(run, estimator().refined_trajectory());
     }
   }
 
-  Status write(MetricsReport& report) {
+  /// All but metrics.json and report.html.
+  [[nodiscard]] Status write(MetricsReport& report) const {
     const std::filesystem::path& folder = request_.out_dir;
     std::vector<double> times_s;
     for (std::size_t i = 0; i < trajectory_.size(); ++i) {
@@ -105,7 +119,7 @@ class ResultWriter {
     keep_first(written, write_refined(folder / "trajectory_refined_kitti.txt"));
     report = make_report();
     keep_first(written, drive_.written);
-    keep_first(written, write_text_file(folder / "config.yaml", config_text()));
+    keep_first(written, write_text_file(folder / "config.yaml", config_text_));
     if (request_.write_map) {
       keep_first(written, write_map_ply(folder / "map.ply", map_points(), *refined_));
     }
@@ -131,7 +145,7 @@ class ResultWriter {
     return write_run_page(
         request_.out_dir / "report.html",
         {plot.title, plot.subtitle, plot.unit, report, frames, drawn, plot.estimate,
-         plot.ground_truth, drive_.images, config_text(), request_.command});
+         plot.ground_truth, drive_.images, config_text_, request_.command});
   }
 
  private:
@@ -153,20 +167,22 @@ class ResultWriter {
         std::chrono::steady_clock::now() - request_.started +
         std::chrono::duration<double>(drive_.elapsed_before_s);
     const Config& config = request_.config;
-    const auto num_frames = static_cast<double>(trajectory_.size());
     MetricsReport report;
     report.stemvo_version = version();
     report.sequence = sequence_.name();
     report.first_frame = sequence_.range().begin;
     report.num_frames = trajectory_.size();
     report.model = config.stem.model;
-    report.filter = odometry_.stem_info().filter;
-    report.fps = num_frames / std::max(elapsed.count(), 1e-9);
+    report.filter = run_.odometry.stem_info().filter;
+    report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
     report.scale_source = options::to_string(config.scale.source);
-    report.tracked_fraction = static_cast<double>(drive_.num_measured) / num_frames;
+    report.tracked_fraction =
+        share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
     report.camera = {drive_.frames.back().camera, drive_.frames.back().principal_point_sigma_px};
     if (config.scale.source == ScaleSource::kCameraHeight) {
-      report.road_measured_fraction = static_cast<double>(drive_.num_road_measured) / num_frames;
+      report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
+        return frame.road == RoadState::kMeasured;
+      });
     }
     if (truth_) {
       // A trajectory without a scale has no error in metres until one is fitted.
@@ -184,17 +200,15 @@ class ResultWriter {
     return report;
   }
 
-  [[nodiscard]] std::string config_text() const {
-    return pipeline::config_text(request_, sequence_, odometry_, trajectory_.size());
-  }
+  [[nodiscard]] const Estimator& estimator() const { return run_.odometry.frames().estimator(); }
 
   /// The landmarks in the world of trajectory_refined_kitti.txt: where steps were rescaled, they
   /// are with them.
   [[nodiscard]] std::vector<ColoredPoint> map_points() const {
-    const Trajectory refined = odometry_.frames().estimator().refined_trajectory();
+    const Trajectory refined = estimator().refined_trajectory();
     STEMVO_CHECK(refined.size() == refined_->size(), "the same poses, before and after rescaling");
     std::vector<ColoredPoint> points;
-    for (const MapLandmark& landmark : odometry_.frames().estimator().landmarks()) {
+    for (const MapLandmark& landmark : estimator().landmarks()) {
       const auto frame = static_cast<std::size_t>(landmark.frame);
       STEMVO_CHECK(frame < refined.size(), "landmarks belong to frames");
       const Eigen::Vector3d in_camera =
@@ -224,9 +238,10 @@ class ResultWriter {
 
   const RunRequest& request_;
   const FrameSource& sequence_;
-  const PhasedOdometry& odometry_;
+  const Run& run_;
   const Drive& drive_;
   Trajectory trajectory_;
+  std::string config_text_;
   std::optional<Trajectory> refined_;  ///< the same with look-ahead; mode map only
   std::optional<GroundTruth> truth_;
   Status matched_;  ///< the ground truth of a stream
@@ -234,26 +249,32 @@ class ResultWriter {
 
 }  // namespace
 
+std::string count_matched(const RunRequest& request,
+                          std::size_t num_matched,
+                          std::size_t num_frames) {
+  const std::string others = fmt::format(" (the others have none within {} s: --gt-tolerance)",
+                                         request.ground_truth_tolerance_s);
+  return fmt::format(" for {} of {} frames{}", num_matched, num_frames,
+                     num_matched < num_frames ? others : "");
+}
+
 void keep_first(Status& first, Status next) {
   if (first && !next) {
     first = std::move(next);
   }
 }
 
-Trajectory as_written(const RunRequest& request,
-                      const FrameSource& sequence,
-                      Trajectory trajectory) {
-  return request.config.scale.source == ScaleSource::kGroundTruth
-             ? rescale_steps(trajectory,
-                             std::span(*sequence.ground_truth()).first(trajectory.size()))
-             : trajectory;
+Trajectory Drive::trajectory(const Run& run) const {
+  Trajectory poses;
+  for (const FrameResult& frame : frames) {
+    poses.push_back(frame.world_from_camera);
+  }
+  return as_written(run, std::move(poses));
 }
 
-std::string config_text(const RunRequest& request,
-                        const FrameSource& sequence,
-                        const PhasedOdometry& odometry,
-                        std::size_t num_frames) {
-  const StemInfo& stem = odometry.stem_info();
+std::string config_text(const Run& run, std::size_t num_frames) {
+  const FrameSource& sequence = run.sequence;
+  const StemInfo& stem = run.odometry.stem_info();
   std::string text =
       fmt::format("# stemvo {}\n# {}\n", version(),
                   describe_frames(sequence, sequence.stream() ? num_frames : sequence.size()));
@@ -264,7 +285,7 @@ std::string config_text(const RunRequest& request,
     text += fmt::format("# calibration {}\n", one_line(calibration->string()));
   }
   // With what auto, -1 and 0 stand for, which may change with the manifest.
-  Config effective = request.config;
+  Config effective = run.request.config;
   effective.stem.upsample =
       choose_upsample(effective.stem.upsample, effective.features.method, sequence.camera());
   effective.stem.filter = stem.filter;
@@ -272,20 +293,17 @@ std::string config_text(const RunRequest& request,
   return text + "\n" + dump_config(effective);
 }
 
-Status write_results(const RunRequest& request,
-                     const FrameSource& sequence,
-                     const PhasedOdometry& odometry,
-                     const Drive& drive,
-                     MetricsReport& report) {
-  return ResultWriter(request, sequence, odometry, drive).write(report);
-}
-
-Status write_report_page(const RunRequest& request,
-                         const FrameSource& sequence,
-                         const PhasedOdometry& odometry,
-                         const Drive& drive,
-                         const MetricsReport& report) {
-  return ResultWriter(request, sequence, odometry, drive).write_page(report);
+Status write_results(const Run& run, const Drive& drive, MetricsReport& report) {
+  const ResultWriter writer(run, drive);
+  Status written = timed(Stage::kResultFiles, [&] { return writer.write(report); });
+  if (const StageRecorder* recorder = StageRecorder::active()) {
+    report.timing = recorder->report();
+    report.timing->fps = report.fps;
+    report.timing->num_threads = cv::getNumThreads();
+  }
+  keep_first(written, write_metrics_json(run.request.out_dir / "metrics.json", report));
+  keep_first(written, writer.write_page(report));
+  return written;
 }
 
 }  // namespace stemvo::pipeline

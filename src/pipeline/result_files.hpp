@@ -14,50 +14,44 @@
 
 namespace stemvo::pipeline {
 
-/// The first thing that went wrong while writing; the rest is written all the same.
-void keep_first(Status& first, Status next);
+/// What works together while a sequence is run.
+struct Run {
+  const RunRequest& request;
+  const FrameSource& sequence;
+  PhasedOdometry& odometry;
+};
 
 /// What the loop over the frames leaves behind.
 struct Drive {
-  Trajectory trajectory;  ///< one pose per frame done
-  std::size_t num_measured = 0;
-  std::size_t num_road_measured = 0;
-  std::vector<FrameResult> frames;           ///< of each of them
+  std::vector<FrameResult> frames;           ///< one per frame done
+  std::string csv;                           ///< frames.csv of them
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
-  bool interrupted = false;
   double elapsed_before_s = 0.0;  ///< in the runs that this one goes on from
-  Status written;                 ///< of frames.csv and the images
+  bool interrupted = false;
+  Status written;  ///< of frames.csv and the images
+
+  /// Of the frames, as trajectory_kitti.txt holds it: of scale.source=ground_truth with the ground
+  /// truth's step lengths.
+  [[nodiscard]] Trajectory trajectory(const Run& run) const;
 };
 
-/// The trajectory of the first frames of a run as its files hold it: of scale.source=ground_truth
-/// with the ground truth's step lengths.
-[[nodiscard]] Trajectory as_written(const RunRequest& request,
-                                    const FrameSource& sequence,
-                                    Trajectory trajectory);
+/// " for 11 of 12 frames", and why not for the others.
+[[nodiscard]] std::string count_matched(const RunRequest& request,
+                                        std::size_t num_matched,
+                                        std::size_t num_frames);
+
+/// The first thing that went wrong while writing; the rest is written all the same.
+void keep_first(Status& first, Status next);
 
 /// What config.yaml holds: the effective configuration under comments that say which program,
 /// frames and model made the results. `num_frames`: of a stream, those read.
-[[nodiscard]] std::string config_text(const RunRequest& request,
-                                      const FrameSource& sequence,
-                                      const PhasedOdometry& odometry,
-                                      std::size_t num_frames);
+[[nodiscard]] std::string config_text(const Run& run, std::size_t num_frames);
 
-/// Everything that is written at the end but metrics.json, for which it makes `report`:
+/// Everything that is written at the end; `report` becomes what metrics.json holds:
 /// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
 /// trajectory, what an earlier run left there is removed), config.yaml (`stemvo run --config` takes
-/// it as it is), map.ply where it is asked for, trajectory.png.
-[[nodiscard]] Status write_results(const RunRequest& request,
-                                   const FrameSource& sequence,
-                                   const PhasedOdometry& odometry,
-                                   const Drive& drive,
-                                   MetricsReport& report);
-
-/// report.html, of the report with everything in it.
-[[nodiscard]] Status write_report_page(const RunRequest& request,
-                                       const FrameSource& sequence,
-                                       const PhasedOdometry& odometry,
-                                       const Drive& drive,
-                                       const MetricsReport& report);
+/// it as it is), map.ply where it is asked for, trajectory.png, metrics.json, report.html.
+[[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
 
 }  // namespace stemvo::pipeline

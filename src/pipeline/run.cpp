@@ -11,11 +11,10 @@
 #include "pipeline/drive_loop.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/input_hashes.hpp"
-#include "pipeline/input_notes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
-#include "pipeline/result_keeper.hpp"
 #include "pipeline/thread_scope.hpp"
+#include "report/frames_csv.hpp"
 #include "stem/model_file.hpp"
 #include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
@@ -23,6 +22,8 @@
 
 namespace stemvo {
 namespace {
+
+using pipeline::Run;
 
 /// Another camera is not on KITTI's car: what its camera file does not say is not known.
 Config with_camera_height(Config config, const FrameSource& source) {
@@ -64,6 +65,17 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
+/// All that is read, as far as it is known; `--mask` may also be a rectangle, which is no file.
+std::vector<std::filesystem::path> inputs_of(const RunRequest& request,
+                                             const FrameSource& sequence) {
+  std::vector<std::filesystem::path> files = pipeline::input_files(sequence, request.config);
+  for (const auto& file : {request.times, request.camera_file}) {
+    files.push_back(file.value_or(""));
+  }
+  files.insert(files.end(), request.masks.begin(), request.masks.end());
+  return files;
+}
+
 /// Which file it is, and which version of it.
 std::string version_of(const std::filesystem::path& file) {
   std::error_code code;
@@ -75,60 +87,44 @@ std::string version_of(const std::filesystem::path& file) {
 }
 
 /// What the results depend on: a checkpoint of anything else is not gone on from.
-Expected<std::string> identity_of(const RunRequest& request,
-                                  const FrameSource& sequence,
-                                  const PhasedOdometry& odometry) {
+Expected<std::string> identity_of(const Run& run) {
   const auto program = pipeline::hash_program();
   if (!program) {
     return program.error();
   }
   std::string files;
-  for (const std::filesystem::path& file : pipeline::input_files(sequence, request.config)) {
+  for (const std::filesystem::path& file : inputs_of(run.request, run.sequence)) {
     files += version_of(file) + '\n';
   }
-  for (const auto& file : {request.times, request.camera_file}) {
-    files += file ? version_of(*file) + '\n' : "";
-  }
-  for (const std::string& mask : request.masks) {
-    files += mask + ' ' + version_of(mask) + '\n';
-  }
-  const Camera& c = sequence.camera();
+  const Camera& c = run.sequence.camera();
   return fmt::format("{}\n{}\n{} {} frames, pictures {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
-                     cv::getCPUFeaturesLine(), sequence.kind(), sequence.size(),
-                     request.image_every, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.width_px,
-                     c.height_px, pipeline::config_text(request, sequence, odometry, 0),
-                     internal::sha256_hex(files));
+                     cv::getCPUFeaturesLine(), run.sequence.kind(), run.sequence.size(),
+                     run.request.image_every, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.width_px,
+                     c.height_px, pipeline::config_text(run, 0), internal::sha256_hex(files));
 }
 
 /// What an earlier run left in the folder is removed, unless this one goes on from it.
 Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunRequest& request,
                                                                  const std::string& identity) {
-  std::optional<pipeline::Checkpoint> checkpoint;
-  if (request.resume) {
-    auto found = pipeline::read_checkpoint(request.out_dir, identity);
-    if (!found) {
-      return found.error();
-    }
-    checkpoint = *std::move(found);
+  const std::filesystem::path& out = request.out_dir;
+  auto checkpoint = request.resume ? pipeline::read_checkpoint(out, identity)
+                                   : std::optional<pipeline::Checkpoint>();
+  if (!checkpoint) {
+    return checkpoint;
   }
   Status status;
   if (request.image_every > 0) {
-    status = checkpoint ? pipeline::create_out_folder(request.out_dir / "pictures")
-                        : pipeline::prepare_pictures(request.out_dir);
+    status = *checkpoint ? pipeline::create_out_folder(out / "pictures")
+                         : pipeline::prepare_pictures(out);
   }
-  if (status && !checkpoint) {
-    status = pipeline::remove_checkpoint(request.out_dir);
+  if (status && !*checkpoint) {
+    status = remove_file(pipeline::checkpoint_file(out));
   }
-  if (!status) {
-    return status.error();
+  if (status) {  // from now on it can be seen how far the run is
+    status = write_text_file(out / "frames.csv",
+                             *checkpoint ? (*checkpoint)->drive.csv : frames_csv_header());
   }
-  return checkpoint;
-}
-
-/// The configuration of an earlier run may be that of the next, in the same folder.
-bool is_config_of_results(const std::filesystem::path& file) {
-  const auto text = read_text_file(file);
-  return text && text->starts_with("# stemvo ");
+  return status ? std::move(checkpoint) : status.error();
 }
 
 /// Results must not take the place of what they are made from.
@@ -139,22 +135,59 @@ Status check_inputs_are_spared(const RunRequest& request, const FrameSource& seq
         "trajectory.png", "frames.csv", "metrics.json", "config.yaml", "checkpoint"}) {
     results.push_back(request.out_dir / name);
   }
-  Config config = request.config;
-  if (is_config_of_results(config.file)) {
-    config.file.clear();
+  std::vector<std::filesystem::path> inputs = inputs_of(request, sequence);
+  // The configuration of an earlier run may be that of the next, in the same folder.
+  const auto config = read_text_file(request.config.file);
+  if (config && config->starts_with("# stemvo ")) {
+    std::erase(inputs, request.config.file);
   }
-  std::vector<std::filesystem::path> inputs = pipeline::input_files(sequence, config);
   if (request.image_every > 0) {
     results.push_back(request.out_dir / "pictures");
     if (!sequence.frames().files.empty()) {  // a live camera has none
       inputs.push_back(sequence.file(0).parent_path());
     }
   }
-  if (request.times) {
-    inputs.push_back(*request.times);
-  }
-  inputs.insert(inputs.end(), request.masks.begin(), request.masks.end());
   return check_spares_inputs(results, inputs);
+}
+
+std::string describe_truth(const RunRequest& request, const FrameSource& sequence) {
+  if (!sequence.has_ground_truth()) {
+    return "no ground truth";
+  }
+  if (sequence.stream()) {
+    return "ground truth to be matched";
+  }
+  const auto& frames = sequence.frames().ground_truth_frames;
+  return "ground truth" + (frames
+                               ? pipeline::count_matched(request, frames->size(), sequence.size())
+                               : std::string());
+}
+
+std::string describe_size(const FrameSource& sequence) {
+  const Camera& camera = sequence.camera();
+  const std::string count =
+      sequence.stream() ? "frames" : fmt::format("{} frames", sequence.size());
+  const cv::Size full = sequence.frames().full_size;
+  const std::string worked_on =
+      full == cv::Size(camera.width_px, camera.height_px)
+          ? ""
+          : fmt::format(" worked on at {}x{}", camera.width_px, camera.height_px);
+  return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
+}
+
+/// What the input was taken for, and where a run that may go on begins.
+void note_start(const Run& run, const std::optional<pipeline::Checkpoint>& checkpoint) {
+  const auto& [request, sequence, odometry] = run;
+  if (!request.note) {
+    return;
+  }
+  request.note(fmt::format("input: {} {}, {}, {}", sequence.kind(), sequence.name(),
+                           describe_size(sequence), describe_truth(request, sequence)));
+  if (request.resume) {
+    request.note(
+        checkpoint ? fmt::format("goes on at frame {}", sequence.range().begin + checkpoint->frame)
+                   : "starts at the first frame: no checkpoint in " + request.out_dir.string());
+  }
 }
 
 Expected<RunSummary> run_source(const RunRequest& request,
@@ -165,10 +198,11 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (!odometry) {
     return odometry.error();
   }
+  const Run run{request, sequence, *odometry};
   const auto lock = check_inputs_are_spared(request, sequence).and_then([&] {
     return pipeline::open_out_folder(request.out_dir);
   });
-  const auto identity = identity_of(request, sequence, *odometry);
+  const auto identity = identity_of(run);
   if (!lock || !identity) {
     return lock ? identity.error() : lock.error();
   }
@@ -176,48 +210,20 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (!checkpoint) {
     return checkpoint.error();
   }
-  pipeline::ResultKeeper keeper(request.out_dir, [&](Trajectory so_far) {
-    return pipeline::as_written(request, sequence, std::move(so_far));
-  });
-  if (*checkpoint) {
-    keeper.go_on((*checkpoint)->csv, (*checkpoint)->drive.trajectory);
-  }
-  if (const Status status = keeper.start(); !status) {
-    return status.error();
-  }
-
   std::optional<StageRecorder> recorder;
   if (request.measure_times) {
     recorder.emplace();
   }
-  pipeline::note_input(request, sequence);
-  if (request.resume && request.note) {
-    request.note(
-        *checkpoint
-            ? fmt::format("goes on at frame {}", sequence.range().begin + (*checkpoint)->frame)
-            : "starts at the first frame: no checkpoint in " + request.out_dir.string());
-  }
-  pipeline::Drive done =
-      pipeline::DriveLoop(request, sequence, *odometry, keeper, progress, *identity)
-          .run(*std::move(checkpoint));
-  if (done.trajectory.empty()) {
+  note_start(run, *checkpoint);
+  pipeline::Drive done = pipeline::run_drive(run, *identity, *std::move(checkpoint), progress);
+  if (done.frames.empty()) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
                             request.sequence_dir.string()));
   }
   MetricsReport report;
-  Status written = timed(Stage::kResultFiles, [&] {
-    return pipeline::write_results(request, sequence, *odometry, done, report);
-  });
-  if (recorder) {
-    report.timing = recorder->report();
-    report.timing->fps = report.fps;
-    report.timing->num_threads = cv::getNumThreads();
-  }
-  pipeline::keep_first(written, write_metrics_json(request.out_dir / "metrics.json", report));
-  pipeline::keep_first(written,
-                       pipeline::write_report_page(request, sequence, *odometry, done, report));
+  Status written = pipeline::write_results(run, done, report);
   if (!done.interrupted && written) {
-    written = pipeline::remove_checkpoint(request.out_dir);
+    written = remove_file(pipeline::checkpoint_file(request.out_dir));
   }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +12,6 @@
 #include "dataset/frame_source.hpp"
 #include "report/metrics_json.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/odometry.hpp"
 
 namespace stemvo {
 

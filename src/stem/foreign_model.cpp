@@ -5,51 +5,120 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <optional>
 
 #include <fmt/format.h>
-
-#include "stem/protobuf_reader.hpp"
 
 namespace stemvo::internal {
 namespace {
 
+/// Walks the fields of a message in Protocol Buffers' wire format, which .onnx files have, without
+/// asking for memory. Nothing is read beyond the bytes given.
+class ProtobufReader {
+ public:
+  struct Field {
+    std::uint64_t number = 0;
+    std::uint64_t value = 0;  ///< of a number
+    std::string_view bytes;  ///< of a text, a list or a message inside; of a fixed number its bytes
+    bool is_bytes = false;
+  };
+
+  explicit ProtobufReader(std::string_view message) : rest_(message) {}
+
+  /// Nullopt: the end, or not the wire format (is_damaged).
+  [[nodiscard]] std::optional<Field> next() {
+    if (rest_.empty() || is_damaged_) {
+      return std::nullopt;
+    }
+    const std::uint64_t key = varint();
+    Field field{key >> 3U, 0, {}, false};
+    switch (key & 7U) {
+      case 0:
+        field.value = varint();
+        break;
+      case 1:
+        field.bytes = take(8);
+        break;
+      case 2:
+        field.is_bytes = true;
+        field.bytes = take(varint());
+        break;
+      case 5:
+        field.bytes = take(4);
+        break;
+      default:  // groups, which ONNX has none of
+        is_damaged_ = true;
+    }
+    is_damaged_ = is_damaged_ || field.number == 0;
+    return is_damaged_ ? std::nullopt : std::optional(field);
+  }
+
+  /// A list of numbers, "packed", one behind the other.
+  [[nodiscard]] std::optional<std::uint64_t> next_packed() {
+    if (rest_.empty() || is_damaged_) {
+      return std::nullopt;
+    }
+    const std::uint64_t value = varint();
+    return is_damaged_ ? std::nullopt : std::optional(value);
+  }
+
+  [[nodiscard]] bool is_damaged() const { return is_damaged_; }
+
+ private:
+  std::string_view take(std::uint64_t size) {
+    if (size > rest_.size()) {
+      is_damaged_ = true;
+      return {};
+    }
+    const std::string_view taken = rest_.substr(0, static_cast<std::size_t>(size));
+    rest_.remove_prefix(taken.size());
+    return taken;
+  }
+
+  std::uint64_t varint() {
+    std::uint64_t value = 0;
+    for (unsigned shift = 0; shift < 64 && !rest_.empty(); shift += 7) {
+      const auto byte = static_cast<unsigned char>(rest_.front());
+      rest_.remove_prefix(1);
+      value |= static_cast<std::uint64_t>(byte & 0x7fU) << shift;
+      if ((byte & 0x80U) == 0) {
+        return value;
+      }
+    }
+    is_damaged_ = true;
+    return 0;
+  }
+
+  std::string_view rest_;
+  bool is_damaged_ = false;
+};
+
 using Field = ProtobufReader::Field;
 
-/// Numbers of onnx.proto.
-namespace number {
-namespace model {
-constexpr std::uint64_t kGraph = 7;
-constexpr std::uint64_t kFunctions = 25;
-}  // namespace model
-namespace graph {
-constexpr std::uint64_t kNode = 1;
-constexpr std::uint64_t kInitializer = 5;
-constexpr std::uint64_t kSparseInitializer = 15;
-}  // namespace graph
-namespace node {
-constexpr std::uint64_t kType = 4;
-constexpr std::uint64_t kAttribute = 5;
-constexpr std::uint64_t kDomain = 7;
-}  // namespace node
-namespace attribute {
-constexpr std::uint64_t kName = 1;
-constexpr std::uint64_t kTensor = 5;
-constexpr std::uint64_t kGraph = 6;
-constexpr std::uint64_t kInts = 8;
-constexpr std::uint64_t kTensors = 10;
-constexpr std::uint64_t kGraphs = 11;
-}  // namespace attribute
-namespace tensor {
-constexpr std::uint64_t kType = 2;
-constexpr std::uint64_t kFloats = 4;
-constexpr std::uint64_t kName = 8;
-constexpr std::uint64_t kRaw = 9;
-constexpr std::uint64_t kExternal = 13;
-constexpr std::uint64_t kLocation = 14;
-constexpr std::uint64_t kFloat32 = 1;  ///< a value of kType
-}  // namespace tensor
-}  // namespace number
+// Numbers of onnx.proto.
+enum ModelField : std::uint64_t { kModelGraph = 7, kModelFunctions = 25 };
+enum GraphField : std::uint64_t { kGraphNode = 1, kGraphInitializer = 5, kGraphSparse = 15 };
+enum NodeField : std::uint64_t { kNodeType = 4, kNodeAttribute = 5, kNodeDomain = 7 };
+enum AttributeField : std::uint64_t {
+  kAttributeName = 1,
+  kAttributeTensor = 5,
+  kAttributeGraph = 6,
+  kAttributeInts = 8,
+  kAttributeTensors = 10,
+  kAttributeGraphs = 11
+};
+enum TensorField : std::uint64_t {
+  kTensorType = 2,
+  kTensorFloats = 4,
+  kTensorName = 8,
+  kTensorRaw = 9,
+  kTensorExternal = 13,
+  kTensorLocation = 14
+};
+constexpr std::uint64_t kFloat32 = 1;  ///< a value of kTensorType
 
 /// Calls `visit` for each field until it returns an Error.
 template <typename Visit>
@@ -82,12 +151,12 @@ Status check_tensor(std::string_view message, bool is_weight) {
   bool is_finite = true;
   std::string_view raw;
   const Status status = for_each_field(message, [&](const Field& field) -> Status {
-    name = field.number == number::tensor::kName ? field.bytes : name;
-    type = field.number == number::tensor::kType ? field.value : type;
-    raw = field.number == number::tensor::kRaw ? field.bytes : raw;
-    is_elsewhere = is_elsewhere || field.number == number::tensor::kExternal ||
-                   (field.number == number::tensor::kLocation && field.value != 0);
-    is_finite = is_finite && (field.number != number::tensor::kFloats || all_finite(field.bytes));
+    name = field.number == kTensorName ? field.bytes : name;
+    type = field.number == kTensorType ? field.value : type;
+    raw = field.number == kTensorRaw ? field.bytes : raw;
+    is_elsewhere = is_elsewhere || field.number == kTensorExternal ||
+                   (field.number == kTensorLocation && field.value != 0);
+    is_finite = is_finite && (field.number != kTensorFloats || all_finite(field.bytes));
     return {};
   });
   if (!status) {
@@ -97,7 +166,7 @@ Status check_tensor(std::string_view message, bool is_weight) {
     return fail(fmt::format("expected all weights in the file, found '{}' in another", name));
   }
   static_assert(std::endian::native == std::endian::little, "as in the file");
-  is_finite = is_finite && (type != number::tensor::kFloat32 || all_finite(raw));
+  is_finite = is_finite && (type != kFloat32 || all_finite(raw));
   return is_finite || !is_weight
              ? Status()
              : Status(fail(
@@ -135,18 +204,18 @@ Status check_sizes(std::string_view name, const Field& field) {
 Status check_attribute(std::string_view message) {
   std::string_view name;
   const Status named = for_each_field(message, [&](const Field& field) -> Status {
-    name = field.number == number::attribute::kName ? field.bytes : name;
+    name = field.number == kAttributeName ? field.bytes : name;
     return {};
   });
   return !named ? named : for_each_field(message, [&](const Field& field) -> Status {
     switch (field.number) {
-      case number::attribute::kGraph:
-      case number::attribute::kGraphs:
+      case kAttributeGraph:
+      case kAttributeGraphs:
         return fail("expected a graph without loops and branches, found one");
-      case number::attribute::kTensor:
-      case number::attribute::kTensors:
+      case kAttributeTensor:
+      case kAttributeTensors:
         return check_tensor(field.bytes, /*is_weight=*/false);
-      case number::attribute::kInts:
+      case kAttributeInts:
         return is_size(name) ? check_sizes(name, field) : Status();
       default:
         return {};
@@ -158,15 +227,15 @@ Status check_node(std::string_view message) {
   std::string_view type;
   std::string_view domain;
   Status status = for_each_field(message, [&](const Field& field) -> Status {
-    type = field.number == number::node::kType ? field.bytes : type;
-    domain = field.number == number::node::kDomain ? field.bytes : domain;
+    type = field.number == kNodeType ? field.bytes : type;
+    domain = field.number == kNodeDomain ? field.bytes : domain;
     return {};
   });
   if (status && !domain.empty() && domain != "ai.onnx") {
     return fail(fmt::format("expected ONNX's own operators, found {} of '{}'", type, domain));
   }
   status = !status ? status : for_each_field(message, [&](const Field& field) -> Status {
-    return field.number == number::node::kAttribute ? check_attribute(field.bytes) : Status();
+    return field.number == kNodeAttribute ? check_attribute(field.bytes) : Status();
   });
   return status ? status
                 : Status(fail(fmt::format("operator {}: {}", type, status.error().message)));
@@ -175,11 +244,11 @@ Status check_node(std::string_view message) {
 Status check_graph(std::string_view message) {
   return for_each_field(message, [](const Field& field) -> Status {
     switch (field.number) {
-      case number::graph::kNode:
+      case kGraphNode:
         return check_node(field.bytes);
-      case number::graph::kInitializer:
+      case kGraphInitializer:
         return check_tensor(field.bytes, /*is_weight=*/true);
-      case number::graph::kSparseInitializer:
+      case kGraphSparse:
         return fail("expected dense weights, found sparse ones");
       default:
         return {};
@@ -203,10 +272,10 @@ Status check_foreign_model(const std::string& label, std::string_view model) {
     status = fail("expected an ONNX model, found one in ONNX Runtime's own format");
   } else {
     status = for_each_field(model, [&](const Field& field) -> Status {
-      has_graph = has_graph || field.number == number::model::kGraph;
-      return field.number == number::model::kGraph       ? check_graph(field.bytes)
-             : field.number == number::model::kFunctions ? fail("expected no functions, found one")
-                                                         : Status();
+      has_graph = has_graph || field.number == kModelGraph;
+      return field.number == kModelGraph       ? check_graph(field.bytes)
+             : field.number == kModelFunctions ? fail("expected no functions, found one")
+                                               : Status();
     });
     if (status && !has_graph) {
       status = fail("expected an ONNX model, found a file without a graph");

@@ -9,24 +9,21 @@ namespace stemvo::synth {
 /// Texture coordinates along a road start anew at multiples of this: float stays exact.
 inline constexpr double kTexturePeriod_m = 61.44;
 
-/// What one pixel sees of a face: the middle of its footprint and the footprint's size, in metres
-/// of the face's texture coordinates.
-struct Footprint {
-  float u = 0.0F;
-  float v = 0.0F;
-  float width_u = 0.0F;
-  float width_v = 0.0F;
-};
-
 /// Share of the footprint [x - width/2, x + width/2] inside [begin, end].
 [[nodiscard]] float box_coverage(float x, float width, float begin, float end);
 /// The same for bars [k * period, k * period + bar] of all integers k.
 [[nodiscard]] float bars_coverage(float x, float width, float period, float bar);
 
-/// A footprint on a face of some style. u runs along a road or a wall, v across the road or up.
-struct Sample : Footprint {
+/// What one pixel sees of a face of some style: the middle of its footprint and the footprint's
+/// size, in metres of the face's texture coordinates. u runs along a road or a wall, v across the
+/// road or up.
+struct Sample {
   const Style& style;
   const Textures& textures;
+  float u = 0.0F;
+  float v = 0.0F;
+  float width_u = 0.0F;
+  float width_v = 0.0F;
 
   /// Noise at `texel_m` metres per texel. `texel_m` * Ripmap::kSize should divide kTexturePeriod_m
   /// for the noise on roads to go on where u starts anew.

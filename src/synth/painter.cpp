@@ -216,8 +216,8 @@ cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]
 class FramePainter {
  public:
   FramePainter(const Camera& camera, const Rigid3& world_from_camera, const Textures& textures)
-      : light(camera.height_px, camera.width_px, CV_32FC3),
-        depth_m(camera.height_px, camera.width_px, CV_32FC1),
+      : frame{cv::Mat(camera.height_px, camera.width_px, CV_32FC3),
+              cv::Mat(camera.height_px, camera.width_px, CV_32FC1)},
         camera_(camera),
         world_from_camera_(world_from_camera.rotation_matrix()),
         textures_(textures) {}
@@ -234,8 +234,7 @@ class FramePainter {
     }
   }
 
-  cv::Mat light;
-  cv::Mat depth_m;
+  PaintedFrame frame;
 
  private:
   void paint_band(int first_row, int end_row) {
@@ -254,8 +253,8 @@ class FramePainter {
 
   /// Each face seen by a pixel is painted once, at the middle of the samples it holds.
   void resolve(const std::array<int, kSamples>& ids, int column, int row) {
-    cv::Vec3f& out = light.at<cv::Vec3f>(row, column);
-    float& depth = depth_m.at<float>(row, column);
+    cv::Vec3f& out = frame.light.at<cv::Vec3f>(row, column);
+    float& depth = frame.depth_m.at<float>(row, column);
     out = cv::Vec3f(0.0F, 0.0F, 0.0F);
     int max_count = 0;
     for (auto first = ids.begin(); first != ids.end(); ++first) {
@@ -305,7 +304,7 @@ class FramePainter {
   }
 
   [[nodiscard]] Sample sample_of(const ScreenFace& face, const Vec2& pixel, double z) const {
-    Sample at{{}, *face.style, textures_};
+    Sample at{*face.style, textures_};
     const auto texture = [&](const Linear& over_z, float& value, float& width) {
       const double t = over_z.at(pixel) * z;
       const double dx = z * (over_z.c[0] - t * face.inverse_z.c[0]);
@@ -345,7 +344,7 @@ PaintedFrame paint_scene(const Scene& scene,
                          const Textures& textures) {
   FramePainter painter(camera, world_from_camera, textures);
   painter.paint(scene);
-  return {painter.light, painter.depth_m};
+  return painter.frame;
 }
 
 }  // namespace stemvo::synth

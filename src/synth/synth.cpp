@@ -2,9 +2,10 @@
 #include "synth/synth.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <set>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <variant>
@@ -15,7 +16,6 @@
 
 #include "internal_check.hpp"
 #include "io/png.hpp"
-#include "pipeline/folder_lock.hpp"
 #include "pipeline/out_folder.hpp"
 #include "synth/renderer.hpp"
 #include "text/text_file.hpp"
@@ -25,8 +25,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Says in a folder that it holds nothing but what was rendered.
-constexpr const char* kMark = "rendered_by_stemvo";
+/// Says in a folder that it holds nothing but what was rendered, which is this.
+constexpr std::string_view kMark = "rendered_by_stemvo";
+constexpr std::array<std::string_view, 6> kContents = {"image_2",   "depth",       "calib.txt",
+                                                       "times.txt", "camera.yaml", "poses.txt"};
 
 Error cannot(const char* what, const fs::path& path, const std::error_code& code) {
   return fail(fmt::format("{}: cannot {}: {}", path.string(), what, code.message()));
@@ -34,23 +36,21 @@ Error cannot(const char* what, const fs::path& path, const std::error_code& code
 
 /// A user may have put results or masks beside it.
 bool holds_only_a_drive(const fs::path& folder) {
-  const std::set<std::string> known = {kMark,       "image_2",   "depth",
-                                       "calib.txt", "times.txt", "camera.yaml"};
   std::error_code code;
   return std::all_of(
-      fs::directory_iterator(folder, code), fs::directory_iterator(),
-      [&](const auto& entry) { return known.contains(entry.path().filename().string()); });
+      fs::directory_iterator(folder, code), fs::directory_iterator(), [](const auto& entry) {
+        const std::string name = entry.path().filename().string();
+        return name == kMark || std::ranges::find(kContents, name) != kContents.end();
+      });
 }
 
 /// OUT/sequences/NAME and OUT/poses in KITTI's layout. Everything is made beside them, and takes
 /// their names when it is whole. Every Error names the file.
 struct Output {
-  fs::path sequence_dir;  ///< while it is made: NAME.unfinished
-  fs::path pose_file;     ///< the same
+  fs::path sequence_dir;  ///< while it is made, with the poses in it: NAME.unfinished
 
   Output(const fs::path& out_dir, const std::string& name)
       : sequence_dir(out_dir / "sequences" / (name + ".unfinished")),
-        pose_file(out_dir / "poses" / (name + ".txt.unfinished")),
         final_dir_(out_dir / "sequences" / name),
         final_poses_(out_dir / "poses" / (name + ".txt")) {}
 
@@ -64,7 +64,7 @@ struct Output {
     if (code) {
       return cannot("create the folder", sequence_dir, code);
     }
-    auto lock = pipeline::FolderLock::take(sequence_dir);
+    auto lock = pipeline::lock_folder(sequence_dir);
     const Status status = lock ? make_folders(with_depth) : Status(lock.error());
     return status ? std::move(lock) : status.error();
   }
@@ -96,14 +96,14 @@ struct Output {
       return fail(fmt::format("{}: expected an unfinished drive or none, found something else",
                               sequence_dir.string()));
     }
-    for (const char* name : {"image_2", "depth", "calib.txt", "times.txt", "camera.yaml"}) {
+    for (const std::string_view name : kContents) {
       fs::remove_all(sequence_dir / name, code);
       if (code) {
         return cannot("remove the unfinished drive", sequence_dir, code);
       }
     }
     for (const fs::path& folder :
-         {sequence_dir / "image_2", pose_file.parent_path(), sequence_dir / "depth"}) {
+         {sequence_dir / "image_2", final_poses_.parent_path(), sequence_dir / "depth"}) {
       if (with_depth || folder.filename() != "depth") {
         if (const Status made = pipeline::create_out_folder(folder); !made) {
           return made;
@@ -130,16 +130,12 @@ struct Output {
     std::error_code code;
     fs::remove_all(final_dir_, code);
     if (!code) {
-      fs::remove(final_poses_, code);
+      fs::rename(sequence_dir / "poses.txt", final_poses_, code);
     }
     if (!code) {
       fs::rename(sequence_dir, final_dir_, code);
     }
-    if (code) {
-      return cannot("replace the drive", final_dir_, code);
-    }
-    fs::rename(pose_file, final_poses_, code);
-    return code ? Status(cannot("replace the poses", final_poses_, code)) : Status();
+    return code ? Status(cannot("replace the drive", final_dir_, code)) : Status();
   }
 
   /// image_2/%06d.png. May be called from several threads for different frames.
@@ -184,7 +180,7 @@ struct Output {
                     camera.cy_px, rate_hz));
   }
 
-  /// times.txt and poses/NAME.txt, moved so that the first pose is the identity; 17 digits.
+  /// times.txt and the poses, moved so that the first pose is the identity; 17 digits.
   [[nodiscard]] Status write_truth(std::span<const Rigid3> world_from_camera,
                                    double rate_hz) const {
     const int digits = rate_hz == 10.0 ? 6 : 12;  // KITTI's own number of digits where it is exact
@@ -200,7 +196,7 @@ struct Output {
       }
     }
     return write_text_file(sequence_dir / "times.txt", times).and_then([&] {
-      return write_text_file(pose_file, poses);
+      return write_text_file(sequence_dir / "poses.txt", poses);
     });
   }
 

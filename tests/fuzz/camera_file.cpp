@@ -4,7 +4,6 @@
 
 #include <cstdint>
 
-#include "dataset/undistortion.hpp"
 #include "fuzz_input.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -20,7 +19,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::expect(camera.fx_px > 0.0 && camera.fy_px > 0.0, "focal lengths are positive");
   constexpr std::int64_t kMaxPixels = 1 << 16;  // larger ones take the fuzzer's time
   if (std::int64_t{camera.width_px} * camera.height_px <= kMaxPixels) {
-    fuzz::expect_said(dataset::Undistortion::create(read->lens));
+    fuzz::expect_said(dataset::FrameView::create(read->lens, file.path()));
   }
   return 0;
 }

@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "dataset/image_list.hpp"
+#include "dataset/listing.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {

@@ -9,14 +9,14 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "dataset/undistortion.hpp"
+#include "dataset/frame_view.hpp"
 
 namespace stemvo {
 namespace {
 
 using dataset::Distortion;
+using dataset::FrameView;
 using dataset::Lens;
-using dataset::Undistortion;
 
 struct NamedLens {
   const char* name;
@@ -59,7 +59,7 @@ cv::Point2d project_by_opencv(const Lens& lens, const cv::Point2d& xy) {
 class UndistortionTest : public ::testing::TestWithParam<NamedLens> {
  protected:
   const Lens lens_ = GetParam().lens;
-  const Undistortion undistortion_ = Undistortion::create(lens_).value();
+  const FrameView undistortion_ = FrameView::create(lens_, "camera.yaml").value();
   const Camera view_ = undistortion_.camera();
 
   cv::Point2d source_of(double u, double v) const {
@@ -187,7 +187,7 @@ TEST(Undistortion, NoDistortionChangesNothing) {
   cv::Mat image(480, 640, CV_8UC3);
   cv::randu(image, 0, 255);
   for (const Distortion model : {Distortion::kNone, Distortion::kRadialTangential}) {
-    const auto undistortion = Undistortion::create({camera, model, {}});
+    const auto undistortion = FrameView::create({camera, model, {}}, "camera.yaml");
     ASSERT_TRUE(undistortion);
     EXPECT_EQ(undistortion->camera().matrix(), camera.matrix());
     EXPECT_EQ(cv::norm(undistortion->apply(image), image, cv::NORM_INF), 0.0);
@@ -198,7 +198,7 @@ TEST(Undistortion, CoefficientsThatTurnTheImageInsideOutAreRefused) {
   const Camera camera{500.0, 500.0, 320.0, 240.0, 640, 480};
   for (const double k1 : {-8.0, -1e6, 50.0, 1e300}) {
     const auto undistortion =
-        Undistortion::create({camera, Distortion::kRadialTangential, {k1, 0, 0, 0, 0}});
+        FrameView::create({camera, Distortion::kRadialTangential, {k1, 0, 0, 0, 0}}, "camera.yaml");
     ASSERT_FALSE(undistortion) << k1;
     EXPECT_THAT(undistortion.error().message, ::testing::HasSubstr("distortion_coefficients"));
   }
