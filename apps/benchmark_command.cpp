@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <memory>
 #include <optional>
 #include <string>
 
@@ -10,7 +9,6 @@
 #include "benchmark/benchmark.hpp"
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
@@ -42,15 +40,14 @@ struct Arguments {
   bool is_quiet = false;
 };
 
-int benchmark(Arguments& arguments) {
+Expected<int> benchmark(Arguments& arguments) {
   BenchmarkRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   request.command = command_line();
   request.published = data_folder("config") / "published.json";
   const Expected<Config> paper = load_config(data_folder("config") / "paper.yaml");
   if (!paper) {
-    print_error(paper.error().message);
-    return kExitFailed;
+    return paper.error();
   }
   request.configurations = {{"default", Config{}}, {"paper", *paper}};
   std::optional<Progress> progress;
@@ -61,13 +58,10 @@ int benchmark(Arguments& arguments) {
     progress.emplace("frames", arguments.is_quiet);
     return !is_interrupted();
   };
-  request.on_frame = [&](std::size_t done, std::size_t total) {
-    return progress->update(done, total);
-  };
+  request.on_frame = [&](std::size_t done, std::size_t total) { return (*progress)(done, total); };
   const Expected<BenchmarkSummary> summary = run_benchmark(request);
   if (!summary) {
-    print_error(summary.error().message);
-    return kExitFailed;
+    return summary.error();
   }
   std::ranges::for_each(summary->failures, print_error);
   std::ranges::for_each(summary->warnings, print_warning);
@@ -83,26 +77,26 @@ int benchmark(Arguments& arguments) {
   return summary->failures.empty() ? kExitDone : kExitFailed;
 }
 
-}  // namespace
-
-CLI::App* add_benchmark(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("benchmark", "Run all sequences, compare with published");
-  const auto arguments = std::make_shared<Arguments>();
-  BenchmarkRequest& request = arguments->request;
-  command->add_option("KITTI_ROOT", request.kitti_root, "Folder that holds sequences and poses")
+void add_options(CLI::App& command, Arguments& arguments) {
+  BenchmarkRequest& request = arguments.request;
+  command.add_option("KITTI_ROOT", request.kitti_root, "Folder that holds sequences and poses")
       ->required()
       ->type_name("");
-  add_out_folder(*command, request.out_dir);
-  command->add_option("--sequences", request.sequences, "Only these, e.g. 00,02; default: all")
+  add_out_folder(command, request.out_dir);
+  command.add_option("--sequences", request.sequences, "Only these, e.g. 00,02; default: all")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NN,..");
-  add_threads_option(*command, request.num_threads);
-  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
-  command->footer(kFooter);
-  command->callback(
-      [arguments, &action] { action = [arguments] { return benchmark(*arguments); }; });
-  return command;
+  add_threads_option(command, request.num_threads);
+  command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
+}
+
+}  // namespace
+
+CLI::App* add_benchmark(CLI::App& app, Action& action) {
+  return add_command<Arguments>(app, action,
+                                {"benchmark", "Run all sequences, compare with published", kFooter},
+                                add_options, benchmark);
 }
 
 }  // namespace stemvo::apps

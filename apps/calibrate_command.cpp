@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
-#include <memory>
 #include <string>
 
 #include <fmt/format.h>
@@ -9,7 +8,6 @@
 #include "calibration/calibrate.hpp"
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 
@@ -74,11 +72,10 @@ int report(const Arguments& arguments, const CalibrationReport& report) {
   return kExitDone;
 }
 
-int calibrate(Arguments& arguments) {
+Expected<int> calibrate(Arguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
-    print_error(config.error().message);
-    return kExitFailed;
+    return config.error();
   }
   CalibrationRequest& request = arguments.request;
   request.config = *config;
@@ -87,39 +84,36 @@ int calibrate(Arguments& arguments) {
     request.calibration = arguments.calibration;
   }
   Progress progress("frames", arguments.is_quiet);
-  const Expected<CalibrationReport> result = calibrate_sequence(
-      request, [&](std::size_t done, std::size_t total) { return progress.update(done, total); });
+  const Expected<CalibrationReport> result = calibrate_sequence(request, std::ref(progress));
   if (!result) {
-    print_error(result.error().message);
-    return kExitFailed;
+    return result.error();
   }
   return report(arguments, *result);
+}
+
+void add_options(CLI::App& command, Arguments& arguments) {
+  CalibrationRequest& request = arguments.request;
+  command.add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
+      ->required()
+      ->type_name("");
+  command.add_option("--out", request.out_file, "File for the calibration, as KITTI's calib.txt")
+      ->required()
+      ->type_name("FILE");
+  command
+      .add_option("--calib", arguments.calibration,
+                  "Calibration to start from; default: the folder's calib.txt")
+      ->type_name("FILE");
+  add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");
+  add_config_options(command, arguments.config);
+  command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
 }
 
 }  // namespace
 
 CLI::App* add_calibrate(CLI::App& app, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("calibrate", "Refine focal length and principal point over a drive");
-  const auto arguments = std::make_shared<Arguments>();
-  CalibrationRequest& request = arguments->request;
-  command->add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
-      ->required()
-      ->type_name("");
-  command->add_option("--out", request.out_file, "File for the calibration, as KITTI's calib.txt")
-      ->required()
-      ->type_name("FILE");
-  command
-      ->add_option("--calib", arguments->calibration,
-                   "Calibration to start from; default: the folder's calib.txt")
-      ->type_name("FILE");
-  add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
-  add_config_options(*command, arguments->config);
-  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
-  command->footer(kFooter);
-  command->callback(
-      [arguments, &action] { action = [arguments] { return calibrate(*arguments); }; });
-  return command;
+  return add_command<Arguments>(
+      app, action, {"calibrate", "Refine focal length and principal point over a drive", kFooter},
+      add_options, calibrate);
 }
 
 }  // namespace stemvo::apps

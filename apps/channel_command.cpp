@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <memory>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "interrupt.hpp"
 #include "options.hpp"
 #include "pipeline/channel_images.hpp"
@@ -37,9 +35,7 @@ Expected<int> draw(Arguments& arguments) {
   arguments.request.config = *config;
   arguments.request.models_dir = data_folder("models");
   Progress progress("frames", /*is_quiet=*/false);
-  const Expected<std::size_t> written = write_channel_images(
-      arguments.request,
-      [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
+  const Expected<std::size_t> written = write_channel_images(arguments.request, std::ref(progress));
   if (!written) {
     return written.error();
   }
@@ -50,29 +46,30 @@ Expected<int> draw(Arguments& arguments) {
   return is_interrupted() ? kExitInterrupted : kExitDone;
 }
 
+void add_options(CLI::App& command, Arguments& arguments) {
+  arguments.request.frames = FrameRangeRequest{0, 1};
+  command
+      .add_option("SEQUENCE_DIR", arguments.request.sequence_dir,
+                  "Sequence in KITTI's layout; with --camera, images")
+      ->required()
+      ->type_name("");
+  add_out_folder(command, arguments.request.out_dir, "Folder for the images; created");
+  add_range_option(command, "--frames", arguments.request.frames,
+                   "Frames A to B-1; default: the first one");
+  add_range_option(command, "--filters", arguments.request.filters,
+                   "Filters A to B-1; default: all");
+  add_file_option(command, "--camera", arguments.request.camera_file,
+                  "SEQUENCE_DIR is a folder of images or a pattern (see 'stemvo run --help')");
+  add_config_options(command, arguments.config);
+}
+
 }  // namespace
 
 CLI::App* add_channel(CLI::App& app, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("channel", "Draw what the filters make of the frames (paper, Figure 1)");
-  const auto arguments = std::make_shared<Arguments>();
-  arguments->request.frames = FrameRangeRequest{0, 1};
-  command
-      ->add_option("SEQUENCE_DIR", arguments->request.sequence_dir,
-                   "Sequence in KITTI's layout; with --camera, images")
-      ->required()
-      ->type_name("");
-  add_out_folder(*command, arguments->request.out_dir, "Folder for the images; created");
-  add_range_option(*command, "--frames", arguments->request.frames,
-                   "Frames A to B-1; default: the first one");
-  add_range_option(*command, "--filters", arguments->request.filters,
-                   "Filters A to B-1; default: all");
-  add_file_option(*command, "--camera", arguments->request.camera_file,
-                  "SEQUENCE_DIR is a folder of images or a pattern (see 'stemvo run --help')");
-  add_config_options(*command, arguments->config);
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return draw(*arguments); }; });
-  return command;
+  return add_command<Arguments>(
+      app, action,
+      {"channel", "Draw what the filters make of the frames (paper, Figure 1)", kFooter},
+      add_options, draw);
 }
 
 }  // namespace stemvo::apps

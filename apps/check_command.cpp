@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
-#include <memory>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -38,7 +37,7 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
   return {{"passed", all_passed(results)}, {"bounds", bounds}};
 }
 
-Expected<int> check(const Arguments& arguments) {
+Expected<int> check(Arguments& arguments) {
   const Expected<std::vector<ThresholdResult>> results =
       check_metrics(arguments.metrics, arguments.thresholds);
   if (!results) {
@@ -49,20 +48,21 @@ Expected<int> check(const Arguments& arguments) {
   return all_passed(*results) ? kExitDone : kExitFailed;
 }
 
+void add_options(CLI::App& command, Arguments& arguments) {
+  command.add_option("METRICS.json", arguments.metrics, "metrics.json of a run")
+      ->required()
+      ->type_name("");
+  command.add_option("--against", arguments.thresholds, "Thresholds to hold it against")
+      ->required()
+      ->type_name("THRESHOLDS.yaml");
+}
+
 }  // namespace
 
 CLI::App* add_check(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("check", "Hold the numbers of a run against thresholds");
-  const auto arguments = std::make_shared<Arguments>();
-  command->add_option("METRICS.json", arguments->metrics, "metrics.json of a run")
-      ->required()
-      ->type_name("");
-  command->add_option("--against", arguments->thresholds, "Thresholds to hold it against")
-      ->required()
-      ->type_name("THRESHOLDS.yaml");
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return check(*arguments); }; });
-  return command;
+  return add_command<Arguments>(app, action,
+                                {"check", "Hold the numbers of a run against thresholds", kFooter},
+                                add_options, check);
 }
 
 }  // namespace stemvo::apps

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
 #include <CLI/CLI.hpp>
 
@@ -17,6 +18,27 @@ inline constexpr int kExitInterrupted = 130;
 /// What the command line asks for; set while parsing, called afterwards. Returns the exit code; an
 /// error is printed, and means kExitFailed.
 using Action = std::function<Expected<int>()>;
+
+struct CommandText {
+  const char* name;
+  const char* what;    ///< one line
+  const char* footer;  ///< below the options
+};
+/// A command whose options fill an `Arguments`, which lives as long as it, for `run`.
+template <typename Arguments>
+CLI::App* add_command(CLI::App& app,
+                      Action& action,
+                      const CommandText& text,
+                      void (*add_options)(CLI::App&, Arguments&),
+                      Expected<int> (*run)(Arguments&)) {
+  CLI::App* command = app.add_subcommand(text.name, text.what);
+  const auto arguments = std::make_shared<Arguments>();
+  add_options(*command, *arguments);
+  command->footer(text.footer);
+  command->callback(
+      [arguments, run, &action] { action = [arguments, run] { return run(*arguments); }; });
+  return command;
+}
 
 /// Each adds its command, whose parsing sets `action`.
 CLI::App* add_run(CLI::App& app, Action& action);

@@ -7,19 +7,24 @@
 #include <cstdlib>
 #include <exception>
 #include <fstream>
+#include <new>
 #include <string>
 #include <system_error>
 
+#include <execinfo.h>
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <opencv2/core.hpp>
 #include <unistd.h>
 
 #include "commands.hpp"
-#include "exceptions.hpp"
 #include "report/metrics_keys.hpp"
 
 namespace stemvo::apps {
 namespace {
+
+constexpr const char* kNoMemory =
+    "out of memory: expected more than there is, or than 'ulimit -v' allows";
 
 std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
 int first_failure = 0;        // errno of the first write to standard output that failed
@@ -52,7 +57,30 @@ void print_labelled(std::string_view label, std::string_view message) {
 
 }  // namespace
 
+std::string describe(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    return kNoMemory;
+  } catch (const cv::Exception& opencv) {
+    return opencv.code == cv::Error::StsNoMem ? kNoMemory
+                                              : std::string("internal: ") + opencv.what();
+  } catch (const std::system_error& system) {
+    return system.code() == std::errc::resource_unavailable_try_again
+               ? "out of threads: expected more than 'ulimit -u' allows, or more memory for them"
+               : system.what();
+  } catch (const std::exception& other) {
+    return std::string("internal: ") + other.what();
+  } catch (...) {
+    return "internal: unknown exception";
+  }
+}
+
 void prepare_console() {
+  // The C library loads what unwinds the stack at its first use, which may be where memory has run
+  // out (backtrace(3), notes): from here on it is there.
+  void* frame = nullptr;
+  backtrace(&frame, 1);
   // A file opened while descriptor 1 is closed would become standard output.
   int descriptor = 0;
   do {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <exception>
 #include <string>
 #include <string_view>
 
@@ -10,8 +11,13 @@
 namespace stemvo::apps {
 
 /// Keeps files away from a closed standard output, a closed pipe from ending the program, and what
-/// libraries print (libpng, libjpeg) from standard error, which is ours.
+/// libraries print (libpng, libjpeg) from standard error, which is ours; what ends the program says
+/// so.
 void prepare_console();
+
+/// What an exception that nobody caught means: what ran out (memory, threads, open files), else
+/// "internal: ..", a bug of ours.
+[[nodiscard]] std::string describe(const std::exception_ptr& error);
 
 /// Results for people, to standard output; nothing with --json. A failure is told by flush_console.
 void print(std::string_view text);

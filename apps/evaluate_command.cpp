@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <memory>
 #include <string>
 
 #include <nlohmann/json.hpp>
@@ -49,31 +48,31 @@ Expected<int> evaluate(Arguments& arguments) {
   return kExitDone;
 }
 
+void add_options(CLI::App& command, Arguments& arguments) {
+  command
+      .add_option("--gt", arguments.request.ground_truth,
+                  "Ground truth: KITTI's, TUM's or EuRoC's poses")
+      ->required()
+      ->type_name("POSES");
+  command.add_option("ESTIMATE", arguments.request.estimates, "Trajectories to judge")
+      ->required()
+      ->type_name("");
+  command.add_option("--align", arguments.alignment, "none (default), scale, se3 or sim3")
+      ->type_name("KIND")
+      ->check(CLI::IsMember({"none", "scale", "se3", "sim3"}));
+  add_tolerance_option(command, arguments.request.tolerance_s);
+  add_file_option(command, "--camera", arguments.request.camera_file,
+                  "With EuRoC's poses: the camera file with T_BS");
+  add_file_option(command, "--json", arguments.request.json,
+                  "Write the numbers to this file as well; -: to standard output, alone");
+}
+
 }  // namespace
 
 CLI::App* add_evaluate(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("evaluate", "Compare trajectories with the ground truth");
-  const auto arguments = std::make_shared<Arguments>();
-  command
-      ->add_option("--gt", arguments->request.ground_truth,
-                   "Ground truth: KITTI's, TUM's or EuRoC's poses")
-      ->required()
-      ->type_name("POSES");
-  command->add_option("ESTIMATE", arguments->request.estimates, "Trajectories to judge")
-      ->required()
-      ->type_name("");
-  command->add_option("--align", arguments->alignment, "none (default), scale, se3 or sim3")
-      ->type_name("KIND")
-      ->check(CLI::IsMember({"none", "scale", "se3", "sim3"}));
-  add_tolerance_option(*command, arguments->request.tolerance_s);
-  add_file_option(*command, "--camera", arguments->request.camera_file,
-                  "With EuRoC's poses: the camera file with T_BS");
-  add_file_option(*command, "--json", arguments->request.json,
-                  "Write the numbers to this file as well; -: to standard output, alone");
-  command->footer(kFooter);
-  command->callback(
-      [arguments, &action] { action = [arguments] { return evaluate(*arguments); }; });
-  return command;
+  return add_command<Arguments>(app, action,
+                                {"evaluate", "Compare trajectories with the ground truth", kFooter},
+                                add_options, evaluate);
 }
 
 }  // namespace stemvo::apps

@@ -12,7 +12,6 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "console.hpp"
-#include "exceptions.hpp"
 #include "interrupt.hpp"
 #include "stemvo/version.hpp"
 
@@ -115,7 +114,6 @@ int run_program(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   stemvo::apps::process_start();
-  stemvo::apps::prepare_exceptions();
   stemvo::apps::prepare_console();
   stemvo::apps::catch_interrupts();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -8,8 +7,8 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "models/manifest.hpp"
+#include "options.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -46,8 +45,12 @@ nlohmann::ordered_json document(const ModelEntry& entry, const Status& status) {
           {"made_by", entry.command}};
 }
 
-/// `model` empty: all.
-Expected<int> list_models(const std::string& model) {
+struct Arguments {
+  std::string model;  ///< empty: all
+};
+
+Expected<int> list_models(Arguments& arguments) {
+  const std::string& model = arguments.model;
   const auto folder = data_folder("models");
   const Expected<std::vector<ModelEntry>> entries =
       model.empty() ? load_manifest(folder / "manifest.yaml") : find_layers(model, folder);
@@ -69,16 +72,17 @@ Expected<int> list_models(const std::string& model) {
   return exit_code;
 }
 
+void add_options(CLI::App& command, Arguments& arguments) {
+  command.add_option("MODEL", arguments.model,
+                     "Only this one's layers: its name, or the path of an .onnx");
+}
+
 }  // namespace
 
 CLI::App* add_models(CLI::App& app, Action& action) {
-  CLI::App* command =
-      app.add_subcommand("models", "List the models and check that each file is sound");
-  command->footer(kFooter);
-  const auto model = std::make_shared<std::string>();
-  command->add_option("MODEL", *model, "Only this one's layers: its name, or the path of an .onnx");
-  command->callback([&action, model] { action = [model] { return list_models(*model); }; });
-  return command;
+  return add_command<Arguments>(
+      app, action, {"models", "List the models and check that each file is sound", kFooter},
+      add_options, list_models);
 }
 
 }  // namespace stemvo::apps

@@ -4,8 +4,6 @@
 #include <map>
 #include <system_error>
 
-#include "install_paths.hpp"
-
 namespace stemvo::apps {
 namespace {
 
@@ -25,6 +23,17 @@ std::filesystem::path find_config(const std::string& given) {
 }
 
 }  // namespace
+
+std::filesystem::path data_folder(const char* name) {
+  std::error_code code;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
+  const std::filesystem::path installed =
+      program.parent_path().parent_path() / "share" / "stemvo" / name;
+  if (!code && std::filesystem::is_directory(installed, code)) {
+    return installed;
+  }
+  return std::filesystem::path(STEMVO_SOURCE_DIR) / name;
+}
 
 CLI::Validator in_range(int min, int max) { return CLI::Range(min, max).description(""); }
 

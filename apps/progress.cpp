@@ -66,7 +66,7 @@ bool Progress::is_due(Clock::time_point now, bool is_last) const {
   return is_last || since.count() >= (is_terminal_ ? kTerminalPeriod_s : kPlainPeriod_s);
 }
 
-bool Progress::update(std::size_t done, std::size_t total) {
+bool Progress::operator()(std::size_t done, std::size_t total) {
   const bool go_on = !is_interrupted();
   const Clock::time_point now = Clock::now();
   const bool is_last = done == total || !go_on;

@@ -18,7 +18,7 @@ class Progress {
 
   /// After each unit of work; `total` 0: not known. False once the user interrupted, so that it
   /// fits as a callback.
-  bool update(std::size_t done, std::size_t total);
+  bool operator()(std::size_t done, std::size_t total);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <functional>
-#include <memory>
 #include <string>
 
 #include <fmt/format.h>
@@ -10,7 +9,6 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "robustness/contenders.hpp"
@@ -44,24 +42,22 @@ struct Arguments {
   bool is_quiet = false;
 };
 
-int run(Arguments& arguments) {
+Expected<int> run(Arguments& arguments) {
   robustness::RobustnessRequest& request = arguments.request;
   Config base;
   base.scale.source = ScaleSource::kGroundTruth;
   const Expected<Config> config = read_config(arguments.config, base);
   if (!config) {
-    print_error(config.error().message);
-    return kExitFailed;
+    return config.error();
   }
   request.config = *config;
   request.command = command_line();
   request.models_dir = data_folder("models");
   Progress progress("runs", arguments.is_quiet);
-  request.progress = std::bind_front(&Progress::update, &progress);
+  request.progress = std::ref(progress);
   const auto report = robustness::run_robustness(request);
   if (!report) {
-    print_error(report.error().message);
-    return kExitFailed;
+    return report.error();
   }
   std::ranges::for_each(report->warnings, print_warning);
   if (!arguments.is_quiet) {
@@ -84,36 +80,37 @@ std::string kinds_help() {
   return help;
 }
 
+void add_options(CLI::App& command, Arguments& arguments) {
+  robustness::RobustnessRequest& request = arguments.request;
+  command
+      .add_option("SEQUENCE_DIR", request.sequence_dirs,
+                  "Sequences in KITTI's layout, with ground truth")
+      ->required()
+      ->type_name("");
+  add_out_folder(command, request.out_dir);
+  add_range_option(command, "--frames", request.frames, "Frames A to B-1 of each sequence");
+  command.add_option("--kinds", request.kinds, kinds_help())
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,..");
+  command
+      .add_option("--controls", request.controls,
+                  fmt::format("Only these: some of {}, or other filters, MODEL:K",
+                              fmt::join(robustness::all_controls(), ", ")))
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,..");
+  add_threads_option(command, request.num_threads);
+  command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
+  add_config_options(command, arguments.config);
+}
+
 }  // namespace
 
 CLI::App* add_robustness(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("robustness", "Compare channels on disturbed frames");
-  const auto arguments = std::make_shared<Arguments>();
-  robustness::RobustnessRequest& request = arguments->request;
-  command
-      ->add_option("SEQUENCE_DIR", request.sequence_dirs,
-                   "Sequences in KITTI's layout, with ground truth")
-      ->required()
-      ->type_name("");
-  add_out_folder(*command, request.out_dir);
-  add_range_option(*command, "--frames", request.frames, "Frames A to B-1 of each sequence");
-  command->add_option("--kinds", request.kinds, kinds_help())
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("NAME,..");
-  command
-      ->add_option("--controls", request.controls,
-                   fmt::format("Only these: some of {}, or other filters, MODEL:K",
-                               fmt::join(robustness::all_controls(), ", ")))
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->type_name("NAME,..");
-  add_threads_option(*command, request.num_threads);
-  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
-  add_config_options(*command, arguments->config);
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });
-  return command;
+  return add_command<Arguments>(app, action,
+                                {"robustness", "Compare channels on disturbed frames", kFooter},
+                                add_options, run);
 }
 
 }  // namespace stemvo::apps

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <memory>
 #include <string>
 
 #include <fmt/format.h>
@@ -7,7 +6,6 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "options.hpp"
 #include "pipeline/run.hpp"
 #include "progress.hpp"
@@ -94,9 +92,7 @@ Expected<int> run(Arguments& arguments) {
     request.note = print_line;
   }
   Progress progress("frames", arguments.is_quiet);
-  const Expected<RunSummary> summary = run_sequence(
-      request,
-      [&progress](std::size_t done, std::size_t total) { return progress.update(done, total); });
+  const Expected<RunSummary> summary = run_sequence(request, std::ref(progress));
   if (!summary) {
     return summary.error();
   }
@@ -118,54 +114,54 @@ Expected<int> run(Arguments& arguments) {
   return summary->interrupted ? kExitInterrupted : kExitDone;
 }
 
-}  // namespace
-
-CLI::App* add_run(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("run", "Reconstruct a drive from a recording");
-  const auto arguments = std::make_shared<Arguments>();
-  RunRequest& request = arguments->request;
+void add_options(CLI::App& command, Arguments& arguments) {
+  RunRequest& request = arguments.request;
   command
-      ->add_option(
+      .add_option(
           "INPUT", request.sequence_dir,
           "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
-  add_out_folder(*command, request.out_dir,
+  add_out_folder(command, request.out_dir,
                  "Folder for the results; created, files replaced; default: results/NAME of INPUT")
       ->required(false);
-  add_config_options(*command, arguments->config);
-  add_range_option(*command, "--frames", request.frames, "Frames A to B-1 only");
-  add_file_option(*command, "--gt", request.ground_truth,
+  add_config_options(command, arguments.config);
+  add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");
+  add_file_option(command, "--gt", request.ground_truth,
                   "Ground truth: poses in KITTI's, TUM's or EuRoC's format");
-  add_tolerance_option(*command, request.ground_truth_tolerance_s);
-  add_file_option(*command, "--camera", request.camera_file,
+  add_tolerance_option(command, request.ground_truth_tolerance_s);
+  add_file_option(command, "--camera", request.camera_file,
                   "Camera file; INPUT may be any folder of images or a pattern (see below)");
-  add_file_option(*command, "--times", request.times,
+  add_file_option(command, "--times", request.times,
                   "Of images: a time in seconds per image; default: the camera's rate_hz");
-  add_file_option(*command, "--calib", request.calibration,
+  add_file_option(command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
   command
-      ->add_option(
+      .add_option(
           "--mask", request.masks,
           "No points there: a rectangle of the frames in pixels, or an image of their size, "
           "black there; may be repeated")
       ->type_name("x,y,w,h|FILE")
       ->expected(1)
       ->take_all();
-  add_threads_option(*command, request.num_threads);
-  command->add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
+  add_threads_option(command, request.num_threads);
+  command.add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
-  command->add_flag("--resume", request.resume,
-                    "Go on where an interrupted run into --out stopped, if there is one");
-  command->add_flag("--map", request.write_map,
-                    "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
-  command->add_flag("--timing", request.measure_times,
-                    "Also where the time went: a table, and the key timing in metrics.json");
-  command->add_flag("--quiet", arguments->is_quiet, "Only errors and warnings");
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });
-  return command;
+  command.add_flag("--resume", request.resume,
+                   "Go on where an interrupted run into --out stopped, if there is one");
+  command.add_flag("--map", request.write_map,
+                   "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
+  command.add_flag("--timing", request.measure_times,
+                   "Also where the time went: a table, and the key timing in metrics.json");
+  command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
+}
+
+}  // namespace
+
+CLI::App* add_run(CLI::App& app, Action& action) {
+  return add_command<Arguments>(
+      app, action, {"run", "Reconstruct a drive from a recording", kFooter}, add_options, run);
 }
 
 }  // namespace stemvo::apps

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <functional>
-#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -11,7 +10,6 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "install_paths.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "search/search.hpp"
@@ -67,10 +65,10 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   request.config = *config;
   request.command = command_line();
   Progress progress("filter-frames", arguments.is_quiet);
-  return search::run_search(request, std::bind_front(&Progress::update, &progress));
+  return search::run_search(request, std::ref(progress));
 }
 
-int run(Arguments& arguments) {
+Expected<int> run(Arguments& arguments) {
   const search::SearchRequest& request = arguments.request;
   if (arguments.merge.empty() == request.sequence_dirs.empty()) {
     print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
@@ -78,8 +76,7 @@ int run(Arguments& arguments) {
   }
   const Expected<search::SearchReport> report = find_filters(arguments);
   if (!report) {
-    print_error(report.error().message);
-    return kExitFailed;
+    return report.error();
   }
   std::ranges::for_each(report->warnings, print_warning);
   if (!arguments.is_quiet) {
@@ -159,12 +156,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_search(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("search", "Find the best filter of a network");
-  const auto arguments = std::make_shared<Arguments>();
-  add_options(*command, *arguments);
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return run(*arguments); }; });
-  return command;
+  return add_command<Arguments>(
+      app, action, {"search", "Find the best filter of a network", kFooter}, add_options, run);
 }
 
 }  // namespace stemvo::apps

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 
 #include <fmt/format.h>
@@ -33,16 +32,15 @@ struct Arguments {
   SyntheticDriveOptions options;
 };
 
-int render(const Arguments& arguments) {
+Expected<int> render(Arguments& arguments) {
   Progress progress("frames", /*is_quiet=*/false);
-  const Status status = render_synthetic_drive(arguments.out_dir, arguments.options,
-                                               std::bind_front(&Progress::update, &progress));
+  const Status status =
+      render_synthetic_drive(arguments.out_dir, arguments.options, std::ref(progress));
   if (is_interrupted()) {
     return kExitInterrupted;
   }
   if (!status) {
-    print_error(status.error().message);
-    return kExitFailed;
+    return status.error();
   }
   const std::string& name = arguments.options.name;
   const std::string sequence = (arguments.out_dir / "sequences" / name).string();
@@ -52,34 +50,30 @@ int render(const Arguments& arguments) {
   return kExitDone;
 }
 
-}  // namespace
-
-CLI::App* add_synth(CLI::App& app, Action& action) {
-  CLI::App* command = app.add_subcommand("synth", "Render a drive along a street, or a walk");
-  const auto arguments = std::make_shared<Arguments>();
-  SyntheticDriveOptions& options = arguments->options;
-  command->add_option("OUT_DIR", arguments->out_dir, "Folder for the drive; created")
+void add_options(CLI::App& command, Arguments& arguments) {
+  SyntheticDriveOptions& options = arguments.options;
+  command.add_option("OUT_DIR", arguments.out_dir, "Folder for the drive; created")
       ->required()
       ->type_name("");
   CLI::Option* trajectory =
       command
-          ->add_option("--trajectory", options.trajectory,
-                       "Drive along these KITTI poses; default: a curve of its own")
+          .add_option("--trajectory", options.trajectory,
+                      "Drive along these KITTI poses; default: a curve of its own")
           ->type_name("POSES");
   command
-      ->add_flag("--walk", options.walk,
-                 "Walk through a courtyard with the camera in the hand, in place of a drive")
+      .add_flag("--walk", options.walk,
+                "Walk through a courtyard with the camera in the hand, in place of a drive")
       ->excludes(trajectory);
   command
-      ->add_option("--rate", options.rate_hz,
-                   "Frames per second, 1 to 1000; default 10, of a walk 30")
+      .add_option("--rate", options.rate_hz,
+                  "Frames per second, 1 to 1000; default 10, of a walk 30")
       ->type_name("HZ");
   command
-      ->add_option("--speed", options.speed_m_s,
-                   "Mean speed, 0.1 to 60, of a walk to 1; default 8-12, of a walk 0.5")
+      .add_option("--speed", options.speed_m_s,
+                  "Mean speed, 0.1 to 60, of a walk to 1; default 8-12, of a walk 0.5")
       ->type_name("M_PER_S")
       ->excludes(trajectory);
-  command->add_option("--name", options.name, "Of the sequence; default 00")
+  command.add_option("--name", options.name, "Of the sequence; default 00")
       ->type_name("NAME")
       ->check([](const std::string& text) {
         const bool is_name = !text.empty() && text != "." && text != ".." &&
@@ -88,27 +82,32 @@ CLI::App* add_synth(CLI::App& app, Action& action) {
                    ? std::string()
                    : "expected the name of a folder (not NAME.unfinished), found '" + text + "'";
       });
-  command->add_option("--frames", options.num_frames, "Frames to render; default 100")
+  command.add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")
       ->check(in_range(1, 1000000));
-  command->add_option("--seed", options.seed, "Of textures, shading and noise; default 1")
+  command.add_option("--seed", options.seed, "Of textures, shading and noise; default 1")
       ->type_name("S")
       ->check([](const std::string& text) {
         // CLI11 would wrap a negative number around.
         return text.starts_with('-') ? "expected a whole number of at least 0, found " + text
                                      : std::string();
       });
-  command->add_option("--width", options.width_px, "Pixels; default 1241, of a walk 640")
+  command.add_option("--width", options.width_px, "Pixels; default 1241, of a walk 640")
       ->type_name("W")
       ->check(in_range(16, 8192));
-  command->add_option("--height", options.height_px, "Pixels; default 376, of a walk 480")
+  command.add_option("--height", options.height_px, "Pixels; default 376, of a walk 480")
       ->type_name("H")
       ->check(in_range(16, 8192));
-  command->add_flag("--depth", options.write_depth,
-                    "Also depth/NNNNNN.npy: metres along the optical axis, float32");
-  command->footer(kFooter);
-  command->callback([arguments, &action] { action = [arguments] { return render(*arguments); }; });
-  return command;
+  command.add_flag("--depth", options.write_depth,
+                   "Also depth/NNNNNN.npy: metres along the optical axis, float32");
+}
+
+}  // namespace
+
+CLI::App* add_synth(CLI::App& app, Action& action) {
+  return add_command<Arguments>(app, action,
+                                {"synth", "Render a drive along a street, or a walk", kFooter},
+                                add_options, render);
 }
 
 }  // namespace stemvo::apps

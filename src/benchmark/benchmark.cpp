@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -27,6 +28,7 @@ constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
 constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
 constexpr const char* kMetricsFile = "metrics.json";
 constexpr const char* kPosesFile = "trajectory_kitti.txt";
+constexpr const char* kResultFiles[] = {kMetricsFile, kPosesFile};  // that are read here
 constexpr double kLengthTolerance_m = 1.5;
 
 /// Those asked for, where one that is not there is a row, or all.
@@ -106,6 +108,12 @@ Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence)
               {"ground_truth", files->ground_truth}};
 }
 
+/// As kInputsFile has it beside the inputs: a result that was touched does not count.
+Json hash_result(const fs::path& file) {
+  const Expected<std::string> text = read_text_file(file);
+  return text ? Json(internal::sha256_hex(*text)) : Json("cannot be read");
+}
+
 /// Why the run of this folder is to be done (again), for its title; nothing where its result
 /// counts.
 std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inputs) {
@@ -113,37 +121,23 @@ std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inp
   if (!fs::exists(folder / kInputsFile, ignored)) {
     return "";  // never completed
   }
-  const Expected<std::string> text = read_text_file(folder / kInputsFile);
-  if (!text) {
-    return fmt::format(" (again: {})", text.error().message);
+  const Expected<Json> before = read_json_object(folder / kInputsFile);
+  if (!before) {
+    return fmt::format(" (again: {})", before.error().message);
   }
-  const Json before = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
-  if (!before.is_object()) {
-    return fmt::format(" (again: {} is damaged)", (folder / kInputsFile).string());
+  Json now = inputs;
+  for (const char* name : kResultFiles) {
+    now[name] = hash_result(folder / name);
   }
   std::vector<std::string> changed;
-  for (const auto& [part, hash] : inputs.items()) {
-    if (!before.contains(part) || before[part] != hash) {
+  for (const auto& [part, hash] : now.items()) {
+    if (before->value(part, Json()) != hash) {
       changed.push_back(part);
     }
   }
-  if (!changed.empty()) {
-    return fmt::format(" (again: {} changed)", fmt::join(changed, ", "));
-  }
-  const Expected<MetricsReport> report = read_metrics_json(folder / kMetricsFile);
-  const Expected<Trajectory> poses = read_kitti_trajectory(folder / kPosesFile);
-  if (const auto lines = read_text_file(folder / kPosesFile); lines && !lines->ends_with('\n')) {
-    return fmt::format(" (again: {}: expected whole lines)", (folder / kPosesFile).string());
-  }
-  if (report && poses && poses->size() == report->num_frames) {
-    return std::nullopt;
-  }
-  const std::string problem =
-      !report  ? report.error().message
-      : !poses ? poses.error().message
-               : fmt::format("{}: expected {} poses, found {}", (folder / kPosesFile).string(),
-                             report->num_frames, poses->size());
-  return fmt::format(" (again: {})", problem);
+  return changed.empty()
+             ? std::nullopt
+             : std::optional(fmt::format(" (again: {} changed)", fmt::join(changed, ", ")));
 }
 
 const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
@@ -159,6 +153,7 @@ class Benchmark {
     const auto opened = KittiSequence::open(sequence_dir(name));
     const Json official = published.at("sequences").value(name, Json::object());
     const Json publications = published_rows(published.at("published"), name);
+    truths_[name] = opened ? opened->ground_truth() : std::nullopt;
     const bool is_complete = opened && !official.empty() && is_official(official, *opened);
     if (!opened) {
       summary_.failures.push_back(fmt::format("{}: {}", name, opened.error().message));
@@ -186,8 +181,8 @@ class Benchmark {
       if (!paths) {
         return paths.error();
       }
-      if (!paths->runs.empty()) {
-        paths_.push_back(*std::move(paths));
+      if (!paths->empty()) {
+        paths_[text_of(sequence["name"])] = *std::move(paths);
       }
       if (const Status written = write_files(); !written) {
         return written.error();
@@ -231,35 +226,6 @@ class Benchmark {
         fmt::format("{}, {}, {}", text_of(sequence["name"]), text_of(run["configuration"]),
                     text_of(run["scale_source"]));
     ++num_begun_;
-    const Expected<MetricsReport> report = result_of(sequence, config, title, run);
-    if (summary_.interrupted) {  // stays pending
-      return;
-    }
-    if (!report) {
-      run["problem"] = report.error().message;
-      if (run["state"] == "pending") {
-        run["state"] = "failed";
-        summary_.failures.push_back(fmt::format("{}: {}", title, report.error().message));
-      }
-      return;
-    }
-    run["state"] = "done";
-    run["tracked_fraction"] = report->tracked_fraction;
-    add_metrics(run, report->metrics);
-    if (report->metrics) {
-      sequence["zero_motion"]["average_offset_m"] = report->metrics->null_offset_m;
-    }
-    speed_.push_back({{"sequence", sequence["name"]},
-                      {"configuration", run["configuration"]},
-                      {"scale_source", run["scale_source"]},
-                      {"fps", report->fps}});
-  }
-
-  /// Of an earlier call, or of a run now, which may be stopped. Marks a run that is not possible.
-  Expected<MetricsReport> result_of(const Json& sequence,
-                                    const Config& config,
-                                    const std::string& title,
-                                    Json& run) {
     RunRequest one;
     one.sequence_dir = sequence_dir(sequence["name"]);
     one.out_dir = run_dir(sequence, run);
@@ -268,31 +234,62 @@ class Benchmark {
     const bool takes_truth = run["scale_source"] == "ground_truth";
     one.config.scale.source = takes_truth ? ScaleSource::kGroundTruth : ScaleSource::kCameraHeight;
     one.num_threads = request_.num_threads;
-    const auto opened = KittiSequence::open(one.sequence_dir, {.camera = config.input.camera});
-    if (!opened) {
-      return opened.error();
-    }
-    if (takes_truth && !opened->ground_truth()) {
+    if (takes_truth && !truths_[text_of(sequence["name"])]) {
       run["state"] = "not possible";
-      return fail("no ground truth");
+      run["problem"] = "no ground truth";
+      return;
     }
-    const Expected<Json> inputs = hash_inputs(one, *opened);
+    const Expected<Json> metrics = result_of(one, title);
+    if (summary_.interrupted) {  // stays pending
+      return;
+    }
+    if (!metrics) {
+      run["state"] = "failed";
+      run["problem"] = metrics.error().message;
+      summary_.failures.push_back(fmt::format("{}: {}", title, metrics.error().message));
+      return;
+    }
+    add_result(*metrics, sequence, run);
+  }
+
+  void add_result(const Json& metrics, Json& sequence, Json& run) {
+    run["state"] = "done";
+    run["tracked_fraction"] = metrics["tracked_fraction"];
+    Json keys;
+    add_metrics(keys, std::nullopt);
+    for (const auto& [key, null] : keys.items()) {
+      run[key] = metrics[key];
+    }
+    if (!metrics["null_offset_m"].is_null()) {
+      sequence["zero_motion"]["average_offset_m"] = metrics["null_offset_m"];
+    }
+    speed_.push_back({{"sequence", sequence["name"]},
+                      {"configuration", run["configuration"]},
+                      {"scale_source", run["scale_source"]},
+                      {"fps", metrics["fps"]}});
+  }
+
+  /// The metrics of an earlier call, or of a run now, which may be stopped.
+  Expected<Json> result_of(RunRequest& one, const std::string& title) {
+    const Expected<Json> inputs =
+        KittiSequence::open(one.sequence_dir, {.camera = one.config.input.camera})
+            .and_then([&](const KittiSequence& opened) { return hash_inputs(one, opened); });
     if (!inputs) {
-      return inputs.error();
+      return inputs;
     }
     if (const std::optional<std::string> reason = reason_to_run(one.out_dir, *inputs)) {
       summary_.interrupted =
           request_.on_run &&
           !request_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, *reason));
       const Status done = summary_.interrupted ? Status() : run_now(one, *inputs, title);
-      if (!done) {
-        return done.error();
+      if (!done || summary_.interrupted) {
+        return done ? Expected<Json>(Json()) : done.error();
       }
     }
-    return read_metrics_json(one.out_dir / kMetricsFile);
+    return read_json_object(one.out_dir / kMetricsFile);
   }
 
-  Status run_now(RunRequest& one, const Json& inputs, const std::string& title) {
+  Status run_now(RunRequest& one, Json inputs, const std::string& title) {
     std::error_code ignored;
     fs::remove(one.out_dir / kInputsFile, ignored);  // an interrupted run must not pass for done
     one.started = std::chrono::steady_clock::now();
@@ -307,7 +304,10 @@ class Benchmark {
     for (const std::string& warning : done->warnings) {
       summary_.warnings.push_back(fmt::format("{}: {}", title, warning));
     }
-    return write_text_file(one.out_dir / kInputsFile, inputs.dump(2) + '\n');
+    for (const char* name : kResultFiles) {
+      inputs[name] = hash_result(one.out_dir / name);
+    }
+    return write_text_file(one.out_dir / kInputsFile, to_text(inputs));
   }
 
   [[nodiscard]] Status write_files() const {
@@ -321,23 +321,20 @@ class Benchmark {
     return benchmark::write_page(request_.out_dir / "report.html", report_, paths_, request_);
   }
 
-  /// Of the runs that are done.
-  [[nodiscard]] Expected<benchmark::SequencePaths> paths_of(const Json& sequence) const {
-    benchmark::SequencePaths paths;
-    paths.sequence = text_of(sequence["name"]);
+  /// Of the runs that are done, after the ground truth.
+  [[nodiscard]] Expected<std::vector<html::PathFromAbove>> paths_of(const Json& sequence) {
+    std::vector<html::PathFromAbove> paths;
     for (const Json& run : sequence["runs"]) {
       if (run["state"] == "done") {
-        auto poses = read_kitti_trajectory(run_dir(sequence, run) / kPosesFile);
+        const auto poses = read_kitti_trajectory(run_dir(sequence, run) / kPosesFile);
         if (!poses) {
           return poses.error();
         }
-        paths.runs.push_back(
-            {text_of(run["configuration"]) + ", " + benchmark::words_for(run["scale_source"]),
-             *std::move(poses)});
+        paths.push_back({benchmark::name_of(run), html::seen_from_above(*poses)});
       }
     }
-    if (const auto opened = KittiSequence::open(sequence_dir(paths.sequence))) {
-      paths.ground_truth = opened->ground_truth();
+    if (const auto& truth = truths_[text_of(sequence["name"])]; truth && !paths.empty()) {
+      paths.insert(paths.begin(), {"ground truth", html::seen_from_above(*truth), true});
     }
     return paths;
   }
@@ -345,7 +342,8 @@ class Benchmark {
   const BenchmarkRequest& request_;
   Json report_ = {{"stemvo_version", version()}, {"interrupted", false}};
   Json speed_ = Json::array();
-  std::vector<benchmark::SequencePaths> paths_;
+  std::map<std::string, std::optional<Trajectory>> truths_;
+  benchmark::SequencePaths paths_;
   std::size_t num_runs_ = 0;
   std::size_t num_begun_ = 0;
   BenchmarkSummary summary_;

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,7 +11,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "config/config.hpp"
-#include "evaluation/trajectory.hpp"
+#include "html/figures.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
@@ -53,8 +53,8 @@ struct BenchmarkSummary {
 
 namespace benchmark {
 
-/// For people: "camera height", "per-step ground-truth scale".
-[[nodiscard]] std::string words_for(const nlohmann::ordered_json& scale_source);
+/// "default, camera height".
+[[nodiscard]] std::string name_of(const nlohmann::ordered_json& run);
 
 /// "all 4541 frames", "clip 0:200 of 4541", "frames 0:60".
 [[nodiscard]] std::string describe_frames(const nlohmann::ordered_json& sequence);
@@ -63,20 +63,12 @@ namespace benchmark {
 /// zero-motion baseline and, where all official frames ran, the published numbers.
 [[nodiscard]] std::string format_markdown(const nlohmann::ordered_json& report);
 
-struct NamedTrajectory {
-  std::string name;
-  Trajectory trajectory;
-};
-/// What the runs of a sequence that are done drove.
-struct SequencePaths {
-  std::string sequence;
-  std::optional<Trajectory> ground_truth;
-  std::vector<NamedTrajectory> runs;
-};
+/// What was driven, by the name of the sequence.
+using SequencePaths = std::map<std::string, std::vector<html::PathFromAbove>>;
 /// report.html: benchmark.json as figures. Error: the file cannot be written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,
                                 const nlohmann::ordered_json& report,
-                                const std::vector<SequencePaths>& paths,
+                                const SequencePaths& paths,
                                 const BenchmarkRequest& request);
 
 }  // namespace benchmark

@@ -25,9 +25,9 @@ judged, scale is not. *Zero motion*: what a trajectory scores that stays at the 
 )";
 
 /// Names come from folders: nothing in them may end a cell or a line.
-std::string safe(const Json& json) {
+std::string safe(const std::string& text) {
   std::string result;
-  for (const char c : json.get<std::string>()) {
+  for (const char c : text) {
     if (c == '|') {
       result += '\\';
     }
@@ -48,6 +48,11 @@ std::string row(const Cells& cells) { return fmt::format("| {} |\n", fmt::join(c
 
 std::string head_row(const Cells& cells) {
   return row(cells) + fmt::format("|{}\n", fmt::join(Cells(cells.size(), "---|"), ""));
+}
+
+/// For people: "camera height", "per-step ground-truth scale".
+std::string words_for(const Json& scale_source) {
+  return scale_source == "camera_height" ? "camera height" : "per-step ground-truth scale";
 }
 
 bool has_metrics(const Json& run) { return !run["segments"].is_null(); }
@@ -81,7 +86,7 @@ std::string overview(const Json& report) {
     for (std::size_t i = 2; i < rows.size(); ++i) {
       const Json& run = sequence["runs"][i - 2];
       if (rows[i].empty()) {
-        rows[i] = {safe(run["configuration"]) + ", " + words_for(run["scale_source"])};
+        rows[i] = {safe(name_of(run))};
       }
       rows[i].push_back(short_cell(run));
     }
@@ -118,8 +123,7 @@ std::string result_row(const Json& result, bool is_published) {
 }
 
 std::string section(const Json& sequence) {
-  const std::string name = safe(sequence["name"]);
-  std::string text = fmt::format("\n## {}\n\n", name);
+  std::string text = fmt::format("\n## {}\n\n", safe(sequence["name"]));
   if (!sequence["problem"].is_null()) {
     return text + fmt::format("Not run: {}\n", safe(sequence["problem"]));
   }
@@ -130,8 +134,8 @@ std::string section(const Json& sequence) {
     text += fmt::format(", {:.0f} m; {} segments of {}", (*any)["path_length_m"].get<double>(),
                         (*any)["segments"].get<int>(), length_range((*any)["segment_lengths_m"]));
   }
-  text += fmt::format(".\n\n![the map of {}](<{}.png>)\n\n", name, name);
-  text += head_row({"", "scale from", "alignment", "t_rel", "r_rel", "offset", "ATE", ""});
+  text +=
+      ".\n\n" + head_row({"", "scale from", "alignment", "t_rel", "r_rel", "offset", "ATE", ""});
   for (const Json& run : runs) {
     text += result_row(run, false);
   }
@@ -150,8 +154,8 @@ std::string section(const Json& sequence) {
 
 }  // namespace
 
-std::string words_for(const Json& scale_source) {
-  return scale_source == "camera_height" ? "camera height" : "per-step ground-truth scale";
+std::string name_of(const Json& run) {
+  return run["configuration"].get<std::string>() + ", " + words_for(run["scale_source"]);
 }
 
 std::string describe_frames(const Json& sequence) {

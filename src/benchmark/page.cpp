@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmark/benchmark.hpp"
-#include "html/figures.hpp"
 
 namespace stemvo::benchmark {
 namespace {
@@ -15,11 +14,6 @@ using nlohmann::json;
 using Json = nlohmann::ordered_json;
 
 std::string text_of(const Json& value) { return value.get<std::string>(); }
-
-/// "default, camera height".
-std::string name_of(const Json& run) {
-  return text_of(run["configuration"]) + ", " + words_for(run["scale_source"]);
-}
 
 /// One measure of every sequence, a bar per run; published numbers beside them.
 void add_bars(const Json& report, const char* key, const std::string& title, html::Page& page) {
@@ -54,45 +48,21 @@ void add_bars(const Json& report, const char* key, const std::string& title, htm
   }
 }
 
-void add_paths(const Json& sequence,
-               const Trajectory* ground_truth,
-               const std::vector<NamedTrajectory>& runs,
-               html::Page& page) {
-  const auto path_of = [](const std::string& name, const Trajectory& trajectory) {
-    html::PathFromAbove path{name, {}};
-    for (const Rigid3& pose : trajectory) {
-      path.xz_m.push_back({pose.translation.x(), pose.translation.z()});
-    }
-    return path;
-  };
-  std::vector<html::PathFromAbove> paths;
-  if (ground_truth != nullptr) {
-    paths.push_back(path_of("ground truth", *ground_truth));
-    paths.back().is_ground_truth = true;
-  }
-  for (const NamedTrajectory& run : runs) {
-    paths.push_back(path_of(run.name, run.trajectory));
-  }
-  html::add_paths_from_above(
-      page, fmt::format("{}, {}", text_of(sequence["name"]), describe_frames(sequence)),
-      "Nothing is aligned afterwards.", paths);
-}
-
 }  // namespace
 
 Status write_page(const std::filesystem::path& file,
                   const nlohmann::ordered_json& report,
-                  const std::vector<SequencePaths>& paths,
+                  const SequencePaths& paths,
                   const BenchmarkRequest& request) {
   html::Page page("Benchmark", fmt::format("stemvo {}{}", text_of(report["stemvo_version"]),
                                            report["interrupted"] == true ? ", interrupted" : ""));
   add_bars(report, "t_rel_percent", "t_rel, %", page);
   add_bars(report, "r_rel_deg_per_100m", "r_rel, degrees per 100 m", page);
-  for (const SequencePaths& one : paths) {
-    for (const Json& sequence : report["sequences"]) {
-      if (text_of(sequence["name"]) == one.sequence) {
-        add_paths(sequence, one.ground_truth ? &*one.ground_truth : nullptr, one.runs, page);
-      }
+  for (const Json& sequence : report["sequences"]) {
+    if (const auto found = paths.find(text_of(sequence["name"])); found != paths.end()) {
+      html::add_paths_from_above(page,
+                                 fmt::format("{}, {}", found->first, describe_frames(sequence)),
+                                 "Nothing is aligned afterwards.", found->second);
     }
   }
   page.add_folded_text("All numbers", format_markdown(report));

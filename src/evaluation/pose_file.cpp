@@ -33,14 +33,59 @@ Format format_of(std::string_view text) {
   return has_comment ? Format::kTum : Format::kKitti;
 }
 
-/// EuRoC's columns behind the pose (velocity, biases) are not read.
-constexpr std::size_t kNumEurocColumns = 8;
+/// A row: the time in whatever unit, none of KITTI's.
+struct TimedPose {
+  double time = 0.0;
+  Rigid3 pose;
+};
 
-/// The columns of the pose as a row of TUM's, whose quaternion ends with w.
+/// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
+constexpr double kRotationTolerance = 1e-3;
+
+/// Metres: further than any drive, and near enough that squares and sums stay finite.
+constexpr double kFurthest_m = 1e9;
+
+Expected<TimedPose> with_near_translation(double time, const Rigid3& pose) {
+  if (!(pose.translation.cwiseAbs().maxCoeff() <= kFurthest_m)) {
+    return fail(fmt::format("expected a position within {} m, found ({}, {}, {})", kFurthest_m,
+                            pose.translation.x(), pose.translation.y(), pose.translation.z()));
+  }
+  return TimedPose{time, pose};
+}
+
+Expected<TimedPose> pose_from_matrix_row(const std::vector<double>& numbers) {
+  const Matrix34d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= kRotationTolerance)) {
+    return fail(fmt::format(
+        "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
+        deviation));
+  }
+  if (!(rotation.determinant() > 0.0)) {
+    return fail("expected a rotation in the first three columns, found a reflection");
+  }
+  return with_near_translation(0.0, Rigid3::from_matrix(matrix));
+}
+
+Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
+  const Eigen::Quaterniond rotation(n[7], n[4], n[5], n[6]);
+  if (!(std::abs(rotation.norm() - 1.0) <= kRotationTolerance)) {
+    return fail(
+        fmt::format("expected a quaternion of length 1 in the last four numbers, found {:.6g}",
+                    rotation.norm()));
+  }
+  return with_near_translation(n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3])));
+}
+
+/// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
+/// (velocity, biases) are not read.
 Expected<std::string> to_tum_row(std::string line) {
-  std::replace(line.begin(), line.end(), ',', ' ');
+  std::ranges::replace(line, ',', ' ');
   const std::vector<std::string_view> words = split_words(line);
-  if (words.size() < kNumEurocColumns) {
+  if (words.size() < 8) {
     return fail(
         fmt::format("expected time, x, y, z, qw, qx, qy, qz, .., found {} numbers", words.size()));
   }
@@ -48,24 +93,41 @@ Expected<std::string> to_tum_row(std::string line) {
                      words[6], words[7], words[4]);
 }
 
-Expected<PoseFile> read_euroc(const fs::path& file, const std::string& text) {
-  constexpr double kNanosecond_s = 1e-9;
+Expected<TimedPose> parse_row(Format format, const std::string& line) {
+  if (format == Format::kKitti) {
+    return parse_numbers(line, 12).and_then(pose_from_matrix_row);
+  }
+  return (format == Format::kEuroc ? to_tum_row(line) : Expected<std::string>(line))
+      .and_then([](const std::string& row) { return parse_numbers(row, 8); })
+      .and_then(pose_from_quaternion_row);
+}
+
+Expected<PoseFile> read_rows(const fs::path& file, std::string_view text, Format format) {
+  const double unit_s = format == Format::kEuroc ? 1e-9 : 1.0;
+  std::vector<std::string_view> lines = split_lines(text);
+  // Empty lines at the end of a file are no poses; within KITTI's they would shift the frames.
+  while (!lines.empty() && split_words(lines.back()).empty()) {
+    lines.pop_back();
+  }
   PoseFile result;
-  result.is_of_body = true;
-  const std::vector<std::string_view> lines = split_lines(text);
+  result.is_of_body = format == Format::kEuroc;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::vector<std::string_view> words = split_words(lines[i]);
-    if (words.empty() || words.front().starts_with('#')) {
+    const std::string line(format == Format::kKitti ? lines[i]
+                                                    : lines[i].substr(0, lines[i].find('#')));
+    if (format != Format::kKitti && split_words(line).empty()) {
       continue;
     }
-    const auto row = to_tum_row(std::string(lines[i])).and_then([](const std::string& line) {
-      return parse_tum_row(line);
-    });
+    const Expected<TimedPose> row = parse_row(format, line);
     if (!row) {
       return fail_at(file, i, row.error());
     }
-    result.timestamps_s.push_back(kNanosecond_s * row->time);
-    result.poses.push_back(row->world_from_camera);
+    result.poses.push_back(row->pose);
+    if (format != Format::kKitti) {
+      result.timestamps_s.push_back(unit_s * row->time);
+    }
+  }
+  if (result.poses.empty()) {
+    return fail(fmt::format("{}: expected at least one pose, found none", file.string()));
   }
   return result;
 }
@@ -97,24 +159,15 @@ std::size_t nearest(std::span<const double> times_s, double time_s) {
 
 }  // namespace
 
+Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
+  return read_text_file(file)
+      .and_then([&](const std::string& text) { return read_rows(file, text, Format::kKitti); })
+      .map([](const PoseFile& read) { return read.poses; });
+}
+
 Expected<PoseFile> read_pose_file(const fs::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
-  }
-  Expected<PoseFile> result = [&]() -> Expected<PoseFile> {
-    switch (format_of(*text)) {
-      case Format::kEuroc:
-        return read_euroc(file, *text);
-      case Format::kTum:
-        return read_tum_trajectory(file).map([](const TimedTrajectory& timed) {
-          return PoseFile{timed.timestamps_s, timed.world_from_camera, false};
-        });
-      default:
-        return read_kitti_trajectory(file).map(
-            [](const Trajectory& poses) { return PoseFile{{}, poses, false}; });
-    }
-  }();
+  Expected<PoseFile> result = read_text_file(file).and_then(
+      [&](const std::string& text) { return read_rows(file, text, format_of(text)); });
   if (result) {
     sort_by_time(*result);
   }

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "stemvo/error.hpp"
@@ -24,18 +23,6 @@ using Trajectory = std::vector<Rigid3>;
 [[nodiscard]] Status write_tum_trajectory(const std::filesystem::path& file,
                                           std::span<const double> timestamps_s,
                                           std::span<const Rigid3> world_from_camera);
-/// Also `#` comments and blank lines; timestamps are returned beside the poses.
-struct TimedTrajectory {
-  std::vector<double> timestamps_s;
-  Trajectory world_from_camera;
-};
-[[nodiscard]] Expected<TimedTrajectory> read_tum_trajectory(const std::filesystem::path& file);
-/// One row of it, as it is written: the time in whatever unit. Error without file and line.
-struct TimedPose {
-  double time = 0.0;
-  Rigid3 world_from_camera;
-};
-[[nodiscard]] Expected<TimedPose> parse_tum_row(std::string_view row);
 
 /// Moves all poses so that the first one is the identity.
 [[nodiscard]] Trajectory relative_to_first(std::span<const Rigid3> world_from_camera);

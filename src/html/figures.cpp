@@ -6,16 +6,11 @@
 #include <nlohmann/json.hpp>
 
 namespace stemvo::html {
-namespace {
-
 using nlohmann::json;
 
-/// Millimetres: nobody needs a file of digits.
-json rounded(double value_m) {
-  return std::isfinite(value_m) ? json(std::round(value_m * 1e3) / 1e3) : json();
+json rounded(double value) {
+  return std::isfinite(value) ? json(std::round(value * 1e5) / 1e5) : json();
 }
-
-}  // namespace
 
 json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
 
@@ -27,31 +22,48 @@ json logarithmic(const std::string& title) {
   return axis;
 }
 
+std::vector<std::array<double, 2>> seen_from_above(std::span<const Rigid3> poses) {
+  std::vector<std::array<double, 2>> xz;
+  for (const Rigid3& pose : poses) {
+    xz.push_back({pose.translation.x(), pose.translation.z()});
+  }
+  return xz;
+}
+
 void add_paths_from_above(Page& page,
                           const std::string& heading,
                           const std::string& note,
-                          const std::vector<PathFromAbove>& paths) {
+                          const std::vector<PathFromAbove>& paths,
+                          const std::string& unit) {
   json traces = json::array();
+  int frame_trace = -1;
   for (const PathFromAbove& path : paths) {
     json x = json::array();
     json y = json::array();
-    for (const auto& [x_m, z_m] : path.xz_m) {
-      x.push_back(rounded(x_m));
-      y.push_back(rounded(z_m));
+    for (const auto& [right, forward] : path.xz) {
+      x.push_back(rounded(right));
+      y.push_back(rounded(forward));
     }
-    traces.push_back({{"name", path.name}, {"mode", "lines"}, {"x", x}, {"y", y}});
-    traces.back()["line"] =
+    json& trace = traces.emplace_back(json{{"name", path.name}, {"mode", "lines"}});
+    trace["x"] = x;
+    trace["y"] = y;
+    trace["line"] =
         path.is_ground_truth ? json{{"width", 5}, {"color", "#999999"}} : json{{"width", 2}};
     if (path.is_dotted) {
-      traces.back()["line"]["dash"] = "dot";
+      trace["line"]["dash"] = "dot";
+    }
+    if (!path.frames.empty()) {
+      frame_trace = static_cast<int>(traces.size()) - 1;
+      trace.update({{"mode", "lines+markers"}, {"marker", {{"size", 4}}}, {"hoverinfo", "text"}});
+      trace["text"] = path.frames;
     }
   }
   json layout = {{"large", true},
                  {"dragmode", "pan"},
-                 {"xaxis", titled("x (right), m")},
-                 {"yaxis", titled("z (forward), m")}};
+                 {"xaxis", titled("x (right), " + unit)},
+                 {"yaxis", titled("z (forward), " + unit)}};
   layout["yaxis"]["scaleanchor"] = "x";
-  page.add_figure({heading, note, traces, layout});
+  page.add_figure({heading, note, traces, layout, frame_trace});
 }
 
 void add_how_to_repeat(Page& page,

@@ -2,32 +2,40 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "html/page.hpp"
+#include "stemvo/rigid3.hpp"
 
 /// What several pages draw.
 namespace stemvo::html {
 
+/// To the fifth decimal, nobody needs a file of digits; null where it is not finite.
+[[nodiscard]] nlohmann::json rounded(double value);
 /// An axis with this title.
 [[nodiscard]] nlohmann::json titled(const std::string& title);
 [[nodiscard]] nlohmann::json logarithmic(const std::string& title);
 
-/// A way seen from above, metres.
+/// A way seen from above.
 struct PathFromAbove {
   std::string name;
-  std::vector<std::array<double, 2>> xz_m;
+  std::vector<std::array<double, 2>> xz;
   bool is_ground_truth = false;
   bool is_dotted = false;  ///< told from another of its colour
+  /// A line for each point, which is frame k of the page's slider; empty: hover says where it is.
+  std::vector<std::string> frames = {};
 };
-/// Their top views in one figure; hover says which point it is.
+[[nodiscard]] std::vector<std::array<double, 2>> seen_from_above(std::span<const Rigid3> poses);
+/// Their top views in one figure.
 void add_paths_from_above(Page& page,
                           const std::string& heading,
                           const std::string& note,
-                          const std::vector<PathFromAbove>& paths);
+                          const std::vector<PathFromAbove>& paths,
+                          const std::string& unit = "m");
 
 /// At the end of a page: the command (where there is one), and the configuration folded away.
 void add_how_to_repeat(Page& page,

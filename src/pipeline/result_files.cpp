@@ -15,6 +15,7 @@
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
 #include "report/evaluate_report.hpp"
+#include "report/frame_image.hpp"
 #include "report/map_ply.hpp"
 #include "report/run_page.hpp"
 #include "report/trajectory_plot.hpp"
@@ -123,7 +124,7 @@ class ResultWriter {
     if (request_.write_map) {
       keep_first(written, write_map_ply(folder / "map.ply", map_points(), *refined_));
     }
-    keep_first(written, write_trajectory_png(folder / "trajectory.png", make_plot(report)));
+    keep_first(written, write_image(folder / "trajectory.png", draw_trajectory(make_plot(report))));
     keep_first(written, matched_);
     if (request_.note && truth_ && sequence_.stream()) {
       request_.note("ground truth" +

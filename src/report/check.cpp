@@ -7,9 +7,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "config/config_yaml.hpp"
+#include "report/metrics_keys.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -17,19 +17,14 @@ namespace stemvo {
 
 namespace {
 
-struct Bound {
-  std::string key;
-  bool is_max = true;
-  double limit = 0.0;
-  int line = 0;
-};
+using Json = nlohmann::ordered_json;
 
 std::string first_line(std::string_view text) {
   return std::string(text.substr(0, text.find('\n')));
 }
 
 /// `{max: 1.0}`, `{min: 0.99}` or both under each metric's name.
-Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) {
+Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
   const Expected<YAML::Node> root = read_text_file(file).and_then(
       [&](const std::string& text) { return config::parse_document(text, file.string()); });
   if (!root) {
@@ -42,7 +37,7 @@ Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) 
   const auto fail_at = [&](const YAML::Node& node, const std::string& problem) {
     return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, problem));
   };
-  std::vector<Bound> bounds;
+  std::vector<ThresholdResult> bounds;
   std::set<std::pair<std::string, std::string>> seen;
   for (const auto& entry : *root) {
     const YAML::Node& key_node = entry.first;
@@ -72,34 +67,16 @@ Expected<std::vector<Bound>> read_thresholds(const std::filesystem::path& file) 
       if (!limit) {
         return fail_at(name_node, fmt::format("{}.{}: {}", key, name, limit.error().message));
       }
-      bounds.push_back({key, name == "max", limit->front(), key_node.Mark().line + 1});
+      bounds.push_back(
+          {key, name == "max", limit->front(), key_node.Mark().line + 1, std::nullopt, false});
     }
   }
   return bounds;
 }
 
-Expected<nlohmann::json> read_metrics(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
-  }
-  try {
-    nlohmann::json json = nlohmann::json::parse(*text);
-    if (!json.is_object()) {
-      return fail(
-          fmt::format("{}: expected a JSON object, found {}", file.string(), json.type_name()));
-    }
-    return json;
-  } catch (const nlohmann::json::exception& error) {
-    const std::string_view what = error.what();
-    return fail(fmt::format("{}: not JSON: {}", file.string(),
-                            first_line(what.substr(std::min(what.find("] ") + 2, what.size())))));
-  }
-}
-
 /// Goes down along the dots; null when there is no such key.
-const nlohmann::json* find_metric(const nlohmann::json& root, std::string_view key) {
-  const nlohmann::json* node = &root;
+const Json* find_metric(const Json& root, std::string_view key) {
+  const Json* node = &root;
   while (!key.empty()) {
     const std::size_t dot = key.find('.');
     const std::string part(key.substr(0, dot));
@@ -117,51 +94,41 @@ const nlohmann::json* find_metric(const nlohmann::json& root, std::string_view k
 }
 
 /// Six digits, or all of them where six would show a passed bound as kept.
-std::string shown(double value, double limit) {
-  const std::string rounded = fmt::format("{:.6g}", value);
-  return rounded == fmt::format("{:.6g}", limit) ? fmt::format("{}", value) : rounded;
-}
-
-ThresholdResult hold_against(const Bound& bound, const nlohmann::json& metric) {
-  ThresholdResult result{
-      bound.key,    fmt::format("{} {}", bound.is_max ? "<=" : ">=", bound.limit),
-      "null",       false,
-      bound.is_max, bound.limit,
-      std::nullopt};
-  if (metric.is_number()) {
-    const double value = metric.get<double>();
-    result.value = shown(value, bound.limit);
-    result.number = value;
-    result.passed = bound.is_max ? value <= bound.limit : value >= bound.limit;  // NaN fails both
+std::string shown(const ThresholdResult& result) {
+  if (!result.number) {
+    return "null";
   }
-  return result;
+  const std::string rounded = fmt::format("{:.6g}", *result.number);
+  return rounded == fmt::format("{:.6g}", result.limit) ? fmt::format("{}", *result.number)
+                                                        : rounded;
 }
 
 }  // namespace
 
 Expected<std::vector<ThresholdResult>> check_metrics(const std::filesystem::path& metrics_file,
                                                      const std::filesystem::path& thresholds_file) {
-  const Expected<std::vector<Bound>> bounds = read_thresholds(thresholds_file);
-  if (!bounds) {
-    return bounds.error();
+  auto results = read_thresholds(thresholds_file);
+  if (!results) {
+    return results;
   }
-  const Expected<nlohmann::json> metrics = read_metrics(metrics_file);
+  const Expected<Json> metrics = read_json_object(metrics_file);
   if (!metrics) {
     return metrics.error();
   }
-  std::vector<ThresholdResult> results;
-  for (const Bound& bound : *bounds) {
-    const nlohmann::json* metric = find_metric(*metrics, bound.key);
+  for (ThresholdResult& result : *results) {
+    const Json* metric = find_metric(*metrics, result.key);
     if (metric == nullptr) {
       return fail(fmt::format("{}:{}: expected a metric of {}, found '{}'",
-                              thresholds_file.string(), bound.line, metrics_file.string(),
-                              bound.key));
+                              thresholds_file.string(), result.line, metrics_file.string(),
+                              result.key));
     }
-    if (!metric->is_number() && !metric->is_null()) {
+    if (metric->is_number()) {
+      const double value = result.number.emplace(metric->get<double>());
+      result.passed = result.is_max ? value <= result.limit : value >= result.limit;  // not NaN
+    } else if (!metric->is_null()) {
       return fail(fmt::format("{}: {}: expected a number, found {}", metrics_file.string(),
-                              bound.key, metric->type_name()));
+                              result.key, metric->type_name()));
     }
-    results.push_back(hold_against(bound, *metric));
   }
   return results;
 }
@@ -176,7 +143,9 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   table.add({"metric", "value", "bound", "result"});
   table.rule();
   for (const ThresholdResult& result : results) {
-    table.add({result.key, result.value, result.bound, result.passed ? "ok" : "FAILED"});
+    table.add({result.key, shown(result),
+               fmt::format("{} {}", result.is_max ? "<=" : ">=", result.limit),
+               result.passed ? "ok" : "FAILED"});
   }
   const auto failed = std::count_if(results.begin(), results.end(),
                                     [](const ThresholdResult& r) { return !r.passed; });

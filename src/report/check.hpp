@@ -12,13 +12,12 @@ namespace stemvo {
 
 /// One bound of a thresholds file, held against a metrics.json.
 struct ThresholdResult {
-  std::string key;    ///< dotted, e.g. "ate_rmse_m.none"
-  std::string bound;  ///< e.g. "<= 1"
-  std::string value;  ///< as found, or "null"
-  bool passed = false;
+  std::string key;     ///< dotted, e.g. "ate_rmse_m.none"
   bool is_max = true;  ///< of `limit`
   double limit = 0.0;
-  std::optional<double> number;  ///< `value`; nullopt: null
+  int line = 0;                  ///< of the thresholds file
+  std::optional<double> number;  ///< as found; nullopt: null
+  bool passed = false;
 };
 
 /// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, `tracked_fraction: {min: 0.99}`, nested keys

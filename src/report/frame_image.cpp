@@ -12,16 +12,14 @@
 #include "internal_check.hpp"
 #include "io/image_file.hpp"
 #include "io/png.hpp"
-#include "report/plot_layout.hpp"
+#include "report/caption.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
 
 namespace {
 
-constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-
-constexpr int kBand_px = 40;  // above a frame's images: caption and legend
+constexpr int kBand_px = 40;  // above a frame's images: the caption
 constexpr int kGap_px = 4;
 constexpr int kDefaultWidth_px = 1241;  // where there is neither frame nor channel
 constexpr int kSubpixelBits = 4;
@@ -44,35 +42,6 @@ cv::Mat to_rgb(const cv::Mat& image) {
     cv::cvtColor(image, rgb, cv::COLOR_GRAY2RGB);
   }
   return rgb;
-}
-
-/// OpenCV's fonts know ASCII only: any other character becomes one '?'.
-std::string to_ascii(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if ((byte & 0xC0) != 0x80) {  // not the rest of a character
-      result += byte >= 0x20 && byte < 0x7F ? c : '?';
-    }
-  }
-  return result;
-}
-
-/// One line, centred in the height of `box`; shrinks until it fits into its width.
-void put_caption(cv::Mat& rgb,
-                 const cv::Rect& box,
-                 const std::string& text,
-                 const cv::Scalar& color) {
-  const std::string ascii = to_ascii(text);
-  if (ascii.empty() || box.width <= 0) {
-    return;
-  }
-  double scale = cv::getFontScaleFromHeight(kFont, std::max(6, box.height * 2 / 5));
-  const cv::Size natural = cv::getTextSize(ascii, kFont, scale, 1, nullptr);
-  scale *= std::min(1.0, static_cast<double>(box.width) / natural.width);
-  const cv::Size size = cv::getTextSize(ascii, kFont, scale, 1, nullptr);
-  cv::putText(rgb, ascii, {box.x, box.y + (box.height + size.height) / 2}, kFont, scale, color, 1,
-              cv::LINE_AA);
 }
 
 /// Colour of a flow of `share` (0..1) of the longest: blue over green to yellow, growing brighter.
@@ -112,7 +81,7 @@ cv::Mat stretch_for_the_eye(const cv::Mat& values) {
   return image;
 }
 
-/// Flow that gets the brightest colour: 95 % of the inliers are below, rounded up to 1, 2, 5, 10...
+/// Flow that gets the brightest colour: 95 % of the inliers are below, whole pixels.
 double longest_flow_px(const Matches& matches, const std::vector<char>& inlier_mask) {
   std::vector<double> lengths;
   for (std::size_t i = 0; i < inlier_mask.size(); ++i) {
@@ -127,7 +96,7 @@ double longest_flow_px(const Matches& matches, const std::vector<char>& inlier_m
   const auto at =
       lengths.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(lengths.size() - 1));
   std::nth_element(lengths.begin(), at, lengths.end());
-  return round_tick(std::max(1.0, *at));
+  return std::ceil(std::max(1.0, *at));
 }
 
 cv::Point to_subpixels(const Eigen::Vector2d& uv) {
@@ -167,28 +136,15 @@ void draw_matches(cv::Mat& rgb,
   }
 }
 
-/// Caption at the left, colours of the flow at the right.
+/// The caption, and what the colours of the flow mean.
 void draw_band(cv::Mat& rgb, const std::string& caption, double longest_px, bool has_matches) {
   cv::Mat band = rgb.rowRange(0, kBand_px);
   band.setTo(kBandColor);
-  const int legend_px = has_matches ? std::min(430, rgb.cols / 2) : 0;
-  put_caption(rgb, {12, 0, rgb.cols - legend_px - 24, kBand_px}, caption, kBandText);
-  if (!has_matches) {
-    return;
-  }
-  const int bar_px = legend_px / 4;
-  int x = rgb.cols - legend_px;
-  put_caption(rgb, {x, 0, legend_px / 6, kBand_px}, "flow 0", kBandText);
-  x += legend_px / 6 + 8;
-  for (int i = 0; i < bar_px; ++i) {
-    cv::line(rgb, {x + i, 12}, {x + i, kBand_px - 13}, flow_color(static_cast<double>(i) / bar_px),
-             1);
-  }
-  x += bar_px + 8;
-  put_caption(rgb, {x, 0, legend_px / 5, kBand_px}, fmt::format("{:g} px", longest_px), kBandText);
-  x += legend_px / 5 + 8;
-  cv::line(rgb, {x, kBand_px / 2}, {x + 24, kBand_px / 2}, kOutlier, 1, cv::LINE_AA);
-  put_caption(rgb, {x + 32, 0, rgb.cols - x - 36, kBand_px}, "outlier", kBandText);
+  const std::string legend =
+      has_matches ? fmt::format("flow 0 (blue) to {:g} px (yellow), outliers red", longest_px) : "";
+  put_caption(band, {12, 0, rgb.cols * 3 / 5, kBand_px}, caption, kBandText);
+  put_caption(band, {rgb.cols * 3 / 5 + 24, 0, rgb.cols * 2 / 5 - 36, kBand_px}, legend, kBandText,
+              1.0);
 }
 
 int height_at_width(const cv::Mat& image, int width_px) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "report/metrics_json.hpp"
 
-#include <limits>
-#include <type_traits>
+#include <algorithm>
 
 #include <fmt/format.h>
 
@@ -15,75 +14,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Writer {
-  Json& json;
-
-  template <typename Value>
-  void operator()(const char* key, const Value& value) const {
-    json[key] = value;
-  }
-};
-
-/// Throws Json::exception where a key is missing or of another type.
-struct Reader {
-  const Json& json;
-
-  template <typename Value>
-  void operator()(const char* key, Value& value) const {
-    const Json& found = json.at(key);
-    if constexpr (std::is_same_v<Value, double>) {
-      value = found.is_null() ? std::numeric_limits<double>::quiet_NaN() : found.get<double>();
-    } else {
-      read_value(found, value);
-    }
-  }
-};
-
-// Each key once, in the file's order: what is visited is const where it is written.
-
-template <typename Report, typename Visitor>
-void visit_run(Report& report, const Visitor& visit) {
-  visit("stemvo_version", report.stemvo_version);
-  visit("sequence", report.sequence);
-  visit("first_frame", report.first_frame);
-  visit("frames", report.num_frames);
-  visit("model", report.model);
-  visit("filter", report.filter);
-  visit("fps", report.fps);
-  visit("scale_source", report.scale_source);
-  visit("tracked_fraction", report.tracked_fraction);
-  visit("camera", report.camera);
-  visit("road_measured_fraction", report.road_measured_fraction);
-}
-
-template <typename M, typename Visitor>
-void visit_metrics(M& metrics, const Visitor& visit) {
-  visit("path_length_m", metrics.path_length_m);
-  visit("average_offset_m", metrics.average_offset_m);
-  visit("null_offset_m", metrics.null_offset_m);
-  visit("t_rel_percent", metrics.t_rel_percent);
-  visit("r_rel_deg_per_100m", metrics.r_rel_deg_per_100m);
-  visit("segment_lengths_m", metrics.segment_lengths_m);
-  visit("segments", metrics.num_segments);
-  visit("ate_rmse_m", metrics.ate_rmse);
-  visit("rpe_rotation_deg", metrics.rpe_rotation_deg);
-}
-
 /// What is kept of a refined trajectory.
-template <typename M, typename Visitor>
-void visit_refined(M& metrics, const Visitor& visit) {
-  visit("average_offset_m", metrics.average_offset_m);
-  visit("t_rel_percent", metrics.t_rel_percent);
-  visit("r_rel_deg_per_100m", metrics.r_rel_deg_per_100m);
-  visit("rpe_rotation_deg", metrics.rpe_rotation_deg);
-}
-
-template <typename Ate, typename Visitor>
-void visit_ate(Ate& ate, const Visitor& visit) {
-  visit("none", ate.none_m);
-  visit("scale", ate.scale_m);
-  visit("se3", ate.se3_m);
-  visit("sim3", ate.sim3_m);
+Json refined_json(const Metrics& metrics) {
+  return {{"average_offset_m", metrics.average_offset_m},
+          {"t_rel_percent", metrics.t_rel_percent},
+          {"r_rel_deg_per_100m", metrics.r_rel_deg_per_100m},
+          {"rpe_rotation_deg", metrics.rpe_rotation_deg}};
 }
 
 }  // namespace
@@ -98,19 +34,9 @@ void to_json(Json& json, const CameraReport& report) {
   json["cx_sigma_px"] = report.sigma_px ? Json(report.sigma_px->x()) : Json();
   json["cy_sigma_px"] = report.sigma_px ? Json(report.sigma_px->y()) : Json();
 }
-void from_json(const Json& json, CameraReport& report) {
-  const Reader read{json};
-  read("fx_px", report.camera.fx_px);
-  read("fy_px", report.camera.fy_px);
-  read("cx_px", report.camera.cx_px);
-  read("cy_px", report.camera.cy_px);
-  report.sigma_px.reset();
-  if (!json.at("cx_sigma_px").is_null()) {
-    report.sigma_px = {json.at("cx_sigma_px").get<double>(), json.at("cy_sigma_px").get<double>()};
-  }
+void to_json(Json& json, const AbsoluteTrajectoryError& ate) {
+  json = {{"none", ate.none_m}, {"scale", ate.scale_m}, {"se3", ate.se3_m}, {"sim3", ate.sim3_m}};
 }
-void to_json(Json& json, const AbsoluteTrajectoryError& ate) { visit_ate(ate, Writer{json}); }
-void from_json(const Json& json, AbsoluteTrajectoryError& ate) { visit_ate(ate, Reader{json}); }
 void to_json(Json& json, const TimeSummary& time) {
   json = {{"median_ms", time.median_ms}, {"p95_ms", time.p95_ms}};
 }
@@ -139,25 +65,59 @@ void to_json(Json& json, const TimingReport& report) {
 }
 
 void add_metrics(Json& json, const std::optional<Metrics>& metrics) {
-  const Metrics none;
-  visit_metrics(metrics ? *metrics : none, [&](const char* key, const auto& value) {
-    json[key] = metrics ? Json(value) : Json();
-  });
+  const Metrics m = metrics.value_or(Metrics());
+  const Json numbers = {{"path_length_m", m.path_length_m},
+                        {"average_offset_m", m.average_offset_m},
+                        {"null_offset_m", m.null_offset_m},
+                        {"t_rel_percent", m.t_rel_percent},
+                        {"r_rel_deg_per_100m", m.r_rel_deg_per_100m},
+                        {"segment_lengths_m", m.segment_lengths_m},
+                        {"segments", m.num_segments},
+                        {"ate_rmse_m", m.ate_rmse},
+                        {"rpe_rotation_deg", m.rpe_rotation_deg}};
+  for (const auto& [key, value] : numbers.items()) {
+    json[key] = metrics ? value : Json();
+  }
 }
 
 std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
-Json metrics_document(const MetricsReport& report) {
-  Json json;
-  visit_run(report, Writer{json});
-  json["alignment"] = report.metrics ? Json(to_string(report.metrics->alignment)) : Json();
-  add_metrics(json, report.metrics);
-  json["refined"] = nullptr;
-  if (report.refined) {
-    visit_refined(*report.refined, Writer{json["refined"]});
+Expected<Json> read_json_object(const std::filesystem::path& file) {
+  const Expected<std::string> text = read_text_file(file);
+  if (!text) {
+    return text.error();
   }
+  try {
+    Json json = Json::parse(*text);
+    if (!json.is_object()) {
+      return fail(
+          fmt::format("{}: expected a JSON object, found {}", file.string(), json.type_name()));
+    }
+    return json;
+  } catch (const Json::exception& error) {
+    const std::string what = error.what();  // "[json.exception.parse_error.101] parse error at .."
+    return fail(fmt::format("{}: not JSON: {}", file.string(),
+                            what.substr(std::min(what.find("] ") + 2, what.size()))));
+  }
+}
+
+Json metrics_document(const MetricsReport& report) {
+  Json json = {{"stemvo_version", report.stemvo_version},
+               {"sequence", report.sequence},
+               {"first_frame", report.first_frame},
+               {"frames", report.num_frames},
+               {"model", report.model},
+               {"filter", report.filter},
+               {"fps", report.fps},
+               {"scale_source", report.scale_source},
+               {"tracked_fraction", report.tracked_fraction},
+               {"camera", report.camera},
+               {"road_measured_fraction", report.road_measured_fraction},
+               {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
+  add_metrics(json, report.metrics);
+  json["refined"] = report.refined ? refined_json(*report.refined) : Json();
   if (report.timing) {
     json["timing"] = *report.timing;
   }
@@ -166,30 +126,6 @@ Json metrics_document(const MetricsReport& report) {
 
 Status write_metrics_json(const std::filesystem::path& file, const MetricsReport& report) {
   return write_text_file(file, to_text(metrics_document(report)));
-}
-
-Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  if (!text) {
-    return text.error();
-  }
-  try {
-    const Json json = Json::parse(*text);
-    MetricsReport report;
-    visit_run(report, Reader{json});
-    if (!json.at("refined").is_null()) {
-      visit_refined(report.refined.emplace(), Reader{json["refined"]});
-    }
-    if (!json.at("segment_lengths_m").is_null()) {  // all of them are null without ground truth
-      visit_metrics(report.metrics.emplace(), Reader{json});
-      report.metrics->alignment =
-          parse_alignment(json.at("alignment").get<std::string>()).value_or(Alignment::kNone);
-    }
-    return report;
-  } catch (const Json::exception& error) {
-    return fail(
-        fmt::format("{}: expected the metrics of a run, found: {}", file.string(), error.what()));
-  }
 }
 
 }  // namespace stemvo

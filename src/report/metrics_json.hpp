@@ -54,11 +54,6 @@ struct MetricsReport {
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
 
-/// What write_metrics_json wrote, bit for bit (of `refined` the four errors, of `timing` nothing);
-/// a null number that has no nullopt is NaN. Errors: the file cannot be read, is not JSON, lacks a
-/// key or has another type there.
-[[nodiscard]] Expected<MetricsReport> read_metrics_json(const std::filesystem::path& file);
-
 /// The same numbers as an aligned table; each row names its alignment, the zero-motion baseline
 /// stands beside the offset. Ends with a newline.
 [[nodiscard]] std::string format_metrics_table(const MetricsReport& report);

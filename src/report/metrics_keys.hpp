@@ -1,37 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <concepts>
-#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "evaluation/metrics.hpp"
-
-namespace stemvo {
-
-/// As get_to, but a number that is no whole number, or out of the type's range, is an exception of
-/// the library too, where get_to casts it as it is.
-template <typename Json, typename T>
-void read_value(const Json& json, T& value) {
-  if constexpr (std::integral<T> && !std::same_as<T, bool>) {
-    const bool fits =
-        json.is_number_unsigned()
-            ? std::in_range<T>(json.template get<std::uint64_t>())
-            : json.is_number_integer() && std::in_range<T>(json.template get<std::int64_t>());
-    if (!fits) {
-      const std::string found = json.is_number() ? json.dump() : json.type_name();
-      throw nlohmann::json::other_error::create(
-          501, "expected a whole number in range, found " + found, &json);
-    }
-  }
-  json.get_to(value);
-}
-
-}  // namespace stemvo
+#include "stemvo/error.hpp"
 
 /// What may be missing is null in JSON.
 template <typename T>
@@ -44,7 +21,7 @@ struct nlohmann::adl_serializer<std::optional<T>> {
   static void from_json(const Json& json, std::optional<T>& value) {
     value.reset();
     if (!json.is_null()) {
-      stemvo::read_value(json, value.emplace());
+      json.get_to(value.emplace());
     }
   }
 };
@@ -57,6 +34,9 @@ struct MetricsReport;
 
 /// Adds the keys of metrics.json that need ground truth; all null without metrics.
 void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& metrics);
+
+/// A file that somebody else may have written. Errors: it cannot be read, or holds no JSON object.
+[[nodiscard]] Expected<nlohmann::ordered_json> read_json_object(const std::filesystem::path& file);
 
 /// Indented, ends with a newline. A number that is not finite becomes null, bytes that are not
 /// UTF-8 the replacement character.

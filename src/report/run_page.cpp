@@ -15,16 +15,11 @@
 namespace stemvo {
 namespace {
 
+using html::rounded;
 using nlohmann::json;
 
 /// The devkit's.
 constexpr std::size_t kFirstFrameStep = 10;
-
-/// JSON has no NaN, and nobody needs a file of digits.
-json rounded(double value) {
-  constexpr double kSteps = 1e5;
-  return std::isfinite(value) ? json(std::round(value * kSteps) / kSteps) : json();
-}
 
 /// One value per element.
 template <typename Range, typename Value>
@@ -74,29 +69,15 @@ class RunFigures {
   }
 
   void add_top_view() const {
-    json traces = json::array();
+    std::vector<html::PathFromAbove> paths;
     if (run_.ground_truth) {
-      traces.push_back({{"name", "ground truth"},
-                        {"mode", "lines"},
-                        {"line", {{"width", 5}, {"color", "#999999"}}},
-                        {"hoverinfo", "skip"},
-                        {"x", coordinates(*run_.ground_truth, 0)},
-                        {"y", coordinates(*run_.ground_truth, 2)}});
+      paths.push_back({"ground truth", html::seen_from_above(*run_.ground_truth), true});
     }
-    traces.push_back({{"name", "estimate"},
-                      {"mode", "lines+markers"},
-                      {"marker", {{"size", 4}}},
-                      {"text", descriptions()},
-                      {"hoverinfo", "text"},
-                      {"x", coordinates(run_.estimate, 0)},
-                      {"y", coordinates(run_.estimate, 2)}});
-    json layout = {{"large", true},
-                   {"dragmode", "pan"},
-                   {"xaxis", html::titled("x (right), " + run_.unit)},
-                   {"yaxis", html::titled("z (forward), " + run_.unit)}};
-    layout["yaxis"]["scaleanchor"] = "x";
-    add({"Path from above", "Drag to move, wheel to zoom, double click to see all.", traces, layout,
-         static_cast<int>(traces.size()) - 1});
+    paths.push_back(
+        {"estimate", html::seen_from_above(run_.estimate), false, false, descriptions()});
+    html::add_paths_from_above(page_, "Path from above",
+                               "Drag to move, wheel to zoom, double click to see all.", paths,
+                               run_.unit);
   }
 
   void add_path_in_space() const {

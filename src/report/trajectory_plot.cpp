@@ -2,309 +2,191 @@
 #include "report/trajectory_plot.hpp"
 
 #include <algorithm>
-#include <memory>
-#include <numbers>
+#include <cmath>
+#include <iterator>
 #include <vector>
 
-#include <cairo.h>
+#include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
-#include "report/plot_layout.hpp"
-#include "text/text_file.hpp"
+#include "report/caption.hpp"
 
 namespace stemvo {
-
 namespace {
 
-struct Color {
-  double red = 0.0;
-  double green = 0.0;
-  double blue = 0.0;
-};
-
 // Okabe and Ito's colours (safe for the colour-blind) on neutral grays.
-constexpr Color kWhite{1.0, 1.0, 1.0};
-constexpr Color kInk{0.13, 0.13, 0.13};
-constexpr Color kSoftInk{0.35, 0.35, 0.35};
-constexpr Color kGrid{0.90, 0.90, 0.90};
-constexpr Color kFrame{0.45, 0.45, 0.45};
-constexpr Color kTruth{0.62, 0.62, 0.62};
-constexpr Color kEstimate{0.0, 114.0 / 255.0, 178.0 / 255.0};
-constexpr Color kStart{0.0, 158.0 / 255.0, 115.0 / 255.0};
-constexpr Color kEnd{213.0 / 255.0, 94.0 / 255.0, 0.0};
+const cv::Scalar kInk(34, 34, 34);
+const cv::Scalar kGrid(230, 230, 230);
+const cv::Scalar kTruth(158, 158, 158);
+const cv::Scalar kEstimate(0, 114, 178);
+const cv::Scalar kStart(0, 158, 115);
+const cv::Scalar kEnd(213, 94, 0);
+const cv::Scalar kWhite = cv::Scalar::all(255);
 
 // The truth is a broad gray road under the thin estimate: both stay visible where they agree.
-constexpr double kTruthWidth_px = 9.0;
-constexpr double kEstimateWidth_px = 3.5;
-constexpr double kStart_px = 9.5;
-constexpr double kEnd_px = 12.0;
-constexpr double kRim_px = 3.0;
+constexpr int kTruthWidth_px = 9;
+constexpr int kEstimateWidth_px = 3;
+constexpr int kMarker_px = 10;
 
-constexpr double kTitle_px = 36.0;
-constexpr double kSubtitle_px = 25.0;
-constexpr double kLabel_px = 27.0;
-constexpr double kTick_px = 24.0;
+constexpr int kLeft_px = 150;
+constexpr int kTop_px = 180;
+constexpr int kRight_px = 50;
+constexpr int kBottom_px = 120;
+constexpr int kLine_px = 50;  // of text
+constexpr double kTick_px = 105.0;
+constexpr int kSubpixelBits = 4;
 
-constexpr double kSwatch_px = 76.0;  // legend: room of a path's sample
-constexpr double kAfterText_px = 48.0;
-constexpr double kAfterMarker_px = 14.0;
-
-struct CairoDelete {
-  void operator()(cairo_t* context) const { cairo_destroy(context); }
-  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-  void operator()(cairo_font_options_t* options) const { cairo_font_options_destroy(options); }
-};
-using CairoSurface = std::unique_ptr<cairo_surface_t, CairoDelete>;
-
-/// One bad byte in a folder's name would otherwise cost the whole figure: cairo stops at it.
-std::string printable(std::string text) {
-  using Json = nlohmann::json;
-  std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
-  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
-}
-
-struct Path {
-  const Trajectory* trajectory;
-  std::string name;  ///< in the legend
-  Color color;
-  double width_px;
-};
-
-/// In the legend's order.
-std::vector<Path> paths_of(const TrajectoryPlot& plot) {
-  STEMVO_CHECK(!plot.estimate.empty(), "at least one pose to draw");
-  std::vector<Path> paths;
-  if (plot.ground_truth) {
-    paths.push_back({&*plot.ground_truth, "ground truth", kTruth, kTruthWidth_px});
-  }
-  paths.push_back({&plot.estimate, "estimate", kEstimate, kEstimateWidth_px});
-  return paths;
-}
-
-PlotLayout layout_of(const std::vector<Path>& paths) {
-  std::vector<const Trajectory*> trajectories;
-  for (const Path& path : paths) {
-    trajectories.push_back(path.trajectory);
-  }
-  return make_plot_layout(trajectories);
-}
-
-class Drawing {
- public:
-  explicit Drawing(const TrajectoryPlot& plot)
-      : plot_(plot), paths_(paths_of(plot)), layout_(layout_of(paths_)) {}
-
-  [[nodiscard]] const PlotLayout& layout() const { return layout_; }
-
-  [[nodiscard]] cairo_status_t draw(cairo_surface_t* surface) {
-    cairo_.reset(cairo_create(surface));
-    const std::unique_ptr<cairo_font_options_t, CairoDelete> options(cairo_font_options_create());
-    cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);
-    cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
-    cairo_font_options_set_hint_metrics(options.get(), CAIRO_HINT_METRICS_OFF);
-    cairo_set_font_options(cairo_.get(), options.get());
-    cairo_set_line_cap(cairo_.get(), CAIRO_LINE_CAP_ROUND);
-    cairo_set_line_join(cairo_.get(), CAIRO_LINE_JOIN_ROUND);
-    set_color(kWhite);
-    cairo_paint(cairo_.get());
-    draw_titles();
-    draw_legend();
-    draw_grid();
-    std::ranges::for_each(paths_, [&](const Path& path) { draw_path(path); });
-    draw_markers();
-    return cairo_status(cairo_.get());
-  }
-
- private:
-  void set_color(const Color& color) const {
-    cairo_set_source_rgb(cairo_.get(), color.red, color.green, color.blue);
-  }
-
-  void stroke(double width_px) const {
-    cairo_set_line_width(cairo_.get(), width_px);
-    cairo_stroke(cairo_.get());
-  }
-
-  void line(double x0, double y0, double x1, double y1, double width_px) const {
-    cairo_move_to(cairo_.get(), x0, y0);
-    cairo_line_to(cairo_.get(), x1, y1);
-    stroke(width_px);
-  }
-
-  /// Fills the current path and gives it a white rim, so that it stands out on any line.
-  void fill_marker(const Color& color) const {
-    set_color(color);
-    cairo_fill_preserve(cairo_.get());
-    set_color(kWhite);
-    stroke(kRim_px);
-  }
-
-  void start_marker(double x, double y) const {
-    cairo_new_path(cairo_.get());
-    cairo_arc(cairo_.get(), x, y, kStart_px, 0.0, 2.0 * std::numbers::pi);
-    fill_marker(kStart);
-  }
-
-  void end_marker(double x, double y) const {
-    cairo_rectangle(cairo_.get(), x - kEnd_px, y - kEnd_px, 2.0 * kEnd_px, 2.0 * kEnd_px);
-    fill_marker(kEnd);
-  }
-
-  void set_font(double size_px, bool is_bold = false) const {
-    // Every Debian and Ubuntu with cairo has DejaVu (fontconfig depends on it); elsewhere
-    // fontconfig finds the nearest face.
-    cairo_select_font_face(cairo_.get(), "DejaVu Sans", CAIRO_FONT_SLANT_NORMAL,
-                           is_bold ? CAIRO_FONT_WEIGHT_BOLD : CAIRO_FONT_WEIGHT_NORMAL);
-    cairo_set_font_size(cairo_.get(), size_px);
-  }
-
-  [[nodiscard]] double text_width(const std::string& text) const {
-    cairo_text_extents_t extents;
-    cairo_text_extents(cairo_.get(), printable(text).c_str(), &extents);
-    return extents.x_advance;
-  }
-
-  /// Baseline at y; the text starts at x - share * its width.
-  void text(double x, double y, const std::string& text, double share) const {
-    cairo_move_to(cairo_.get(), x - share * text_width(text), y);
-    cairo_show_text(cairo_.get(), printable(text).c_str());
-    cairo_new_path(cairo_.get());
-  }
-
-  [[nodiscard]] double room_px() const { return layout_.width_px() - PlotLayout::kLeft_px - 20.0; }
-
-  /// Left-aligned with the plot; shrinks until it fits the figure.
-  void fitting_text(double y, const std::string& text_to_fit, double size_px, bool is_bold) const {
-    set_font(size_px, is_bold);
-    const double width_px = text_width(text_to_fit);
-    if (width_px > room_px()) {
-      set_font(size_px * room_px() / width_px, is_bold);
+std::vector<Eigen::Vector2d> finite_positions(const Trajectory& trajectory) {
+  std::vector<Eigen::Vector2d> positions;
+  for (const Rigid3& pose : trajectory) {
+    if (pose.translation.allFinite()) {
+      positions.emplace_back(pose.translation.x(), pose.translation.z());
     }
-    text(PlotLayout::kLeft_px, y, text_to_fit, 0.0);
   }
+  return positions;
+}
 
-  void draw_titles() const {
-    set_color(kInk);
-    fitting_text(plot_.subtitle.empty() ? 108.0 : 62.0, plot_.title, kTitle_px, true);
-    set_color(kSoftInk);
-    fitting_text(108.0, plot_.subtitle, kSubtitle_px, false);
+/// Where metres are in the figure: one scale for both axes, with some air around all positions.
+struct View {
+  cv::Rect frame;
+  Eigen::Vector2d low_m;  ///< at the lower left corner
+  double px_per_m = 1.0;
+
+  explicit View(const Eigen::AlignedBox2d& box) {
+    const double air_m = 0.12 * std::max(box.sizes().maxCoeff(), 1.0);
+    const Eigen::Vector2d span_m = box.sizes().array() + air_m;
+    px_per_m = std::min(1400.0 / span_m.x(), 1100.0 / span_m.y());
+    frame = {kLeft_px, kTop_px, std::max(900, cvRound(span_m.x() * px_per_m)),
+             std::max(480, cvRound(span_m.y() * px_per_m))};
+    low_m = box.center() - 0.5 / px_per_m * Eigen::Vector2d(frame.width, frame.height);
   }
+  [[nodiscard]] cv::Point2d to_px(const Eigen::Vector2d& xz_m) const {
+    const Eigen::Vector2d px = px_per_m * (xz_m - low_m);
+    return {frame.x + px.x(), frame.br().y - px.y()};
+  }
+};
 
-  /// One line above the plot, where it can hide no data.
-  void draw_legend() const {
-    set_font(kTick_px);
-    const double y = PlotLayout::kTop_px - 30.0;
-    double x = PlotLayout::kLeft_px;
-    const auto label = [&](const std::string& name) {
-      set_color(kInk);
-      text(x, y + 0.36 * kTick_px, name, 0.0);
-      x += text_width(name) + kAfterText_px;
+/// The smallest of 1, 2, 5 times a power of ten that is not below `least`.
+double round_tick(double least) {
+  const double decade = std::pow(10.0, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * decade >= least) {
+      return factor * decade;
+    }
+  }
+  return 10.0 * decade;
+}
+
+void draw_grid(const View& view, const std::string& unit, cv::Mat& image) {
+  const cv::Rect& frame = view.frame;
+  const double tick_m = round_tick(kTick_px / view.px_per_m);
+  const Eigen::Vector2d high_m =
+      view.low_m + Eigen::Vector2d(frame.width, frame.height) / view.px_per_m;
+  const auto for_each_tick = [&](int axis, const auto& draw) {
+    for (double i = std::ceil(view.low_m[axis] / tick_m); i * tick_m <= high_m[axis]; i += 1.0) {
+      const cv::Point2d at = view.to_px(Eigen::Vector2d::Constant(i * tick_m));
+      draw(cvRound(axis == 0 ? at.x : at.y), fmt::format("{:g}", i * tick_m + 0.0));
+    }
+  };
+  for_each_tick(0, [&](int x, const std::string& label) {
+    cv::line(image, {x, frame.y}, {x, frame.br().y}, kGrid, 2);
+    put_caption(image, {x - 50, frame.br().y, 100, kLine_px}, label, kInk, 0.5);
+  });
+  for_each_tick(1, [&](int y, const std::string& label) {
+    cv::line(image, {frame.x, y}, {frame.br().x, y}, kGrid, 2);
+    put_caption(image, {0, y - kLine_px / 2, frame.x - 12, kLine_px}, label, kInk, 1.0);
+  });
+  cv::rectangle(image, frame, cv::Scalar::all(115), 2);
+  put_caption(image, {frame.x, frame.br().y + kLine_px, frame.width, kLine_px},
+              fmt::format("x, to the right [{}]", unit), kInk, 0.5);
+  cv::Mat upright(kLine_px, frame.height, CV_8UC3, kWhite);
+  put_caption(upright, {0, 0, frame.height, kLine_px}, fmt::format("z, forward [{}]", unit), kInk,
+              0.5);
+  cv::rotate(upright, image(cv::Rect(8, frame.y, kLine_px, frame.height)),
+             cv::ROTATE_90_COUNTERCLOCKWISE);
+}
+
+void draw_path(const Trajectory& path,
+               const View& view,
+               const cv::Scalar& color,
+               int width_px,
+               cv::Mat& image) {
+  std::vector<cv::Point> points;
+  for (const Eigen::Vector2d& position : finite_positions(path)) {
+    points.emplace_back(view.to_px(position) * (1 << kSubpixelBits));
+  }
+  cv::polylines(image, points, false, color, width_px, cv::LINE_AA, kSubpixelBits);
+}
+
+/// A disk for the start, a square for the end, with a white rim: on a loop both fall together, and
+/// the square's corners stay visible.
+void draw_marker(bool is_start, const cv::Point& at, cv::Mat& image) {
+  for (const auto& [color, size] :
+       {std::pair(kWhite, kMarker_px + 3), std::pair(is_start ? kStart : kEnd, kMarker_px)}) {
+    if (is_start) {
+      cv::circle(image, at, size, color, cv::FILLED, cv::LINE_AA);
+    } else {
+      cv::rectangle(image, at - cv::Point(size, size), at + cv::Point(size, size), color,
+                    cv::FILLED);
+    }
+  }
+}
+
+/// One line above the plot, where it can hide no data.
+void draw_legend(bool has_truth, cv::Mat& image) {
+  constexpr int kY_px = kTop_px - kLine_px / 2;
+  int x = kLeft_px;
+  const auto add = [&](const char* name, int sample_px, const auto& draw_sample) {
+    draw_sample(x);
+    x = put_caption(image, {x + sample_px, kTop_px - kLine_px, 400, kLine_px}, name, kInk) + 40;
+  };
+  const auto line_of = [&](const cv::Scalar& color, int width_px) {
+    return [&image, color, width_px](int at) {
+      cv::line(image, {at, kY_px}, {at + 54, kY_px}, color, width_px, cv::LINE_AA);
     };
-    for (const Path& path : paths_) {
-      set_color(path.color);
-      line(x + 5.0, y, x + 59.0, y, path.width_px);
-      x += kSwatch_px;
-      label(path.name);
-    }
-    start_marker(x + kStart_px, y);
-    x += 2.0 * kStart_px + kAfterMarker_px;
-    label("start");
-    end_marker(x + kEnd_px, y);
-    x += 2.0 * kEnd_px + kAfterMarker_px;
-    label("end");
+  };
+  if (has_truth) {
+    add("ground truth", 70, line_of(kTruth, kTruthWidth_px));
   }
-
-  void draw_grid() const {
-    constexpr double kLeft = PlotLayout::kLeft_px;
-    constexpr double kTop = PlotLayout::kTop_px;
-    const double right = layout_.right_px();
-    const double bottom = layout_.bottom_px();
-    set_font(kTick_px);
-    for (const double x : tick_positions(layout_.min_x_m, layout_.max_x_m(), layout_.tick_m)) {
-      const double px = layout_.to_px_x(x);
-      set_color(kGrid);
-      line(px, kTop, px, bottom, 1.5);
-      set_color(kInk);
-      text(px, bottom + 38.0, tick_label(x, layout_.tick_m), 0.5);
-    }
-    for (const double z : tick_positions(layout_.min_z_m, layout_.max_z_m(), layout_.tick_m)) {
-      const double py = layout_.to_px_y(z);
-      set_color(kGrid);
-      line(kLeft, py, right, py, 1.5);
-      set_color(kInk);
-      text(kLeft - 16.0, py + 0.36 * kTick_px, tick_label(z, layout_.tick_m), 1.0);
-    }
-    set_font(kLabel_px);
-    text(0.5 * (kLeft + right), bottom + 92.0, fmt::format("x, to the right [{}]", plot_.unit),
-         0.5);
-    cairo_save(cairo_.get());
-    cairo_translate(cairo_.get(), 44.0, kTop + 0.5 * layout_.plot_height_px);
-    cairo_rotate(cairo_.get(), -0.5 * std::numbers::pi);
-    text(0.0, 0.0, fmt::format("z, forward [{}]", plot_.unit), 0.5);
-    cairo_restore(cairo_.get());
-    set_color(kFrame);
-    cairo_rectangle(cairo_.get(), kLeft, kTop, layout_.plot_width_px, layout_.plot_height_px);
-    stroke(2.0);
+  add("estimate", 70, line_of(kEstimate, kEstimateWidth_px));
+  for (const bool is_start : {true, false}) {
+    add(is_start ? "start" : "end", 32,
+        [&](int at) { draw_marker(is_start, {at + kMarker_px, kY_px}, image); });
   }
-
-  void draw_path(const Path& path) const {
-    bool is_open = false;
-    for (const Rigid3& pose : *path.trajectory) {
-      if (!pose.translation.allFinite()) {
-        is_open = false;
-        continue;
-      }
-      const double x = layout_.to_px_x(pose.translation.x());
-      const double y = layout_.to_px_y(pose.translation.z());
-      is_open ? cairo_line_to(cairo_.get(), x, y) : cairo_move_to(cairo_.get(), x, y);
-      is_open = true;
-    }
-    set_color(path.color);
-    stroke(path.width_px);
-  }
-
-  void draw_markers() const {
-    const auto is_finite = [](const Rigid3& pose) { return pose.translation.allFinite(); };
-    const Trajectory& path = plot_.estimate;
-    const auto first = std::find_if(path.begin(), path.end(), is_finite);
-    if (first == path.end()) {
-      return;
-    }
-    const auto last = std::find_if(path.rbegin(), path.rend(), is_finite);
-    // On a loop both fall together: the square's corners stay visible around the disk.
-    end_marker(layout_.to_px_x(last->translation.x()), layout_.to_px_y(last->translation.z()));
-    start_marker(layout_.to_px_x(first->translation.x()), layout_.to_px_y(first->translation.z()));
-  }
-
-  const TrajectoryPlot& plot_;
-  std::vector<Path> paths_;
-  PlotLayout layout_;
-  std::unique_ptr<cairo_t, CairoDelete> cairo_;
-};
-
-cairo_status_t append_bytes(void* text, const unsigned char* data, unsigned int size) {
-  static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(data), size);
-  return CAIRO_STATUS_SUCCESS;
 }
 
 }  // namespace
 
-Status write_trajectory_png(const std::filesystem::path& file, const TrajectoryPlot& plot) {
-  Drawing drawing(plot);
-  const CairoSurface surface(
-      cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(drawing.layout().width_px()),
-                                 static_cast<int>(drawing.layout().height_px())));
-  std::string bytes;
-  cairo_status_t status = drawing.draw(surface.get());
-  if (status == CAIRO_STATUS_SUCCESS) {
-    status = cairo_surface_write_to_png_stream(surface.get(), append_bytes, &bytes);
+cv::Mat draw_trajectory(const TrajectoryPlot& plot) {
+  STEMVO_CHECK(!plot.estimate.empty(), "at least one pose to draw");
+  const std::vector<Eigen::Vector2d> estimate = finite_positions(plot.estimate);
+  Eigen::AlignedBox2d box;
+  for (const auto& positions :
+       {estimate, finite_positions(plot.ground_truth.value_or(Trajectory()))}) {
+    std::ranges::for_each(positions, [&](const Eigen::Vector2d& one) { box.extend(one); });
   }
-  if (status != CAIRO_STATUS_SUCCESS) {
-    return fail(fmt::format("{}: cannot draw: {}", file.string(), cairo_status_to_string(status)));
+  if (box.isEmpty()) {
+    box.extend(Eigen::Vector2d::Zero());
   }
-  return write_text_file(file, bytes);
+  const View view(box);
+  const int width_px = view.frame.br().x + kRight_px;
+  cv::Mat image(view.frame.br().y + kBottom_px, width_px, CV_8UC3, kWhite);
+  const int room_px = width_px - kLeft_px - kRight_px;
+  put_caption(image, {kLeft_px, 10, room_px, 70}, plot.title, kInk);
+  put_caption(image, {kLeft_px, 75, room_px, kLine_px}, plot.subtitle, cv::Scalar::all(90));
+  draw_legend(plot.ground_truth.has_value(), image);
+  draw_grid(view, plot.unit, image);
+  if (plot.ground_truth) {
+    draw_path(*plot.ground_truth, view, kTruth, kTruthWidth_px, image);
+  }
+  draw_path(plot.estimate, view, kEstimate, kEstimateWidth_px, image);
+  if (!estimate.empty()) {
+    draw_marker(false, view.to_px(estimate.back()), image);
+    draw_marker(true, view.to_px(estimate.front()), image);
+  }
+  return image;
 }
 
 }  // namespace stemvo

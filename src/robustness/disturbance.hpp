@@ -60,37 +60,8 @@ struct Disturbance {
 /// Random numbers of one frame (`frame`: any number where all frames share them).
 [[nodiscard]] cv::RNG random_of(std::uint64_t seed, std::uint64_t frame);
 
-/// Effects on images, one screen each; `strength` as `Disturbance::effect` says.
-namespace effects {
-void exposure_steps(cv::Mat& image, double strength, const EffectContext& context);
-void exposure_drift(cv::Mat& image, double strength, const EffectContext& context);
-void gamma(cv::Mat& image, double strength, const EffectContext& context);
-void vignette(cv::Mat& image, double strength, const EffectContext& context);
-void dusk(cv::Mat& image, double strength, const EffectContext& context);
-void low_contrast(cv::Mat& image, double strength, const EffectContext& context);
-void sensor_noise(cv::Mat& image, double strength, const EffectContext& context);
-void gaussian_blur(cv::Mat& image, double strength, const EffectContext& context);
-void motion_blur(cv::Mat& image, double strength, const EffectContext& context);
-void jpeg(cv::Mat& image, double strength, const EffectContext& context);
-void fog(cv::Mat& image, double strength, const EffectContext& context);
-void rain(cv::Mat& image, double strength, const EffectContext& context);
-void shadows(cv::Mat& image, double strength, const EffectContext& context);
-void dirt(cv::Mat& image, double strength, const EffectContext& context);
-void occluder(cv::Mat& image, double strength, const EffectContext& context);
-void moving_third(cv::Mat& image, double strength, const EffectContext& context);
-void blackout(cv::Mat& image, double strength, const EffectContext& context);
-/// When `occluder` and `blackout` are there.
-bool occluder_passes(std::size_t frame, double strength);
-bool is_black(std::size_t frame, double strength);
-}  // namespace effects
-
-/// Sources of other frames.
-namespace resampling {
-FrameSource dropped(const FrameSource& source, double share, std::uint64_t seed);
-FrameSource repeated(const FrameSource& source, double share, std::uint64_t seed);
-FrameSource every_nth(const FrameSource& source, double step, std::uint64_t seed);
-FrameSource cropped(const FrameSource& source, double share, std::uint64_t seed);
-FrameSource scaled(const FrameSource& source, double factor, std::uint64_t seed);
-}  // namespace resampling
+/// Those with `apply`, and those with `resample`.
+[[nodiscard]] std::vector<Disturbance> effects();
+[[nodiscard]] std::vector<Disturbance> resamplings();
 
 }  // namespace stemvo::robustness

@@ -62,18 +62,6 @@ cv::Mat texture(cv::Size size, int type, std::uint64_t seed) {
   return image;
 }
 
-}  // namespace
-
-cv::RNG random_of(std::uint64_t seed, std::uint64_t frame) {
-  // SplitMix64 (Steele, Lea, Flood 2014): neighbours' generators have nothing in common.
-  std::uint64_t state = seed * 0x9E3779B97F4A7C15U + frame;
-  state = (state ^ (state >> 30U)) * 0xBF58476D1CE4E5B9U;
-  state = (state ^ (state >> 27U)) * 0x94D049BB133111EBU;
-  return cv::RNG(state ^ (state >> 31U));
-}
-
-namespace effects {
-
 void exposure_steps(cv::Mat& image, double strength, const EffectContext& context) {
   constexpr std::size_t kFramesBetween = 12;
   cv::RNG random = random_of(context.seed, context.frame / kFramesBetween);
@@ -263,5 +251,97 @@ void blackout(cv::Mat& image, double /*strength*/, const EffectContext& /*contex
   image.setTo(0);
 }
 
-}  // namespace effects
+}  // namespace
+
+cv::RNG random_of(std::uint64_t seed, std::uint64_t frame) {
+  // SplitMix64 (Steele, Lea, Flood 2014): neighbours' generators have nothing in common.
+  std::uint64_t state = seed * 0x9E3779B97F4A7C15U + frame;
+  state = (state ^ (state >> 30U)) * 0xBF58476D1CE4E5B9U;
+  state = (state ^ (state >> 27U)) * 0x94D049BB133111EBU;
+  return cv::RNG(state ^ (state >> 31U));
+}
+
+std::vector<Disturbance> effects() {
+  return {
+      {"exposure_steps",
+       "light",
+       "gain jumps every 12 frames, up to this factor",
+       {1.2, 1.5, 2.0},
+       exposure_steps},
+      {"exposure_drift",
+       "light",
+       "gain swings slowly up to this factor",
+       {1.5, 2.0, 3.0},
+       exposure_drift},
+      {"gamma", "light", "gray levels to this power", {1.5, 2.2, 3.0}, gamma},
+      {"vignette",
+       "light",
+       "this share of the light is lost in the corners",
+       {0.3, 0.6, 0.9},
+       vignette},
+      {"dusk",
+       "noise",
+       "the light falls to this share in 50 frames, photon and read noise; gain makes up for half "
+       "of the stops",
+       {0.1, 0.03, 0.01},
+       dusk},
+      {"low_contrast",
+       "light",
+       "this share of the contrast is left",
+       {0.5, 0.25, 0.1},
+       low_contrast},
+      {"sensor_noise",
+       "noise",
+       "normal noise of this many gray levels",
+       {6.0, 12.0, 24.0},
+       sensor_noise},
+      {"gaussian_blur",
+       "blur",
+       "of this sigma, pixels of a frame 1242 wide",
+       {1.0, 2.0, 3.0},
+       gaussian_blur},
+      {"motion_blur",
+       "blur",
+       "along a line so long, of another direction in each frame",
+       {5.0, 11.0, 21.0},
+       motion_blur},
+      {"jpeg", "noise", "compressed at this quality", {30.0, 15.0, 7.0}, jpeg},
+      {"fog",
+       "weather",
+       "visible so far, metres, on a flat road between walls 40 m away",
+       {100.0, 50.0, 25.0},
+       fog},
+      {"rain", "weather", "so many streaks per frame of 1242x375", {200.0, 600.0, 1500.0}, rain},
+      {"shadows",
+       "light",
+       "bands that move over the image take this share of the light",
+       {0.3, 0.5, 0.7},
+       shadows},
+      {"dirt",
+       "in the way",
+       "blots on the lens over this share of the image",
+       {0.05, 0.1, 0.2},
+       dirt},
+      {"occluder",
+       "in the way",
+       "something passes before the camera, of this share of the image",
+       {0.1, 0.2, 0.4},
+       occluder,
+       nullptr,
+       occluder_passes},
+      {"moving_third",
+       "in the way",
+       "a third of the image moves on its own, pixels per frame",
+       {2.0, 5.0, 10.0},
+       moving_third},
+      {"blackout",
+       "in the way",
+       "no light in so many of 100 frames",
+       {3.0, 10.0, 20.0},
+       blackout,
+       nullptr,
+       is_black},
+  };
+}
+
 }  // namespace stemvo::robustness

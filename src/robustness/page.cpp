@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "html/page.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -95,22 +96,24 @@ void add_panel(const RobustnessReport& report,
        "", traces, layout});
 }
 
+/// One per disturbance, each after the undisturbed frames; those alone only where there is no
+/// other.
 void add_panels(const RobustnessReport& report, html::Page& page) {
-  std::vector<const Row*> panel;
-  const Row* undisturbed = nullptr;
-  for (std::size_t i = 0; i < report.rows.size(); ++i) {
-    const Row& row = report.rows[i];
-    undisturbed = row.disturbance == kUndisturbed ? &row : undisturbed;
-    if (panel.empty() && undisturbed != nullptr && undisturbed != &row) {
-      panel.push_back(undisturbed);
+  std::vector<std::string> names;
+  for (const Row& row : report.rows) {
+    if (std::ranges::find(names, row.disturbance) == names.end()) {
+      names.push_back(row.disturbance);
     }
-    panel.push_back(&row);
-    const bool is_end = i + 1 == report.rows.size();
-    if (is_end || report.rows[i + 1].disturbance != row.disturbance) {
-      if (&row != undisturbed || is_end) {  // which is in every panel
-        add_panel(report, panel, page);
+  }
+  for (const std::string& name : names) {
+    std::vector<const Row*> panel;
+    for (const Row& row : report.rows) {
+      if (row.disturbance == kUndisturbed || row.disturbance == name) {
+        panel.push_back(&row);
       }
-      panel.clear();
+    }
+    if (name != kUndisturbed || names.size() == 1) {
+      add_panel(report, panel, page);
     }
   }
 }

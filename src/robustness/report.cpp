@@ -85,28 +85,31 @@ std::vector<std::string> groups_of(const std::vector<Row>& rows) {
   return groups;
 }
 
-std::optional<double> geometric_mean(const std::vector<ErrorRatio>& ratios) {
+/// nullopt: of nothing.
+std::optional<double> geometric_mean(const std::vector<double>& ratios) {
   double sum = 0.0;
-  int count = 0;
-  for (const ErrorRatio& one : ratios) {
-    if (std::isfinite(one.high)) {
-      sum += std::log(one.ratio);
-      ++count;
-    }
+  for (const double ratio : ratios) {
+    sum += std::log(ratio);
   }
-  return count == 0 ? std::nullopt : std::optional(std::exp(sum / count));
+  return ratios.empty() ? std::nullopt
+                        : std::optional(std::exp(sum / static_cast<double>(ratios.size())));
 }
 
 Summary summarize(const std::string& group,
                   const std::vector<const Row*>& rows,
                   std::size_t control) {
   Summary result{group, rows.size(), {}, {}, 0, 0};
-  std::vector<ErrorRatio> rotation;
-  std::vector<ErrorRatio> translation;
+  std::vector<double> rotation;
+  std::vector<double> translation;
+  const auto add = [](const ErrorRatio& one, std::vector<double>& ratios) {
+    if (std::isfinite(one.high)) {
+      ratios.push_back(one.ratio);
+    }
+  };
   for (const Row* row : rows) {
     const Verdict& verdict = row->verdicts.at(control);
-    rotation.push_back(verdict.rotation);
-    translation.push_back(verdict.translation);
+    add(verdict.rotation, rotation);
+    add(verdict.translation, translation);
     if (verdict.rotation.is_decided()) {
       ++(verdict.rotation.ratio < 1.0 ? result.num_for_judged : result.num_for_control);
     }
@@ -199,17 +202,15 @@ std::vector<Summary> summaries(const std::vector<Row>& rows, std::size_t control
 std::optional<double> ratio_on_drive(const std::vector<Row>& rows,
                                      std::size_t control,
                                      std::size_t drive) {
-  double sum = 0.0;
-  int count = 0;
+  std::vector<double> ratios;
   for (const Row& row : rows) {
     const auto judged = row.outcomes.front().at(drive).r_rel_deg_per_100m;
     const auto other = row.outcomes.at(control + 1).at(drive).r_rel_deg_per_100m;
     if (judged && other && *judged > 0.0 && *other > 0.0) {
-      sum += std::log(*judged / *other);
-      ++count;
+      ratios.push_back(*judged / *other);
     }
   }
-  return count == 0 ? std::nullopt : std::optional(std::exp(sum / count));
+  return geometric_mean(ratios);
 }
 
 std::string format_table(const RobustnessReport& report) {

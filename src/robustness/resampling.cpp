@@ -7,7 +7,7 @@
 
 #include "robustness/disturbance.hpp"
 
-namespace stemvo::robustness::resampling {
+namespace stemvo::robustness {
 namespace {
 
 /// Frames `shown[i]` of the source, at the time and place of frames `kept[i]`.
@@ -65,8 +65,6 @@ FrameSource with_camera(const FrameSource& source, const cv::Rect& part, double 
   return FrameSource(std::move(frames));
 }
 
-}  // namespace
-
 FrameSource dropped(const FrameSource& source, double share, std::uint64_t seed) {
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < source.size(); ++i) {
@@ -107,4 +105,41 @@ FrameSource scaled(const FrameSource& source, double factor, std::uint64_t /*see
   return with_camera(source, {0, 0, source.camera().width_px, source.camera().height_px}, factor);
 }
 
-}  // namespace stemvo::robustness::resampling
+}  // namespace
+
+std::vector<Disturbance> resamplings() {
+  return {
+      {"dropped",
+       "other frames",
+       "this share of the frames is missing",
+       {0.05, 0.1, 0.2},
+       nullptr,
+       dropped},
+      {"repeated",
+       "other frames",
+       "this share of the frames shows the one before",
+       {0.05, 0.1, 0.2},
+       nullptr,
+       repeated},
+      {"every_nth",
+       "other frames",
+       "only every so many frames",
+       {2.0, 3.0, 5.0},
+       nullptr,
+       every_nth},
+      {"cropped",
+       "other views",
+       "only the middle of the image, this share of its sides",
+       {0.8, 0.6, 0.4},
+       nullptr,
+       cropped},
+      {"scaled",
+       "other views",
+       "the image made smaller by this factor",
+       {0.75, 0.5, 0.35},
+       nullptr,
+       scaled},
+  };
+}
+
+}  // namespace stemvo::robustness

@@ -35,7 +35,7 @@ Expected<cv::Mat> draw_channels(const Results& results,
     const LayerIdentity& layer = results.identity.layer_of(row->key);
     const Config config = config_of(results.config, layer, row->key.filter);
     const Expected<Channel> channel =
-        create_stem(config.stem, results.models_dir).and_then([&](const Stem& s) {
+        create_stem(config.stem, results.target.models_dir).and_then([&](const Stem& s) {
           return s.apply(*frame);
         });
     if (!channel) {

@@ -2,7 +2,9 @@
 // report.html of a search.
 #include "html/page.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -16,11 +18,11 @@ namespace {
 
 using nlohmann::json;
 
-json number(const std::optional<double>& value) { return value ? json(*value) : json(); }
+using Number = std::optional<double>;
 
-/// What a filter's points say when they are hovered over.
+/// What a filter's point says when it is hovered over.
 std::string described(const FilterRow& row) {
-  const auto part = [](const char* name, const std::optional<double>& value, const char* unit) {
+  const auto part = [](const char* name, const Number& value, const char* unit) {
     return value ? fmt::format("\n{} {:.3g} {}", name, *value, unit) : std::string();
   };
   return to_string(row.key) + part("t_rel", row.mean.t_rel_percent, "%") +
@@ -28,75 +30,52 @@ std::string described(const FilterRow& row) {
          part("inliers", row.mean.inliers, "") + part("tracked", row.mean.tracked, "of the frames");
 }
 
-/// Points of rows, in traces by what became of them.
-class Groups {
- public:
-  explicit Groups(const Results& results) : results_(results) {}
-
-  template <typename X, typename Y>
-  [[nodiscard]] json traces(const X& x_of, const Y& y_of, bool has_intervals) const {
-    std::vector<json> groups = {trace("equal to the best"), trace("worse than the best"),
-                                trace("baseline"), trace("stopped early")};
-    for (const FilterRow& row : results_.rows) {
-      const json x = x_of(row);
-      const json y = y_of(row);
-      if (row.status == FilterStatus::kNotDetected || x.is_null() || y.is_null()) {
-        continue;
-      }
-      json& group = groups[group_of(row)];
-      group["x"].push_back(x);
-      group["y"].push_back(y);
-      group["text"].push_back(described(row));
-      const bool is_known = std::isfinite(row.over_best.high);
-      const double ratio = row.over_best.ratio;
-      group["error_y"]["array"].push_back(is_known ? row.over_best.high - ratio : 0.0);
-      group["error_y"]["arrayminus"].push_back(is_known ? ratio - row.over_best.low : 0.0);
+/// Points of the rows that have both numbers, a trace for each thing that became of them.
+template <typename X, typename Y>
+json traces_of(const Results& results, const X& x_of, const Y& y_of, bool has_intervals = false) {
+  json groups = json::array();
+  for (const char* name :
+       {"equal to the best", "worse than the best", "baseline", "stopped early"}) {
+    groups.push_back(
+        {{"name", name}, {"mode", "markers"}, {"marker", {{"size", 8}}}, {"hoverinfo", "text"}});
+    if (has_intervals) {
+      groups.back()["error_y"] = {{"type", "data"}, {"symmetric", false}, {"thickness", 1}};
     }
-    json all = json::array();
-    for (json& group : groups) {
-      if (!has_intervals) {
-        group.erase("error_y");
-      }
-      if (!group["x"].empty()) {
-        all.push_back(std::move(group));
-      }
+  }
+  for (const FilterRow& row : results.rows) {
+    const Number x = x_of(row);
+    const Number y = y_of(row);
+    if (row.status == FilterStatus::kNotDetected || !x || !y) {
+      continue;
     }
-    return all;
-  }
-
- private:
-  static json trace(const char* name) {
-    return {{"name", name},
-            {"mode", "markers"},
-            {"marker", {{"size", 8}}},
-            {"hoverinfo", "text"},
-            {"x", json::array()},
-            {"y", json::array()},
-            {"text", json::array()},
-            {"error_y",
-             {{"type", "data"},
-              {"symmetric", false},
-              {"thickness", 1},
-              {"array", json::array()},
-              {"arrayminus", json::array()}}}};
-  }
-  [[nodiscard]] std::size_t group_of(const FilterRow& row) const {
-    if (results_.identity.layer_of(row.key).baseline) {
-      return 2;
+    json& group = groups[results.identity.layer_of(row.key).baseline ? 2
+                         : row.status == FilterStatus::kStopped      ? 3
+                         : row.is_equal                              ? 0
+                                                                     : 1];
+    group["x"].push_back(*x);
+    group["y"].push_back(*y);
+    group["text"].push_back(described(row));
+    if (has_intervals) {
+      const ErrorRatio& over = row.over_best;
+      const bool is_known = std::isfinite(over.high);
+      group["error_y"]["array"].push_back(is_known ? over.high - over.ratio : 0.0);
+      group["error_y"]["arrayminus"].push_back(is_known ? over.ratio - over.low : 0.0);
     }
-    return row.status == FilterStatus::kStopped ? 3 : row.is_equal ? 0 : 1;
   }
-
-  const Results& results_;
-};
+  json traces = json::array();
+  std::ranges::copy_if(groups, std::back_inserter(traces),
+                       [](const json& group) { return group.contains("x"); });
+  return traces;
+}
 
 void add_ranking(const Results& results, html::Page& page) {
-  std::size_t rank = 0;
-  const json traces = Groups(results).traces(
+  int rank = 0;
+  const json traces = traces_of(
+      results,
       [&](const FilterRow& row) {
-        return row.status == FilterStatus::kRanked ? json(++rank) : json();
+        return row.status == FilterStatus::kRanked ? Number(++rank) : std::nullopt;
       },
-      [](const FilterRow& row) { return json(row.over_best.ratio); }, true);
+      [](const FilterRow& row) { return Number(row.over_best.ratio); }, true);
   const json layout = {{"xaxis", html::titled("rank")},
                        {"yaxis", html::logarithmic("error, times the best's")}};
   page.add_figure(
@@ -106,31 +85,25 @@ void add_ranking(const Results& results, html::Page& page) {
 }
 
 void add_scatter(const Results& results, html::Page& page) {
-  const auto t_rel = [](const FilterRow& row) { return number(row.mean.t_rel_percent); };
+  const auto t_rel = [](const FilterRow& row) { return row.mean.t_rel_percent; };
   json layout = {{"xaxis", html::titled("inliers per frame")}, {"yaxis", html::titled("t_rel, %")}};
-  const json traces = Groups(results).traces(
-      [](const FilterRow& row) { return number(row.mean.inliers); }, t_rel, false);
   page.add_figure(
-      {"Error and matches", "Of filters stopped early: over the frames they ran.", traces, layout});
+      {"Error and matches", "Of filters stopped early: over the frames they ran.",
+       traces_of(results, [](const FilterRow& row) { return row.mean.inliers; }, t_rel), layout});
   if (!results.identity.sequences.back().held_out) {
     return;
   }
-  const json seen = Groups(results).traces(
-      t_rel,
-      [](const FilterRow& row) {
-        return row.held_out && row.held_out->detected ? number(row.held_out->t_rel_percent)
-                                                      : json();
-      },
-      false);
+  const auto held_out = [](const FilterRow& row) {
+    return row.held_out && row.held_out->detected ? row.held_out->t_rel_percent : std::nullopt;
+  };
   layout = {{"xaxis", html::titled("t_rel, %")}, {"yaxis", html::titled("t_rel held out, %")}};
-  page.add_figure({"On the sequence that did not rank", "", seen, layout});
+  page.add_figure(
+      {"On the sequence that did not rank", "", traces_of(results, t_rel, held_out), layout});
 }
 
 void add_paths(const Results& results, const Trajectory& ground_truth, html::Page& page) {
-  std::vector<html::PathFromAbove> paths = {{"ground truth", {}, true}};
-  for (const Rigid3& pose : ground_truth) {
-    paths.front().xz_m.push_back({pose.translation.x(), pose.translation.z()});
-  }
+  std::vector<html::PathFromAbove> paths = {
+      {"ground truth", html::seen_from_above(ground_truth), true}};
   for (const auto& [rank, row] : choose_rows(results.identity, results.rows)) {
     paths.push_back({fmt::format("{}: {}", rank, to_string(row->key)),
                      row->drives.front().path_xz_m, false,
@@ -156,7 +129,7 @@ std::string subtitle_of(const Results& results) {
 
 }  // namespace
 
-Status write_page(const Results& results, const Pictures& pictures, const PageTexts& texts) {
+Status write_page(const Results& results, const Pictures& pictures, const std::string& table) {
   const bool has_best =
       !results.rows.empty() && results.rows.front().status == FilterStatus::kRanked;
   html::Page page(
@@ -172,10 +145,10 @@ Status write_page(const Results& results, const Pictures& pictures, const PageTe
     page.add_images("Channels", {{"the input, and the filters above on its middle frame",
                                   io::encode_jpeg(pictures.sheet, kQuality)}});
   }
-  page.add_text("All filters", texts.table);
-  html::add_how_to_repeat(page, texts.command, "Configuration of all rows",
+  page.add_text("All filters", table);
+  html::add_how_to_repeat(page, results.target.command, "Configuration of all rows",
                           results.identity.configuration);
-  return page.write(results.out_dir / "report.html");
+  return page.write(results.target.out_dir / "report.html");
 }
 
 }  // namespace stemvo::search

@@ -9,7 +9,7 @@
 #include "options/option_fields.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "robustness/disturbance.hpp"
-#include "search/plan_sequences.hpp"
+#include "search/race.hpp"
 #include "stem/hand_made.hpp"
 
 namespace stemvo::search {
@@ -85,9 +85,7 @@ Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan&
   layer.last = static_cast<int>(filters.end);
   layer.hash = *hash;
   layer.sampling_px = info.sampling_px;
-  // Gray and R, G, B take no pass: one for all.
-  const std::size_t pass = is_hand_made(layer.model) ? SIZE_MAX : plan.layers.size();
-  plan.layers.push_back({config, std::move(*stem), pass});
+  plan.layers.push_back({config, std::move(*stem)});
   plan.identity.layers.push_back(std::move(layer));
   return {};
 }
@@ -186,15 +184,12 @@ Config config_of(Config common, const LayerIdentity& layer, int filter) {
 std::vector<std::vector<std::size_t>> cut_into_blocks(const SearchPlan& plan,
                                                       const std::vector<std::size_t>& candidates) {
   std::vector<std::vector<std::size_t>> blocks;
-  const PlanLayer* first = nullptr;  // of the last block
   for (const std::size_t candidate : candidates) {
-    const PlanLayer& layer = plan.layers[plan.candidates[candidate].layer];
-    const bool goes_on =
-        first != nullptr && (plan.block > 0 || layer.pass == first->pass) &&
-        blocks.back().size() < (plan.block > 0 ? plan.block : first->max_in_flight);
-    if (!goes_on) {
+    const std::size_t layer = plan.candidates[candidate].layer;
+    const std::size_t most = plan.block > 0 ? plan.block : plan.layers[layer].max_in_flight;
+    if (blocks.empty() || blocks.back().size() >= most ||
+        plan.candidates[blocks.back().front()].layer != layer) {
       blocks.emplace_back();
-      first = &layer;
     }
     blocks.back().push_back(candidate);
   }

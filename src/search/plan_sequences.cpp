@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include "search/plan_sequences.hpp"
-
 #include <algorithm>
-#include <map>
+#include <iterator>
 #include <system_error>
 #include <utility>
 
@@ -11,6 +9,7 @@
 #include "evaluation/metrics.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "robustness/disturbance.hpp"
+#include "search/race.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -49,14 +48,24 @@ Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added)
   return {};
 }
 
-Expected<KittiSequence> open_sequence(const SearchRequest& request,
-                                      const fs::path& directory,
-                                      bool is_held_out) {
+/// A directory, read and hashed once however often it is disturbed.
+struct OpenedSequence {
+  fs::path directory;
+  KittiSequence sequence;
+  bool is_held_out = false;
+  pipeline::SequenceHashes hashes;
+};
+
+/// `is_run`: else the contents of its frames do not matter here.
+Expected<OpenedSequence> open_sequence(const SearchRequest& request,
+                                       const fs::path& directory,
+                                       bool is_held_out,
+                                       bool is_run) {
   Expected<KittiSequence> sequence = KittiSequence::open(
       directory, {.camera = request.config.input.camera,
                   .frames = is_held_out ? request.held_out_frames : request.frames});
   if (!sequence) {
-    return sequence;
+    return sequence.error();
   }
   if (!sequence->ground_truth()) {
     const fs::path file = directory / "../../poses" / (sequence->name() + ".txt");
@@ -73,7 +82,12 @@ Expected<KittiSequence> open_sequence(const SearchRequest& request,
         metrics.segment_lengths_m.empty() ? 0.0 : metrics.segment_lengths_m.front(),
         metrics.path_length_m, sequence->size()));
   }
-  return sequence;
+  using pipeline::FrameIdentity;
+  return pipeline::hash_sequence(*sequence, directory,
+                                 is_run ? FrameIdentity::kContents : FrameIdentity::kNamesAndSizes)
+      .map([&](const pipeline::SequenceHashes& hashes) {
+        return OpenedSequence{directory, *sequence, is_held_out, hashes};
+      });
 }
 
 /// Why the layer's filters cannot be run on frames of this camera, empty where they can; lowers how
@@ -105,26 +119,6 @@ std::string suffix_of(const robustness::Disturbance* how) {
   return how == nullptr ? "" : fmt::format("_{}_{}", how->name, how->strengths[kMiddleStrength]);
 }
 
-/// One directory, disturbed in several ways: read and hashed once.
-struct OpenedSequence {
-  const fs::path& directory;
-  KittiSequence sequence;
-  bool is_held_out = false;
-  std::map<pipeline::FrameIdentity, pipeline::SequenceHashes> hashes = {};
-};
-
-Expected<pipeline::SequenceHashes> hash_once(OpenedSequence& opened,
-                                             pipeline::FrameIdentity frames) {
-  if (const auto known = opened.hashes.find(frames); known != opened.hashes.end()) {
-    return known->second;
-  }
-  const auto hashes = pipeline::hash_sequence(opened.sequence, opened.directory, frames);
-  if (hashes) {
-    opened.hashes[frames] = *hashes;
-  }
-  return hashes;
-}
-
 /// The frames under it, null: as they are.
 FrameSource disturbed(const FrameSource& source,
                       const robustness::Disturbance* how,
@@ -138,26 +132,20 @@ FrameSource disturbed(const FrameSource& source,
 }
 
 Status add_sequence(const SearchRequest& request,
-                    OpenedSequence& opened,
+                    const OpenedSequence& opened,
                     const robustness::Disturbance* how,
                     SearchPlan& plan) {
   std::vector<SequenceIdentity>& known = plan.identity.sequences;
   const bool is_run = request.only_sequence.value_or(known.size()) == known.size();
-  using pipeline::FrameIdentity;
-  const auto hashes =
-      hash_once(opened, is_run ? FrameIdentity::kContents : FrameIdentity::kNamesAndSizes);
-  if (!hashes) {
-    return hashes.error();
-  }
   const FrameSource source = disturbed(opened.sequence, how, request.config.seed);
   const SequenceIdentity added = {.name = source.name(),
                                   .held_out = opened.is_held_out,
                                   .disturbance = suffix_of(how),
                                   .first_frame = opened.sequence.range().begin,
                                   .num_frames = source.size(),
-                                  .frames = is_run ? hashes->frames : std::string(),
-                                  .calibration = hashes->calibration,
-                                  .ground_truth = hashes->ground_truth,
+                                  .frames = is_run ? opened.hashes.frames : std::string(),
+                                  .calibration = opened.hashes.calibration,
+                                  .ground_truth = opened.hashes.ground_truth,
                                   .directory = from_anywhere(opened.directory)};
   for (const SequenceIdentity& before : known) {
     if (Status status = check_pair(before, added); !status) {
@@ -199,21 +187,23 @@ std::size_t bytes_in_flight(cv::Size channel, cv::Size image, std::size_t num_se
 }
 
 Status add_sequences(const SearchRequest& request, SearchPlan& plan) {
+  const auto& only = request.only_sequence;
+  const std::size_t num_folders = request.sequence_dirs.size();
+  const std::size_t num_ranking = num_folders * (1 + request.kinds.size());
   std::vector<OpenedSequence> ranking;
-  for (const fs::path& directory : request.sequence_dirs) {
-    Expected<KittiSequence> sequence = open_sequence(request, directory, false);
-    if (!sequence) {
-      return sequence.error();
+  for (std::size_t i = 0; i < num_folders; ++i) {
+    const bool is_run = !only || (*only < num_ranking && *only % num_folders == i);
+    auto opened = open_sequence(request, request.sequence_dirs[i], false, is_run);
+    if (!opened) {
+      return opened.error();
     }
-    ranking.push_back({directory, *std::move(sequence)});
+    ranking.push_back(*std::move(opened));
   }
   // First as they are: the sheet shows the first of all.
   std::vector<const robustness::Disturbance*> kinds = {nullptr};
-  for (const std::string& kind : request.kinds) {
-    kinds.push_back(robustness::find_disturbance(kind));
-  }
+  std::ranges::transform(request.kinds, std::back_inserter(kinds), robustness::find_disturbance);
   for (const robustness::Disturbance* const how : kinds) {
-    for (OpenedSequence& opened : ranking) {
+    for (const OpenedSequence& opened : ranking) {
       if (Status status = add_sequence(request, opened, how, plan); !status) {
         return status;
       }
@@ -222,12 +212,11 @@ Status add_sequences(const SearchRequest& request, SearchPlan& plan) {
   if (!request.held_out_dir) {
     return {};
   }
-  Expected<KittiSequence> sequence = open_sequence(request, *request.held_out_dir, true);
-  if (!sequence) {
-    return sequence.error();
-  }
-  OpenedSequence opened = {*request.held_out_dir, *std::move(sequence), true};
-  return add_sequence(request, opened, nullptr, plan);
+  return open_sequence(request, *request.held_out_dir, true,
+                       only.value_or(num_ranking) == num_ranking)
+      .and_then([&](const OpenedSequence& opened) {
+        return add_sequence(request, opened, nullptr, plan);
+      });
 }
 
 }  // namespace stemvo::search

@@ -2,7 +2,6 @@
 #include "search/race.hpp"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -17,10 +16,10 @@ namespace {
 
 using Candidates = std::vector<std::size_t>;  // ascending indices
 
-/// One frame through all layers of a block.
+/// One frame through the layer of a block.
 struct BlockFrame {
-  cv::Mat frame;                            ///< empty: could not be read
-  std::map<std::size_t, Channel> channels;  ///< of candidates whose layer took the frame
+  cv::Mat frame;                  ///< empty: could not be read
+  std::vector<Channel> channels;  ///< from the first filter's on; empty: the layer refused it
 };
 
 struct Race {
@@ -63,6 +62,7 @@ struct Race {
   bool is_baseline(std::size_t candidate) const {
     return plan.identity.layers[plan.candidates[candidate].layer].baseline;
   }
+  int filter_of(std::size_t candidate) const { return plan.candidates[candidate].key.filter; }
   /// Why a candidate cannot be run on a sequence; empty: it can.
   const std::string& problem(std::size_t candidate, const PlanSequence& on) const {
     return on.problems[plan.candidates[candidate].layer];
@@ -74,22 +74,18 @@ struct Race {
                : frames_at(plan.identity.rungs[rung], planned.sequence.size());
   }
 
-  /// Without what is repeated.
+  /// If all filters can be run, and without what is repeated.
   std::size_t frames_planned() const {
     const Schedule& rungs = plan.identity.rungs;
     std::size_t planned = 0;
-    std::size_t num_racing = 0;
-    for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
-      const bool races = plan.candidates[i].races;  // so many reach a rung, whoever that will be
-      const auto reached =
-          std::ranges::count_if(rungs, [&](auto& one) { return one.filters > num_racing; });
-      const std::size_t last = is_baseline(i) ? rungs.size() - 1
-                               : races        ? static_cast<std::size_t>(reached) - 1
-                                              : 0;
-      num_racing += races ? 1 : 0;
-      for (const PlanSequence& sequence : plan.sequences) {
-        planned += problem(i, sequence).empty() ? frames_to(last, sequence) : 0;
+    for (const PlanSequence& sequence : plan.sequences) {
+      std::size_t before = 0;
+      for (std::size_t rung = 0; rung < rungs.size(); ++rung) {
+        const std::size_t end = frames_to(rung, sequence);
+        planned += rungs[rung].filters * (end - before);
+        before = end;
       }
+      planned += plan.identity.count(/*baselines=*/true) * before;
     }
     return std::max(planned, frames_done);
   }
@@ -118,17 +114,15 @@ struct Race {
     return best;
   }
 
-  /// Keeps the best odometries of those that ran this rung, beside those that are still to run it.
-  void limit_kept(std::size_t rung) {
-    Candidates done;
-    Candidates waiting;
-    for (std::size_t i = 0; i < drives.size(); ++i) {
-      if (!drives[i].empty()) {
-        (find(i, rung) != nullptr ? done : waiting).push_back(i);
+  /// Of those of a block only what goes on, as far as there is room.
+  void limit_kept(std::size_t rung, const Candidates& block) {
+    auto num_kept = static_cast<std::size_t>(
+        std::ranges::count_if(drives, [](auto& one) { return !one.empty(); }));
+    for (const std::size_t candidate : block) {
+      if (is_last(rung) || !plan.candidates[candidate].races || num_kept > max_kept) {
+        drives[candidate].clear();
+        --num_kept;
       }
-    }
-    if (done.size() + waiting.size() > max_kept) {
-      best_of(done, rung, max_kept - std::min(max_kept, waiting.size()));
     }
   }
 
@@ -164,14 +158,8 @@ struct Race {
         return {};
       }
     }
-    const Status written = file.append(done);
-    for (const std::size_t candidate : block) {
-      if (is_last(rung) || !plan.candidates[candidate].races) {
-        drives[candidate].clear();
-      }
-    }
-    limit_kept(rung);
-    return written;
+    limit_kept(rung, block);
+    return file.append(done);
   }
 
   /// False: stopped before the last frame.
@@ -217,9 +205,10 @@ struct Race {
         for (int task = tasks.start; task < tasks.end; ++task) {
           if (task > 0) {
             const std::size_t candidate = running[static_cast<std::size_t>(task - 1)];
-            const auto found = now.channels.find(candidate);
+            const auto behind =
+                static_cast<std::size_t>(filter_of(candidate) - filter_of(running.front()));
             drives[candidate][sequence]->process(
-                found == now.channels.end() ? nullptr : &found->second, now.frame);
+                now.channels.empty() ? nullptr : &now.channels[behind], now.frame);
           } else if (i + 1 < frames.end) {
             next = read_frame(sequence, i + 1, running);
           }
@@ -242,28 +231,16 @@ struct Race {
       warn(frame.error().message);
       return {};
     }
-    BlockFrame read{*frame, {}};
-    const auto layer_of = [this](std::size_t one) { return plan.candidates[one].layer; };
-    for (std::size_t layer = 0; layer < plan.layers.size(); ++layer) {
-      const auto group = std::ranges::equal_range(running, layer, {}, layer_of);
-      if (group.empty()) {
-        continue;
-      }
-      const int first = plan.candidates[group.front()].key.filter;
-      const int last = plan.candidates[group.back()].key.filter;
-      auto channels = plan.layers[layer].stem.apply_range(
-          *frame, first, last + 1, frame_zoom(plan.layers[layer], sequence.camera()));
-      if (!channels) {
-        warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
-                         channels.error().message));
-        continue;
-      }
-      for (const std::size_t one : group) {
-        const int behind = plan.candidates[one].key.filter - first;
-        read.channels[one] = std::move((*channels)[static_cast<std::size_t>(behind)]);
-      }
+    const PlanLayer& layer = plan.layers[plan.candidates[running.front()].layer];
+    auto channels =
+        layer.stem.apply_range(*frame, filter_of(running.front()), filter_of(running.back()) + 1,
+                               frame_zoom(layer, sequence.camera()));
+    if (!channels) {
+      warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
+                       channels.error().message));
+      return {*frame, {}};
     }
-    return read;
+    return {*frame, *std::move(channels)};
   }
 
   void warn(const std::string& text) {

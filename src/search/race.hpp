@@ -16,7 +16,6 @@ namespace stemvo::search {
 struct PlanLayer {
   Config config;  ///< of its odometry, with the model and layer; the filter is the candidate's
   Stem stem;
-  std::size_t pass = 0;  ///< layers with the same one come from one pass over a frame
   std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
 };
 
@@ -26,6 +25,9 @@ struct PlanLayer {
   return layer.stem.frame_zoom(
       choose_upsample(config.stem.upsample, config.features.method, camera));
 }
+
+/// A path that holds in any folder.
+[[nodiscard]] std::string from_anywhere(const std::filesystem::path& path);
 
 struct Candidate {
   FilterKey key;
@@ -50,6 +52,14 @@ struct SearchPlan {
   std::size_t block = 0;                ///< filters in flight; 0: as memory allows
 };
 
+/// Each directory as it is and under each disturbance asked for, and the held-out one.
+[[nodiscard]] std::size_t num_sequences(const SearchRequest& request);
+
+/// The sequences of a plan that has its layers, and how many filters fit into memory beside each
+/// other. Errors: one that cannot be read, without ground truth, too short to rank by, or named
+/// twice; held-out frames that rank.
+[[nodiscard]] Status add_sequences(const SearchRequest& request, SearchPlan& plan);
+
 /// Errors: those of run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
@@ -59,8 +69,8 @@ struct SearchPlan {
                                           cv::Size image,
                                           std::size_t num_sequences);
 
-/// Candidates, in the order they are in, in blocks that run in lock-step: those of one pass of the
-/// stem, as far as their layer's max_in_flight allows; if the plan names a block, of so many.
+/// Candidates, in the order they are in, in blocks that run in lock-step: those of one layer, which
+/// one pass of the stem serves, as many as max_in_flight allows or as the plan asks for.
 [[nodiscard]] std::vector<std::vector<std::size_t>> cut_into_blocks(
     const SearchPlan& plan, const std::vector<std::size_t>& candidates);
 
@@ -80,7 +90,7 @@ struct SearchPlan {
 /// others behind all.
 [[nodiscard]] std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records);
 
-/// The best odometries, some 2 MB each, are kept from rung to rung; others start again.
+/// So many odometries, some 2 MB each, are kept from rung to rung; others start again.
 inline constexpr std::size_t kMaxKept = 512;
 
 /// Runs the rungs of a plan but for what is in the file, which grows as blocks end. What a filter

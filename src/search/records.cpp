@@ -15,60 +15,55 @@
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
 #include "report/metrics_keys.hpp"
-#include "search/record_check.hpp"
+#include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
 using Json = nlohmann::ordered_json;
 
-/// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order, and
-/// with numbers that fit their members.
-#define STEMVO_JSON_FROM(member) read_value(nlohmann_json_j.at(#member), nlohmann_json_t.member);
-#define STEMVO_LIST(...) __VA_ARGS__
-#define STEMVO_JSON_MEMBERS(Type, members)                                           \
-  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {                 \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, STEMVO_LIST members)) \
-  }                                                                                  \
-  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {        \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(STEMVO_JSON_FROM, STEMVO_LIST members)) \
+/// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order.
+#define STEMVO_JSON_MEMBERS(Type, ...)                                         \
+  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {           \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, __VA_ARGS__))   \
+  }                                                                            \
+  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {  \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, __VA_ARGS__)) \
   }
 
 namespace stemvo::search {
 
-STEMVO_JSON_MEMBERS(FilterKey, (model, layer, filter, features))
+STEMVO_JSON_MEMBERS(FilterKey, model, layer, filter, features)
 STEMVO_JSON_MEMBERS(DriveScore,
-                    (sequence,
-                     frames,
-                     detected,
-                     reason,
-                     t_rel_percent,
-                     r_rel_deg_per_100m,
-                     average_offset_m,
-                     E_t_m,
-                     E_r_deg,
-                     inliers,
-                     tracked,
-                     early_error_percent,
-                     dense_t_percent,
-                     block,
-                     path_xz_m))
+                    sequence,
+                    frames,
+                    detected,
+                    reason,
+                    t_rel_percent,
+                    r_rel_deg_per_100m,
+                    average_offset_m,
+                    E_t_m,
+                    E_r_deg,
+                    inliers,
+                    tracked,
+                    early_error_percent,
+                    dense_t_percent,
+                    block,
+                    path_xz_m)
 /// Beside those of its key.
-STEMVO_JSON_MEMBERS(FilterRecord, (rung, filter_frames, held_out_filter_frames, drives, held_out))
-STEMVO_JSON_MEMBERS(Rung, (frame_share, filters))
-STEMVO_JSON_MEMBERS(LayerIdentity,
-                    (model, layer, features, first, last, hash, sampling_px, stem_model, baseline))
-STEMVO_JSON_MEMBERS(SequenceIdentity,
-                    (name,
-                     held_out,
-                     disturbance,
-                     first_frame,
-                     num_frames,
-                     frames,
-                     calibration,
-                     ground_truth,
-                     directory))
+STEMVO_JSON_MEMBERS(FilterRecord, rung, filter_frames, held_out_filter_frames, drives, held_out)
+STEMVO_JSON_MEMBERS(Rung, frame_share, filters)
 STEMVO_JSON_MEMBERS(
-    SearchIdentity,
-    (stemvo_search, program, configuration, rungs, layers, sequences, only_sequence))
+    LayerIdentity, model, layer, features, first, last, hash, sampling_px, stem_model, baseline)
+STEMVO_JSON_MEMBERS(SequenceIdentity,
+                    name,
+                    held_out,
+                    disturbance,
+                    first_frame,
+                    num_frames,
+                    frames,
+                    calibration,
+                    ground_truth,
+                    directory)
+STEMVO_JSON_MEMBERS(SearchIdentity, program, configuration, rungs, layers, sequences, only_sequence)
 
 namespace {
 
@@ -130,50 +125,37 @@ std::vector<Fact> facts_of(const SearchIdentity& identity, bool as_part) {
   return facts;
 }
 
-/// Bytes of a file name that are not UTF-8 become the replacement character.
-std::string line_of(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+/// One line: bytes of a file name that are not UTF-8 become the replacement character.
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-bool is_same(const FilterRecord& a, const FilterRecord& b) {
-  return a.drives == b.drives && a.held_out == b.held_out;
+/// A line of the file; `first_line`: what is in the first one, for the others.
+std::string sealed(const std::string& text, const std::string& first_line) {
+  return fmt::format(R"({{"sha256":"{}","of":{}}})", internal::sha256_hex(first_line + text), text);
 }
 
-/// Error: none of the search, or another than an earlier line's.
-Status add_record(const FilterRecord& record, SearchRecords& records) {
-  if (Status status = check_record(record, records.identity); !status) {
-    return status;
+/// What is in it. Error, without file and line: no search wrote it.
+Expected<std::string> unsealed(const std::string& line, const std::string& first_line) {
+  static const std::size_t kBefore = sealed("", "").size() - 1;
+  const std::string text =
+      line.size() > kBefore ? line.substr(kBefore, line.size() - kBefore - 1) : std::string();
+  if (line != sealed(text, first_line)) {
+    return fail("expected a line as this version of stemvo wrote it, found another one");
   }
-  const auto [there, is_new] = records.records.insert(record);
-  return is_new || is_same(*there, record)
-             ? Status()
-             : Status(fail(
-                   fmt::format("expected {} once, found another result", to_string(record.key))));
+  return text;
 }
 
-/// The first line is the identity. Error without the file: not JSON, a key missing or of another
-/// type, another format.
-Status parse_line(const std::string& line, bool is_first, SearchRecords& records) {
-  try {
-    const Json json = Json::parse(line);
-    if (!is_first) {
-      FilterRecord record = json.get<FilterRecord>();
-      json.get_to(record.key);
-      return add_record(record, records);
-    }
-    int format = 0;
-    read_value(json.at("stemvo_search"), format);
-    if (format == records.identity.stemvo_search) {
-      json.get_to(records.identity);
-      return check_identity(records.identity);
-    }
-    return fail(fmt::format("expected records of format {}, found {}",
-                            records.identity.stemvo_search, format));
-  } catch (const Json::exception& error) {
-    return fail(fmt::format("expected {}, found: {}",
-                            is_first ? "the identity of a search" : "the record of a filter",
-                            error.what()));
+void add_line(const std::string& text, SearchRecords& records) {
+  const Json json = Json::parse(text);
+  if (records.first_line.empty()) {
+    json.get_to(records.identity);
+    records.first_line = text;
+    return;
   }
+  FilterRecord record = json.get<FilterRecord>();
+  json.get_to(record.key);
+  records.records.insert(record);
 }
 
 }  // namespace
@@ -244,12 +226,13 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   std::size_t line_number = 0;
   for (std::size_t end = 0; (end = text->find('\n', begin)) != text->npos; begin = end + 1) {
     ++line_number;
-    const Status parsed = parse_line(text->substr(begin, end - begin), line_number == 1, records);
-    if (parsed) {
+    const auto line = unsealed(text->substr(begin, end - begin), records.first_line);
+    if (line) {
+      add_line(*line, records);
       continue;
     }
     const std::string problem =
-        fmt::format("{}: {}", at_line(file, line_number), parsed.error().message);
+        fmt::format("{}: {}", at_line(file, line_number), line.error().message);
     if (line_number == 1) {
       return fail(problem);
     }
@@ -291,7 +274,9 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
     return fail(fmt::format("{}: cannot be written: {}", file.string(),
                             std::generic_category().message(errno)));
   }
-  const Status written = opened.write(is_new ? line_of(identity) : std::string());
+  opened.first_line_ = is_new ? text_of(identity) : before->first_line;
+  const Status written =
+      opened.write(is_new ? sealed(opened.first_line_, "") + '\n' : std::string());
   return written ? Expected<RecordFile>(opened) : written.error();
 }
 
@@ -301,7 +286,7 @@ Status RecordFile::append(const std::vector<FilterRecord>& records) {
   for (const FilterRecord& record : records) {
     Json json = record.key;
     to_json(json, record);
-    text += line_of(json);
+    text += sealed(text_of(json), first_line_) + '\n';
   }
   return write(text);
 }

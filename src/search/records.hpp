@@ -22,8 +22,9 @@
 #include "evaluation/trajectory.hpp"
 #include "search/search.hpp"
 
-/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line. Members
-/// of what is in it are called like their keys.
+/// records.jsonl: the identity of a search in the first line, then a FilterRecord a line, each
+/// under a hash of it and of the first line: a line that was changed, or is another search's, is
+/// none. Members of what is in it are called like their keys.
 namespace stemvo::search {
 
 inline constexpr const char* kRecordsFile = "records.jsonl";
@@ -123,7 +124,6 @@ struct SequenceIdentity {
 
 /// Everything that the records depend on.
 struct SearchIdentity {
-  int stemvo_search = 4;      ///< the format
   std::string program;        ///< hash
   std::string configuration;  ///< YAML of every key, without the model
   Schedule rungs;             ///< of the filters; the baselines are outside
@@ -149,12 +149,13 @@ struct SearchIdentity {
 
 struct SearchRecords {
   SearchIdentity identity;
+  std::string first_line;  ///< the identity's text
   FilterRecords records;
   std::size_t num_good_bytes = 0;     ///< up to the last whole line; a kill may tear the next
   std::vector<std::string> warnings;  ///< lines that are no record of the search, and left out
 };
 
-/// Reads all whole lines. Errors: not there, the first line is no identity, another format.
+/// Reads all whole lines. Errors: not there, the first line is no identity of this version.
 [[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file);
 
 /// Records that grow, on the disk when append() returns. A second writer of a file is an error.
@@ -176,6 +177,7 @@ class RecordFile {
 
   std::filesystem::path file_;
   std::shared_ptr<std::FILE> stream_;
+  std::string first_line_;
   FilterRecords records_;
   std::vector<std::string> warnings_;
 };
@@ -212,15 +214,21 @@ struct FilterRow : FilterRecord {
 [[nodiscard]] std::string format_csv(const SearchIdentity& identity,
                                      const std::vector<FilterRow>& rows);
 
+/// What is written to a folder, where named models are found, and the command that repeats the
+/// search, which may be empty.
+struct ResultsTarget {
+  std::filesystem::path out_dir;
+  std::filesystem::path models_dir;
+  std::string command = {};
+};
+
 /// Ranks the records and writes the files of run_search, of which filters.json says what was
 /// searched, how, and the work it took; without sheet.png, with a warning, where frames or models
-/// are not where they were. `command`, which may be empty, is for report.html. Where records are
-/// missing the search was interrupted. Of a part with one sequence nothing is written.
-[[nodiscard]] Expected<SearchReport> write_results(const std::filesystem::path& out_dir,
-                                                   const std::filesystem::path& models_dir,
-                                                   const SearchIdentity& identity,
+/// are not where they were. Where records are missing the search was interrupted. Of a part with
+/// one sequence nothing is written.
+[[nodiscard]] Expected<SearchReport> write_results(const SearchIdentity& identity,
                                                    const FilterRecords& records,
-                                                   const std::string& command);
+                                                   const ResultsTarget& target);
 
 /// Best, median and worst of the filters whose pose was detected, those that halving stopped behind
 /// the others, the later the better; the same filter once. Then the baselines, by rank.
@@ -228,10 +236,8 @@ using ShownFilters = std::vector<std::pair<std::string_view, const FilterRow*>>;
 [[nodiscard]] ShownFilters choose_rows(const SearchIdentity& identity,
                                        const std::vector<FilterRow>& rows);
 
-/// What is written to a folder, and where named models are found.
 struct Results {
-  std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
+  ResultsTarget target;
   SearchIdentity identity;
   Config config;  ///< of all rows
   std::vector<FilterRow> rows;
@@ -244,14 +250,10 @@ struct Pictures {
 /// Error: the sequence or a model is not where it was.
 [[nodiscard]] Expected<Pictures> draw_pictures(const Results& results);
 
-struct PageTexts {
-  std::string table;    ///< as the program prints it
-  std::string command;  ///< that repeats the search; may be empty
-};
-/// report.html. Error: it cannot be written.
+/// report.html; `table`: as the program prints it. Error: it cannot be written.
 [[nodiscard]] Status write_page(const Results& results,
                                 const Pictures& pictures,
-                                const PageTexts& texts);
+                                const std::string& table);
 
 void to_json(nlohmann::ordered_json& json, const FilterKey& key);
 void to_json(nlohmann::ordered_json& json, const DriveScore& score);

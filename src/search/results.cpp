@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <set>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -25,23 +25,20 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// A number of a DriveScore: its key, its decimals in filters.csv, its column in the table for
-/// people.
+/// A number of a DriveScore: its key, and its decimals in filters.csv.
 struct ScoreNumber {
   const char* key;
   std::optional<double> DriveScore::* value;
-  int csv_decimals;
-  const char* title;
   int decimals;
 };
 constexpr std::array<ScoreNumber, 7> kScoreNumbers = {{
-    {"t_rel_percent", &DriveScore::t_rel_percent, 4, "t_rel %", 3},
-    {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m, 4, "r_rel deg/100m", 3},
-    {"average_offset_m", &DriveScore::average_offset_m, 4, "offset m", 2},
-    {"E_t_m", &DriveScore::E_t_m, 4, "E_t m", 3},
-    {"E_r_deg", &DriveScore::E_r_deg, 4, "E_r deg", 3},
-    {"inliers", &DriveScore::inliers, 1, "inliers", 0},
-    {"tracked", &DriveScore::tracked, 4, "tracked %", 1},
+    {"t_rel_percent", &DriveScore::t_rel_percent, 4},
+    {"r_rel_deg_per_100m", &DriveScore::r_rel_deg_per_100m, 4},
+    {"average_offset_m", &DriveScore::average_offset_m, 4},
+    {"E_t_m", &DriveScore::E_t_m, 4},
+    {"E_r_deg", &DriveScore::E_r_deg, 4},
+    {"inliers", &DriveScore::inliers, 1},
+    {"tracked", &DriveScore::tracked, 4},
 }};
 
 constexpr const char* kStatusWords[] = {"ranked", "stopped", "not detected"};
@@ -49,77 +46,26 @@ std::string word_for(FilterStatus status) { return kStatusWords[static_cast<int>
 
 /// Frames times filters, and what was run again after a kill: of the filters, of all on the
 /// held-out sequence, of the baselines, and of an exhaustive search of all filters that can run.
-Json work_of(const SearchIdentity& identity, const FilterRecords& records) {
+Json work_of(const SearchIdentity& identity,
+             const FilterRecords& records,
+             const std::vector<FilterRow>& rows) {
   std::size_t done = 0;
   std::size_t held_out = 0;
   std::size_t baselines = 0;
   std::size_t exhaustive = 0;
-  std::set<std::pair<const LayerIdentity*, std::string>> impossible;  // layer and sequence
   for (const FilterRecord& record : records) {
-    const LayerIdentity& layer = identity.layer_of(record.key);
-    (layer.baseline ? baselines : done) += record.filter_frames;
+    (identity.layer_of(record.key).baseline ? baselines : done) += record.filter_frames;
     held_out += record.held_out_filter_frames;
-    for (const DriveScore& drive : record.drives) {
-      if (drive.frames == 0) {
-        impossible.emplace(&layer, drive.sequence);
-      }
-    }
   }
-  for (const SequenceIdentity& sequence : identity.sequences) {
-    for (const LayerIdentity& layer : identity.layers) {
-      if (!sequence.held_out && !layer.baseline && !impossible.contains({&layer, sequence.name})) {
-        exhaustive += sequence.num_frames * layer.size();
-      }
+  for (const FilterRow& row : rows) {
+    for (std::size_t i = 0; i < row.drives.size() && !identity.layer_of(row.key).baseline; ++i) {
+      exhaustive += row.drives[i].frames > 0 ? identity.sequences[i].num_frames : 0;
     }
   }
   return {{"filter_frames", done},
           {"held_out_filter_frames", held_out},
           {"baseline_filter_frames", baselines},
           {"exhaustive_filter_frames", exhaustive}};
-}
-
-/// "1.07 0.95-1.20"; without an interval where the drives are too short for one.
-std::string over_best(const FilterRow& row) {
-  const ErrorRatio& ratio = row.over_best;
-  return std::isfinite(ratio.high)
-             ? fmt::format("{:.2f} {:.2f}-{:.2f}", ratio.ratio, ratio.low, ratio.high)
-             : fmt::format("{:.2f} -", ratio.ratio);
-}
-
-std::string format_table(const std::vector<FilterRow>& rows) {
-  const bool has_held_out =
-      std::ranges::any_of(rows, [](const FilterRow& row) { return row.held_out.has_value(); });
-  TextTable table("rllrlrrrrrrrrrrl");
-  std::vector<std::string> cells = {"", "model", "layer", "filter", "by"};
-  std::ranges::transform(kScoreNumbers, std::back_inserter(cells), &ScoreNumber::title);
-  cells.insert(cells.end(), {"over best", "frames", has_held_out ? "held out t_rel %" : "", ""});
-  table.add(cells);
-  table.rule();
-  int rank = 0;
-  for (const FilterRow& row : rows) {
-    DriveScore mean = row.mean;
-    std::string remark = row.status == FilterStatus::kStopped ? "stopped" : "";
-    if (row.status == FilterStatus::kNotDetected) {
-      mean.t_rel_percent.reset();
-      mean.r_rel_deg_per_100m.reset();
-      remark = "pose not detected: " + mean.reason;
-    }
-    if (mean.tracked) {
-      *mean.tracked *= 100.0;
-    }
-    cells = {row.status == FilterStatus::kRanked ? std::to_string(++rank) : "", row.key.model,
-             row.key.layer, std::to_string(row.key.filter), row.key.features};
-    for (const ScoreNumber& number : kScoreNumbers) {
-      cells.push_back(number_or_dash(mean.*number.value, number.decimals));
-    }
-    const bool is_known = row.held_out && row.held_out->detected;
-    cells.insert(
-        cells.end(),
-        {row.status == FilterStatus::kRanked ? over_best(row) : "", std::to_string(mean.frames),
-         is_known ? number_or_dash(row.held_out->t_rel_percent, 3) : "", remark});
-    table.add(cells);
-  }
-  return table.str();
 }
 
 /// A column's name, and what the row has there.
@@ -133,7 +79,7 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
                                  {"status", word_for(row.status)}};
   const auto add = [&](const std::string& name, const ScoreNumber& number, const DriveScore& of) {
     const std::optional<double>& value = of.*number.value;
-    columns.emplace_back(name, value ? fmt::format("{:.{}f}", *value, number.csv_decimals) : "");
+    columns.emplace_back(name, value ? fmt::format("{:.{}f}", *value, number.decimals) : "");
   };
   for (const ScoreNumber& number : kScoreNumbers) {
     add(number.key, number, row.mean);
@@ -164,6 +110,47 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
   }
   columns.emplace_back("reason", row.mean.reason);
   return columns;
+}
+
+/// Those columns of filters.csv that tell filters apart, for people: numbers to the right.
+std::string format_table(const SearchIdentity& identity, const std::vector<FilterRow>& rows) {
+  static const std::map<std::string, char> kShown = {{"model", 'l'},
+                                                     {"layer", 'l'},
+                                                     {"filter", 'r'},
+                                                     {"features", 'l'},
+                                                     {"status", 'l'},
+                                                     {"t_rel_percent", 'r'},
+                                                     {"r_rel_deg_per_100m", 'r'},
+                                                     {"inliers", 'r'},
+                                                     {"tracked", 'r'},
+                                                     {"over_best", 'r'},
+                                                     {"over_best_low", 'r'},
+                                                     {"over_best_high", 'r'},
+                                                     {"frames", 'r'},
+                                                     {"held_out_t_rel_percent", 'r'},
+                                                     {"reason", 'l'}};
+  const auto cells_of = [&](std::string rank, const FilterRow& row, std::string Column::* part) {
+    std::vector<std::string> cells = {std::move(rank)};
+    for (const Column& column : csv_columns(identity, row)) {
+      if (kShown.contains(column.first)) {
+        cells.push_back(column.*part);
+      }
+    }
+    return cells;
+  };
+  const std::vector<std::string> head = cells_of("", FilterRow(), &Column::first);
+  std::string alignment = "r";
+  std::for_each(head.begin() + 1, head.end(),
+                [&](const std::string& name) { alignment += kShown.at(name); });
+  TextTable table(alignment);
+  table.add(head);
+  table.rule();
+  int rank = 0;
+  for (const FilterRow& row : rows) {
+    const bool is_ranked = row.status == FilterStatus::kRanked;
+    table.add(cells_of(is_ranked ? std::to_string(++rank) : "", row, &Column::second));
+  }
+  return table.str();
 }
 
 Json drive_json(const DriveScore& drive) {
@@ -217,6 +204,25 @@ std::string format_json(const Results& results, const Json& work, bool is_comple
   return to_text(json);
 }
 
+/// What stands below the table.
+std::string format_summary(const Results& results, const Json& work) {
+  const auto num_frames = work["filter_frames"].get<std::size_t>();
+  const auto num_exhaustive = work["exhaustive_filter_frames"].get<double>();
+  const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
+  const fs::path& folder = results.target.out_dir;
+  return (num_equal > 1
+              ? fmt::format("filters 1 to {} cannot be told from the best (over best: errors over "
+                            "its errors, 95 % interval)\n",
+                            num_equal)
+              : "") +
+         fmt::format(
+             "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: "
+             "{}\nreport: {}\n",
+             num_frames, 100.0 * static_cast<double>(num_frames) / std::max(num_exhaustive, 1.0),
+             work["baseline_filter_frames"].get<std::size_t>(), (folder / "filters.csv").string(),
+             (folder / "report.html").string());
+}
+
 /// best.yaml: what repeats the first row.
 std::string format_best(const Results& results) {
   const FilterRow& best = results.rows.front();
@@ -231,6 +237,30 @@ std::string format_best(const Results& results) {
       version(), to_string(best.key), best.mean.t_rel_percent.value_or(0.0),
       results.identity.rungs.size() > 1 ? " (successive halving)" : "", config.stem.model,
       config.stem.layer, config.stem.filter, dump_config(config));
+}
+
+/// All but config.yaml.
+Status write_files(const Results& results, SearchReport& report) {
+  const fs::path& folder = results.target.out_dir;
+  std::vector<std::pair<const char*, std::string>> files = {
+      {"filters.csv", format_csv(results.identity, results.rows)}, {"filters.json", report.json}};
+  if (!results.rows.empty() && results.rows.front().status == FilterStatus::kRanked) {
+    files.emplace_back("best.yaml", format_best(results));
+  }
+  for (const auto& [name, text] : files) {
+    if (const Status status = write_text_file(folder / name, text); !status) {
+      return status;
+    }
+  }
+  const Expected<Pictures> pictures = draw_pictures(results);
+  if (!pictures) {
+    report.warnings.push_back("no sheet.png: " + pictures.error().message);
+  } else if (!pictures->sheet.empty()) {
+    if (const Status status = write_image(folder / "sheet.png", pictures->sheet); !status) {
+      return status;
+    }
+  }
+  return write_page(results, pictures ? *pictures : Pictures(), report.text);
 }
 
 }  // namespace
@@ -250,12 +280,9 @@ std::string format_csv(const SearchIdentity& identity, const std::vector<FilterR
   return text;
 }
 
-Expected<SearchReport> write_results(const fs::path& out_dir,
-                                     const fs::path& models_dir,
-                                     const SearchIdentity& identity,
+Expected<SearchReport> write_results(const SearchIdentity& identity,
                                      const FilterRecords& records,
-                                     const std::string& command) {
-  const Json work = work_of(identity, records);
+                                     const ResultsTarget& target) {
   const auto num_done = std::ranges::count(records, identity.rungs.size() - 1, &FilterRecord::rung);
   SearchReport report;
   report.interrupted =
@@ -267,7 +294,7 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
     report.json = to_text({{"part", true}, {"filters", identity.num_rows()}});
     return report;
   }
-  const fs::path config_file = out_dir / "config.yaml";
+  const fs::path config_file = target.out_dir / "config.yaml";
   const Expected<Config> config =
       write_text_file(config_file, identity.configuration).and_then([&] {
         return load_config(config_file);
@@ -275,49 +302,14 @@ Expected<SearchReport> write_results(const fs::path& out_dir,
   if (!config) {
     return config.error();
   }
-  const Results results = {out_dir, models_dir, identity, *config, rank_filters(identity, records)};
+  const Results results = {target, identity, *config, rank_filters(identity, records)};
+  const Json work = work_of(identity, records, results.rows);
   report.json = format_json(results, work, !report.interrupted);
-  std::vector<std::pair<const char*, std::string>> files = {
-      {"filters.csv", format_csv(identity, results.rows)}, {"filters.json", report.json}};
-  if (!results.rows.empty() && results.rows.front().status == FilterStatus::kRanked) {
-    files.emplace_back("best.yaml", format_best(results));
+  report.text = format_table(identity, results.rows);
+  if (const Status written = write_files(results, report); !written) {
+    return written.error();
   }
-  for (const auto& [name, text] : files) {
-    if (const Status status = write_text_file(out_dir / name, text); !status) {
-      return status.error();
-    }
-  }
-  report.text = format_table(results.rows);
-  const Expected<Pictures> pictures = draw_pictures(results);
-  if (!pictures) {
-    report.warnings.push_back("no sheet.png: " + pictures.error().message);
-  } else if (!pictures->sheet.empty()) {
-    if (const Status status = write_image(out_dir / "sheet.png", pictures->sheet); !status) {
-      return status.error();
-    }
-  }
-  const Status page =
-      write_page(results, pictures ? *pictures : Pictures(), {report.text, command});
-  if (!page) {
-    return page.error();
-  }
-  const auto num_frames = work["filter_frames"].get<std::size_t>();
-  const auto num_exhaustive = work["exhaustive_filter_frames"].get<std::size_t>();
-  const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
-  if (num_equal > 1) {
-    report.text += fmt::format(
-        "filters 1 to {} cannot be told from the best (over best: errors over its errors, 95 % "
-        "interval)\n",
-        num_equal);
-  }
-  report.text += fmt::format(
-      "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: {}\nreport: "
-      "{}\n",
-      num_frames,
-      100.0 * static_cast<double>(num_frames) /
-          static_cast<double>(std::max<std::size_t>(num_exhaustive, 1)),
-      work["baseline_filter_frames"].get<std::size_t>(), (out_dir / "filters.csv").string(),
-      (out_dir / "report.html").string());
+  report.text += format_summary(results, work);
   return report;
 }
 

@@ -139,8 +139,8 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!warnings) {
     return warnings.error();
   }
-  auto report = write_results(request.out_dir, request.models_dir, plan->identity,
-                              records->records(), request.command);
+  auto report = write_results(plan->identity, records->records(),
+                              {request.out_dir, request.models_dir, request.command});
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
     report->warnings.insert(report->warnings.begin(), records->warnings().begin(),
@@ -185,7 +185,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   if (!written) {
     return written.error();
   }
-  auto report = write_results(out_dir, models_dir, identity, *records, command);
+  auto report = write_results(identity, *records, {out_dir, models_dir, command});
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings.begin(), warnings.end());
   }

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: MIT
-// metrics.json, read and written again.
+// metrics.json, held against thresholds.
+#include <string_view>
+
 #include "fuzz_input.hpp"
-#include "report/metrics_json.hpp"
+#include "report/check.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace stemvo;
-  const fuzz::InputFile file(data, size);
-  const auto report = read_metrics_json(file.path());
-  fuzz::expect_said(report);
-  if (report) {
-    (void)format_metrics_table(*report);
+  constexpr std::string_view kThresholds = "frames: {min: 1}\nate_rmse_m.none: {max: 1.5}\n";
+  const fuzz::InputFile thresholds(reinterpret_cast<const std::uint8_t*>(kThresholds.data()),
+                                   kThresholds.size());
+  const fuzz::InputFile metrics(data, size);
+  const auto results = check_metrics(metrics.path(), thresholds.path());
+  fuzz::expect_said(results);
+  if (results) {
+    fuzz::expect(results->size() == 2 && !format_check_table(*results).empty(), "a row per bound");
   }
   return 0;
 }

@@ -73,7 +73,7 @@ TEST_F(SearchRace, OnePassServesAllFiltersUnlessABlockIsAskedFor) {
   EXPECT_EQ(table("four"), table("whole"));
 }
 
-TEST_F(SearchRace, OnlyTheBestAreKeptInMemoryAndTheTableIsTheSame) {
+TEST_F(SearchRace, HoweverManyAreKeptInMemoryTheTableIsTheSame) {
   const Outcome all = race("all", kMaxKept);
   ASSERT_NE(all.table.find(",stopped,"), std::string::npos);
   std::size_t more_work = all.filter_frames;
@@ -81,9 +81,10 @@ TEST_F(SearchRace, OnlyTheBestAreKeptInMemoryAndTheTableIsTheSame) {
   for (const std::size_t max_kept : {5U, 2U, 0U}) {
     const Outcome some = race("kept" + std::to_string(max_kept), max_kept);
     EXPECT_EQ(some.table, all.table) << max_kept;
-    EXPECT_GT(some.filter_frames, more_work) << max_kept;
+    EXPECT_GE(some.filter_frames, more_work) << max_kept;
     more_work = some.filter_frames;
   }
+  EXPECT_GT(more_work, all.filter_frames);
 }
 
 TEST_F(SearchRace, StoppedAndGoneOnWithHalvingGivesTheSameTable) {

@@ -40,7 +40,7 @@ TEST_F(Search, KilledAndResumedGivesTheSameBytes) {
   EXPECT_EQ(table("killed"), table("whole"));
 }
 
-/// 16 filters and 4 baselines are two blocks of the default size.
+/// 16 filters, gray, and R, G and B are three blocks of the default size.
 TEST_F(Search, KilledWithTheDefaultBlockKeepsTheBlocksThatEnded) {
   const Words asked = {"--exhaustive", "--threads", "1"};
   ASSERT_EQ(search("whole", asked).exit_code, 0);
@@ -107,7 +107,7 @@ TEST_F(Search, ADamagedRecordIsNamedAndRunAgain) {
   resumed.emplace_back("--resume");
   const ProgramResult result = search("out", resumed);
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, StartsWith("warning: " + records.string() + ":3: expected a rung"));
+  EXPECT_THAT(result.err, StartsWith("warning: " + records.string() + ":3: expected a line"));
   EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
   EXPECT_EQ(table("out"), whole);
 }

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "support/temp_folder.hpp"
 
@@ -135,28 +136,27 @@ TEST(TumTrajectory, ComesBackAsItWasWritten) {
     times_s.push_back(0.1036224 * static_cast<double>(i));
   }
   ASSERT_TRUE(write_tum_trajectory(folder / "tum.txt", times_s, poses));
-  const Expected<TimedTrajectory> found = read_tum_trajectory(folder / "tum.txt");
+  const Expected<PoseFile> found = read_pose_file(folder / "tum.txt");
   ASSERT_TRUE(found) << found.error().message;
-  expect_near(found->world_from_camera, poses, 1e-8);
+  expect_near(found->poses, poses, 1e-8);
   EXPECT_THAT(found->timestamps_s, ::testing::Pointwise(::testing::DoubleNear(1e-9), times_s));
 }
 
 TEST(TumTrajectory, SkipsCommentsAndBlankLinesButCountsThem) {
   const TempFolder folder;
   const auto good = folder.file("a.txt", "# t x y z\n\n1.5 1 2 3 0 0 0 1 # here\n");
-  const Expected<TimedTrajectory> found = read_tum_trajectory(good);
+  const Expected<PoseFile> found = read_pose_file(good);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_EQ(found->timestamps_s, std::vector<double>{1.5});
-  EXPECT_EQ(found->world_from_camera[0].translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(found->poses[0].translation, Eigen::Vector3d(1, 2, 3));
 
-  const auto bad = read_tum_trajectory(folder.file("b.txt", "# t x y z\n\n1.5 1 2 3 0 0 1\n"));
+  const auto bad = read_pose_file(folder.file("b.txt", "# t x y z\n\n1.5 1 2 3 0 0 1\n"));
   ASSERT_FALSE(bad);
   EXPECT_THAT(bad.error().message, HasSubstr("b.txt:3: expected 8 numbers, found 7"));
-  const auto long_q =
-      read_tum_trajectory(folder.file("c.txt", "1 1 2 3 0 0 0 1\n1 1 2 3 0 0 1 1\n"));
+  const auto long_q = read_pose_file(folder.file("c.txt", "1 1 2 3 0 0 0 1\n1 1 2 3 0 0 1 1\n"));
   ASSERT_FALSE(long_q);
   EXPECT_THAT(long_q.error().message, HasSubstr("c.txt:2: expected a quaternion of length 1"));
-  EXPECT_FALSE(read_tum_trajectory(folder.file("d.txt", "# nothing\n")));
+  EXPECT_FALSE(read_pose_file(folder.file("d.txt", "# nothing\n")));
 }
 
 TEST(RelativeToFirst, StartsAtTheIdentityAndKeepsTheMotions) {

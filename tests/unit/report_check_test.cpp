@@ -36,11 +36,12 @@ TEST(Check, PassesWhatIsWithinItsBounds) {
   ASSERT_EQ(results->size(), 5U);
   EXPECT_TRUE(all_passed(*results));
   EXPECT_EQ((*results)[0].key, "t_rel_percent");
-  EXPECT_EQ((*results)[0].bound, "<= 1");
-  EXPECT_EQ((*results)[0].value, "0.83");
-  EXPECT_EQ((*results)[1].bound, ">= 0.99");
+  EXPECT_TRUE((*results)[0].is_max);
+  EXPECT_EQ((*results)[0].limit, 1.0);
+  EXPECT_EQ((*results)[0].number, 0.83);
+  EXPECT_FALSE((*results)[1].is_max);
   EXPECT_EQ((*results)[3].key, "ate_rmse_m.none");
-  EXPECT_EQ((*results)[3].value, "2.5");
+  EXPECT_EQ((*results)[3].number, 2.5);
 }
 
 TEST(Check, FailsWhatIsBeyondABound) {
@@ -57,7 +58,8 @@ TEST(Check, FailsAMetricThatIsNull) {
       check("r_rel_deg_per_100m: {max: 100}\ngone.none: {max: 100}\nt_rel_percent: {max: 1}\n");
   ASSERT_TRUE(results) << results.error().message;
   EXPECT_FALSE((*results)[0].passed);
-  EXPECT_EQ((*results)[0].value, "null");
+  EXPECT_FALSE((*results)[0].number);
+  EXPECT_THAT(format_check_table(*results), ::testing::ContainsRegex("100m +null +<= 100 +FAILED"));
   EXPECT_FALSE((*results)[1].passed);
   EXPECT_TRUE((*results)[2].passed);
 }
@@ -66,7 +68,7 @@ TEST(Check, ShowsTheDigitsThatDecide) {
   const auto results = check("t_rel_percent: {max: 0.83}\n", R"({"t_rel_percent": 0.8300000001})");
   ASSERT_TRUE(results);
   EXPECT_FALSE(results->front().passed);
-  EXPECT_EQ(results->front().value, "0.8300000001");
+  EXPECT_THAT(format_check_table(*results), HasSubstr("0.8300000001"));
 }
 
 TEST(Check, TableNamesValueBoundAndResult) {

@@ -103,44 +103,6 @@ TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   EXPECT_EQ(json["frames"], 200);
 }
 
-TEST(MetricsJson, IsReadBackAsItWasWritten) {
-  const TempFolder folder;
-  MetricsReport without_truth = example();
-  without_truth.metrics.reset();
-  without_truth.refined.reset();
-  without_truth.road_measured_fraction.reset();
-  for (const MetricsReport& report : {example(), without_truth}) {
-    ASSERT_TRUE(write_metrics_json(folder / "a.json", report));
-    const Expected<MetricsReport> read = read_metrics_json(folder / "a.json");
-    ASSERT_TRUE(read) << read.error().message;
-    ASSERT_TRUE(write_metrics_json(folder / "b.json", *read));
-    EXPECT_EQ(read_all(folder / "a.json"), read_all(folder / "b.json"));
-  }
-  for (const char* text : {"{}", "[1]", "no json", "{\"stemvo_version\": 3}"}) {
-    const Expected<MetricsReport> read = read_metrics_json(folder.file("broken.json", text));
-    ASSERT_FALSE(read) << text;
-    EXPECT_THAT(read.error().message, HasSubstr("broken.json: expected the metrics of a run"));
-  }
-  EXPECT_FALSE(read_metrics_json(folder / "nothing.json"));
-}
-
-TEST(MetricsJson, WholeNumbersAreWholeAndInRange) {
-  const TempFolder folder;
-  ASSERT_TRUE(write_metrics_json(folder / "a.json", example()));
-  nlohmann::json json = nlohmann::json::parse(read_all(folder / "a.json"));
-  const nlohmann::json good = json;
-  for (const char* key : {"first_frame", "filter", "segments"}) {
-    for (const nlohmann::json& value : {nlohmann::json(1e300), nlohmann::json(-1e300),
-                                        nlohmann::json(1.5), nlohmann::json("1")}) {
-      json = good;
-      json[key] = value;
-      const auto read = read_metrics_json(folder.file("odd.json", json.dump()));
-      ASSERT_FALSE(read) << key << " " << value;
-      EXPECT_THAT(read.error().message, HasSubstr("expected a whole number in range, found "));
-    }
-  }
-}
-
 TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();

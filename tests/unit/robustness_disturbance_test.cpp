@@ -51,6 +51,10 @@ double distance(const cv::Mat& a, const cv::Mat& b) {
   return cv::norm(a, b, cv::NORM_L1) / static_cast<double>(a.total());
 }
 
+void apply(std::string_view name, cv::Mat& image, double strength, const EffectContext& context) {
+  find_disturbance(name)->apply(image, strength, context);
+}
+
 class EachDisturbance : public ::testing::TestWithParam<Disturbance> {
  protected:
   [[nodiscard]] static const Disturbance& kind() { return GetParam(); }
@@ -129,7 +133,7 @@ TEST(Disturbances, RandomOnesDependOnSeedAndFrame) {
   cv::Mat image(40, 60, CV_8UC1, cv::Scalar(100));
   const auto noisy = [&](std::size_t frame, std::uint64_t seed) {
     cv::Mat result = image.clone();
-    effects::sensor_noise(result, 10.0, {frame, seed, {}});
+    apply("sensor_noise", result, 10.0, {frame, seed, {}});
     return result;
   };
   EXPECT_GT(distance(noisy(1, 1), noisy(2, 1)), 5.0);
@@ -145,7 +149,7 @@ TEST(Disturbances, RandomOnesDependOnSeedAndFrame) {
 TEST(Disturbances, DuskHasPhotonNoise) {
   const auto noise_over_signal = [](int gray, double light) {
     cv::Mat image(200, 200, CV_8UC1, cv::Scalar(gray));
-    effects::dusk(image, light, {50, 1, {}});
+    apply("dusk", image, light, {50, 1, {}});
     cv::Scalar mean;
     cv::Scalar deviation;
     cv::meanStdDev(image, mean, deviation);
@@ -159,7 +163,7 @@ TEST(Disturbances, DuskHasPhotonNoise) {
 /// What is red stays red: a JPEG of the colours swapped has other brightness.
 TEST(Disturbances, JpegKeepsColours) {
   cv::Mat image(64, 64, CV_8UC3, cv::Scalar(200, 40, 20));
-  effects::jpeg(image, 30.0, {});
+  apply("jpeg", image, 30.0, {0, 0, {}});
   const cv::Scalar mean = cv::mean(image);
   EXPECT_NEAR(mean[0], 200.0, 4.0);
   EXPECT_NEAR(mean[1], 40.0, 4.0);

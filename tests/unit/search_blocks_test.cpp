@@ -11,7 +11,6 @@ using ::testing::ElementsAre;
 struct LayerShape {
   std::size_t filters = 0;
   std::size_t max_in_flight = 0;
-  std::size_t pass = 0;
 };
 
 /// The sizes of the blocks of these layers.
@@ -22,7 +21,7 @@ std::vector<std::size_t> sizes(const std::vector<LayerShape>& layers, std::size_
   for (const LayerShape& layer : layers) {
     StemOptions gray;
     gray.model = "gray";
-    plan.layers.push_back({Config(), Stem::create(gray).value(), layer.pass, layer.max_in_flight});
+    plan.layers.push_back({Config(), Stem::create(gray).value(), layer.max_in_flight});
     for (std::size_t i = 0; i < layer.filters; ++i) {
       all.push_back(plan.candidates.size());
       plan.candidates.push_back({.key = {}, .layer = plan.layers.size() - 1});
@@ -46,9 +45,9 @@ TEST(Blocks, AWholeLayerWhereMemoryAllows) {
   EXPECT_TRUE(sizes({}).empty());
 }
 
-TEST(Blocks, OfOnePassRunTogetherAndOthersApart) {
-  EXPECT_THAT(sizes({{3, 10, 0}, {4, 10, 0}, {5, 10, 1}}), ElementsAre(7, 5));
-  EXPECT_THAT(sizes({{3, 10, 0}, {4, 10, 0}, {5, 10, 1}}, 10), ElementsAre(10, 2));
+TEST(Blocks, EachIsOfOneLayer) {
+  EXPECT_THAT(sizes({{3, 10}, {4, 10}, {5, 4}}), ElementsAre(3, 4, 4, 1));
+  EXPECT_THAT(sizes({{3, 10}, {4, 10}}, 3), ElementsAre(3, 3, 1));
 }
 
 TEST(Blocks, LargerImagesAndMoreSequencesTakeMore) {
