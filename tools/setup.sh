@@ -216,6 +216,13 @@ if [[ "${1:-}" == fuzz ]]; then
   install_packages
   exit
 fi
+# An empty Debian, for the test that installs the package there.
+if [[ "${1:-}" == root ]]; then
+  mkdir -p "$LOGS"
+  PACKAGES=(debootstrap)
+  install_packages
+  exit
+fi
 # What puts the system's libraries into a wheel.
 if [[ "${1:-}" == wheel ]]; then
   mkdir -p "$LOGS"

@@ -97,8 +97,8 @@ class RunFigures {
                    {"xaxis", html::titled("x (right), " + run_.unit)},
                    {"yaxis", html::titled("z (forward), " + run_.unit)}};
     layout["yaxis"]["scaleanchor"] = "x";
-    add({"Path from above", "Drag to move, wheel (or + and -) to zoom, double click to see all.", traces, layout,
-         static_cast<int>(traces.size()) - 1});
+    add({"Path from above", "Drag to move, wheel (or + and -) to zoom, double click to see all.",
+         traces, layout, static_cast<int>(traces.size()) - 1});
   }
 
   void add_path_in_space() const {

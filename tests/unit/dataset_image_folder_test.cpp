@@ -260,7 +260,8 @@ TEST_F(ImageFolderTest, NeitherCameraFileNorKittisLayout) {
 TEST_F(ImageFolderTest, BagsAreNamedWithWhatReadsThem) {
   request_.camera_file.reset();
   request_.sequence_dir = temp_.file("drive.mcap", "");
-  EXPECT_THAT(error_of(), HasSubstr("drive.mcap: expected a recording, found a ROS bag; 'python -m"));
+  EXPECT_THAT(error_of(),
+              HasSubstr("drive.mcap: expected a recording, found a ROS bag; 'python -m"));
   fs::create_directories(temp_ / "bag");
   request_.sequence_dir = temp_.file("bag/metadata.yaml", "").parent_path();
   EXPECT_THAT(error_of(), HasSubstr("bag: expected a recording, found a ROS bag"));
