@@ -43,7 +43,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/install/stemvoConfigVersi
 install(FILES ${PROJECT_BINARY_DIR}/install/stemvoConfig.cmake
               ${PROJECT_BINARY_DIR}/install/stemvoConfigVersion.cmake DESTINATION ${package_dir})
 
-file(RELATIVE_PATH prefix_from_pkgconfig /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig OUTPUT_VARIABLE prefix_from_pkgconfig)
 get_target_property(opencv_include_dir opencv_core INTERFACE_INCLUDE_DIRECTORIES)
 configure_file(cmake/stemvo.pc.in ${PROJECT_BINARY_DIR}/install/stemvo.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/install/stemvo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
