@@ -12,7 +12,10 @@ if ((EUID != 0)) || ! command -v debootstrap >/dev/null; then
   exit 77
 fi
 inside() { chroot "$ROOT" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@" </dev/null; }
-remove() { rm -rf --one-file-system "$WORK"; }
+remove() {
+  ! mountpoint --quiet "$ROOT/proc" || umount "$ROOT/proc"
+  rm -rf --one-file-system "$WORK"
+}
 
 remove
 trap remove EXIT
@@ -23,6 +26,7 @@ components=$(. /etc/os-release && [[ $ID == ubuntu ]] && echo main,universe || e
 debootstrap --variant=minbase --components="$components" "$release" "$ROOT" >"$WORK/debootstrap.log" || { tail "$WORK/debootstrap.log"; exit 1; }
 cp -r /etc/apt/apt.conf.d /etc/apt/apt.conf "$ROOT/etc/apt/" 2>/dev/null || true  # a proxy, where there is one
 cp /etc/resolv.conf "$ROOT/etc/"
+mount -t proc proc "$ROOT/proc"  # by which the loader knows where the program is
 cp "$WORK"/stemvo_*.deb "$ROOT/tmp/package.deb"
 
 echo "==> Install"
