@@ -41,6 +41,7 @@ test-all: test test-long
 
 test-long:
 	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
+	@tools/setup.sh root || echo "==> Without debootstrap: the test that installs the package in an empty root is skipped"
 	@tools/setup.sh docs
 	@tools/setup.sh evo
 	@echo "==> Running the long tests"

@@ -1,5 +1,5 @@
-# `cmake --install`: the program, the static libraries, what they need at run time, and a CMake package.
-#   bin/stemvo  lib/libstemvo*.a  lib/stemvo/libonnxruntime.so.1  lib/cmake/stemvo  include/stemvo
+# `cmake --install`: the program, the static library, what they need at run time, and packages for CMake and pkg-config.
+#   bin/stemvo  lib/libstemvo.a  lib/stemvo/libonnxruntime.so.1  lib/{cmake/stemvo,pkgconfig}  include/stemvo
 #   share/stemvo/{models,config}  share/doc/stemvo
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -42,3 +42,8 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/install/stemvoConfigVersi
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/install/stemvoConfig.cmake
               ${PROJECT_BINARY_DIR}/install/stemvoConfigVersion.cmake DESTINATION ${package_dir})
+
+cmake_path(RELATIVE_PATH CMAKE_INSTALL_PREFIX BASE_DIRECTORY ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig OUTPUT_VARIABLE prefix_from_pkgconfig)
+get_target_property(opencv_include_dir opencv_core INTERFACE_INCLUDE_DIRECTORIES)
+configure_file(cmake/stemvo.pc.in ${PROJECT_BINARY_DIR}/install/stemvo.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/install/stemvo.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -3,7 +3,8 @@
 # Everything stemvo needs on a fresh machine: apt packages, ONNX Runtime, plotly.js, a Python environment.
 # Safe to repeat; takes about a second when nothing is missing. Called by `make build`; `setup.sh cluster` adds Ray,
 # `setup.sh peers` what `make bench` compares with, `setup.sh browser` Chromium for a test of `make test-all`,
-# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh, `setup.sh docs` what `make docs` needs, `setup.sh lint` clang-tidy.
+# `setup.sh fuzz` clang for tools/fuzz.sh, `setup.sh coverage` gcovr for tools/coverage.sh, `setup.sh docs` what `make docs` needs, `setup.sh lint` clang-tidy,
+# `setup.sh root` debootstrap for a test of `make test-all`.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -213,6 +214,13 @@ fi
 if [[ "${1:-}" == fuzz ]]; then
   mkdir -p "$LOGS"
   PACKAGES=(clang-15 libclang-common-15-dev)
+  install_packages
+  exit
+fi
+# An empty Debian, for the test that installs the package there.
+if [[ "${1:-}" == root ]]; then
+  mkdir -p "$LOGS"
+  PACKAGES=(debootstrap)
   install_packages
   exit
 fi

@@ -17,6 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_file(const fs::path& path) {
+  std::error_code code;
+  return fs::is_regular_file(path, code);
+}
+
 /// A folder with some of KITTI's layout: KittiSequence says what is missing.
 bool looks_like_kitti(const fs::path& folder) {
   std::error_code code;
@@ -28,6 +33,13 @@ bool looks_like_kitti(const fs::path& folder) {
   return false;
 }
 
+/// What `python -m stemvo.bag` reads.
+bool is_bag(const fs::path& path) {
+  const fs::path kind = path.extension();
+  return is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
+                       : is_file(path / "metadata.yaml");
+}
+
 /// Nothing that is known.
 Error refuse(const fs::path& path) {
   std::string_view problem =
@@ -35,15 +47,13 @@ Error refuse(const fs::path& path) {
       "TUM's (rgb.txt), camera.yaml beside images, or --camera FILE, found neither";
   if (dataset::is_pattern(path)) {
     problem = "expected --camera FILE beside a pattern, found none";
+  } else if (is_bag(path)) {
+    problem =
+        "expected a recording, found a ROS bag; 'python -m stemvo.bag BAG FOLDER' makes one of it";
   } else if (!dataset::is_folder(path)) {
     problem = "expected a folder, a video file, a quoted pattern of images or camera:N, found none";
   }
   return fail(fmt::format("{}: {}", path.string(), problem));
-}
-
-bool is_file(const fs::path& path) {
-  std::error_code code;
-  return fs::is_regular_file(path, code);
 }
 
 /// A listing of images, if it is one that is known.
@@ -117,6 +127,9 @@ Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t nu
 
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
+  if (is_file(path) && is_bag(path)) {
+    return refuse(path);
+  }
   const bool is_stream = dataset::camera_number(path) || is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
   if (const Status status = check_unused(request, listing.has_value(), is_stream); !status) {

@@ -63,8 +63,10 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
 Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequest& request) {
   const auto camera_path = request.camera_file ? request.camera_file : listing.camera_file;
   if (!camera_path) {
-    return fail(fmt::format("{}: a {}: expected --camera FILE or camera.yaml in it, found neither",
-                            request.sequence_dir.string(), listing.kind));
+    return fail(
+        fmt::format("{}: a {}: expected --camera FILE or camera.yaml in it, found neither; "
+                    "'stemvo run --help' shows what it holds",
+                    request.sequence_dir.string(), listing.kind));
   }
   const auto camera_file = read_camera_file(*camera_path);
   if (!camera_file) {

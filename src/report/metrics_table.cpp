@@ -69,6 +69,10 @@ std::string error_table(const MetricsReport& report) {
         std::pair(Alignment::kScale, "one scale fitted"),
         std::pair(Alignment::kSe3, "rotation and shift fitted"),
         std::pair(Alignment::kSim3, "rotation, shift and scale fitted")}) {
+    const bool is_scaled = alignment == Alignment::kScale || alignment == Alignment::kSim3;
+    if (report.scale_source == "none" && !is_scaled) {
+      continue;  // units against metres
+    }
     table.add({"position ATE", fmt::format("{:.2f}", m.ate_rmse.after_m(alignment)), "m",
                std::string(to_string(alignment)), note});
   }

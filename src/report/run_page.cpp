@@ -21,6 +21,8 @@ using nlohmann::json;
 /// The devkit's.
 constexpr std::size_t kFirstFrameStep = 10;
 
+const Eigen::Vector2d kNoSigma = Eigen::Vector2d::Zero();
+
 /// One value per element.
 template <typename Range, typename Value>
 json list(const Range& range, const Value& value) {
@@ -76,7 +78,7 @@ class RunFigures {
     paths.push_back(
         {"estimate", html::seen_from_above(run_.estimate), false, false, descriptions()});
     html::add_paths_from_above(page_, "Path from above",
-                               "Drag to move, wheel to zoom, double click to see all.", paths,
+                               "Drag to move, wheel (or + and -) to zoom, double click to see all.", paths,
                                run_.unit);
   }
 
@@ -195,30 +197,22 @@ class RunFigures {
       steps.push_back(
           rounded((run_.estimate[i].translation - run_.estimate[i - 1].translation).norm()));
     }
-    json traces = {over_frames("length of a step", "y3", [](const FrameResult&) { return 0; })};
+    json traces = {over_frames("length of a step", "y2", [](const FrameResult&) { return 0; })};
     traces[0]["y"] = steps;
-    traces.push_back(over_frames("sigma of the scale", "y2", [](const FrameResult& r) {
-      return r.scale_sigma ? rounded(100.0 * *r.scale_sigma) : json();
-    }));
-    for (int axis = 0; axis < 2; ++axis) {
-      traces.push_back(over_frames(
-          axis == 0 ? "principal point, x" : "principal point, y", "y", [&](const FrameResult& r) {
-            return rounded(principal_point(r)[axis] - principal_point(run_.frames.front())[axis]);
-          }));
-      traces.back()["error_y"] = {{"type", "data"},
-                                  {"thickness", 0.5},
-                                  {"width", 0},
-                                  {"array", list(run_.frames, [&](const FrameResult& r) {
-                                     return r.principal_point_sigma_px
-                                                ? rounded((*r.principal_point_sigma_px)[axis])
-                                                : json();
-                                   })}};
+    add_principal_point(traces, 0, "principal point, x", "#009e73");
+    add_principal_point(traces, 1, "principal point, y", "#cc79a7");
+    const bool has_scale = std::any_of(run_.frames.begin(), run_.frames.end(),
+                                       [](const FrameResult& r) { return r.scale_sigma; });
+    json layout = stacked(has_scale ? 3 : 2);
+    if (has_scale) {
+      traces.push_back(over_frames("sigma of the scale", "y3", [](const FrameResult& r) {
+        return r.scale_sigma ? rounded(100.0 * *r.scale_sigma) : json();
+      }));
+      layout["yaxis3"].update(html::titled("sigma, %"));
     }
-    json layout = stacked(3);
-    layout["yaxis3"].update(html::titled("step, " + run_.unit));
-    layout["yaxis2"].update(html::titled("sigma, %"));
+    layout["yaxis2"].update(html::titled("step, " + run_.unit));
     layout["yaxis"].update(html::titled("moved by, px"));
-    add({"Scale and camera", "Bars: one sigma, where the principal point is learnt.", traces,
+    add({"Scale and camera", "Shaded: one sigma, where the principal point is learnt.", traces,
          layout, 0});
   }
 
@@ -242,8 +236,28 @@ class RunFigures {
  private:
   void add(const html::Figure& figure) const { page_.add_figure(figure); }
 
-  static Eigen::Vector2d principal_point(const FrameResult& r) {
-    return {r.camera.cx_px, r.camera.cy_px};
+  /// How far it has moved; around it one sigma, where it has one.
+  void add_principal_point(json& traces, int axis, const char* name, const char* color) const {
+    const auto moved = [&](const FrameResult& r) {
+      return axis == 0 ? r.camera.cx_px - run_.frames.front().camera.cx_px
+                       : r.camera.cy_px - run_.frames.front().camera.cy_px;
+    };
+    const auto line = [&](double sigmas) {
+      json trace = over_frames(name, "y", [&](const FrameResult& r) {
+        return rounded(moved(r) + sigmas * r.principal_point_sigma_px.value_or(kNoSigma)[axis]);
+      });
+      trace["line"] = {{"color", color}, {"width", sigmas == 0.0 ? 2 : 0}};
+      if (sigmas != 0.0) {
+        trace.update({{"showlegend", false}, {"hoverinfo", "skip"}});
+      }
+      return trace;
+    };
+    if (run_.frames.front().principal_point_sigma_px) {
+      traces.push_back(line(-1.0));
+      traces.push_back(line(1.0));
+      traces.back().update({{"fill", "tonexty"}, {"fillcolor", color + std::string("40")}});
+    }
+    traces.push_back(line(0.0));
   }
 
   static json mean_at(const std::vector<SegmentError>& errors,

@@ -57,6 +57,12 @@ def use(page, found):
         page.wait_for_timeout(200)
     found["zoom"] = [before, x_range(page)]
 
+    page.locator("section", has=page.locator("h2", has_text="Error over distance")).locator(".figure").hover()
+    before = page.evaluate("scrollY")
+    page.mouse.wheel(0, 100)
+    page.wait_for_timeout(200)
+    found["scrolled_over_a_chart"] = page.evaluate("scrollY") - before
+
 
 def look(browser, report, screenshot):
     found = {"errors": [], "requests": []}
@@ -74,9 +80,12 @@ def look(browser, report, screenshot):
         page.screenshot(path=screenshot, full_page=True)
     page.close()
 
-    page = open_page(browser, report, found, viewport={"width": 380, "height": 800}, color_scheme="dark", has_touch=True)
+    page = open_page(browser, report, found, viewport={"width": 380, "height": 800}, color_scheme="dark", has_touch=True, is_mobile=True)
     found["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     found["phone_width"] = page.evaluate("document.documentElement.scrollWidth")
+    found["buttons_over_legend"] = page.evaluate("""figures.filter(({ div }) => {
+        const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
+        return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
     page.close()
     return found
 

@@ -54,12 +54,22 @@ run("render" "${BINARY_DIR}/stemvo" synth "${work}/drive" --frames 4)
 file(GLOB frames "${work}/drive/sequences/00/image_2/*.png")
 list(SORT frames)
 run("images_to_poses" "${work}/examples/images_to_poses" ${frames})
+set(positions_by_cmake "${output}")
 string(REGEX MATCHALL "[^\n]+\n" positions "${output}")
 list(LENGTH positions count)
 list(GET positions 3 last)
 # x right, y down, z forward: a car drives some metres forward.
 if(NOT count EQUAL 4 OR NOT last MATCHES " ([0-9.]+)\n$" OR CMAKE_MATCH_1 LESS 1 OR CMAKE_MATCH_1 GREATER 10)
   message(FATAL_ERROR "images_to_poses: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
+endif()
+
+# The same program by pkg-config, whose output the shell splits at spaces.
+file(CREATE_LINK "${prefix}" "${work}/prefix" SYMBOLIC)
+set(ENV{PKG_CONFIG_PATH} "${work}/prefix/lib/pkgconfig")
+run("compile with pkg-config" sh -c "c++ -std=c++20 '${examples}/images_to_poses.cpp' -o '${work}/by_pkg_config' $(pkg-config --cflags --libs stemvo) -lopencv_imgcodecs")
+run("images_to_poses by pkg-config" "${work}/by_pkg_config" ${frames})
+if(NOT output STREQUAL positions_by_cmake)
+  message(FATAL_ERROR "pkg-config: expected the same positions, found:\n${output}")
 endif()
 
 # The same frames as raw gray pixels.

@@ -34,6 +34,7 @@ RUN_ELSEWHERE = {
     "build/examples/": "tests/package/install_and_consume.cmake",
     "pip install": "tests/python/package_test.py",
     "python -m stemvo.view": "tests/python/package_test.py",
+    "python -m stemvo.bag": "tests/python/bag_test.py",
     "tools/ablation.py": "tests/python/ablation_test.py",
     "tools/long_drives.py": "tests/python/long_drives_test.py",
     "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",

@@ -85,7 +85,7 @@ class Package(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         call(sys.executable, "-m", "venv", cls.folder / "venv")
         cls.python = cls.folder / "venv/bin/python"
-        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[view]",
+        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,view]",
              env={**os.environ, "PYTHONPATH": "", "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count())})
         call(PROGRAM, "synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
 
@@ -128,6 +128,12 @@ class Package(unittest.TestCase):
             self.assertNotEqual(done.returncode, 0)
             self.assertIn(text, done.stderr)
             self.assertNotIn("Traceback", done.stderr)
+
+    def test_bag(self):
+        # What it reads: bag_test.py.
+        done = subprocess.run([self.python, "-I", "-m", "stemvo.bag", "/nowhere.bag", self.folder / "bag"], capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stdout), (1, ""))
+        self.assertRegex(done.stderr, "^error: /nowhere.bag: [^\n]+\n$")
 
     def test_a_wheel_that_needs_no_library_of_the_system(self):
         wheels = self.folder / "wheels"

@@ -42,6 +42,7 @@ class ReportPage(unittest.TestCase):
         self.assertTrue(all(count > 0 for count in found["points"]), found["points"])
         self.assertNotEqual(found["light"], found["dark"])
         self.assertLessEqual(found["phone_width"], 380)
+        self.assertEqual(found["buttons_over_legend"], 0)
 
     def test_search(self):
         out = self.folder / "search"
@@ -86,6 +87,7 @@ class ReportPage(unittest.TestCase):
         self.assertIn(self.found["hover"], self.found["by_hover"])
         (left, right), (zoomed_left, zoomed_right) = self.found["zoom"]
         self.assertLess(zoomed_right - zoomed_left, 0.9 * (right - left))
+        self.assertGreater(self.found["scrolled_over_a_chart"], 50)
 
 
 if __name__ == "__main__":

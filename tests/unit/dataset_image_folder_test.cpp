@@ -257,6 +257,16 @@ TEST_F(ImageFolderTest, NeitherCameraFileNorKittisLayout) {
   EXPECT_THAT(error_of(), HasSubstr("times.txt: expected --times beside --camera only"));
 }
 
+TEST_F(ImageFolderTest, BagsAreNamedWithWhatReadsThem) {
+  request_.camera_file.reset();
+  request_.sequence_dir = temp_.file("drive.mcap", "");
+  EXPECT_THAT(error_of(),
+              HasSubstr("drive.mcap: expected a recording, found a ROS bag; 'python -m"));
+  fs::create_directories(temp_ / "bag");
+  request_.sequence_dir = temp_.file("bag/metadata.yaml", "").parent_path();
+  EXPECT_THAT(error_of(), HasSubstr("bag: expected a recording, found a ROS bag"));
+}
+
 TEST_F(ImageFolderTest, CameraAndCalibrationAtATimeAreRefused) {
   request_.calibration = temp_ / "calib.txt";
   EXPECT_THAT(error_of(), HasSubstr("calib.txt: expected --camera or --calib"));

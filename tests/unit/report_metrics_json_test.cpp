@@ -155,6 +155,9 @@ TEST(MetricsTable, NamesTheFitOfATrajectoryWithoutScale) {
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +sim3"));
   EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +sim3"));
   EXPECT_THAT(table, ContainsRegex("of zero motion +79\\.25  m +none"));
+  EXPECT_THAT(table, ContainsRegex("position ATE +[0-9.]+  m +scale"));
+  EXPECT_THAT(table, Not(ContainsRegex("position ATE +[0-9.]+  m +(none|se3)")))
+      << "units against metres";
 }
 
 TEST(MetricsTable, SaysWhatIsMissing) {

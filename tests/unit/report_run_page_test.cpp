@@ -102,8 +102,24 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   EXPECT_EQ(tracks["traces"][0]["x"][1], 102) << "in the folder's numbering";
   EXPECT_EQ(tracks["traces"][0]["y"][200], 600);
   EXPECT_EQ(tracks["traces"][3]["y"][1], "tracking");
-  const json camera = section(page, "Scale and camera");
-  EXPECT_NEAR(camera["traces"][2]["y"][200].get<double>(), 2.0, 1e-4);
+}
+
+TEST_F(RunPageTest, ShowsScaleAndCameraWithTheirSigma) {
+  json traces = section(content(), "Scale and camera")["traces"];
+  ASSERT_EQ(traces.size(), 3U) << "no sigma, so no lines for it";
+  EXPECT_NEAR(traces[1]["y"][200].get<double>(), 2.0, 1e-4);
+
+  for (FrameResult& frame : frames_) {
+    frame.scale_sigma = 0.02;
+    frame.principal_point_sigma_px = Eigen::Vector2d(0.5, 0.25);
+  }
+  traces = section(content(), "Scale and camera")["traces"];
+  ASSERT_EQ(traces.size(), 8U);
+  EXPECT_NEAR(traces[1]["y"][200].get<double>(), 1.5, 1e-4);
+  EXPECT_NEAR(traces[2]["y"][200].get<double>(), 2.5, 1e-4);
+  EXPECT_EQ(traces[2]["fill"], "tonexty");
+  EXPECT_NEAR(traces[5]["y"][200].get<double>(), 0.25, 1e-4);
+  EXPECT_EQ(traces[7]["y"][200], 2.0) << "percent";
 }
 
 TEST_F(RunPageTest, WithoutGroundTruthNoErrorsAreShown) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""tools/bag_to_folder.py on bags of ROS 1 and 2 and MCAP made here; `stemvo run` takes what it writes."""
+"""`python -m stemvo.bag` on bags of ROS 1 and 2 and MCAP made here; `stemvo run` takes what it writes."""
 
 import contextlib
 import io
@@ -11,16 +11,14 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
-import _environment  # noqa: E402,F401
+sys.path.insert(0, str(ROOT / "python/stemvo"))  # the file alone: it needs no built module
 
+import bag as bag_module  # noqa: E402
 import numpy as np  # noqa: E402
 import PIL.Image  # noqa: E402
 import rosbags.rosbag1  # noqa: E402
 import rosbags.rosbag2  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
-
-import bag_to_folder  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", str(ROOT / "build/release/stemvo"))
 FIRST_NS = 1_700_000_000_123_456_789
@@ -34,7 +32,7 @@ def scene(index):
     return wall[8:8 + HEIGHT, 2 * index:2 * index + WIDTH]
 
 
-class BagToFolder(unittest.TestCase):
+class Bag(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -85,9 +83,9 @@ class BagToFolder(unittest.TestCase):
                 put(images, FIRST_NS + index * 10**8, message, image_type)
         return file
 
-    def run_tool(self, *arguments):
+    def convert(self, *arguments):
         with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()) as complaints:
-            code = bag_to_folder.main([str(argument) for argument in arguments])
+            code = bag_module.main([str(argument) for argument in arguments])
         return code, said.getvalue(), complaints.getvalue()
 
     def images(self):
@@ -97,7 +95,7 @@ class BagToFolder(unittest.TestCase):
         return [(int(time), np.asarray(PIL.Image.open(self.out / "mav0/cam0/data" / name))) for time, name in rows]
 
     def expect_error(self, words, *arguments):
-        code, said, complaint = self.run_tool(*arguments)
+        code, said, complaint = self.convert(*arguments)
         self.assertEqual((code, said, complaint.count("\n")), (1, "", 1), complaint)
         for word in ("error: ", *words):
             self.assertIn(word, complaint)
@@ -107,7 +105,7 @@ class BagToFolder(unittest.TestCase):
         for kind, encoding in (("bag", "bgr8"), ("bag", "mono8"), ("sqlite3", "rgb8"), ("mcap", "mono16"), ("mcap", "rgb8")):
             with self.subTest(kind=kind, encoding=encoding), tempfile.TemporaryDirectory() as folder:
                 self.folder, self.out = pathlib.Path(folder), pathlib.Path(folder) / "out"
-                code, _, complaint = self.run_tool(self.write(kind, encoding), self.out)
+                code, _, complaint = self.convert(self.write(kind, encoding), self.out)
                 self.assertEqual(code, 0, complaint)
                 found = self.images()
                 self.assertEqual([time for time, _ in found], [FIRST_NS + index * 10**8 for index in range(COUNT)])
@@ -117,12 +115,12 @@ class BagToFolder(unittest.TestCase):
 
     def test_a_lone_mcap_file_and_jpegs_as_they_are(self):
         file = next(self.write("mcap", "jpeg", "/cam0/image_raw/compressed").glob("*.mcap"))
-        self.assertEqual(self.run_tool(file, self.out)[0], 0)
+        self.assertEqual(self.convert(file, self.out)[0], 0)
         self.assertEqual(len(list((self.out / "mav0/cam0/data").glob("*.jpg"))), COUNT)
         self.assertLess(np.abs(self.images()[2][1].astype(int) - scene(2)).mean(), 20)
 
     def test_stemvo_runs_on_it(self):
-        self.assertEqual(self.run_tool(self.write("sqlite3"), self.out)[0], 0)
+        self.assertEqual(self.convert(self.write("sqlite3"), self.out)[0], 0)
         done = subprocess.run([PROGRAM, "run", self.out, "--out", self.folder / "result"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("input: EuRoC recording out, 5 frames of 160x120 pixels", done.stderr)
@@ -130,7 +128,7 @@ class BagToFolder(unittest.TestCase):
         self.assertAlmostEqual(float(first), FIRST_NS * 1e-9, places=5)
 
     def test_late_images_are_left_out(self):
-        code, said, _ = self.run_tool(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
+        code, said, _ = self.convert(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
         self.assertEqual(code, 0)
         self.assertIn("3 images; 2 of no later time", said)
         self.assertEqual([time - FIRST_NS for time, _ in self.images()], [0, 10, 20])
@@ -140,7 +138,7 @@ class BagToFolder(unittest.TestCase):
         self.expect_error(["/cam0/camera_info", "--camera FILE"], bag, self.out)
         camera = self.folder / "camera.yaml"
         camera.write_text("resolution: [160, 120]\nintrinsics: [150, 150, 79.5, 59.5]\ndistortion_model: none\n", encoding="utf-8")
-        self.assertEqual(self.run_tool(bag, self.out, "--camera", camera)[0], 0)
+        self.assertEqual(self.convert(bag, self.out, "--camera", camera)[0], 0)
         self.assertEqual((self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8"), camera.read_text(encoding="utf-8"))
 
     def test_what_cannot_be_converted_is_one_line(self):

@@ -1,11 +1,8 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Makes a folder in EuRoC's layout of a camera in a ROS 1 bag, a ROS 2 bag or an MCAP file: `stemvo run FOLDER` takes it. Needs no ROS.
 
 Compressed images stay the bytes they are. The camera is that of the camera_info topic beside the images', or --camera FILE.
 """
-
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
 
 import argparse
 import pathlib
@@ -13,9 +10,15 @@ import shutil
 import sys
 
 import numpy as np
-import PIL.Image
-import rosbags.highlevel
-import rosbags.typesys
+
+try:
+    import PIL.Image
+    import rosbags.highlevel
+    import rosbags.typesys
+except ImportError as error:
+    if __name__ != "__main__":
+        raise
+    sys.exit(f"error: expected the package {error.name}: pip install 'stemvo[bag]', or '.[bag]' in a checkout")
 
 IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # Encoding: type of a sample, channels, order of those that are kept.
@@ -116,7 +119,7 @@ def convert(options, folder):
 
 
 def main(arguments=None):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(prog="python -m stemvo.bag", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bag", type=pathlib.Path, help="a .bag file (ROS 1), a folder with metadata.yaml (ROS 2), or an .mcap or .db3 file")
     parser.add_argument("out", type=pathlib.Path, help="the folder to make; must not exist")
     parser.add_argument("--topic", help="of the images; default: the only one")
