@@ -16,7 +16,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kBenchmarkFooter =
     R"(KITTI_ROOT holds sequences/NN (as 'stemvo run' takes them) and poses/NN.txt. Each sequence runs with
 the default configuration and the paper's, each with metres from the camera's height (no ground
 truth, no alignment) and with per-step ground-truth scale (the paper's
@@ -35,12 +35,12 @@ Examples:
   stemvo benchmark kitti --out result
   stemvo benchmark kitti --out result --sequences 00,05)";
 
-struct Arguments {
+struct BenchmarkArguments {
   BenchmarkRequest request;
   bool is_quiet = false;
 };
 
-Expected<int> benchmark(Arguments& arguments) {
+Expected<int> benchmark(BenchmarkArguments& arguments) {
   BenchmarkRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   request.command = command_line();
@@ -77,7 +77,7 @@ Expected<int> benchmark(Arguments& arguments) {
   return summary->failures.empty() ? kExitDone : kExitFailed;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, BenchmarkArguments& arguments) {
   BenchmarkRequest& request = arguments.request;
   command.add_option("KITTI_ROOT", request.kitti_root, "Folder that holds sequences and poses")
       ->required()
@@ -94,9 +94,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_benchmark(CLI::App& app, Action& action) {
-  return add_command<Arguments>(app, action,
-                                {"benchmark", "Run all sequences, compare with published", kFooter},
-                                add_options, benchmark);
+  return add_command<BenchmarkArguments>(
+      app, action, {"benchmark", "Run all sequences, compare with published", kBenchmarkFooter},
+      add_options, benchmark);
 }
 
 }  // namespace stemvo::apps

@@ -14,7 +14,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kCalibrateFooter =
     R"(Runs the odometry (mode map, no scale, camera.refine all) and writes down what it has learnt of the
 camera by the end. Turns tell of it, a straight road does not: a number that the drive does not
 determine stays as given and is marked. Ground truth is not read. Nothing uses FILE unless it is
@@ -24,14 +24,15 @@ Examples:
   stemvo calibrate kitti/sequences/00 --out refined.txt
   stemvo run kitti/sequences/00 --out result --calib refined.txt)";
 
-struct Arguments {
+struct CalibrateArguments {
   CalibrationRequest request;
   ConfigArguments config;
   std::string calibration;
   bool is_quiet = false;
 };
 
-nlohmann::ordered_json document(const Arguments& arguments, const CalibrationReport& report) {
+nlohmann::ordered_json document(const CalibrateArguments& arguments,
+                                const CalibrationReport& report) {
   auto parameters = nlohmann::ordered_json::array();
   for (const CalibratedParameter& one : report.parameters) {
     parameters.push_back({{"name", one.name},
@@ -46,7 +47,7 @@ nlohmann::ordered_json document(const Arguments& arguments, const CalibrationRep
           {"parameters", parameters}};
 }
 
-int report(const Arguments& arguments, const CalibrationReport& report) {
+int report(const CalibrateArguments& arguments, const CalibrationReport& report) {
   const std::string file = arguments.request.out_file.string();
   for (const std::string& warning : report.warnings) {
     print_warning(warning);
@@ -72,7 +73,7 @@ int report(const Arguments& arguments, const CalibrationReport& report) {
   return kExitDone;
 }
 
-Expected<int> calibrate(Arguments& arguments) {
+Expected<int> calibrate(CalibrateArguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
     return config.error();
@@ -91,7 +92,7 @@ Expected<int> calibrate(Arguments& arguments) {
   return report(arguments, *result);
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, CalibrateArguments& arguments) {
   CalibrationRequest& request = arguments.request;
   command.add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
       ->required()
@@ -111,8 +112,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_calibrate(CLI::App& app, Action& action) {
-  return add_command<Arguments>(
-      app, action, {"calibrate", "Refine focal length and principal point over a drive", kFooter},
+  return add_command<CalibrateArguments>(
+      app, action,
+      {"calibrate", "Refine focal length and principal point over a drive", kCalibrateFooter},
       add_options, calibrate);
 }
 

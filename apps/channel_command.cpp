@@ -13,7 +13,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kChannelFooter =
     R"(For each frame --out receives NNNNNN_input.png, NNNNNN_filter_KKK.png and NNNNNN_sheet.png, which
 shows them side by side.
 
@@ -22,12 +22,12 @@ Examples:
   stemvo channel kitti/sequences/03 --out images --frames 100:110 --filters 0:4
   stemvo channel kitti/sequences/02 --out rgb --set stem.model=input_layer)";
 
-struct Arguments {
+struct ChannelArguments {
   ChannelImagesRequest request;
   ConfigArguments config;
 };
 
-Expected<int> draw(Arguments& arguments) {
+Expected<int> draw(ChannelArguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
     return config.error();
@@ -46,7 +46,7 @@ Expected<int> draw(Arguments& arguments) {
   return is_interrupted() ? kExitInterrupted : kExitDone;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, ChannelArguments& arguments) {
   arguments.request.frames = FrameRangeRequest{0, 1};
   command
       .add_option("SEQUENCE_DIR", arguments.request.sequence_dir,
@@ -66,9 +66,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_channel(CLI::App& app, Action& action) {
-  return add_command<Arguments>(
+  return add_command<ChannelArguments>(
       app, action,
-      {"channel", "Draw what the filters make of the frames (paper, Figure 1)", kFooter},
+      {"channel", "Draw what the filters make of the frames (paper, Figure 1)", kChannelFooter},
       add_options, draw);
 }
 

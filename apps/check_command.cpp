@@ -12,7 +12,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kCheckFooter =
     R"(THRESHOLDS.yaml holds one line per number of metrics.json that must stay inside its bounds:
   t_rel_percent: {max: 1.0}
   tracked_fraction: {min: 0.99}
@@ -21,7 +21,7 @@ constexpr const char* kFooter =
 Exit code 1 when a bound is passed, so that it gates a script:
   stemvo check result/metrics.json --against thresholds.yaml)";
 
-struct Arguments {
+struct CheckArguments {
   std::filesystem::path metrics;
   std::filesystem::path thresholds;
 };
@@ -37,7 +37,7 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
   return {{"passed", all_passed(results)}, {"bounds", bounds}};
 }
 
-Expected<int> check(Arguments& arguments) {
+Expected<int> check(CheckArguments& arguments) {
   const Expected<std::vector<ThresholdResult>> results =
       check_metrics(arguments.metrics, arguments.thresholds);
   if (!results) {
@@ -48,7 +48,7 @@ Expected<int> check(Arguments& arguments) {
   return all_passed(*results) ? kExitDone : kExitFailed;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, CheckArguments& arguments) {
   command.add_option("METRICS.json", arguments.metrics, "metrics.json of a run")
       ->required()
       ->type_name("");
@@ -60,9 +60,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_check(CLI::App& app, Action& action) {
-  return add_command<Arguments>(app, action,
-                                {"check", "Hold the numbers of a run against thresholds", kFooter},
-                                add_options, check);
+  return add_command<CheckArguments>(
+      app, action, {"check", "Hold the numbers of a run against thresholds", kCheckFooter},
+      add_options, check);
 }
 
 }  // namespace stemvo::apps

@@ -11,7 +11,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kEvaluateFooter =
     R"(Pose files are KITTI's (12 numbers a line), TUM's (8) or EuRoC's (state_groundtruth_estimate0/data.csv,
 the body's pose, which T_BS of ../cam0/sensor.yaml, or of --camera, makes the camera's). Where both
 files have times, each pose is compared with the true one nearest in time; else line by line. Both
@@ -23,12 +23,12 @@ Examples:
   stemvo evaluate --gt kitti/poses/03.txt a.txt b.txt --align sim3 --json numbers.json
   stemvo evaluate --gt kitti/poses/03.txt a.txt --json - | jq .estimates[0].t_rel_percent)";
 
-struct Arguments {
+struct EvaluateArguments {
   EvaluationRequest request;
   std::string alignment = "none";
 };
 
-Expected<int> evaluate(Arguments& arguments) {
+Expected<int> evaluate(EvaluateArguments& arguments) {
   arguments.request.alignment = parse_alignment(arguments.alignment).value();
   if (arguments.request.json == "-") {
     arguments.request.json.reset();
@@ -48,7 +48,7 @@ Expected<int> evaluate(Arguments& arguments) {
   return kExitDone;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, EvaluateArguments& arguments) {
   command
       .add_option("--gt", arguments.request.ground_truth,
                   "Ground truth: KITTI's, TUM's or EuRoC's poses")
@@ -70,9 +70,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_evaluate(CLI::App& app, Action& action) {
-  return add_command<Arguments>(app, action,
-                                {"evaluate", "Compare trajectories with the ground truth", kFooter},
-                                add_options, evaluate);
+  return add_command<EvaluateArguments>(
+      app, action, {"evaluate", "Compare trajectories with the ground truth", kEvaluateFooter},
+      add_options, evaluate);
 }
 
 }  // namespace stemvo::apps

@@ -13,7 +13,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kModelsFooter =
     R"(A model is chosen by its name (--set stem.model=NAME) or by the path of an .onnx file with a
 manifest.yaml beside it. Four need no file, to compare with: gray, input_layer (filters 0, 1, 2 =
 R, G, B), log (Laplacian of Gaussian) and census (gray levels against their surroundings').)";
@@ -45,11 +45,11 @@ nlohmann::ordered_json document(const ModelEntry& entry, const Status& status) {
           {"made_by", entry.command}};
 }
 
-struct Arguments {
+struct ModelsArguments {
   std::string model;  ///< empty: all
 };
 
-Expected<int> list_models(Arguments& arguments) {
+Expected<int> list_models(ModelsArguments& arguments) {
   const std::string& model = arguments.model;
   const auto folder = data_folder("models");
   const Expected<std::vector<ModelEntry>> entries =
@@ -72,7 +72,7 @@ Expected<int> list_models(Arguments& arguments) {
   return exit_code;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, ModelsArguments& arguments) {
   command.add_option("MODEL", arguments.model,
                      "Only this one's layers: its name, or the path of an .onnx");
 }
@@ -80,8 +80,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_models(CLI::App& app, Action& action) {
-  return add_command<Arguments>(
-      app, action, {"models", "List the models and check that each file is sound", kFooter},
+  return add_command<ModelsArguments>(
+      app, action, {"models", "List the models and check that each file is sound", kModelsFooter},
       add_options, list_models);
 }
 

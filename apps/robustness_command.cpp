@@ -18,7 +18,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kRobustnessFooter =
     R"(Each drive runs as it is and under each disturbance, at three strengths, through the configured
 channel and through controls: gray, log, census (and red, green, blue where frames are colour), which
 differ in nothing but the channel, and orb and sift, matched between pairs of frames of the gray image.
@@ -36,13 +36,13 @@ Examples:
   stemvo robustness kitti/sequences/03 --out result
   stemvo robustness kitti/sequences/00 kitti/sequences/03 --kinds none,dusk,jpeg --controls gray --out result)";
 
-struct Arguments {
+struct RobustnessArguments {
   robustness::RobustnessRequest request;
   ConfigArguments config;
   bool is_quiet = false;
 };
 
-Expected<int> run(Arguments& arguments) {
+Expected<int> run(RobustnessArguments& arguments) {
   robustness::RobustnessRequest& request = arguments.request;
   Config base;
   base.scale.source = ScaleSource::kGroundTruth;
@@ -80,7 +80,7 @@ std::string kinds_help() {
   return help;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, RobustnessArguments& arguments) {
   robustness::RobustnessRequest& request = arguments.request;
   command
       .add_option("SEQUENCE_DIR", request.sequence_dirs,
@@ -108,9 +108,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_robustness(CLI::App& app, Action& action) {
-  return add_command<Arguments>(app, action,
-                                {"robustness", "Compare channels on disturbed frames", kFooter},
-                                add_options, run);
+  return add_command<RobustnessArguments>(
+      app, action, {"robustness", "Compare channels on disturbed frames", kRobustnessFooter},
+      add_options, run);
 }
 
 }  // namespace stemvo::apps

@@ -14,7 +14,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kRunFooter =
     R"(INPUT is one of
   KITTI/sequences/03    image_2/000000.png, .. (colour) or image_0 (gray), calib.txt, times.txt;
                         ground truth is ../../poses/03.txt from there, where it exists
@@ -55,13 +55,13 @@ Examples:
   stemvo run drive.mp4 --camera camera.yaml --mask 0,900,1920,180              a video, no bonnet
   stemvo run 'drive/left_*.png' --camera camera.yaml --times times.txt --out result)";
 
-struct Arguments {
+struct RunArguments {
   RunRequest request;
   ConfigArguments config;
   bool is_quiet = false;
 };
 
-void print_summary(const Arguments& arguments, const RunSummary& summary) {
+void print_summary(const RunArguments& arguments, const RunSummary& summary) {
   if (arguments.is_quiet) {
     return;
   }
@@ -78,7 +78,7 @@ void print_summary(const Arguments& arguments, const RunSummary& summary) {
   }
 }
 
-Expected<int> run(Arguments& arguments) {
+Expected<int> run(RunArguments& arguments) {
   const Expected<Config> config = read_config(arguments.config);
   if (!config) {
     return config.error();
@@ -114,7 +114,7 @@ Expected<int> run(Arguments& arguments) {
   return summary->interrupted ? kExitInterrupted : kExitDone;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, RunArguments& arguments) {
   RunRequest& request = arguments.request;
   command
       .add_option(
@@ -160,8 +160,8 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_run(CLI::App& app, Action& action) {
-  return add_command<Arguments>(
-      app, action, {"run", "Reconstruct a drive from a recording", kFooter}, add_options, run);
+  return add_command<RunArguments>(
+      app, action, {"run", "Reconstruct a drive from a recording", kRunFooter}, add_options, run);
 }
 
 }  // namespace stemvo::apps

@@ -17,7 +17,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kSearchFooter =
     R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
 is given an odometry of its own, each step having its true length. First come the filters that cannot
 be told from the best (paired bootstrap over segments, 95 %), a group of equals, then the others by
@@ -35,14 +35,14 @@ Examples:
   stemvo search kitti/sequences/00 --exhaustive --filters 0:8 --out part0     part of a layer
   stemvo search --merge part0 part1 --out result                              parts to one table)";
 
-struct Arguments {
+struct SearchArguments {
   search::SearchRequest request;
   ConfigArguments config;
   std::vector<std::filesystem::path> merge;
   bool is_quiet = false;
 };
 
-Expected<search::SearchReport> find_filters(Arguments& arguments) {
+Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
   search::SearchRequest& request = arguments.request;
   request.models_dir = data_folder("models");
   if (!arguments.merge.empty()) {
@@ -68,7 +68,7 @@ Expected<search::SearchReport> find_filters(Arguments& arguments) {
   return search::run_search(request, std::ref(progress));
 }
 
-Expected<int> run(Arguments& arguments) {
+Expected<int> run(SearchArguments& arguments) {
   const search::SearchRequest& request = arguments.request;
   if (arguments.merge.empty() == request.sequence_dirs.empty()) {
     print_error("expected either SEQUENCE_DIR or --merge with parts (see 'stemvo search --help')");
@@ -90,7 +90,7 @@ Expected<int> run(Arguments& arguments) {
   return kExitDone;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, SearchArguments& arguments) {
   search::SearchRequest& request = arguments.request;
   command
       .add_option("SEQUENCE_DIR", request.sequence_dirs,
@@ -156,8 +156,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_search(CLI::App& app, Action& action) {
-  return add_command<Arguments>(
-      app, action, {"search", "Find the best filter of a network", kFooter}, add_options, run);
+  return add_command<SearchArguments>(
+      app, action, {"search", "Find the best filter of a network", kSearchFooter}, add_options,
+      run);
 }
 
 }  // namespace stemvo::apps

@@ -16,7 +16,7 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kFooter =
+constexpr const char* kSynthFooter =
     R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses; of a walk
 also camera.yaml beside calib.txt. The same options give the same files.
 
@@ -27,12 +27,12 @@ Examples:
   stemvo synth walk --walk --frames 600
   stemvo synth drives --name street7 --seed 7              several drives in one folder)";
 
-struct Arguments {
+struct SynthArguments {
   std::filesystem::path out_dir;
   SyntheticDriveOptions options;
 };
 
-Expected<int> render(Arguments& arguments) {
+Expected<int> render(SynthArguments& arguments) {
   Progress progress("frames", /*is_quiet=*/false);
   const Status status =
       render_synthetic_drive(arguments.out_dir, arguments.options, std::ref(progress));
@@ -50,7 +50,7 @@ Expected<int> render(Arguments& arguments) {
   return kExitDone;
 }
 
-void add_options(CLI::App& command, Arguments& arguments) {
+void add_options(CLI::App& command, SynthArguments& arguments) {
   SyntheticDriveOptions& options = arguments.options;
   command.add_option("OUT_DIR", arguments.out_dir, "Folder for the drive; created")
       ->required()
@@ -105,9 +105,9 @@ void add_options(CLI::App& command, Arguments& arguments) {
 }  // namespace
 
 CLI::App* add_synth(CLI::App& app, Action& action) {
-  return add_command<Arguments>(app, action,
-                                {"synth", "Render a drive along a street, or a walk", kFooter},
-                                add_options, render);
+  return add_command<SynthArguments>(
+      app, action, {"synth", "Render a drive along a street, or a walk", kSynthFooter}, add_options,
+      render);
 }
 
 }  // namespace stemvo::apps

@@ -13,7 +13,7 @@ namespace {
 using nlohmann::json;
 using Json = nlohmann::ordered_json;
 
-std::string text_of(const Json& value) { return value.get<std::string>(); }
+std::string string_of(const Json& value) { return value.get<std::string>(); }
 
 /// One measure of every sequence, a bar per run; published numbers beside them.
 void add_bars(const Json& report, const char* key, const std::string& title, html::Page& page) {
@@ -27,7 +27,7 @@ void add_bars(const Json& report, const char* key, const std::string& title, htm
       order.push_back(name);
       bars[name] = {{"name", name}, {"type", "bar"}, {"x", json::array()}, {"y", json::array()}};
     }
-    bars[name]["x"].push_back(text_of(sequence["name"]) + ", " + describe_frames(sequence));
+    bars[name]["x"].push_back(string_of(sequence["name"]) + ", " + describe_frames(sequence));
     bars[name]["y"].push_back(value.get<double>());
   };
   for (const Json& sequence : report["sequences"]) {
@@ -54,12 +54,12 @@ Status write_page(const std::filesystem::path& file,
                   const nlohmann::ordered_json& report,
                   const SequencePaths& paths,
                   const BenchmarkRequest& request) {
-  html::Page page("Benchmark", fmt::format("stemvo {}{}", text_of(report["stemvo_version"]),
+  html::Page page("Benchmark", fmt::format("stemvo {}{}", string_of(report["stemvo_version"]),
                                            report["interrupted"] == true ? ", interrupted" : ""));
   add_bars(report, "t_rel_percent", "t_rel, %", page);
   add_bars(report, "r_rel_deg_per_100m", "r_rel, degrees per 100 m", page);
   for (const Json& sequence : report["sequences"]) {
-    if (const auto found = paths.find(text_of(sequence["name"])); found != paths.end()) {
+    if (const auto found = paths.find(string_of(sequence["name"])); found != paths.end()) {
       html::add_paths_from_above(page,
                                  fmt::format("{}, {}", found->first, describe_frames(sequence)),
                                  "Nothing is aligned afterwards.", found->second);

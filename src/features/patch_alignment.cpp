@@ -159,7 +159,8 @@ bool is_plausible(const Similarity& warp, const BorderedImage& image, const Simi
   const float scale_sq = warp.a * warp.a + warp.b * warp.b;
   return is_in_image(image, warp.x, warp.y) &&
          std::hypot(warp.x - start.x, warp.y - start.y) <= kMaxFineMove_px &&
-         scale_sq < kMaxWarpScale * kMaxWarpScale && scale_sq * kMaxWarpScale * kMaxWarpScale > 1.0F;
+         scale_sq < kMaxWarpScale * kMaxWarpScale &&
+         scale_sq * kMaxWarpScale * kMaxWarpScale > 1.0F;
 }
 
 /// A translation first, until it has nearly converged; then the similarity.

@@ -17,7 +17,7 @@ namespace stemvo {
 namespace {
 
 // Okabe and Ito's colours (safe for the colour-blind) on neutral grays.
-const cv::Scalar kInk(34, 34, 34);
+const cv::Scalar kPlotInk(34, 34, 34);
 const cv::Scalar kGrid(230, 230, 230);
 const cv::Scalar kTruth(158, 158, 158);
 const cv::Scalar kEstimate(0, 114, 178);
@@ -36,7 +36,7 @@ constexpr int kRight_px = 50;
 constexpr int kBottom_px = 120;
 constexpr int kLine_px = 50;  // of text
 constexpr double kTick_px = 105.0;
-constexpr int kSubpixelBits = 4;
+constexpr int kPlotSubpixelBits = 4;
 
 std::vector<Eigen::Vector2d> finite_positions(const Trajectory& trajectory) {
   std::vector<Eigen::Vector2d> positions;
@@ -92,18 +92,18 @@ void draw_grid(const View& view, const std::string& unit, cv::Mat& image) {
   };
   for_each_tick(0, [&](int x, const std::string& label) {
     cv::line(image, {x, frame.y}, {x, frame.br().y}, kGrid, 2);
-    put_caption(image, {x - 50, frame.br().y, 100, kLine_px}, label, kInk, 0.5);
+    put_caption(image, {x - 50, frame.br().y, 100, kLine_px}, label, kPlotInk, 0.5);
   });
   for_each_tick(1, [&](int y, const std::string& label) {
     cv::line(image, {frame.x, y}, {frame.br().x, y}, kGrid, 2);
-    put_caption(image, {0, y - kLine_px / 2, frame.x - 12, kLine_px}, label, kInk, 1.0);
+    put_caption(image, {0, y - kLine_px / 2, frame.x - 12, kLine_px}, label, kPlotInk, 1.0);
   });
   cv::rectangle(image, frame, cv::Scalar::all(115), 2);
   put_caption(image, {frame.x, frame.br().y + kLine_px, frame.width, kLine_px},
-              fmt::format("x, to the right [{}]", unit), kInk, 0.5);
+              fmt::format("x, to the right [{}]", unit), kPlotInk, 0.5);
   cv::Mat upright(kLine_px, frame.height, CV_8UC3, kWhite);
-  put_caption(upright, {0, 0, frame.height, kLine_px}, fmt::format("z, forward [{}]", unit), kInk,
-              0.5);
+  put_caption(upright, {0, 0, frame.height, kLine_px}, fmt::format("z, forward [{}]", unit),
+              kPlotInk, 0.5);
   cv::rotate(upright, image(cv::Rect(8, frame.y, kLine_px, frame.height)),
              cv::ROTATE_90_COUNTERCLOCKWISE);
 }
@@ -115,9 +115,9 @@ void draw_path(const Trajectory& path,
                cv::Mat& image) {
   std::vector<cv::Point> points;
   for (const Eigen::Vector2d& position : finite_positions(path)) {
-    points.emplace_back(view.to_px(position) * (1 << kSubpixelBits));
+    points.emplace_back(view.to_px(position) * (1 << kPlotSubpixelBits));
   }
-  cv::polylines(image, points, false, color, width_px, cv::LINE_AA, kSubpixelBits);
+  cv::polylines(image, points, false, color, width_px, cv::LINE_AA, kPlotSubpixelBits);
 }
 
 /// A disk for the start, a square for the end, with a white rim: on a loop both fall together, and
@@ -140,7 +140,7 @@ void draw_legend(bool has_truth, cv::Mat& image) {
   int x = kLeft_px;
   const auto add = [&](const char* name, int sample_px, const auto& draw_sample) {
     draw_sample(x);
-    x = put_caption(image, {x + sample_px, kTop_px - kLine_px, 400, kLine_px}, name, kInk) + 40;
+    x = put_caption(image, {x + sample_px, kTop_px - kLine_px, 400, kLine_px}, name, kPlotInk) + 40;
   };
   const auto line_of = [&](const cv::Scalar& color, int width_px) {
     return [&image, color, width_px](int at) {
@@ -174,7 +174,7 @@ cv::Mat draw_trajectory(const TrajectoryPlot& plot) {
   const int width_px = view.frame.br().x + kRight_px;
   cv::Mat image(view.frame.br().y + kBottom_px, width_px, CV_8UC3, kWhite);
   const int room_px = width_px - kLeft_px - kRight_px;
-  put_caption(image, {kLeft_px, 10, room_px, 70}, plot.title, kInk);
+  put_caption(image, {kLeft_px, 10, room_px, 70}, plot.title, kPlotInk);
   put_caption(image, {kLeft_px, 75, room_px, kLine_px}, plot.subtitle, cv::Scalar::all(90));
   draw_legend(plot.ground_truth.has_value(), image);
   draw_grid(view, plot.unit, image);

@@ -32,14 +32,14 @@ Schedule schedule_of(std::size_t num_filters, const Shares& shares, std::size_t 
   return schedule;
 }
 
-constexpr double kWorst = std::numeric_limits<double>::infinity();
+constexpr double kNone = std::numeric_limits<double>::infinity();
 
 /// What survivors are chosen by: first detected or not and the early error; the other numbers tell
 /// whether two filters are one.
 std::tuple<int, double, double, double, double> standing_of(const FilterRecord& record) {
   const DriveScore mean = mean_score(record.drives);
-  return {mean.detected ? 0 : 1, early_error(mean), mean.E_r_deg.value_or(kWorst),
-          mean.average_offset_m.value_or(kWorst), mean.inliers.value_or(0.0)};
+  return {mean.detected ? 0 : 1, early_error(mean), mean.E_r_deg.value_or(kNone),
+          mean.average_offset_m.value_or(kNone), mean.inliers.value_or(0.0)};
 }
 
 }  // namespace

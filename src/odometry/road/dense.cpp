@@ -21,11 +21,12 @@ constexpr double kMaxDenseSigma = 0.2;
 constexpr std::size_t kMinSamples = 600;
 /// Fewer than this where pixels are left out: take every pixel.
 constexpr std::size_t kFewSamples = 2400;
-constexpr int kMaxIterations = 5;  ///< per grid
-constexpr double kCoarseBound = 5.0;    ///< times the last grid's bound of convergence
+constexpr int kMaxIterations = 5;     ///< per grid
+constexpr double kCoarseBound = 5.0;  ///< times the last grid's bound of convergence
 /// Of a tile's mean square residual, in normalised images.
 constexpr double kNoiseFloor = 0.05;
-constexpr double kSearchScaleSigma = 0.05;  ///< prior knowledge of log_scale worse than this: search
+constexpr double kSearchScaleSigma =
+    0.05;  ///< prior knowledge of log_scale worse than this: search
 constexpr double kSearchStep = 0.03;
 constexpr double kMaxSearch = 1.8;
 constexpr int kMinTileSamples = 20;
@@ -153,7 +154,8 @@ Tiles align_road(const RoadImage::Level& prev,
     a.segment<3>(4) = p.cross(g);  // of exp(w) p
     a[7] = value - match.cur;
     const float size = std::abs(a[7]);
-    const Eigen::Matrix<float, 8, 1> weighted = (size <= kHuberResidual ? 1.0F : kHuberResidual / size) * a;
+    const Eigen::Matrix<float, 8, 1> weighted =
+        (size <= kHuberResidual ? 1.0F : kHuberResidual / size) * a;
     tile.sums.topRows<4>().noalias() += a.head<4>() * weighted.transpose();
     tile.sums.bottomRightCorner<4, 4>().noalias() += a.tail<4>() * weighted.tail<4>().transpose();
   });

@@ -56,9 +56,9 @@ Strip find_strip(const RoadImage& cur, const RoadRegion& region, const RoadOptio
     low = {std::min(low.x, sample.u), std::min(low.y, sample.v)};
     high = {std::max(high.x, sample.u), std::max(high.y, sample.v)};
   }
-  strip.box =
-      cv::Rect(low - cv::Point(kTrackingBorder_px, kTrackingBorder_px), high + cv::Point(kTrackingBorder_px, kTrackingBorder_px)) &
-      cv::Rect({}, cur.pixels.size());
+  strip.box = cv::Rect(low - cv::Point(kTrackingBorder_px, kTrackingBorder_px),
+                       high + cv::Point(kTrackingBorder_px, kTrackingBorder_px)) &
+              cv::Rect({}, cur.pixels.size());
   if (samples.empty() || strip.box.area() == 0) {
     return {};
   }
