@@ -6,7 +6,6 @@
 #include <numeric>
 #include <optional>
 #include <span>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -102,7 +101,10 @@ class ResultWriter {
     }
     Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
     keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
-    keep_first(written, write_refined(folder / "trajectory_refined_kitti.txt"));
+    if (refined_) {
+      keep_first(written,
+                 write_kitti_trajectory(folder / "trajectory_refined_kitti.txt", *refined_));
+    }
     report = make_report();
     keep_first(written, drive_.written);
     keep_first(written, write_text_file(folder / "config.yaml", config_text()));
@@ -135,19 +137,6 @@ class ResultWriter {
   }
 
  private:
-  [[nodiscard]] Status write_refined(const std::filesystem::path& file) const {
-    if (refined_) {
-      return write_kitti_trajectory(file, *refined_);
-    }
-    std::error_code code;
-    std::filesystem::remove(file, code);
-    if (code) {
-      return fail(fmt::format("{}: an earlier run's file cannot be removed ({})", file.string(),
-                              code.message()));
-    }
-    return {};
-  }
-
   [[nodiscard]] MetricsReport make_report() const {
     const std::chrono::duration<double> elapsed =
         std::chrono::steady_clock::now() - request_.started +

@@ -100,6 +100,21 @@ Expected<std::string> identity_of(const RunRequest& request,
                      internal::sha256_hex(files));
 }
 
+/// What is written when all frames are done: beside the frames of a run that was killed before, an
+/// earlier run's would pass for its own. Links stay.
+Status remove_earlier_results(const std::filesystem::path& out_dir) {
+  for (const char* name : {"metrics.json", "report.html", "trajectory.png", "trajectory_tum.txt",
+                           "trajectory_refined_kitti.txt", "map.ply"}) {
+    std::error_code code;
+    if (is_regular_file(symlink_status(out_dir / name, code))) {
+      if (Status status = remove_file(out_dir / name); !status) {
+        return status;
+      }
+    }
+  }
+  return {};
+}
+
 /// What an earlier run left in the folder is removed, unless this one goes on from it.
 Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunRequest& request,
                                                                  const std::string& identity) {
@@ -118,6 +133,9 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
   }
   if (status && !checkpoint) {
     status = pipeline::remove_checkpoint(request.out_dir);
+  }
+  if (status) {
+    status = remove_earlier_results(request.out_dir);
   }
   if (!status) {
     return status.error();

@@ -52,15 +52,14 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
-/// else an old one is removed, frames.csv, config.yaml, metrics.json,
-/// report.html, trajectory.png, map.ply, pictures/%06d.png; until the end also
-/// checkpoint). A wrong request
-/// (configuration, sequence, ground truth that scale.source needs, model, out_dir that cannot be
-/// written) is an error before work starts. A frame that cannot be read is a warning and gets a
-/// pose. When a result cannot be written the others still are; `written` says so. One run with
-/// measure_times at a time in a process. OpenCV is told, for the whole process, how many threads it
-/// may use, and by whom its loops are run: call nothing of it in another thread while a run begins
-/// or ends.
+/// frames.csv, config.yaml, metrics.json, report.html, trajectory.png, map.ply, pictures/%06d.png;
+/// until the end also checkpoint; an earlier run's are removed when this one starts). A wrong
+/// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that
+/// cannot be written) is an error before work starts. A frame that cannot be read is a warning and
+/// gets a pose. When a result cannot be written the others still are; `written` says so. One run
+/// with measure_times at a time in a process. OpenCV is told, for the whole process, how many
+/// threads it may use, and by whom its loops are run: call nothing of it in another thread while a
+/// run begins or ends.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

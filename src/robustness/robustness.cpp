@@ -265,8 +265,9 @@ Expected<RobustnessReport> run_robustness(const RobustnessRequest& request) {
   if (const Status status = robustness.plan(); !status) {
     return status.error();
   }
-  if (const Status made = pipeline::create_out_folder(request.out_dir); !made) {
-    return made.error();
+  const auto lock = pipeline::open_out_folder(request.out_dir);
+  if (!lock) {
+    return lock.error();
   }
   return robustness.run();
 }

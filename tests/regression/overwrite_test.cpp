@@ -44,6 +44,15 @@ TEST_F(Overwrite, EvaluateSparesWhatItReads) {
       0);
 }
 
+TEST_F(Overwrite, SynthSparesWhatItDidNotRender) {
+  const std::string image = read_file(sequence_ / "image_2/000003.png");
+  const std::string poses = read_file(folder_ / "poses/00.txt");
+  expect_error(run_stemvo({"synth", folder_.path().string(), "--frames", "2"}), 1,
+               {"sequences/00", "expected a drive that stemvo rendered"});
+  EXPECT_EQ(read_file(sequence_ / "image_2/000003.png"), image);
+  EXPECT_EQ(read_file(folder_ / "poses/00.txt"), poses);
+}
+
 TEST_F(Overwrite, CalibrateSparesWhatItReads) {
   write_file(folder_ / "my.yaml", "seed: 1\n");
   fs::create_symlink(sequence_ / "times.txt", folder_ / "link.txt");

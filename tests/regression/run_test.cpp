@@ -251,7 +251,7 @@ TEST_F(Run, BrokenFirstFrameIsNoEnd) {
 }
 
 TEST_F(Run, InterruptWritesWhatWasComputed) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     // The same few frames many times over last long enough to be interrupted.
     const fs::path copy = test::copy_drive(folder_.path() / std::to_string(signal), 2);
     for (int i = 2; i < 4000; ++i) {

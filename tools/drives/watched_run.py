@@ -27,6 +27,8 @@ class Result:
     memory_ratio: float  # median of the resident set in the second half over that in the second quarter: peaks come and go
     quarters_ms: list  # mean time per frame of each quarter, by the clock
     quarters_cpu_ms: list  # mean processor time per frame of each quarter, of all threads
+    median_mb: tuple  # of the resident set in the second quarter, in the second half
+    handles: tuple  # most open files in the first half of the frames, in the second
 
 
 def resident_mb(pid):
@@ -49,6 +51,14 @@ def processor_s(pid):
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
     except OSError:
         return 0.0
+
+
+def open_files(pid):
+    """0 once the process is gone."""
+    try:
+        return len(os.listdir(f"/proc/{pid}/fd"))
+    except OSError:
+        return 0
 
 
 class Messages:
@@ -86,12 +96,15 @@ class Watched:
 
     memory_samples_mb: tuple = dataclasses.field(default_factory=lambda: ([], [], []))
     second_quarter_mb: list = dataclasses.field(default_factory=list)  # the program has started, the queues are full
+    handles: list = dataclasses.field(default_factory=lambda: [0, 0])
     marks: list = dataclasses.field(default_factory=list)  # (frames, seconds, processor seconds) at the quarters
 
     def add(self, pid, done, num_frames):
         part = 2 if done >= num_frames else 1 if 2 * done >= num_frames else 0
         memory_mb = resident_mb(pid)
         self.memory_samples_mb[part].append(memory_mb)
+        if part < 2:
+            self.handles[part] = max(self.handles[part], open_files(pid))
         if part == 0 and 4 * done >= num_frames:
             self.second_quarter_mb.append(memory_mb)
         if len(self.marks) < 5 and (done > 0 or self.marks) and 4 * done >= len(self.marks) * num_frames:
@@ -102,8 +115,12 @@ class Watched:
         return tuple(max(samples, default=0.0) for samples in self.memory_samples_mb)
 
     @property
+    def median_mb(self):
+        return statistics.median(self.second_quarter_mb), statistics.median(self.memory_samples_mb[1])
+
+    @property
     def memory_ratio(self):
-        return statistics.median(self.memory_samples_mb[1]) / statistics.median(self.second_quarter_mb)
+        return self.median_mb[1] / self.median_mb[0]
 
     def quarters_ms(self, clock):
         """Per frame; `clock` 1: of the wall, 2: of the processor. None where the run was too short to tell."""
@@ -139,7 +156,8 @@ def run(program, sequence, out, num_frames, options):
     if not watched.second_quarter_mb or not watched.memory_mb[1]:
         raise RunError(f"{out}: the run was too short to sample its memory")
     metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
-    return Result(metrics, watched.memory_mb, watched.memory_ratio, watched.quarters_ms(1), watched.quarters_ms(2))
+    return Result(metrics, watched.memory_mb, watched.memory_ratio, watched.quarters_ms(1), watched.quarters_ms(2),
+                  watched.median_mb, tuple(watched.handles))
 
 
 def lengths_ratio(estimate, truth):

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""20,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
+is kept of a frame: pose, row, landmarks, and the checkpoint's copies of them."""
+
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from drives import watched_run
+
+PROGRAM = os.environ["STEMVO_PROGRAM"]
+RENDERED = 100
+FRAMES = 20000
+MAX_KB_PER_FRAME = 8.0
+
+
+def frame(i):
+    """0, 1, .. 98, 99, 98, .. 1, 0, 1, .."""
+    return RENDERED - 1 - abs(i % (2 * RENDERED - 2) - (RENDERED - 1))
+
+
+class ManyFrames(unittest.TestCase):
+    def test_nothing_grows(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            subprocess.run([PROGRAM, "synth", folder / "drive", "--frames", str(RENDERED), "--width", "310", "--height", "94"],
+                           check=True, capture_output=True)
+            rendered = folder / "drive/sequences/00"
+            sequence = folder / "long/sequences/00"
+            (sequence / "image_2").mkdir(parents=True)
+            os.link(rendered / "calib.txt", sequence / "calib.txt")
+            (sequence / "times.txt").write_text("".join(f"{0.1 * i:.1f}\n" for i in range(FRAMES)))
+            for i in range(FRAMES):
+                os.symlink(rendered / f"image_2/{frame(i):06d}.png", sequence / f"image_2/{i:06d}.png")
+            result = watched_run.run(PROGRAM, sequence, folder / "out", FRAMES, [])
+            rows = (folder / "out/trajectory_kitti.txt").read_text().count("\n")
+        # Samples of the second quarter and of the second half are 3/8 of the frames apart.
+        grown_kb = 1024 * (result.median_mb[1] - result.median_mb[0]) / (0.375 * FRAMES)
+        print(f"memory {result.memory_mb} MB, {grown_kb:.1f} kB a frame, open files {result.handles}, "
+              f"processor ms per frame {result.quarters_cpu_ms}")
+        self.assertEqual(rows, FRAMES)
+        self.assertEqual(result.metrics["frames"], FRAMES)
+        self.assertLess(grown_kb, MAX_KB_PER_FRAME)
+        self.assertGreater(result.handles[0], 3)
+        self.assertLessEqual(result.handles[1], result.handles[0])
+        self.assertLess(result.quarters_cpu_ms[3], 1.3 * min(result.quarters_cpu_ms[:3]))
+
+
+if __name__ == "__main__":
+    unittest.main()
