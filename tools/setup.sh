@@ -90,7 +90,7 @@ check_toolchain() {
   # shellcheck disable=SC2086
   found=$($cxx -dumpfullversion -dumpversion 2>/dev/null) || die "no C++ compiler: '$cxx' does not run"
   # shellcheck disable=SC2086
-  $cxx --version | grep -qi clang && needed=15
+  $cxx --version | grep -qi clang && needed=16
   version_at_least "$found" "$needed" || die "compiler too old: '$cxx' is version $found, needed $needed or newer (set CXX)"
   found=$(cmake --version 2>/dev/null | sed -n '1s/[^0-9]*//p') || true
   [[ -n "$found" ]] || die "cmake does not run"
