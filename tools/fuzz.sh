@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# fuzz.sh SECONDS [TARGET..]: every fuzzer of tests/fuzz (or those named) for that time, with clang 15
+# fuzz.sh SECONDS [TARGET..]: every fuzzer of tests/fuzz (or those named) for that time, with clang 16
 # (`tools/setup.sh fuzz`). Ends with 1 and the file of the find, with the command that repeats it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -213,7 +213,7 @@ fi
 # clang with libFuzzer: another compiler than the program's.
 if [[ "${1:-}" == fuzz ]]; then
   mkdir -p "$LOGS"
-  PACKAGES=(clang-15 libclang-common-15-dev)
+  PACKAGES=(clang-16 libclang-rt-16-dev)
   install_packages
   exit
 fi
