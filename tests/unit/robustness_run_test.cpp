@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/folder_lock.hpp"
+#include "pipeline/out_folder.hpp"
 #include "robustness/robustness.hpp"
 #include "support/small_drive.hpp"
 
@@ -84,7 +84,7 @@ TEST_F(RobustnessRun, SaysWhatItCannotDo) {
   request_.controls = {"gray"};
   {
     std::filesystem::create_directories(request_.out_dir);
-    const auto other = pipeline::FolderLock::take(request_.out_dir);
+    const auto other = pipeline::lock_folder(request_.out_dir);
     EXPECT_THAT(error(), HasSubstr("no other stemvo writes to"));
   }
   request_.sequence_dirs.push_back(sequence_);
