@@ -31,6 +31,8 @@ def parse_arguments(arguments):
     parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True, help="created where missing")
     parser.add_argument("--name", default="default")
     parser.add_argument("--default-filter", type=int, metavar="K", help="used where none is asked for (default: 0, which gets no file of its own)")
+    parser.add_argument("--objective", choices=("matching", "tracking"), default="matching",
+                        help="tell points apart, or the smallest covariance of a tracked translation (default: %(default)s)")
     parser.add_argument("--sampling", type=int, default=2, metavar="PX",
                         help="pixels between samples of the channel that it is meant for (default: 2)")
     parser.add_argument("--kernel", type=int, default=8, metavar="PX", help="side of a filter (default: %(default)s)")
@@ -59,7 +61,8 @@ def collect(drives, options):
         for before in range(len(frames) - 1):
             next_gray = frames.gray(before + 1)
             corners = drive.corresponding_corners(frames, before, before + 1, size, options.sampling, options.pairs, rng)
-            scatter.add(drive.patches(gray, corners[0], size), views.patches(next_gray, corners[1], size, rng))
+            slopes = [drive.patches(slope, corners[0], size) for slope in np.gradient(gray)[::-1]] if options.objective == "tracking" else ()
+            scatter.add(drive.patches(gray, corners[0], size), views.patches(next_gray, corners[1], size, rng), slopes)
             gray = next_gray
     if scatter.count < 100 * FILTERS:
         raise drive.DriveError(f"{options.drives[-1]}: expected at least {100 * FILTERS} patches seen in two frames, "
@@ -71,7 +74,9 @@ def learn(scatter, nuisance, options):
     """The stem, and the discriminant ratio of each of its filters."""
     signal = scatter.signal()
     has_norm = options.floor > 0
-    filters, ratios = discriminant.generalised_eigenvectors(signal, scatter.noise(nuisance), FILTERS - has_norm)
+    noise, count = scatter.noise(nuisance), FILTERS - has_norm
+    filters, ratios = (discriminant.tracking_filters(scatter.slopes(), noise, count) if options.objective == "tracking"
+                       else discriminant.generalised_eigenvectors(signal, noise, count))
     filters = discriminant.with_signs(filters, signal)
     step = ROUNDING * np.abs(filters).max()
     filters = np.rint(filters / step)
@@ -103,6 +108,7 @@ def write_folded(stem, options):
 
 def command_line(options):
     return (f"tools/learn_stem.py {' '.join(file.name for file in options.drives)} --out models --name {options.name} "
+            f"{'' if options.objective == 'matching' else f'--objective {options.objective} '}"
             f"{'' if options.default_filter is None else f'--default-filter {options.default_filter} '}--kernel {options.kernel} --stride {options.stride} "
             f"--sampling {options.sampling} --zoom {options.zoom:g} --rotation {options.rotation:g} --gain {options.gain:g} "
             f"--offset {options.offset:g} --noise {options.noise:g} --floor {options.floor:g} --pairs {options.pairs} "

@@ -150,6 +150,19 @@ class Learning(PlantedDrive):
         entry = yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text())["models"][0]
         self.assertEqual((entry["folded"]["filter"], entry["folded"]["sampling"]), (5, 2))
 
+    def test_tracking_has_the_steeper_slope_in_its_worse_direction(self):
+        """On the pictures themselves: smaller of the slopes' energies along x and y; the noise is 1 for each filter."""
+        self.assertEqual(self.learn("tracking", "--objective", "tracking")[0], 0)
+        self.assertIn("--objective tracking", (self.folder / "tracking" / "manifest.yaml").read_text())
+        self.learn("matching")
+        gray = drive.Drive(self.folder / "drive").gray(1)
+        ratios = {}
+        for out in ("tracking", "matching"):
+            channels = np.stack([[self.channels(out, np.roll(gray, (-y, -x), (0, 1))) for x in range(2)] for y in range(2)])[:, :, :, 8:-8, 8:-8]
+            slopes = channels[0, 1] - channels[0, 0], channels[1, 0] - channels[0, 0]
+            ratios[out] = np.min([(slope**2).mean(axis=(1, 2)) for slope in slopes], axis=0)
+        self.assertGreater(ratios["tracking"][0], 1.1 * ratios["matching"].max(), ratios)
+
     def test_first_filter_rises_with_gray(self):
         self.learn("out")
         dark, bright = (self.channels("out", np.full((8, 8), level)) for level in (60.0, 180.0))
@@ -181,6 +194,20 @@ class Discriminant(unittest.TestCase):
         np.testing.assert_allclose(ratios, [10.0, 4.0, 1.0])
         np.testing.assert_allclose(np.abs(filters[0]), [0, 0, 10**0.5, 0], atol=1e-12)
         np.testing.assert_allclose(np.einsum("ki,ij,lj->kl", filters, noise, filters), np.eye(3), atol=1e-12)
+
+    def test_planted_slopes_for_tracking(self):
+        """Two even filters with a slope in one direction each, energies 4 and 9: their mixture has 4 * 9 / (4 + 9) in both.
+        An odd filter with 2 and 1 is not mixed in. (A little of both couples the two: a double eigenvalue is no road's.)"""
+        even = np.zeros((2, 16))
+        even[0, [0, 3]] = even[1, [5, 6]] = 0.5**0.5
+        odd = np.zeros(16)
+        odd[[8, 11]] = 0.5**0.5, -(0.5**0.5)
+        slopes = [along * np.outer(filter_, filter_) + own * np.outer(odd, odd) + 1e-3 * np.outer(even.sum(axis=0), even.sum(axis=0))
+                  for along, filter_, own in ((4, even[0], 2), (9, even[1], 1))]
+        filters, ratios = discriminant.tracking_filters(slopes, np.eye(16), 4)
+        np.testing.assert_allclose(ratios[[0, 2]], [36 / 13, 1], atol=0.01)
+        np.testing.assert_allclose(np.abs(filters[0] @ even.T), [(9 / 13)**0.5, (4 / 13)**0.5], atol=0.01)
+        np.testing.assert_allclose(np.abs(filters[2]), np.abs(odd), atol=1e-9)
 
     def test_filters_are_even_or_odd_in_x(self):
         rng = np.random.default_rng(2)
