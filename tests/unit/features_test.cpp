@@ -167,6 +167,27 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
   EXPECT_FALSE(start_of(show(3.0), first.track_ids[2]).has_value());  // it was not there once
 }
 
+TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
+  const auto front_end = create_front_end({});
+  const auto show = [&](const cv::Mat& image) { return front_end->process(image_of(image)); };
+  const cv::Size size(480, 200);
+  static_cast<void>(show(textured_image(size, {0.0, 0.0})));
+  const Matches before = show(textured_image(size, {1.0, 0.0}));
+  ASSERT_GT(before.track_ids.size(), 50U);
+  TrackPoints expected;
+  for (std::size_t i = 0; i < before.track_ids.size(); ++i) {
+    expected.push_back({before.track_ids[i], before.cur_uv[i]});
+  }
+  const cv::Mat dark(size, CV_8U, cv::Scalar(0));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(show(dark).cur_uv.empty());
+    front_end->look_for(expected);
+  }
+  const Matches after = show(textured_image(size, {2.0, 0.0}));
+  EXPECT_GT(after.track_ids.size(), before.track_ids.size() / 2);
+  EXPECT_LT(median_error_px(after, {-1.0, 0.0}), 0.05);
+}
+
 TEST(PatchFrontEnd, WhatLeavesTheImageIsCountedAsOutOfView) {
   const auto front_end = create_front_end({});
   const cv::Size size(480, 200);
