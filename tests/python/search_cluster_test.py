@@ -114,7 +114,7 @@ class SearchCluster(unittest.TestCase):
 
     def check_that_records_name_the_model_here(self, out):
         for part in (*(out / "parts").iterdir(), out / "result"):
-            identity = json.loads((part / "records.jsonl").read_text(encoding="utf-8").splitlines()[0])
+            identity = json.loads((part / "records.jsonl").read_text(encoding="utf-8").splitlines()[0])["of"]
             models = {layer["stem_model"] for layer in identity["layers"]}
             self.assertIn(str(self.model), models)
             self.assertLessEqual(models, {str(self.model), "gray", "input_layer"})

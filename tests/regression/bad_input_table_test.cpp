@@ -329,7 +329,7 @@ TEST_F(BadInputTable, Records) {
        with("\"sequences\":[{", "\"sequences\":[],\"x\":[{"),
        with("\"layers\":[{", "\"layers\":[],\"x\":[{"),
        with("\"rungs\":[{", "\"rungs\":[],\"x\":[{"),
-       with("\"stemvo_search\":", "\"stemvo_search\":9"),
+       with("\"of\":{\"program\":", "\"of\":{\"x\":"), with("\"sha256\":\"", "\"sha256\":\"0"),
        with("\"detected\":true", "\"detected\":1e300")});
 }
 

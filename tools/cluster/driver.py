@@ -3,6 +3,7 @@
 
 import collections
 import dataclasses
+import hashlib
 import json
 import os
 import socket
@@ -24,6 +25,20 @@ class Options:
     retries: int = 3
     patience_s: float = 120.0
     quiet: bool = False
+
+
+def with_folder(records, here):
+    """The records of a part with this machine's folder in them: each line holds a hash of what is in it and in the first
+    (sealed() in src/search/records.cpp)."""
+    first, lines = b"", []
+    for line in records.replace(b"{folder}", here).splitlines(keepends=True):
+        _, found, text = line.rstrip(b"\n").partition(b'"of":')
+        if found:
+            text = text[:-1]
+            line = b'{"sha256":"%s","of":%s}\n' % (hashlib.sha256(first + text).hexdigest().encode(), text)
+            first = first or text
+        lines.append(line)
+    return b"".join(lines)
 
 
 @dataclasses.dataclass
@@ -110,7 +125,7 @@ class _Queue:
         # The model that was sent along is the one here: what the merge writes must name it.
         folder = os.path.abspath(os.path.dirname(task.model))
         here = json.dumps(folder, ensure_ascii=False)[1:-1].encode()
-        self._keep(task, {name: content.replace(b"{folder}", here) for name, content in files.items()})
+        self._keep(task, {name: with_folder(content, here) for name, content in files.items()})
         self._warn(task, [line.replace("{folder}", folder) for line in warnings])
         self.outcome.tasks += 1
         self.outcome.drives += task.filters
