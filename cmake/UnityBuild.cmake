@@ -1,10 +1,9 @@
-# Sources of one folder are compiled together, eight at a time: half the processor time of a build, since headers and
+# Sources of one folder are compiled together, eight at a time: two thirds of the processor time of a build, since headers and
 # templates are paid for once. Off in the preset `dev`, where one file is changed often, and for clang-tidy.
 option(STEMVO_UNITY_BUILD "Compile sources of one folder together" ON)
 
-# After the target has all its sources. by_name: a group is the files `ROOM_*.cpp` of a folder (the tests).
+# Called when the target has all its sources.
 function(stemvo_unity_build target)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "BY_NAME" "" "")
   if(NOT STEMVO_UNITY_BUILD)
     return()
   endif()
@@ -17,11 +16,6 @@ function(stemvo_unity_build target)
     endif()
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${folder})
     cmake_path(GET source PARENT_PATH group)
-    if(arg_BY_NAME)
-      cmake_path(GET source STEM name)
-      string(REGEX REPLACE "_.*" "" name "${name}")
-      cmake_path(APPEND group ${name})
-    endif()
     string(MAKE_C_IDENTIFIER "${group}" key)
     math(EXPR part "0${count_${key}} / 8")
     math(EXPR count_${key} "0${count_${key}} + 1")
