@@ -23,6 +23,8 @@
 namespace stemvo::apps {
 namespace {
 
+constexpr const char* kNoThreads =
+    "out of threads: expected more than 'ulimit -u' allows, or more memory for them";
 constexpr const char* kNoMemory =
     "out of memory: expected more than there is, or than 'ulimit -v' allows";
 
@@ -66,11 +68,11 @@ std::string describe(const std::exception_ptr& error) {
     return opencv.code == cv::Error::StsNoMem ? kNoMemory
                                               : std::string("internal: ") + opencv.what();
   } catch (const std::system_error& system) {
-    return system.code() == std::errc::resource_unavailable_try_again
-               ? "out of threads: expected more than 'ulimit -u' allows, or more memory for them"
-               : system.what();
-  } catch (const std::exception& other) {
-    return std::string("internal: ") + other.what();
+    return system.code() == std::errc::resource_unavailable_try_again ? kNoThreads : system.what();
+  } catch (const std::exception& other) {  // ONNX Runtime's say it in words only
+    return std::string_view(other.what()).find("pthread_create") != std::string_view::npos
+               ? kNoThreads
+               : std::string("internal: ") + other.what();
   } catch (...) {
     return "internal: unknown exception";
   }

@@ -103,11 +103,15 @@ Expected<std::string> identity_of(const Run& run) {
                      c.height_px, pipeline::config_text(run, 0), internal::sha256_hex(files));
 }
 
-/// What is written when all frames are done: beside the frames of a run that was killed before, an
-/// earlier run's would pass for its own. Links stay.
+/// What a run writes at its end, or after a second: beside the frames of one that was killed
+/// before, an earlier run's would pass for its own. Links stay, and all where no run has been.
 Status remove_earlier_results(const std::filesystem::path& out_dir) {
-  for (const char* name : {"metrics.json", "report.html", "trajectory.png", "trajectory_tum.txt",
-                           "trajectory_refined_kitti.txt", "map.ply"}) {
+  const auto frames = read_text_file(out_dir / "frames.csv");
+  if (!frames || !frames->starts_with("frame,timestamp_s,state,")) {
+    return {};
+  }
+  for (const char* name : {"metrics.json", "trajectory_kitti.txt", "report.html", "trajectory.png",
+                           "trajectory_tum.txt", "trajectory_refined_kitti.txt", "map.ply"}) {
     std::error_code code;
     if (is_regular_file(symlink_status(out_dir / name, code))) {
       if (Status status = remove_file(out_dir / name); !status) {
@@ -134,9 +138,7 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
   }
   if (status && !*checkpoint) {
     status = remove_file(pipeline::checkpoint_file(out));
-  }
-  if (status) {
-    status = remove_earlier_results(out);
+    status = status ? remove_earlier_results(out) : status;
   }
   if (status) {  // from now on it can be seen how far the run is
     status = write_text_file(out / "frames.csv",

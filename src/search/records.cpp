@@ -15,6 +15,7 @@
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
 #include "report/metrics_keys.hpp"
+#include "search/record_check.hpp"
 #include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
@@ -146,16 +147,23 @@ Expected<std::string> unsealed(const std::string& line, const std::string& first
   return text;
 }
 
-void add_line(const std::string& text, SearchRecords& records) {
+/// Error, without file and line: sealed or not, it is input, and no search wrote it.
+Status add_line(const std::string& text, SearchRecords& records) try {
   const Json json = Json::parse(text);
   if (records.first_line.empty()) {
     json.get_to(records.identity);
     records.first_line = text;
-    return;
+    return check_identity(records.identity);
   }
   FilterRecord record = json.get<FilterRecord>();
   json.get_to(record.key);
-  records.records.insert(record);
+  Status status = check_record(record, records.identity);
+  if (status) {
+    records.records.insert(record);
+  }
+  return status;
+} catch (const Json::exception& problem) {
+  return fail(fmt::format("expected a line of a search, found another one ({})", problem.what()));
 }
 
 }  // namespace
@@ -227,12 +235,12 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   for (std::size_t end = 0; (end = text->find('\n', begin)) != text->npos; begin = end + 1) {
     ++line_number;
     const auto line = unsealed(text->substr(begin, end - begin), records.first_line);
-    if (line) {
-      add_line(*line, records);
+    const Status status = line ? add_line(*line, records) : Status(line.error());
+    if (status) {
       continue;
     }
     const std::string problem =
-        fmt::format("{}: {}", at_line(file, line_number), line.error().message);
+        fmt::format("{}: {}", at_line(file, line_number), status.error().message);
     if (line_number == 1) {
       return fail(problem);
     }

@@ -129,9 +129,11 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!plan) {
     return plan.error();
   }
-  auto records = pipeline::create_out_folder(request.out_dir).and_then([&] {
-    return RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
-  });
+  const auto lock = pipeline::open_out_folder(request.out_dir);
+  if (!lock) {
+    return lock.error();
+  }
+  auto records = RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
   if (!records) {
     return records.error();
   }
@@ -179,8 +181,11 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
-  auto file = pipeline::create_out_folder(out_dir).and_then(
-      [&] { return RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false); });
+  const auto lock = pipeline::open_out_folder(out_dir);
+  if (!lock) {
+    return lock.error();
+  }
+  auto file = RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false);
   const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
   if (!written) {
     return written.error();

@@ -242,10 +242,13 @@ Status check_node(std::string_view message) {
 }
 
 Status check_graph(std::string_view message) {
-  return for_each_field(message, [](const Field& field) -> Status {
+  std::size_t num_nodes = 0;
+  return for_each_field(message, [&](const Field& field) -> Status {
     switch (field.number) {
       case kGraphNode:
-        return check_node(field.bytes);
+        return ++num_nodes > kMaxNodes
+                   ? fail(fmt::format("expected at most {} operators, found more", kMaxNodes))
+                   : check_node(field.bytes);
       case kGraphInitializer:
         return check_tensor(field.bytes, /*is_weight=*/true);
       case kGraphSparse:

@@ -10,6 +10,8 @@ namespace stemvo::internal {
 
 /// Limits of a model, foreign code as it is. docs/security.md says them.
 inline constexpr std::size_t kMaxModelBytes = std::size_t{512} << 20U;
+/// Whole networks have some thousands.
+inline constexpr std::size_t kMaxNodes = 20000;
 inline constexpr int kMaxKernel_px = 4096;
 inline constexpr int kMaxStride_px = 256;
 inline constexpr int kMaxFilters = 4096;

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <system_error>
 
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -46,7 +47,13 @@ Status write_in_place(const fs::path& file, const fs::path& place, std::string_v
   const auto failed = [&] {
     return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
   };
-  std::FILE* const stream = std::fopen(place.c_str(), "wbe");
+  // A pipe that nobody reads is an error; it would wait for ever.
+  const int descriptor =
+      ::open(place.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK, 0666);
+  if (descriptor < 0 || ::fcntl(descriptor, F_SETFL, 0) != 0) {
+    return failed();
+  }
+  std::FILE* const stream = ::fdopen(descriptor, "wb");
   if (stream == nullptr) {
     return failed();
   }

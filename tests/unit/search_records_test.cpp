@@ -177,6 +177,38 @@ TEST_F(Records, ALineOfAnotherSearchIsLeftOut) {
   EXPECT_THAT(content->warnings.front(), HasSubstr("records.jsonl:3: "));
 }
 
+/// Sealed, but nothing that a search of this identity writes: a seal is no proof.
+TEST_F(Records, WhatNoSearchWritesIsNamedAndLeftOut) {
+  FilterRecord no_rung = record(1);
+  no_rung.rung = 9;
+  FilterRecord no_drives = record(1);
+  no_drives.drives.clear();
+  FilterRecord of_another = record(1);
+  of_another.drives[0].sequence = "01";
+  FilterRecord beyond = record(1);
+  beyond.drives[0].t_rel_percent = 1e300;
+  for (const auto& [bad, reason] :
+       {std::pair(record(7), "expected a filter of the search, found net stem 7"),
+        std::pair(no_rung, "expected a rung below 1, found 9"),
+        std::pair(no_drives, "expected drives over 1 sequences, found 0"),
+        std::pair(of_another, "expected a drive of 00, found one of 01"),
+        std::pair(beyond, "t_rel_percent: expected 0 to")}) {
+    std::filesystem::remove_all(folder_ / "a");
+    write("a", identity(0, 3), {record(0), bad});
+    const auto content = read_records(file("a"));
+    ASSERT_TRUE(content) << content.error().message;
+    EXPECT_EQ(content->records.size(), 1U) << reason;
+    ASSERT_EQ(content->warnings.size(), 1U) << reason;
+    EXPECT_THAT(content->warnings.front(), HasSubstr(reason));
+  }
+  SearchIdentity no_sequences = identity(0, 3);
+  no_sequences.sequences.clear();
+  std::filesystem::remove_all(folder_ / "a");
+  write("a", no_sequences, {});
+  EXPECT_THAT(read_records(file("a")).error().message,
+              HasSubstr("records.jsonl:1: expected rungs, layers and sequences, found none"));
+}
+
 /// Lists in lists, as deep as no stack is.
 TEST_F(Records, ADeepIdentityIsAnError) {
   const std::string deep = std::string(1000000, '[') + std::string(1000000, ']');

@@ -77,6 +77,21 @@ TEST(ForeignModel, WhatIsNoModelIsRefusedBeforeTheRuntimeSeesIt) {
   }
 }
 
+TEST(ForeignModel, AGraphOfTooManyOperatorsIsRefused) {
+  const auto with_nodes = [](std::size_t count) {
+    std::string model = "\x3a";  // the graph, its length, empty nodes
+    for (std::size_t rest = 2 * count; rest > 0; rest >>= 7U) {
+      model += static_cast<char>((rest & 0x7fU) | (rest > 0x7fU ? 0x80U : 0U));
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      model += std::string("\x0a\x00", 2);
+    }
+    return check_foreign_model("many", model);
+  };
+  EXPECT_TRUE(with_nodes(kMaxNodes));
+  EXPECT_THAT(with_nodes(kMaxNodes + 1).error().message, HasSubstr("at most 20000 operators"));
+}
+
 TEST(ForeignModel, ARunEndsAtItsTimeLimit) {
   const auto session = OnnxSession::create("slow", bytes_of("hostile_slow"), "stem");
   ASSERT_TRUE(session) << session.error().message;

@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "support/temp_folder.hpp"
 
@@ -21,6 +22,15 @@ using testing::TempFolder;
 
 std::ptrdiff_t num_files(const TempFolder& folder) {
   return std::distance(fs::directory_iterator(folder.path()), {});
+}
+
+TEST(WriteTextFile, APipeThatNobodyReadsIsAnError) {
+  const TempFolder folder;
+  const fs::path pipe = folder / "metrics.json";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const Status status = write_text_file(pipe, "new");
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, HasSubstr(pipe.string() + ": cannot write: "));
 }
 
 TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
