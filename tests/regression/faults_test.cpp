@@ -62,7 +62,8 @@ class LongRun : public Faults {
 
 TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
   fs::create_directories(out_);
-  write_file(out_ / "metrics.json", "{}\n");  // of an earlier run
+  write_file(out_ / "frames.csv", "frame,timestamp_s,state,\n");  // of an earlier run
+  write_file(out_ / "metrics.json", "{}\n");
   write_file(out_ / "map.ply", "ply\n");
   test::RunningProgram program(STEMVO_PROGRAM, arguments());
   wait_for_poses();
