@@ -137,18 +137,11 @@ class ResultWriter {
 
   [[nodiscard]] Status write_page(const MetricsReport& report) const {
     const TrajectoryPlot plot = make_plot(report);
-    std::vector<std::size_t> drawn(drive_.frames.size());
-    std::iota(drawn.begin(), drawn.end(), std::size_t{0});
-    drawn = truth_ ? truth_->frames : drawn;
-    std::vector<FrameResult> frames;
-    for (std::size_t& i : drawn) {
-      frames.push_back(drive_.frames[i]);
-      i += sequence_.range().begin;
-    }
-    return write_run_page(
-        request_.out_dir / "report.html",
-        {plot.title, plot.subtitle, plot.unit, report, frames, drawn, plot.estimate,
-         plot.ground_truth, drive_.images, config_text_, request_.command});
+    std::vector<std::size_t> numbers(drive_.frames.size());
+    std::iota(numbers.begin(), numbers.end(), sequence_.range().begin);
+    return write_run_page(request_.out_dir / "report.html",
+                          {plot.title, plot.subtitle, plot.unit, report, drive_.frames, numbers,
+                           plot.estimate, truth_, drive_.images, config_text_, request_.command});
   }
 
  private:
@@ -208,7 +201,7 @@ class ResultWriter {
     return points;
   }
 
-  /// Against the ground truth where there is one.
+  /// All frames, in the world of the ground truth where some have one.
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
     TrajectoryPlot plot;
     plot.title = describe_frames(sequence_, trajectory_.size());
@@ -216,9 +209,11 @@ class ResultWriter {
     plot.estimate = trajectory_;
     if (truth_) {
       plot.ground_truth = truth_->poses;
-      plot.estimate = take_poses(trajectory_, truth_->frames);
-      if (report.metrics->alignment != Alignment::kNone) {
-        plot.estimate = align_trajectory(plot.estimate, truth_->poses, report.metrics->alignment);
+      plot.estimate =
+          align_trajectory(trajectory_, truth_->frames, truth_->poses, report.metrics->alignment);
+      if (truth_->frames.size() < trajectory_.size()) {
+        plot.subtitle += fmt::format(", ground truth for {} of {} frames", truth_->frames.size(),
+                                     trajectory_.size());
       }
     } else if (report.scale_source == "none") {
       plot.unit = "units";
