@@ -20,6 +20,7 @@
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
@@ -35,10 +36,10 @@ std::string describe_numbers(const MetricsReport& report) {
   std::string text = fmt::format("scale: {}", report.scale_source);
   if (report.metrics) {
     const Alignment alignment = report.metrics->alignment;
-    text += fmt::format(", path {:.0f} m, ", report.metrics->path_length_m);
+    text += fmt::format(", path {} m, ", format_length(report.metrics->path_length_m, 0));
     text += alignment == Alignment::kNone ? "no alignment:"
                                           : fmt::format("fitted by {}:", to_string(alignment));
-    text += fmt::format(" average offset {:.2f} m", report.metrics->average_offset_m);
+    text += fmt::format(" average offset {} m", format_length(report.metrics->average_offset_m, 2));
     if (report.metrics->t_rel_percent) {
       text += fmt::format(", t_rel {:.2f} %", *report.metrics->t_rel_percent);
     }

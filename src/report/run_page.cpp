@@ -13,6 +13,7 @@
 #include "evaluation/pose_file.hpp"
 #include "html/figures.hpp"
 #include "internal_check.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 namespace {
@@ -69,8 +70,8 @@ class RunFigures {
       lines.push_back(fmt::format("frame {}: {}, {} of {} tracks are inliers", run_.numbers[i],
                                   to_string(r.state), r.num_inliers, r.num_matches));
       if (run_.ground_truth && !std::isnan(travelled_[i])) {
-        lines.back() += fmt::format(", {:.2f} m off after {:.1f} m", errors_[i].norm(),
-                                    travelled_[i]);
+        lines.back() += fmt::format(", {} m off after {} m", format_length(errors_[i].norm(), 2),
+                                    format_length(travelled_[i], 1));
       }
     }
     return lines;

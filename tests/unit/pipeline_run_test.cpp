@@ -183,7 +183,7 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
   for (int i = 0; i < kNumFrames; ++i) {
     EXPECT_THAT(page, HasSubstr(fmt::format("\"frame {}: ", i)));
   }
-  EXPECT_THAT(page, HasSubstr("fitted by sim3: average offset "));
+  EXPECT_THAT(page, HasSubstr("path 0.15 m, fitted by sim3: average offset "));
   EXPECT_THAT(page, HasSubstr(", ground truth for 2 of 6 frames"));
 }
 
