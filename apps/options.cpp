@@ -7,7 +7,9 @@
 namespace stemvo::apps {
 namespace {
 
-std::filesystem::path find_config(const std::string& given) {
+constexpr const char* kShippedConfigs = "default, fast, paper";
+
+Expected<std::filesystem::path> find_config(const std::string& given) {
   std::error_code code;
   const std::filesystem::path file(given);
   if (std::filesystem::exists(file, code) || file.has_parent_path()) {
@@ -19,7 +21,9 @@ std::filesystem::path find_config(const std::string& given) {
       return shipped;
     }
   }
-  return file;  // load_config says what is wrong with it
+  return fail(given +
+              ": expected a configuration file, or the name of one that comes with stemvo (" +
+              kShippedConfigs + "), found neither");
 }
 
 }  // namespace
@@ -39,9 +43,9 @@ CLI::Validator in_range(int min, int max) { return CLI::Range(min, max).descript
 
 void add_config_options(CLI::App& command, ConfigArguments& arguments) {
   command
-      .add_option(
-          "--config", arguments.file,
-          "Configuration file, or the name of one that comes with stemvo: default, fast, paper")
+      .add_option("--config", arguments.file,
+                  std::string("Configuration file, or the name of one that comes with stemvo: ") +
+                      kShippedConfigs)
       ->type_name("FILE");
   command
       .add_option("--set", arguments.overrides,
@@ -57,7 +61,10 @@ void add_config_options(CLI::App& command, ConfigArguments& arguments) {
 Expected<Config> read_config(const ConfigArguments& arguments, const Config& base) {
   Config config = base;
   if (!arguments.file.empty()) {
-    const Expected<Config> loaded = load_config(find_config(arguments.file), base);
+    const Expected<Config> loaded =
+        find_config(arguments.file).and_then([&](const std::filesystem::path& file) {
+          return load_config(file, base);
+        });
     if (!loaded) {
       return loaded;
     }

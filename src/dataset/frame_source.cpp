@@ -22,17 +22,6 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, code);
 }
 
-/// A folder with some of KITTI's layout: KittiSequence says what is missing.
-bool looks_like_kitti(const fs::path& folder) {
-  std::error_code code;
-  for (const char* name : {"image_0", "image_1", "image_2", "image_3", "calib.txt", "times.txt"}) {
-    if (fs::exists(folder / name, code)) {
-      return true;
-    }
-  }
-  return false;
-}
-
 /// What `python -m stemvo.bag` reads.
 bool is_bag(const fs::path& path) {
   const fs::path kind = path.extension();

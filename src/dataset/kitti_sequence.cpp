@@ -32,11 +32,13 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
     return fail(
         fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
   }
+  // Commands that read other recordings too open none of them as KITTI's.
+  const char* why = looks_like_kitti(directory) ? "" : " (this command reads KITTI folders only)";
   return fail(option == "auto"
-                  ? fmt::format("{}: expected a folder image_2 or image_0, found neither",
-                                directory.string())
-                  : fmt::format("{}: expected a folder (input.camera is {}), found none",
-                                (directory / option).string(), option));
+                  ? fmt::format("{}: expected a folder image_2 or image_0, found neither{}",
+                                directory.string(), why)
+                  : fmt::format("{}: expected a folder (input.camera is {}), found none{}",
+                                (directory / option).string(), option, why));
 }
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.
@@ -128,6 +130,16 @@ Status set_size(bool is_color, FrameList& frames) {
 }
 
 }  // namespace
+
+bool looks_like_kitti(const fs::path& folder) {
+  std::error_code code;
+  for (const char* name : {"image_0", "image_1", "image_2", "image_3", "calib.txt"}) {
+    if (fs::exists(folder / name, code)) {
+      return true;
+    }
+  }
+  return false;
+}
 
 Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                                             const SequenceOptions& options) {

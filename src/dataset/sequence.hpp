@@ -8,6 +8,9 @@
 
 namespace stemvo {
 
+/// A folder with some of what only KITTI's layout has: KittiSequence says what is missing.
+[[nodiscard]] bool looks_like_kitti(const std::filesystem::path& folder);
+
 /// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt. Frames are CV_8UC1 for
 /// the gray cameras, CV_8UC3 in RGB order for colour.
 class KittiSequence final : public FrameSource {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "evaluation/pose_file.hpp"
 #include "geometry/degrees.hpp"
 #include "internal_check.hpp"
 
@@ -34,19 +35,23 @@ std::vector<double> distances_m(std::span<const Rigid3> poses) {
   return result;
 }
 
+Trajectory transform(const Similarity3& by, std::span<const Rigid3> poses) {
+  const Eigen::Quaterniond rotation(by.rotation);
+  Trajectory result;
+  result.reserve(poses.size());
+  for (const Rigid3& pose : poses) {
+    result.emplace_back(rotation * pose.rotation,
+                        by.scale * (rotation * pose.translation) + by.translation);
+  }
+  return result;
+}
+
 /// Both start at the identity. Umeyama's fit on positions.
 Trajectory align(std::span<const Rigid3> estimate,
                  std::span<const Rigid3> ground_truth,
                  Alignment alignment) {
-  const Similarity3 fit = align_positions(positions(estimate), positions(ground_truth), alignment);
-  const Eigen::Quaterniond rotation(fit.rotation);
-  Trajectory result;
-  result.reserve(estimate.size());
-  for (const Rigid3& pose : estimate) {
-    result.emplace_back(rotation * pose.rotation,
-                        fit.scale * (rotation * pose.translation) + fit.translation);
-  }
-  return result;
+  return transform(align_positions(positions(estimate), positions(ground_truth), alignment),
+                   estimate);
 }
 
 double position_rmse_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
@@ -213,7 +218,8 @@ Metrics evaluate_aligned(std::span<const Rigid3> estimate,
   if (alignment == Alignment::kNone) {
     return as_it_comes;
   }
-  const Trajectory aligned = align_trajectory(estimate, ground_truth, alignment);
+  const Trajectory aligned =
+      align(relative_to_first(estimate), relative_to_first(ground_truth), alignment);
   Metrics metrics = evaluate(aligned, ground_truth, options);
   metrics.alignment = alignment;
   // evaluate() moves its input back to the origin; the offset is meant where the fit has put it.
@@ -223,10 +229,20 @@ Metrics evaluate_aligned(std::span<const Rigid3> estimate,
 }
 
 Trajectory align_trajectory(std::span<const Rigid3> estimate,
+                            std::span<const std::size_t> frames,
                             std::span<const Rigid3> ground_truth,
                             Alignment alignment) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  return align(relative_to_first(estimate), relative_to_first(ground_truth), alignment);
+  STEMVO_CHECK(!frames.empty() && frames.size() == ground_truth.size(), "a true pose per frame");
+  const Rigid3 first_from_world = estimate[frames.front()].inverse();
+  Trajectory moved;
+  moved.reserve(estimate.size());
+  for (const Rigid3& pose : estimate) {
+    moved.push_back(first_from_world * pose);
+  }
+  moved[frames.front()] = Rigid3();  // exactly
+  return transform(align_positions(positions(take_poses(moved, frames)),
+                                   positions(relative_to_first(ground_truth)), alignment),
+                   moved);
 }
 
 }  // namespace stemvo

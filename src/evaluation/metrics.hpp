@@ -98,8 +98,10 @@ struct DenseErrors {
 [[nodiscard]] double average_offset_m(std::span<const Rigid3> estimate,
                                       std::span<const Rigid3> ground_truth);
 
-/// The estimate moved to start at the identity and then fitted to the ground truth (also moved).
+/// The estimate moved until the first of `frames`, those with a true pose, is the identity, and
+/// then fitted there to the ground truth (also moved). At least one of them (checked).
 [[nodiscard]] Trajectory align_trajectory(std::span<const Rigid3> estimate,
+                                          std::span<const std::size_t> frames,
                                           std::span<const Rigid3> ground_truth,
                                           Alignment alignment);
 

@@ -20,6 +20,7 @@
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
+#include "text/text_table.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
@@ -35,10 +36,10 @@ std::string describe_numbers(const MetricsReport& report) {
   std::string text = fmt::format("scale: {}", report.scale_source);
   if (report.metrics) {
     const Alignment alignment = report.metrics->alignment;
-    text += fmt::format(", path {:.0f} m, ", report.metrics->path_length_m);
+    text += fmt::format(", path {} m, ", format_length(report.metrics->path_length_m, 0));
     text += alignment == Alignment::kNone ? "no alignment:"
                                           : fmt::format("fitted by {}:", to_string(alignment));
-    text += fmt::format(" average offset {:.2f} m", report.metrics->average_offset_m);
+    text += fmt::format(" average offset {} m", format_length(report.metrics->average_offset_m, 2));
     if (report.metrics->t_rel_percent) {
       text += fmt::format(", t_rel {:.2f} %", *report.metrics->t_rel_percent);
     }
@@ -137,18 +138,11 @@ class ResultWriter {
 
   [[nodiscard]] Status write_page(const MetricsReport& report) const {
     const TrajectoryPlot plot = make_plot(report);
-    std::vector<std::size_t> drawn(drive_.frames.size());
-    std::iota(drawn.begin(), drawn.end(), std::size_t{0});
-    drawn = truth_ ? truth_->frames : drawn;
-    std::vector<FrameResult> frames;
-    for (std::size_t& i : drawn) {
-      frames.push_back(drive_.frames[i]);
-      i += sequence_.range().begin;
-    }
-    return write_run_page(
-        request_.out_dir / "report.html",
-        {plot.title, plot.subtitle, plot.unit, report, frames, drawn, plot.estimate,
-         plot.ground_truth, drive_.images, config_text_, request_.command});
+    std::vector<std::size_t> numbers(drive_.frames.size());
+    std::iota(numbers.begin(), numbers.end(), sequence_.range().begin);
+    return write_run_page(request_.out_dir / "report.html",
+                          {plot.title, plot.subtitle, plot.unit, report, drive_.frames, numbers,
+                           plot.estimate, truth_, drive_.images, config_text_, request_.command});
   }
 
  private:
@@ -208,7 +202,7 @@ class ResultWriter {
     return points;
   }
 
-  /// Against the ground truth where there is one.
+  /// All frames, in the world of the ground truth where some have one.
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
     TrajectoryPlot plot;
     plot.title = describe_frames(sequence_, trajectory_.size());
@@ -216,9 +210,11 @@ class ResultWriter {
     plot.estimate = trajectory_;
     if (truth_) {
       plot.ground_truth = truth_->poses;
-      plot.estimate = take_poses(trajectory_, truth_->frames);
-      if (report.metrics->alignment != Alignment::kNone) {
-        plot.estimate = align_trajectory(plot.estimate, truth_->poses, report.metrics->alignment);
+      plot.estimate =
+          align_trajectory(trajectory_, truth_->frames, truth_->poses, report.metrics->alignment);
+      if (truth_->frames.size() < trajectory_.size()) {
+        plot.subtitle += fmt::format(", ground truth for {} of {} frames", truth_->frames.size(),
+                                     trajectory_.size());
       }
     } else if (report.scale_source == "none") {
       plot.unit = "units";

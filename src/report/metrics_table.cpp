@@ -38,7 +38,7 @@ std::string head(const MetricsReport& report) {
                                    100.0 * *report.road_measured_fraction)});
   }
   if (report.metrics) {
-    table.add({"path", fmt::format("{:.1f} m (ground truth)", report.metrics->path_length_m)});
+    table.add({"path", format_length(report.metrics->path_length_m, 1) + " m (ground truth)"});
   }
   return table.str();
 }
@@ -60,9 +60,9 @@ std::string error_table(const MetricsReport& report) {
   }
   table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
              "the same segments"});
-  table.add({"average offset", fmt::format("{:.2f}", m.average_offset_m), "m", fitted,
-             "mean of |dx| + |dz|"});
-  table.add({"  of zero motion", fmt::format("{:.2f}", m.null_offset_m), "m", "none",
+  table.add(
+      {"average offset", format_length(m.average_offset_m, 2), "m", fitted, "mean of |dx| + |dz|"});
+  table.add({"  of zero motion", format_length(m.null_offset_m, 2), "m", "none",
              "the same for a camera that stays at the start"});
   for (const auto& [alignment, note] :
        {std::pair(Alignment::kNone, "root mean square position error"),
@@ -73,7 +73,7 @@ std::string error_table(const MetricsReport& report) {
     if (report.scale_source == "none" && !is_scaled) {
       continue;  // units against metres
     }
-    table.add({"position ATE", fmt::format("{:.2f}", m.ate_rmse.after_m(alignment)), "m",
+    table.add({"position ATE", format_length(m.ate_rmse.after_m(alignment), 2), "m",
                std::string(to_string(alignment)), note});
   }
   table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,

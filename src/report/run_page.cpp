@@ -3,14 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "evaluation/pose_file.hpp"
 #include "html/figures.hpp"
 #include "internal_check.hpp"
+#include "text/text_table.hpp"
 
 namespace stemvo {
 namespace {
@@ -44,13 +47,18 @@ bool is_scored(const FrameResult& r) { return r.homography_score + r.fundamental
 class RunFigures {
  public:
   RunFigures(const RunPage& run, html::Page& page) : run_(run), page_(page), numbers_(run.numbers) {
-    if (run.ground_truth) {
-      travelled_ = {0.0};
-      const Trajectory& truth = *run.ground_truth;
-      for (std::size_t i = 1; i < truth.size(); ++i) {
-        travelled_.push_back(travelled_.back() +
-                             (truth[i].translation - truth[i - 1].translation).norm());
-      }
+    if (!run.ground_truth) {
+      return;
+    }
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    travelled_.assign(run.frames.size(), kUnknown);
+    errors_.assign(run.frames.size(), Eigen::Vector3d::Constant(kUnknown));
+    const auto& [truth, frames] = *run.ground_truth;
+    double travelled = 0.0;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      travelled += i > 0 ? (truth[i].translation - truth[i - 1].translation).norm() : 0.0;
+      travelled_[frames[i]] = travelled;
+      errors_[frames[i]] = run.estimate[frames[i]].translation - truth[i].translation;
     }
   }
 
@@ -61,10 +69,9 @@ class RunFigures {
       const FrameResult& r = run_.frames[i];
       lines.push_back(fmt::format("frame {}: {}, {} of {} tracks are inliers", run_.numbers[i],
                                   to_string(r.state), r.num_inliers, r.num_matches));
-      if (run_.ground_truth) {
-        const Eigen::Vector3d error =
-            run_.estimate[i].translation - (*run_.ground_truth)[i].translation;
-        lines.back() += fmt::format(", {:.2f} m off after {:.1f} m", error.norm(), travelled_[i]);
+      if (run_.ground_truth && !std::isnan(travelled_[i])) {
+        lines.back() += fmt::format(", {} m off after {} m", format_length(errors_[i].norm(), 2),
+                                    format_length(travelled_[i], 1));
       }
     }
     return lines;
@@ -73,7 +80,7 @@ class RunFigures {
   void add_top_view() const {
     std::vector<html::PathFromAbove> paths;
     if (run_.ground_truth) {
-      paths.push_back({"ground truth", html::seen_from_above(*run_.ground_truth), true});
+      paths.push_back({"ground truth", html::seen_from_above(run_.ground_truth->poses), true});
     }
     paths.push_back(
         {"estimate", html::seen_from_above(run_.estimate), false, false, descriptions()});
@@ -94,7 +101,7 @@ class RunFigures {
     };
     json traces = json::array();
     if (run_.ground_truth) {
-      traces.push_back(path("ground truth", *run_.ground_truth));
+      traces.push_back(path("ground truth", run_.ground_truth->poses));
       traces.back()["line"]["color"] = "#999999";
     }
     traces.push_back(path("estimate", run_.estimate));
@@ -109,25 +116,23 @@ class RunFigures {
   }
 
   void add_errors_over_distance() const {
-    json position = json::array();
-    json height = json::array();
-    for (std::size_t i = 0; i < travelled_.size(); ++i) {
-      const Eigen::Vector3d error =
-          run_.estimate[i].translation - (*run_.ground_truth)[i].translation;
-      position.push_back(rounded(error.norm()));
-      height.push_back(rounded(-error.y()));
-    }
     const json distance = list(travelled_, rounded);
-    const json traces = {{{"name", "position"},
-                          {"mode", "lines"},
-                          {"x", distance},
-                          {"y", position},
-                          {"text", descriptions()},
-                          {"hoverinfo", "text+name"}},
-                         {{"name", "height, too high is above 0"},
-                          {"mode", "lines"},
-                          {"x", distance},
-                          {"y", height}}};
+    json traces = {
+        {{"name", "position"},
+         {"mode", "lines"},
+         {"x", distance},
+         {"y", list(errors_, [](const Eigen::Vector3d& error) { return rounded(error.norm()); })},
+         {"text", descriptions()},
+         {"hoverinfo", "text+name"}},
+        {{"name", "height, too high is above 0"},
+         {"mode", "lines"},
+         {"x", distance},
+         {"y", list(errors_, [](const Eigen::Vector3d& error) { return rounded(-error.y()); })}}};
+    if (run_.ground_truth->frames.size() < run_.frames.size()) {
+      for (json& trace : traces) {
+        trace.update({{"mode", "lines+markers"}, {"connectgaps", true}});
+      }
+    }
     add({"Error over distance",
          "",
          traces,
@@ -136,7 +141,8 @@ class RunFigures {
   }
 
   void add_errors_by_length() const {
-    const auto errors = segment_errors(run_.estimate, *run_.ground_truth,
+    const auto& [truth, frames] = *run_.ground_truth;
+    const auto errors = segment_errors(take_poses(run_.estimate, frames), truth,
                                        run_.report.metrics->segment_lengths_m, kFirstFrameStep);
     std::set<double> lengths;  // that fit into the drive
     for (const SegmentError& error : errors) {
@@ -300,7 +306,10 @@ class RunFigures {
   const RunPage& run_;
   html::Page& page_;
   json numbers_;
-  std::vector<double> travelled_;  ///< true metres up to each frame; empty without ground truth
+  /// True metres up to each frame, and how far off it is; NaN for frames without a true pose,
+  /// empty where none has one.
+  std::vector<double> travelled_;
+  std::vector<Eigen::Vector3d> errors_;
 };
 
 }  // namespace
@@ -308,8 +317,11 @@ class RunFigures {
 Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
   STEMVO_CHECK(!run.frames.empty() && run.estimate.size() == run.frames.size() &&
                    run.numbers.size() == run.frames.size() &&
-                   (!run.ground_truth || run.ground_truth->size() == run.frames.size()),
-               "a pose, a result and a number per frame");
+                   (!run.ground_truth ||
+                    (run.ground_truth->poses.size() == run.ground_truth->frames.size() &&
+                     !run.ground_truth->frames.empty() &&
+                     run.ground_truth->frames.back() < run.frames.size())),
+               "a pose, a result and a number per frame, true poses of some");
   html::Page page(run.title, run.subtitle);
   const RunFigures figures(run, page);
   page.set_frames(figures.descriptions());

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "dataset/frame_source.hpp"
 #include "evaluation/trajectory.hpp"
 #include "html/page.hpp"
 #include "report/metrics_json.hpp"
@@ -15,17 +16,17 @@
 
 namespace stemvo {
 
-/// What report.html of a run shows. All trajectories are in one world and of one length, that of
-/// `frames`, at least one (checked).
+/// What report.html of a run shows: a pose per frame, at least one (checked), in the world of the
+/// ground truth, which some frames may lack.
 struct RunPage {
   std::string title;
   std::string subtitle;
   std::string unit = "m";  ///< of the trajectories
   const MetricsReport& report;
-  std::span<const FrameResult> frames;   ///< those with a true pose, where there is ground truth
+  std::span<const FrameResult> frames;
   std::span<const std::size_t> numbers;  ///< of the frames, in the sequence
   const Trajectory& estimate;            ///< after the alignment of report.metrics
-  const std::optional<Trajectory>& ground_truth;
+  const std::optional<GroundTruth>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
   std::string config;   ///< YAML
   std::string command;  ///< that repeats the run; may be empty

@@ -56,6 +56,11 @@ std::string number_or_dash(const std::optional<double>& value, int decimals) {
   return value ? fmt::format("{:.{}f}", *value, decimals) : "-";
 }
 
+std::string format_length(double length_m, int decimals) {
+  return 1e-4 <= length_m && length_m < 1.0 ? fmt::format("{:.3g}", length_m)
+                                            : fmt::format("{:.{}f}", length_m, decimals);
+}
+
 std::string csv_cell(const std::string& text) {
   std::ostringstream quoted;
   quoted << std::quoted(text, '"', '"');

@@ -26,6 +26,9 @@ class TextTable {
 
 [[nodiscard]] std::string number_or_dash(const std::optional<double>& value, int decimals);
 
+/// Metres: three significant digits below 1 (and above 0.1 mm), else this many decimals.
+[[nodiscard]] std::string format_length(double length_m, int decimals);
+
 /// Of a CSV file: quoted where it must be (RFC 4180).
 [[nodiscard]] std::string csv_cell(const std::string& text);
 

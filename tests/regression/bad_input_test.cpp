@@ -222,6 +222,7 @@ TEST_F(BadInput, Configuration) {
                {"my.yaml:2: stem.filter: expected a whole number, found 'three'"});
   expect_error(run_with_config("stem: [\n"), 1, {"my.yaml:2: not YAML"});
   expect_error(run({"--config", folder_ / "none.yaml"}), 1, {"none.yaml"});
+  expect_error(run({"--config", "nope"}), 1, {"nope: expected", "default, fast, paper", "neither"});
   expect_error(run({"--config", folder_.path().string()}), 1, {"found a folder"});
   expect_error(run({"--set", "stem.filter=3", "--set", "seed=2", "--set", "stem.filter=4"}), 1,
                {"--set stem.filter: expected once", "'stem.filter=3'", "'stem.filter=4'"});

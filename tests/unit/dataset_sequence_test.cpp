@@ -14,6 +14,7 @@ namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 constexpr int kNumFrames = 4;
@@ -128,7 +129,13 @@ TEST_F(KittiSequenceTest, FolderProblems) {
   }
   EXPECT_THAT(open_error(), HasSubstr("found none"));
   fs::remove_all(folder_ / "image_2");
-  EXPECT_THAT(open_error(), HasSubstr("image_2 or image_0"));
+  EXPECT_THAT(open_error(), EndsWith("image_2 or image_0, found neither")) << "calib.txt is there";
+  fs::remove_all(folder_);
+  fs::create_directories(folder_);
+  write(folder_ / "times.txt", "0\n");  // as other recordings have
+  EXPECT_THAT(
+      open_error(),
+      EndsWith("image_2 or image_0, found neither (this command reads KITTI folders only)"));
   fs::remove_all(folder_);
   EXPECT_THAT(open_error(), HasSubstr("expected a sequence folder"));
 }

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "evaluation/metrics.hpp"
+#include "evaluation/pose_file.hpp"
 #include "support/shared_data.hpp"
 
 namespace stemvo {
@@ -166,14 +167,19 @@ TEST(AlignTrajectory, UndoesAPlantedSimilarity) {
     estimate.emplace_back(turn * pose.rotation, turn * (0.25 * pose.translation));
   }
   // Both are moved to the identity first, so only the scale is left to find.
+  const std::vector<std::size_t> frames = {30, 60, 61, 150};  // that have a true pose
+  const Trajectory known = take_poses(truth, frames);
+  const Rigid3 first_from_world = truth[30].inverse();
   for (const Alignment alignment : {Alignment::kScale, Alignment::kSim3}) {
-    const Trajectory aligned = align_trajectory(estimate, truth, alignment);
+    const Trajectory aligned = align_trajectory(estimate, frames, known, alignment);
     for (std::size_t i = 0; i < truth.size(); ++i) {
-      EXPECT_LE((aligned[i].matrix() - truth[i].matrix()).cwiseAbs().maxCoeff(), 1e-9);
+      const Rigid3 expected = first_from_world * truth[i];
+      EXPECT_LE((aligned[i].matrix() - expected.matrix()).cwiseAbs().maxCoeff(), 1e-9);
     }
   }
-  const Trajectory untouched = align_trajectory(truth, truth, Alignment::kNone);
-  EXPECT_EQ(untouched.front().matrix(), Rigid3().matrix());
+  const Trajectory unscaled = align_trajectory(truth, frames, known, Alignment::kNone);
+  EXPECT_EQ(unscaled[30].matrix(), Rigid3().matrix());
+  EXPECT_THROW((void)align_trajectory(estimate, {}, {}, Alignment::kSim3), std::logic_error);
 }
 
 Trajectory read(const std::string& name) {

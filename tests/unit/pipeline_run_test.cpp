@@ -172,6 +172,21 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   EXPECT_THAT(read_file(request_.out_dir / "trajectory.png"), HasSubstr("PNG"));
 }
 
+TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
+  const fs::path truth = folder_ / "truth.txt";
+  std::ofstream(truth) << "0.1 0 0 0.05 0 0 0 1\n0.4 0 0 0.2 0 0 0 1\n";
+  request_.ground_truth = truth;
+  request_.config.scale.source = ScaleSource::kNone;
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  const std::string page = read_file(request_.out_dir / "report.html");
+  for (int i = 0; i < kNumFrames; ++i) {
+    EXPECT_THAT(page, HasSubstr(fmt::format("\"frame {}: ", i)));
+  }
+  EXPECT_THAT(page, HasSubstr("path 0.15 m, fitted by sim3: average offset "));
+  EXPECT_THAT(page, HasSubstr(", ground truth for 2 of 6 frames"));
+}
+
 TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   request_.config.odometry.mode = OdometryMode::kMap;
   request_.config.scale.source = ScaleSource::kGroundTruth;

@@ -131,7 +131,7 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +none"));
   EXPECT_THAT(table,
               ContainsRegex("with look-ahead +0\\.97  % +none +trajectory_refined_kitti.txt"));
-  EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +none"));
+  EXPECT_THAT(table, ContainsRegex("average offset +0\\.333  m +none"));
   EXPECT_THAT(table, ContainsRegex("of zero motion +79\\.25  m +none"));
   EXPECT_THAT(table, ContainsRegex("ATE +4\\.00  m +none"));
   EXPECT_THAT(table, ContainsRegex("ATE +3\\.00  m +scale"));
@@ -153,11 +153,22 @@ TEST(MetricsTable, NamesTheFitOfATrajectoryWithoutScale) {
   EXPECT_THAT(table, ContainsRegex("scale +none \\(up to scale: units, not metres"));
   EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +sim3"));
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +sim3"));
-  EXPECT_THAT(table, ContainsRegex("average offset +0\\.33  m +sim3"));
+  EXPECT_THAT(table, ContainsRegex("average offset +0\\.333  m +sim3"));
   EXPECT_THAT(table, ContainsRegex("of zero motion +79\\.25  m +none"));
   EXPECT_THAT(table, ContainsRegex("position ATE +[0-9.]+  m +scale"));
   EXPECT_THAT(table, Not(ContainsRegex("position ATE +[0-9.]+  m +(none|se3)")))
       << "units against metres";
+}
+
+TEST(MetricsTable, LengthsBelowAMetreHaveThreeSignificantDigits) {
+  MetricsReport report = example();
+  report.metrics->path_length_m = 0.48;
+  report.metrics->average_offset_m = 0.02912;
+  report.metrics->ate_rmse.none_m = 1e-16;
+  const std::string table = format_metrics_table(report);
+  EXPECT_THAT(table, ContainsRegex("path +0\\.48 m \\(ground truth"));
+  EXPECT_THAT(table, ContainsRegex("average offset +0\\.0291  m"));
+  EXPECT_THAT(table, ContainsRegex("ATE +0\\.00  m +none")) << "nothing but rounding";
 }
 
 TEST(MetricsTable, SaysWhatIsMissing) {

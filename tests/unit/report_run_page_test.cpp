@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "evaluation/pose_file.hpp"
 #include "report/run_page.hpp"
 #include "support/temp_folder.hpp"
 #include "text/text_file.hpp"
@@ -25,7 +26,8 @@ class RunPageTest : public ::testing::Test {
     for (int i = 0; i <= 200; ++i) {
       Rigid3 pose;
       pose.translation = {0.0, 0.0, 1.0 * i};
-      truth_->push_back(pose);
+      truth_->poses.push_back(pose);
+      truth_->frames.push_back(static_cast<std::size_t>(i));
       pose.translation = {0.0, -0.001 * i, 1.01 * i};
       estimate_.push_back(pose);
       FrameResult frame;
@@ -37,7 +39,7 @@ class RunPageTest : public ::testing::Test {
       numbers_.push_back(100U + 2U * static_cast<std::size_t>(i));
     }
     report_.num_frames = frames_.size();
-    report_.metrics = evaluate(estimate_, *truth_);
+    report_.metrics = evaluate(estimate_, truth_->poses);
   }
 
   json content() {
@@ -68,7 +70,7 @@ class RunPageTest : public ::testing::Test {
 
   testing::TempFolder folder_;
   Trajectory estimate_;
-  std::optional<Trajectory> truth_;
+  std::optional<GroundTruth> truth_;
   std::vector<FrameResult> frames_;
   std::vector<std::size_t> numbers_;
   MetricsReport report_;
@@ -102,6 +104,29 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   EXPECT_EQ(tracks["traces"][0]["x"][1], 102) << "in the folder's numbering";
   EXPECT_EQ(tracks["traces"][0]["y"][200], 600);
   EXPECT_EQ(tracks["traces"][3]["y"][1], "tracking");
+}
+
+TEST_F(RunPageTest, FramesWithoutATruePoseAreShownWithoutTheirErrors) {
+  truth_->frames = {40, 100, 190};
+  truth_->poses = take_poses(truth_->poses, truth_->frames);
+  report_.metrics = evaluate(take_poses(estimate_, truth_->frames), truth_->poses);
+  const json page = content();
+  ASSERT_EQ(page["frames"].size(), 201U);
+  EXPECT_EQ(page["frames"][99], "frame 298: tracking, 300 of 499 tracks are inliers");
+  EXPECT_EQ(page["frames"][100],
+            "frame 300: tracking, 300 of 500 tracks are inliers, 1.00 m off after 60.0 m");
+
+  const json top = section(page, "Path from above");
+  EXPECT_EQ(top["traces"][0]["y"], json::array({40.0, 100.0, 190.0}));
+  EXPECT_EQ(top["traces"][1]["y"].size(), 201U);
+  const json error = section(page, "Error over distance")["traces"][0];
+  ASSERT_EQ(error["y"].size(), 201U) << "as the slider counts";
+  EXPECT_TRUE(error["x"][99].is_null() && error["y"][99].is_null());
+  EXPECT_EQ(error["x"][190], 150.0);
+  EXPECT_NEAR(error["y"][190].get<double>(), std::hypot(1.9, 0.19), 1e-4);
+  EXPECT_EQ(error["connectgaps"], true);
+  EXPECT_EQ(section(page, "Error by segment length")["traces"][0]["x"], json::array({100.0}));
+  EXPECT_EQ(section(page, "Scale and camera")["traces"][0]["y"][100], 1.01) << "a frame's step";
 }
 
 TEST_F(RunPageTest, ShowsScaleAndCameraWithTheirSigma) {
