@@ -221,6 +221,7 @@ TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kConstant;
   fs::create_directories(request_.out_dir);
+  std::ofstream(request_.out_dir / "frames.csv") << "frame,timestamp_s,state,\n";
   std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
