@@ -107,7 +107,7 @@ Expected<std::string> identity_of(const Run& run) {
 /// before, an earlier run's would pass for its own. Links stay, and all where no run has been.
 Status remove_earlier_results(const std::filesystem::path& out_dir) {
   const auto frames = read_text_file(out_dir / "frames.csv");
-  if (!frames || !frames->starts_with("frame,timestamp_s,state,")) {
+  if (!frames || !frames->starts_with(frames_csv_header())) {
     return {};
   }
   for (const char* name : {"metrics.json", "trajectory_kitti.txt", "report.html", "trajectory.png",

@@ -9,6 +9,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include "report/frames_csv.hpp"
 #include "support/program_test.hpp"
 #include "support/whole_files.hpp"
 
@@ -62,7 +63,7 @@ class LongRun : public Faults {
 
 TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
   fs::create_directories(out_);
-  write_file(out_ / "frames.csv", "frame,timestamp_s,state,\n");  // of an earlier run
+  write_file(out_ / "frames.csv", std::string(frames_csv_header()));  // of an earlier run
   write_file(out_ / "metrics.json", "{}\n");
   write_file(out_ / "map.ply", "ply\n");
   test::RunningProgram program(STEMVO_PROGRAM, arguments());

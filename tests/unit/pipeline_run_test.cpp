@@ -15,6 +15,7 @@
 #include "evaluation/trajectory.hpp"
 #include "pipeline/channel_images.hpp"
 #include "pipeline/run.hpp"
+#include "report/frames_csv.hpp"
 #include "report/map_ply.hpp"
 #include "support/ply_reader.hpp"
 
@@ -217,11 +218,21 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   EXPECT_EQ(summary->report.refined.has_value(), true);
 }
 
+TEST_F(PipelineRun, WhereNoRunHasBeenNothingIsRemoved) {
+  request_.config.scale.source = ScaleSource::kConstant;
+  fs::create_directories(request_.out_dir);
+  std::ofstream(request_.out_dir / "map.ply") << "somebody's";
+  ASSERT_TRUE(run_sequence(request_));
+  EXPECT_EQ(read_file(request_.out_dir / "map.ply"), "somebody's");
+  ASSERT_TRUE(run_sequence(request_));  // now one has been
+  EXPECT_FALSE(fs::exists(request_.out_dir / "map.ply"));
+}
+
 TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kConstant;
   fs::create_directories(request_.out_dir);
-  std::ofstream(request_.out_dir / "frames.csv") << "frame,timestamp_s,state,\n";
+  std::ofstream(request_.out_dir / "frames.csv") << frames_csv_header();
   std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
