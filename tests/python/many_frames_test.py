@@ -14,6 +14,7 @@ PROGRAM = os.environ["STEMVO_PROGRAM"]
 RENDERED = 100
 FRAMES = 20000
 MAX_KB_PER_FRAME = 8.0
+MAX_FILES_FOR_A_MOMENT = 3
 
 
 def frame(i):
@@ -44,7 +45,9 @@ class ManyFrames(unittest.TestCase):
         self.assertEqual(result.metrics["frames"], FRAMES)
         self.assertLess(grown_kb, MAX_KB_PER_FRAME)
         self.assertGreater(result.handles[0], 3)
-        self.assertLessEqual(result.handles[1], result.handles[0])
+        # A leak of one a frame would be thousands, of one a checkpoint dozens; files open for a moment while the
+        # checkpoint is written are seen by one sample and missed by the next.
+        self.assertLessEqual(result.handles[1], result.handles[0] + MAX_FILES_FOR_A_MOMENT)
         self.assertLess(result.quarters_cpu_ms[3], 1.3 * min(result.quarters_cpu_ms[:3]))
 
 
