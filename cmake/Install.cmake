@@ -1,5 +1,5 @@
 # `cmake --install`: the program, the static library, what they need at run time, and packages for CMake and pkg-config.
-#   bin/stemvo  lib/libstemvo.a  lib/stemvo/libonnxruntime.so.1  lib/{cmake/stemvo,pkgconfig}  include/stemvo
+#   bin/stemvo  lib/libstemvo.a  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
 #   share/stemvo/{models,config}  share/doc/stemvo
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -18,6 +18,7 @@ if(TARGET stemvo_app)
   file(RELATIVE_PATH runtime_from_bin /prefix/${CMAKE_INSTALL_BINDIR} /prefix/${runtime_dir})
   set_target_properties(stemvo_app PROPERTIES INSTALL_RPATH "$ORIGIN/${runtime_from_bin}")
   install(TARGETS stemvo_app)
+  install(TARGETS stemvo_video LIBRARY DESTINATION ${runtime_dir})
 endif()
 
 # ONNX Runtime under its own name, and a link for its SONAME: older releases carry the whole version

@@ -34,11 +34,21 @@ def output_of(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True, env={**os.environ, "LC_ALL": "C"}).stdout
 
 
+def video_module(program):
+    """Loaded by the program where a video is read: as it was built, or as it was installed."""
+    folder = pathlib.Path(program).resolve().parent
+    places = [folder / "libstemvo_video.so", *folder.parent.glob("lib/**/stemvo/libstemvo_video.so")]
+    return next((place for place in places if place.exists()), None)
+
+
 def linked_libraries(program):
-    """Names the program asks for itself, with the files that the loader finds."""
-    needed = re.findall(r"\(NEEDED\).*\[(.+)\]", output_of("readelf", "--dynamic", "--wide", program))
-    found = dict(re.findall(r"^\s*(\S+) => (/\S+)", output_of("ldd", program), re.MULTILINE))
-    return {name: found.get(name) for name in needed}
+    """Names the program and its module ask for themselves, with the files that the loader finds."""
+    libraries = {}
+    for binary in filter(None, (program, video_module(program))):
+        needed = re.findall(r"\(NEEDED\).*\[(.+)\]", output_of("readelf", "--dynamic", "--wide", binary))
+        found = dict(re.findall(r"^\s*(\S+) => (/\S+)", output_of("ldd", binary), re.MULTILINE))
+        libraries |= {name: found.get(name) for name in needed}
+    return libraries
 
 
 def package_of(file):

@@ -2,60 +2,50 @@
 #include "dataset/video_stream.hpp"
 
 #include <cmath>
-#include <cstdlib>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file) {
-  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
-  // A playlist may name anything; and a relative path with a colon would be taken for an address.
-  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
   std::error_code code;
-  const fs::path path = fs::absolute(file, code);
-  auto capture = std::make_unique<cv::VideoCapture>(path.string(), cv::CAP_FFMPEG);
-  if (!capture->isOpened()) {
+  // A relative path with a colon would be taken for an address.
+  auto decoder = decode_file(fs::absolute(file, code));
+  if (!decoder) {
+    return decoder.error();
+  }
+  if (*decoder == nullptr) {
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
         "no video)",
         file.string()));
   }
-  // The sensor's rows and columns, as of JPEGs: the calibration knows nothing of a turned screen.
-  capture->set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
-  return std::make_shared<VideoStream>(std::move(capture), file.string(), false);
+  return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
 }
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
-  auto capture = std::make_unique<cv::VideoCapture>(number, cv::CAP_V4L2);
-  if (!capture->isOpened()) {
+  auto decoder = decode_camera(number, size);
+  if (!decoder) {
+    return decoder.error();
+  }
+  if (*decoder == nullptr) {
     return fail(fmt::format(
         "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none",
         number));
   }
-  capture->set(cv::CAP_PROP_FRAME_WIDTH, size.width);
-  capture->set(cv::CAP_PROP_FRAME_HEIGHT, size.height);
-  return std::make_shared<VideoStream>(std::move(capture), fmt::format("camera:{}", number), true);
+  return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
 }
 
-VideoStream::VideoStream(std::unique_ptr<cv::VideoCapture> capture, std::string name, bool is_live)
-    : capture_(std::move(capture)), name_(std::move(name)), is_live_(is_live) {}
-
-VideoStream::~VideoStream() = default;
-
-cv::Size VideoStream::size() const {
-  return {static_cast<int>(capture_->get(cv::CAP_PROP_FRAME_WIDTH)),
-          static_cast<int>(capture_->get(cv::CAP_PROP_FRAME_HEIGHT))};
-}
+VideoStream::VideoStream(std::unique_ptr<VideoDecoder> decoder, std::string name, bool is_live)
+    : decoder_(std::move(decoder)), name_(std::move(name)), is_live_(is_live) {}
 
 std::size_t VideoStream::expected_frames() const {
-  const double count = is_live_ ? 0.0 : capture_->get(cv::CAP_PROP_FRAME_COUNT);
+  const double count = is_live_ ? 0.0 : decoder_->frame_count();
   return count > 0.0 && count < 1e12 ? static_cast<std::size_t>(count) : 0U;
 }
 
@@ -65,16 +55,16 @@ double VideoStream::next_time_s() const {
     const std::chrono::duration<double> since = std::chrono::steady_clock::now() - *started_;
     return since.count();
   }
-  const double told_s = kMillisecond_s * capture_->get(cv::CAP_PROP_POS_MSEC);
+  const double told_s = kMillisecond_s * decoder_->position_ms();
   if (std::isfinite(told_s) && (!last_time_s_ || told_s > *last_time_s_)) {
     return told_s;
   }
-  const double told_hz = capture_->get(cv::CAP_PROP_FPS);  // a container without times
+  const double told_hz = decoder_->rate_hz();  // a container without times
   return last_time_s_.value_or(0.0) + 1.0 / (told_hz > 0.0 ? told_hz : default_rate_hz_);
 }
 
 bool VideoStream::grab() {
-  if (is_ended_ || !capture_->grab()) {
+  if (is_ended_ || !decoder_->grab()) {
     is_ended_ = true;
     return false;
   }
@@ -106,7 +96,7 @@ Expected<cv::Mat> VideoStream::read(std::size_t index) {
   }
   cv::Mat image;
   if (std::exchange(is_grabbed_, false) || grab()) {
-    capture_->retrieve(image);
+    image = decoder_->retrieve();
     times_s_.push_back(*last_time_s_);
     ++next_;
   }

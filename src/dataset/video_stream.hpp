@@ -13,11 +13,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "dataset/video_decoder.hpp"
 #include "stemvo/error.hpp"
-
-namespace cv {
-class VideoCapture;
-}
 
 namespace stemvo::dataset {
 
@@ -33,15 +30,12 @@ class VideoStream {
                                                                           const cv::Size& size);
   /// `is_live`: times are those of the clock, from the first frame on, and no frame is skipped to
   /// be read again; how a test plays a file as a camera.
-  VideoStream(std::unique_ptr<cv::VideoCapture> capture, std::string name, bool is_live);
-  ~VideoStream();
-  VideoStream(const VideoStream&) = delete;
-  VideoStream& operator=(const VideoStream&) = delete;
+  VideoStream(std::unique_ptr<VideoDecoder> decoder, std::string name, bool is_live);
 
   /// Decodes and drops frames, before the first is read. Error: none is left to be read.
   [[nodiscard]] Status skip(std::size_t count);
 
-  [[nodiscard]] cv::Size size() const;
+  [[nodiscard]] cv::Size size() const { return decoder_->size(); }
   [[nodiscard]] bool is_live() const { return is_live_; }
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
@@ -60,7 +54,7 @@ class VideoStream {
   [[nodiscard]] bool grab();
   [[nodiscard]] double next_time_s() const;
 
-  std::unique_ptr<cv::VideoCapture> capture_;
+  std::unique_ptr<VideoDecoder> decoder_;
   std::string name_;
   bool is_live_ = false;
   double default_rate_hz_ = 30.0;

@@ -24,7 +24,7 @@ RUN_ELSEWHERE = {
     "make demo": ".ci/run",
     "make test": ".ci/run",
     "make build": ".ci/run",
-    "ctest --test-dir": ".ci/run",
+    "ctest --preset": ".ci/run",
     "cmake --preset": ".ci/run",
     "make bench": "tests/python/bench_run_test.py",
     "bench/run.py": "tests/python/bench_run_test.py",

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""The program as it is built: position independent, read-only after relocation, stack and buffers guarded."""
+"""The program and its module as they are built: position independent, read-only after relocation, stack and buffers guarded."""
 
 import os
+import pathlib
 import subprocess
 import unittest
 
-PROGRAM = os.environ["STEMVO_PROGRAM"]
+PROGRAM = pathlib.Path(os.environ["STEMVO_PROGRAM"])
+MODULE = PROGRAM.parent / "libstemvo_video.so"
 
 
-def readelf(option):
-    return subprocess.run(["readelf", option, "--wide", PROGRAM], check=True, capture_output=True, text=True).stdout
+def readelf(option, binary=PROGRAM):
+    return subprocess.run(["readelf", option, "--wide", binary], check=True, capture_output=True, text=True).stdout
 
 
 class Program(unittest.TestCase):
@@ -17,12 +19,18 @@ class Program(unittest.TestCase):
         self.assertIn("DYN (Position-Independent Executable file)", readelf("--file-header"))
 
     def test_is_read_only_once_it_is_relocated(self):
-        self.assertIn("GNU_RELRO", readelf("--program-headers"))
-        self.assertRegex(readelf("--dynamic"), r"FLAGS\)\s+BIND_NOW")
+        for binary in (PROGRAM, MODULE):
+            self.assertIn("GNU_RELRO", readelf("--program-headers", binary))
+            self.assertRegex(readelf("--dynamic", binary), r"FLAGS\)\s+BIND_NOW")
 
     def test_no_stack_is_executable(self):
-        stack = next(line for line in readelf("--program-headers").splitlines() if "GNU_STACK" in line)
-        self.assertNotIn("E", stack.split("GNU_STACK")[1])
+        for binary in (PROGRAM, MODULE):
+            stack = next(line for line in readelf("--program-headers", binary).splitlines() if "GNU_STACK" in line)
+            self.assertNotIn("E", stack.split("GNU_STACK")[1])
+
+    def test_starts_without_what_only_videos_need(self):
+        self.assertNotIn("videoio", readelf("--dynamic"))
+        self.assertIn("videoio", readelf("--dynamic", MODULE))
 
     def test_stack_and_buffers_are_guarded(self):
         symbols = readelf("--dyn-syms")

@@ -42,7 +42,7 @@ class Bill(unittest.TestCase):
                 self.assertIn(name, self.packages, library)
 
     def test_names_what_the_program_is_made_of(self):
-        for wanted in ("libopencv-core", "libyaml-cpp", "libfmt", "libdeflate", "libssl|libcrypto",
+        for wanted in ("libopencv-core", "libopencv-videoio", "libyaml-cpp", "libfmt", "libdeflate", "libssl|libcrypto",
                        "libturbojpeg", "libpng", "libcereal-dev", "libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev", "stemvo"):  # fmt: skip
             self.assertTrue(any(re.match(wanted, name) for name in self.packages), wanted)
         for package in self.packages.values():

@@ -10,11 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
+#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {
@@ -57,11 +57,11 @@ class RecordingsRun : public ::testing::Test {
   }
   std::string write_video() const {
     const std::string file = folder_ / "drive.avi";
-    cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
-                           {620, 188});
+    std::vector<fs::path> images;
     for (int i = 0; i < kNumFrames; ++i) {
-      writer.write(cv::imread(image(i).string()));
+      images.push_back(image(i));
     }
+    test::write_video(file, 10.0, images);
     return file;
   }
 

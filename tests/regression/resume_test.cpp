@@ -10,10 +10,9 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "support/program_test.hpp"
+#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {
@@ -134,13 +133,11 @@ TEST_F(Resume, KilledGoesOnFromTheLastCheckpoint) {
 TEST_F(Resume, AVideoGoesOnToo) {
   const std::string file = folder_ / "drive.avi";
   const std::string camera = folder_ / "camera.yaml";
-  cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0,
-                         {620, 188});
+  std::vector<fs::path> images;
   for (int i = 0; i < kNumFrames; ++i) {
-    const cv::Mat image = cv::imread((sequence_ / frame_name(i == 33 ? 32 : i)).string());
-    writer.write(image);
+    images.push_back(sequence_ / frame_name(i == 33 ? 32 : i));
   }
-  writer.release();
+  test::write_video(file, 10.0, images);
   std::ofstream(camera) << "image_width: 620\nimage_height: 188\ndistortion_model: none\n"
                            "intrinsics: [360, 360, 305, 92]\n";
   const auto arguments = [&](const std::string& out) {

@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
 #include "support/shared_data.hpp"
 #include "support/temp_folder.hpp"
+#include "support/write_video.hpp"
 
 namespace stemvo {
 namespace {
@@ -100,12 +100,12 @@ class Recordings : public ::testing::Test {
 
   std::string write_video(double rate_hz = 25.0) const {
     const std::string file = temp_ / "drive.avi";
-    cv::VideoWriter writer(file, cv::CAP_FFMPEG, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'),
-                           rate_hz, {kWidth_px, kHeight_px});
-    EXPECT_TRUE(writer.isOpened());
+    std::vector<fs::path> images;
     for (int i = 0; i < kNumFrames; ++i) {
-      writer.write(frame(i));
+      images.push_back(temp_ / fmt::format("video_{}.png", i));
+      cv::imwrite(images.back().string(), frame(i));
     }
+    test::write_video(file, rate_hz, images);
     return file;
   }
 
@@ -253,8 +253,9 @@ TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
 }
 
 TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
-  auto capture = std::make_unique<cv::VideoCapture>(write_video(), cv::CAP_FFMPEG);
-  auto stream = std::make_shared<dataset::VideoStream>(std::move(capture), "camera:0", true);
+  auto decoder = dataset::decode_file(write_video());
+  ASSERT_TRUE(decoder) << decoder.error().message;
+  auto stream = std::make_shared<dataset::VideoStream>(*std::move(decoder), "camera:0", true);
   const std::string file = camera("");
   FrameSourceRequest live = request("camera:0");
   live.camera_file = file;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#include "dataset/video_decoder.hpp"
+
+#include <array>
+#include <string>
+#include <system_error>
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+namespace stemvo::dataset {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+#ifdef STEMVO_VIDEO_MODULE
+Expected<OpenDecoder*> load_module() {
+  std::error_code code;
+  const fs::path program = fs::read_symlink("/proc/self/exe", code);
+  const fs::path name = fs::path(STEMVO_VIDEO_MODULE).filename();
+  const std::array<fs::path, 2> places = {program.parent_path() / STEMVO_RUNTIME_FROM_BIN / name,
+                                          STEMVO_VIDEO_MODULE};  // installed, as it was built
+  std::string why;
+  for (const fs::path& place : places) {
+    // Never unloaded: decoders live as long as their videos.
+    if (void* module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL)) {
+      return reinterpret_cast<OpenDecoder*>(::dlsym(module, kOpenDecoder));
+    }
+    why += fmt::format("; {}", ::dlerror());
+  }
+  return fail(fmt::format(
+      "{}: expected the module that decodes videos beside the program, found none that loads{}",
+      places.front().lexically_normal().string(), why));
+}
+#else
+Expected<OpenDecoder*> load_module() {
+  return fail(
+      "videos and cameras are read by the program stemvo, not by this build of its library: "
+      "hand in images");
+}
+#endif
+
+Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const cv::Size& size) {
+  static const Expected<OpenDecoder*> module = load_module();
+  return module.map([&](OpenDecoder* open_decoder) {
+    return std::unique_ptr<VideoDecoder>(open_decoder(file, number, size.width, size.height));
+  });
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<VideoDecoder>> decode_file(const fs::path& file) {
+  return open(file.c_str(), 0, {});
+}
+
+Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {
+  return open(nullptr, number, size);
+}
+
+}  // namespace stemvo::dataset

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::dataset {
+
+/// Decodes a video file or a live camera. What does it is the module src/video_module, loaded when
+/// the first video is opened: OpenCV's videoio links 240 libraries, whose start takes longer than a
+/// short run on images.
+class VideoDecoder {
+ public:
+  VideoDecoder() = default;
+  virtual ~VideoDecoder() = default;
+  VideoDecoder(const VideoDecoder&) = delete;
+  VideoDecoder& operator=(const VideoDecoder&) = delete;
+
+  /// The next frame; false: there is none.
+  [[nodiscard]] virtual bool grab() = 0;
+  /// The frame grabbed last: CV_8UC3, BGR; empty or of another type where it cannot be decoded.
+  [[nodiscard]] virtual cv::Mat retrieve() = 0;
+
+  [[nodiscard]] virtual cv::Size size() const = 0;
+  /// As the container says; 0 or less: it does not say.
+  [[nodiscard]] virtual double frame_count() const = 0;
+  [[nodiscard]] virtual double rate_hz() const = 0;
+  /// Time of the frame grabbed last; NaN or not increasing: the container does not say.
+  [[nodiscard]] virtual double position_ms() const = 0;
+};
+
+/// By FFmpeg. Null: not a video. Error: this build has no videos (the Python package), or the
+/// module is not where it was installed.
+[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(
+    const std::filesystem::path& file);
+/// Camera N of the machine (V4L2), asked for images of this size. Null: no such camera. Errors: as
+/// above.
+[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number,
+                                                                    const cv::Size& size);
+
+/// The module's only symbol; the caller owns the decoder. Null: it cannot be opened. Without `file`
+/// camera `number`.
+extern "C" using OpenDecoder =
+    VideoDecoder * (const char* file, int number, int width_px, int height_px);
+inline constexpr const char* kOpenDecoder = "stemvo_open_decoder";
+
+}  // namespace stemvo::dataset

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Loaded by dataset/video_decoder.cpp; the only source that links OpenCV's videoio.
+#include <cstdlib>
+#include <memory>
+#include <utility>
+
+#include <opencv2/videoio.hpp>
+
+#include "dataset/video_decoder.hpp"
+
+namespace stemvo::dataset {
+
+namespace {
+
+class OpenCvDecoder final : public VideoDecoder {
+ public:
+  explicit OpenCvDecoder(cv::VideoCapture capture) : capture_(std::move(capture)) {}
+
+  bool grab() override { return capture_.grab(); }
+  cv::Mat retrieve() override {
+    cv::Mat bgr;
+    capture_.retrieve(bgr);
+    return bgr;
+  }
+  cv::Size size() const override {
+    return {static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_WIDTH)),
+            static_cast<int>(capture_.get(cv::CAP_PROP_FRAME_HEIGHT))};
+  }
+  double frame_count() const override { return capture_.get(cv::CAP_PROP_FRAME_COUNT); }
+  double rate_hz() const override { return capture_.get(cv::CAP_PROP_FPS); }
+  double position_ms() const override { return capture_.get(cv::CAP_PROP_POS_MSEC); }
+
+ private:
+  cv::VideoCapture capture_;
+};
+
+cv::VideoCapture open_file(const char* file) {
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
+  // A playlist may name anything.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
+  cv::VideoCapture capture(file, cv::CAP_FFMPEG);
+  // The sensor's rows and columns, as of JPEGs: the calibration knows nothing of a turned screen.
+  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  return capture;
+}
+
+cv::VideoCapture open_camera(int number, int width_px, int height_px) {
+  cv::VideoCapture capture(number, cv::CAP_V4L2);
+  capture.set(cv::CAP_PROP_FRAME_WIDTH, width_px);
+  capture.set(cv::CAP_PROP_FRAME_HEIGHT, height_px);
+  return capture;
+}
+
+}  // namespace
+
+extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_decoder(
+    const char* file, int number, int width_px, int height_px) {
+  cv::VideoCapture capture =
+      file != nullptr ? open_file(file) : open_camera(number, width_px, height_px);
+  return capture.isOpened() ? std::make_unique<OpenCvDecoder>(std::move(capture)).release()
+                            : nullptr;
+}
+
+}  // namespace stemvo::dataset
