@@ -330,7 +330,7 @@ TEST_F(CameraFileTest, AMessageOfRos) {
   expect_refused(message("plumb_bob\n"), {"d: [k1, k2, p1, p2]", "no such key"});
   std::string text = message(five);
   text.replace(text.find("- 520.0\n"), 8, "");
-  expect_refused(text, {"camera.yaml:15: k: expected [fx, 0, cx, 0, fy", "found 8 numbers"});
+  expect_refused(text, {"camera.yaml:16: k: expected [fx, 0, cx, 0, fy", "found 8 numbers"});
   text = message(five);
   text.replace(text.find("width: 640\n"), 11, "");
   expect_refused(text, {"expected width and height, found height alone"});

@@ -88,7 +88,7 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
       "cx_px": 600.5, "cy_px": 180.25, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_EQ(json.size(), 22U);
+  EXPECT_EQ(json.size(), 23U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
