@@ -40,7 +40,7 @@ undistorted, and over 1.5 megapixels made smaller. Without camera_height the pat
 (scale.source=none).
 
 --out (results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
-poses), trajectory_refined_kitti.txt (odometry.mode map: the same with look-ahead), report.html (all
+poses), trajectory_refined_*.txt (odometry.mode map: the same with look-ahead), report.html (all
 there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the
 numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
 Until the run is complete also checkpoint, from which --resume goes on.
@@ -141,7 +141,7 @@ void add_options(CLI::App& command, RunArguments& arguments) {
           "--mask", request.masks,
           "No points there: a rectangle of the frames in pixels, or an image of their size, "
           "black there; may be repeated")
-      ->type_name("x,y,w,h|FILE")
+      ->type_name("X,Y,WIDTH,HEIGHT|FILE")
       ->expected(1)
       ->take_all();
   add_threads_option(command, request.num_threads);

@@ -12,4 +12,4 @@ done = subprocess.run(["stemvo", "evaluate", "--gt", *sys.argv[1:], "--align", "
 if done.returncode != 0:
     sys.exit(done.returncode)  # stemvo has said why
 for estimate in json.loads(done.stdout)["estimates"]:
-    print(f"{estimate['file']}: ATE {estimate['ate_rmse_m']['sim3']:.4f} m, RPE {estimate['rpe_rotation_deg']:.4f} deg/frame")
+    print(f"{estimate['file']}: ATE {estimate['ate_rmse_m']['sim3']:.4f} m, RPE {estimate['rpe_translation_m']:.4f} m and {estimate['rpe_rotation_deg']:.4f} deg a frame")

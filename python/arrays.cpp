@@ -127,6 +127,12 @@ DoubleArray array_of(std::span<const double> numbers) {
   return owned(std::move(data), {numbers.size()});
 }
 
+IndexArray array_of(std::span<const std::size_t> indices) {
+  auto data = std::make_unique<std::int64_t[]>(indices.size());
+  std::copy(indices.begin(), indices.end(), data.get());
+  return owned(std::move(data), {indices.size()});
+}
+
 std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
                                             std::span<const Rigid3> trajectory) {
   const std::size_t n = landmarks.size();

@@ -21,6 +21,7 @@ using AnyArray = nb::ndarray<nb::ro, nb::device::cpu>;
 using DoubleArray = nb::ndarray<nb::numpy, double>;
 using ByteArray = nb::ndarray<nb::numpy, std::uint8_t>;
 using BoolArray = nb::ndarray<nb::numpy, bool>;
+using IndexArray = nb::ndarray<nb::numpy, std::int64_t>;
 
 /// The value, or a ValueError with the library's message. The GIL is held.
 template <typename T>
@@ -48,6 +49,7 @@ struct ImageView {
 [[nodiscard]] DoubleArray array_of(const Rigid3& pose);                  ///< 4x4
 [[nodiscard]] DoubleArray array_of(std::span<const Rigid3> trajectory);  ///< Nx4x4
 [[nodiscard]] DoubleArray array_of(std::span<const double> numbers);
+[[nodiscard]] IndexArray array_of(std::span<const std::size_t> indices);
 /// In the world, Nx3, and their colours, Nx3. `trajectory` is the one they refer to.
 [[nodiscard]] std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
                                                           std::span<const Rigid3> trajectory);
@@ -55,6 +57,7 @@ struct ImageView {
 [[nodiscard]] std::pair<DoubleArray, BoolArray> arrays_of(std::span<const TrackedPoint> points);
 
 void bind_odometry(nb::module_& module);
-void bind_files(nb::module_& module);
+void bind_recordings(nb::module_& module);
+void bind_evaluation(nb::module_& module);
 
 }  // namespace stemvo::python

@@ -14,7 +14,10 @@
 
 #include "arrays.hpp"
 #include "config/config.hpp"
+#include "dataset/camera_height.hpp"
+#include "frames.hpp"
 #include "models/manifest.hpp"
+#include "options/option_fields.hpp"
 
 namespace stemvo::python {
 namespace {
@@ -59,7 +62,11 @@ struct Result {
 /// Odometry is used by one thread at a time; Python may call from several.
 class SafeOdometry {
  public:
-  SafeOdometry(const Camera& camera, const Config& config) : odometry_(create(camera, config)) {}
+  SafeOdometry(const Camera& camera, const Config& config, const cv::Mat& mask)
+      : scale_source_(options::to_string(config.scale.source)),
+        odometry_(create(camera, config, mask)) {}
+
+  [[nodiscard]] const std::string& scale_source() const { return scale_source_; }
 
   Result process(const std::optional<AnyArray>& image, std::optional<double> timestamp) {
     if (!image) {
@@ -85,7 +92,7 @@ class SafeOdometry {
   }
 
  private:
-  static Odometry create(const Camera& camera, const Config& config) {
+  static Odometry create(const Camera& camera, const Config& config, const cv::Mat& mask) {
     auto made = [&]() -> Expected<Odometry> {
       const nb::gil_scoped_release release;
       Options options = config;
@@ -94,7 +101,7 @@ class SafeOdometry {
         return stem.error();
       }
       options.stem = *stem;
-      return Odometry::create(camera, options);
+      return Odometry::create(camera, options, mask);
     }();
     return value_or_raise(std::move(made));
   }
@@ -105,6 +112,7 @@ class SafeOdometry {
     return f(odometry_);
   }
 
+  std::string scale_source_;
   std::mutex mutex_;
   Odometry odometry_;
 };
@@ -161,6 +169,30 @@ void bind_result(nb::module_& module) {
       .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; });
 }
 
+Config config_of(const nb::object& options) {
+  Config config;
+  if (nb::isinstance<Config>(options)) {
+    config = nb::cast<Config>(options);
+  } else if (nb::isinstance<nb::dict>(options)) {
+    apply(config, nb::cast<nb::dict>(options));
+  } else if (!options.is_none()) {
+    throw nb::type_error("options: expected Options or a dict");
+  }
+  return config;
+}
+
+void make_odometry(SafeOdometry* self, const nb::object& camera, const nb::object& options) {
+  const Config config = config_of(options);
+  if (const FrameList* frames = frames_of(camera)) {
+    new (self)
+        SafeOdometry(frames->camera, dataset::with_camera_height(config, *frames), frames->mask);
+  } else if (nb::isinstance<Camera>(camera)) {
+    new (self) SafeOdometry(nb::cast<Camera>(camera), config, {});
+  } else {
+    throw nb::type_error("camera: expected Camera, Recording or FrameView");
+  }
+}
+
 }  // namespace
 
 void bind_odometry(nb::module_& module) {
@@ -168,22 +200,12 @@ void bind_odometry(nb::module_& module) {
   bind_options(module);
   bind_result(module);
   nb::class_<SafeOdometry>(module, "Odometry", "Images in, poses out, one at a time")
-      .def(
-          "__init__",
-          [](SafeOdometry* self, const Camera& camera, const nb::object& options) {
-            Config config;
-            if (nb::isinstance<Config>(options)) {
-              config = nb::cast<Config>(options);
-            } else if (nb::isinstance<nb::dict>(options)) {
-              apply(config, nb::cast<nb::dict>(options));
-            } else if (!options.is_none()) {
-              throw nb::type_error("options: expected Options or a dict");
-            }
-            new (self) SafeOdometry(camera, config);
-          },
-          "camera"_a, "options"_a = nb::none(),
-          nb::sig("def __init__(self, camera: Camera, options: Options | dict[str, object] | None "
-                  "= None) -> None"))
+      .def("__init__", &make_odometry, "camera"_a, "options"_a = nb::none(),
+           nb::sig("def __init__(self, camera: Camera | Recording | FrameView, "
+                   "options: Options | dict[str, object] | None = None) -> None"),
+           "A Recording or a FrameView brings its mask and its camera's height with it")
+      .def_prop_ro("scale_source", &SafeOdometry::scale_source,
+                   "scale.source; 'none': the path is up to scale")
       .def("process", &SafeOdometry::process, "image"_a.noconvert().none(),
            "timestamp"_a = nb::none(),
            "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # wheel.sh [FOLDER]: a manylinux wheel of the Python package in FOLDER (build/wheel) that needs neither OpenCV nor ONNX Runtime of the
-# system. It holds Debian's OpenCV with all that links (FFmpeg, x264: GPL): for machines of one's own (docs/python.md).
+# system: it holds Debian's libraries (docs/python.md).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -8,6 +8,7 @@
 
 import argparse
 import csv
+import json
 import pathlib
 import sys
 
@@ -17,7 +18,7 @@ import stemvo
 
 INLIER, OUTLIER, PATH, TRUTH = (0, 158, 115), (213, 94, 0), (0, 114, 178), (150, 150, 150)
 JPEG_QUALITY = 75
-MAP_EVERY = 10  # frames: the map is sent whole each time
+MAP_EVERY = 10  # frames: the map is sent whole each time, and moved to where the true path is
 PIECE = 100  # frames of path that are sent again with each
 
 
@@ -35,16 +36,28 @@ def read_poses(file):
 
 
 class View:
-    """Where things stand in rerun: world (path, truth, map, camera/image with points), channel, plots."""
+    """Where things stand in rerun: world (truth, estimate/path, estimate/map, estimate/camera/image with points), channel, plots."""
 
-    def __init__(self, rr, truth):
+    def __init__(self, rr, recording, scale_source):
         self.rr = rr
         self.path, self.piece = [], []
+        self.truth = recording.ground_truth if recording else None
+        self.alignment = "sim3" if scale_source == "none" else "none"
         rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Y_DOWN, static=True)
-        if truth is not None:
-            # The truth of all frames, as it would be seen from the first one.
-            start = np.linalg.inv(truth[0])
-            rr.log("world/truth", rr.LineStrips3D([(start @ truth)[:, :3, 3]], colors=[TRUTH]), static=True)
+        if self.truth is not None:
+            self.true_frames = recording.ground_truth_frames
+            rr.log("world/truth", rr.LineStrips3D([self.truth[:, :3, 3]], colors=[TRUTH]), static=True)
+
+    def fit(self, poses):
+        """Moves all that is estimated to where report.html draws it."""
+        known = self.truth is not None and self.true_frames < len(poses)
+        if not np.any(known):
+            return
+        probes = np.tile(np.eye(4), (2, 1, 1))  # which show how the poses are moved
+        probes[1, 0, 3] = 1.0
+        origin, unit = stemvo.align(np.concatenate([poses, probes]), self.truth[known], self.true_frames[known], self.alignment)[-2:]
+        scale = np.linalg.norm(unit[:3, 3] - origin[:3, 3])
+        self.rr.log("world/estimate", self.rr.Transform3D(translation=origin[:3, 3], mat3x3=scale * origin[:3, :3]))
 
     def at(self, frame, timestamp):
         self.rr.set_time("frame", sequence=frame)
@@ -54,25 +67,28 @@ class View:
     def pose(self, world_from_camera):
         if len(self.path) % PIECE == 0:
             self.piece = self.path[-1:]
-        self.path.append(world_from_camera[:3, 3])
-        self.piece.append(self.path[-1])
-        self.rr.log("world/camera", self.rr.Transform3D(translation=world_from_camera[:3, 3],
-                                                        mat3x3=world_from_camera[:3, :3]))
-        self.rr.log(f"world/path/{(len(self.path) - 1) // PIECE}", self.rr.LineStrips3D([self.piece], colors=[PATH]))
+        self.path.append(world_from_camera)
+        self.piece.append(world_from_camera)
+        self.rr.log("world/estimate/camera", self.rr.Transform3D(translation=world_from_camera[:3, 3],
+                                                                 mat3x3=world_from_camera[:3, :3]))
+        strip = [pose[:3, 3] for pose in self.piece]
+        self.rr.log(f"world/estimate/path/{(len(self.path) - 1) // PIECE}", self.rr.LineStrips3D([strip], colors=[PATH]))
 
     def image(self, image, camera):
-        self.rr.log("world/camera/image", self.rr.Pinhole(
+        if image is None:  # it could not be read
+            return
+        self.rr.log("world/estimate/camera/image", self.rr.Pinhole(
             focal_length=(camera.fx, camera.fy), principal_point=(camera.cx, camera.cy),
             width=camera.width, height=camera.height))
-        self.rr.log("world/camera/image", self.rr.Image(image).compress(jpeg_quality=JPEG_QUALITY))
+        self.rr.log("world/estimate/camera/image", self.rr.Image(image).compress(jpeg_quality=JPEG_QUALITY))
 
     def points(self, tracks, is_inlier):
         strips = tracks.reshape(-1, 2, 2)
         colors = [INLIER if inlier else OUTLIER for inlier in is_inlier]
-        self.rr.log("world/camera/image/points", self.rr.LineStrips2D(strips, colors=colors))
+        self.rr.log("world/estimate/camera/image/points", self.rr.LineStrips2D(strips, colors=colors))
 
     def landmarks(self, positions, colors):
-        self.rr.log("world/map", self.rr.Points3D(positions, colors=colors, radii=0.03))
+        self.rr.log("world/estimate/map", self.rr.Points3D(positions, colors=colors, radii=0.03))
 
     def channel(self, image):
         self.rr.log("channel", self.rr.Image(image).compress(jpeg_quality=JPEG_QUALITY))
@@ -87,8 +103,8 @@ class View:
 
 
 def show_live(rr, recording, options):
-    odometry = stemvo.Odometry(recording.camera, options)
-    view = View(rr, recording.ground_truth)
+    odometry = stemvo.Odometry(recording, options)
+    view = View(rr, recording, odometry.scale_source)
     state = None
     for frame, (image, timestamp) in enumerate(recording):
         result = odometry.process(image, timestamp)
@@ -104,26 +120,30 @@ def show_live(rr, recording, options):
         state = result.state
         if frame % MAP_EVERY == MAP_EVERY - 1 or frame == len(recording) - 1:
             view.landmarks(*odometry.landmarks())
+            view.fit(view.path)
     refined = odometry.refined_trajectory()
-    rr.log("world/path_refined", rr.LineStrips3D([refined[:, :3, 3]]))
+    rr.log("world/estimate/path_refined", rr.LineStrips3D([refined[:, :3, 3]]))
 
 
-def show_result(rr, folder, recording):
+def show_result(rr, folder, open_recording):
     poses = read_poses(folder / "trajectory_kitti.txt")
     with open(folder / "frames.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     if len(rows) != len(poses):
         raise ValueError(f"{folder}: expected a row of frames.csv per pose, found {len(rows)} of {len(poses)}")
-    view = View(rr, recording.ground_truth if recording else None)
+    first = int(rows[0]["frame"])
+    recording = open_recording(f"{first}:{first + len(rows)}")
+    view = View(rr, recording, json.loads((folder / "metrics.json").read_text(encoding="utf-8"))["scale_source"])
+    view.fit(poses)
     if (folder / "map.ply").exists():
-        rr.log_file_from_path(folder / "map.ply", entity_path_prefix="world", static=True)
+        rr.log_file_from_path(folder / "map.ply", entity_path_prefix="world/estimate", static=True)
     state = None
     for row, pose in zip(rows, poses):
         frame = int(row["frame"])
         view.at(frame, float(row["timestamp_s"]))
         view.pose(pose)
-        if recording and frame < len(recording):
-            view.image(recording[frame][0], recording.camera)
+        if recording:
+            view.image(recording[frame - first][0], recording.camera)
         for name in ("matches", "inliers", "r_h", "scale_sigma", "stem_ms", "features_ms", "pose_ms"):
             view.number(name, float(row[name]) if row.get(name) else None)
         view.state(row["state"], state)
@@ -157,14 +177,16 @@ def main(arguments=None):
         sys.exit("error: expected the package rerun-sdk: pip install '.[view]'")
     try:
         folder = given.live or given.recording
-        recording = stemvo.read_recording(folder, given.camera) if folder else None
+        def open_recording(frames=None):
+            return stemvo.read_recording(folder, given.camera, frames=frames) if folder else None
+
         rr.init("stemvo", spawn=given.save is None)
         if given.save:
             rr.save(given.save)
         if given.live:
-            show_live(rr, recording, options_of(given.set))
+            show_live(rr, open_recording(), options_of(given.set))
         else:
-            show_result(rr, given.result, recording)
+            show_result(rr, given.result, open_recording)
     except (OSError, ValueError, KeyError) as error:
         sys.exit(f"error: {error}")
 

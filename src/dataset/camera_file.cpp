@@ -24,6 +24,8 @@ using options::Rule;
 
 /// How a kind of camera file says what ours says.
 struct Format {
+  std::string_view width = "image_width";
+  std::string_view height = "image_height";
   std::string_view intrinsics = "intrinsics";
   std::size_t num_intrinsics = 4;
   std::string_view intrinsics_form = "[fx, fy, cx, cy]";
@@ -53,6 +55,18 @@ const Format kMatrices = {
     .matrices = {"camera_matrix", "distortion_coefficients"},
     .known = {"image_width", "image_height", "camera_matrix", "distortion_model",
               "distortion_coefficients", "rate_hz", "camera_height"}};
+
+/// ROS' message as `topic echo` prints it; capitals in ROS 1.
+const Format kMessage = {.width = "width",
+                         .height = "height",
+                         .intrinsics = "k",
+                         .num_intrinsics = 9,
+                         .intrinsics_form = "[fx, 0, cx, 0, fy, cy, 0, 0, 1]",
+                         .places = kMatrices.places,
+                         .coefficients = "d",
+                         .models = kMatrices.models,
+                         .matrices = {},
+                         .known = {"width", "height", "k", "K", "distortion_model", "d", "D"}};
 
 /// A matrix {rows, cols, data: [..]}, or Kalibr's list of rows, becomes the list of its numbers.
 void flatten(YAML::Node map, const char* key) {
@@ -131,6 +145,9 @@ class Reader {
     if (text->starts_with("%YAML:")) {
       text->front() = '#';  // OpenCV writes "%YAML:1.0", which is not YAML: read as a comment
     }
+    if (text->ends_with("\n---\n")) {  // behind each message that ROS prints
+      text->resize(text->size() - 4);
+    }
     Expected<YAML::Node> root = config::parse_document(*text, file_.string());
     if (!root) {
       return root.error();
@@ -148,7 +165,14 @@ class Reader {
       root_ = root["cam0"];
     } else {
       root_ = root;
-      format_ = is_map && root["camera_matrix"] ? kMatrices : Format();
+      format_ = !is_map                  ? Format()
+                : root["camera_matrix"]  ? kMatrices
+                : root["k"] || root["K"] ? kMessage
+                                         : Format();
+      if (is_map && root["K"]) {
+        format_.intrinsics = "K";
+        format_.coefficients = "D";
+      }
     }
     if (is_of_matrices() && !root["distortion_model"]) {
       const YAML::Node fisheye = root["fisheye_model"];
@@ -168,7 +192,7 @@ class Reader {
       root_.remove("comment");
     }
   }
-  [[nodiscard]] bool is_of_matrices() const { return format_.intrinsics == kMatrices.intrinsics; }
+  [[nodiscard]] bool is_of_matrices() const { return format_.num_intrinsics == 9; }
 
   [[nodiscard]] YAML::Node value_of(std::string_view key) const { return root_[std::string(key)]; }
   [[nodiscard]] Error missing(std::string_view expected) const {
@@ -199,8 +223,9 @@ class Reader {
     camera.width_px = width_px_;
     camera.height_px = height_px_;
     if ((width_px_ == 0) != (height_px_ == 0)) {
-      return fail(fmt::format("{}: expected image_width and image_height, found {} alone",
-                              file_.string(), width_px_ == 0 ? "image_height" : "image_width"));
+      return fail(fmt::format("{}: expected {} and {}, found {} alone", file_.string(),
+                              format_.width, format_.height,
+                              width_px_ == 0 ? format_.height : format_.width));
     }
     if (width_px_ > 0) {
       return {};
@@ -255,7 +280,7 @@ class Reader {
       }
     }
     Status status;
-    if (model == "none") {
+    if (model == "none" || (is_of_matrices() && numbers.empty() && value_of(key))) {
       lens.distortion = Distortion::kNone;
       status = check_length(key, numbers, {0}, "[] for distortion_model none");
     } else if (model == "equidistant") {
@@ -294,8 +319,8 @@ class Reader {
 
   std::vector<Field> fields() {
     const Rule side = Rule::between(1.0, kMaxImageSide_px);
-    return {{"", "image_width", &width_px_, side, ""},
-            {"", "image_height", &height_px_, side, ""},
+    return {{"", format_.width, &width_px_, side, ""},
+            {"", format_.height, &height_px_, side, ""},
             {"", "resolution", &resolution_, side, ""},
             {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
             {"", format_.intrinsics, &intrinsics_, Rule::between(-1e6, 1e6), ""},

@@ -24,8 +24,10 @@ struct CameraFile {
 /// and where known rate_hz and camera_height. EuRoC's sensor.yaml is one, with T_BS (sensor_type
 /// and comment are not read). Others, whose further keys are not read: Kalibr's camchain.yaml
 /// (cam0), OpenCV's FileStorage (camera_matrix, distortion_coefficients, fisheye_model), ROS'
-/// camera_info (the same and distortion_model plumb_bob, equidistant or fisheye). Errors, naming
-/// file and line: unreadable, not YAML, a key missing, unknown or twice, a value that cannot be.
+/// camera_info (the same and distortion_model plumb_bob, equidistant or fisheye; or its message as
+/// `topic echo` prints it: width, height, distortion_model, k and d, in ROS 1 K and D). Errors,
+/// naming file and line: unreadable, not YAML, a key missing, unknown or twice, a value that cannot
+/// be.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
 
 }  // namespace stemvo::dataset

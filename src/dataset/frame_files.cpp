@@ -24,6 +24,18 @@ fs::path absolute_folder(const fs::path& folder) {
   return (fs::absolute(folder, code) / "").lexically_normal().parent_path();
 }
 
+std::string recording_name(const fs::path& folder) {
+  const fs::path absolute = absolute_folder(folder);
+  for (fs::path part = absolute; part.has_filename(); part = part.parent_path()) {
+    std::string name = part.filename().string();
+    const bool is_numbered = matches_pattern(name, "cam?") || matches_pattern(name, "image_?");
+    if (!is_numbered && name != "images" && name != "rgb" && name != "data" && name != "mav0") {
+      return name;
+    }
+  }
+  return absolute.filename().string();
+}
+
 Expected<std::vector<fs::path>> list_folder(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code code;

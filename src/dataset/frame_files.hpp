@@ -26,6 +26,9 @@ namespace stemvo::dataset {
 [[nodiscard]] bool is_folder(const std::filesystem::path& path);
 /// Without a trailing separator, so that its last part is the folder's name.
 [[nodiscard]] std::filesystem::path absolute_folder(const std::filesystem::path& folder);
+/// The last part of a folder's name that tells it from others: not `images`, `rgb`, `data`, `mav0`,
+/// `cam0` or `image_2`, as the folders of every recording are called.
+[[nodiscard]] std::string recording_name(const std::filesystem::path& folder);
 /// What lies in a folder, in no order. Error: it cannot be listed.
 [[nodiscard]] Expected<std::vector<std::filesystem::path>> list_folder(
     const std::filesystem::path& folder);

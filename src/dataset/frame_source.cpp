@@ -40,15 +40,19 @@ Error refuse(const fs::path& path) {
     problem =
         "expected a recording, found a ROS bag; 'python -m stemvo.bag BAG FOLDER' makes one of it";
   } else if (!dataset::is_folder(path)) {
-    problem = "expected a folder, a video file, a quoted pattern of images or camera:N, found none";
+    problem =
+        "expected a folder, a video file, a quoted pattern of images or camera:N, found nothing of "
+        "that name; check the path ('stemvo run --help' lists what is read)";
   }
   return fail(fmt::format("{}: {}", path.string(), problem));
 }
 
 /// A listing of images, if it is one that is known.
 std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest& request) {
-  auto found = dataset::find_listing(request.sequence_dir);
-  return !found && request.camera_file ? dataset::list_images(request.sequence_dir) : found;
+  const fs::path& path = request.sequence_dir;
+  auto found = dataset::find_listing(path);
+  const bool may_hold_images = dataset::is_folder(path) || dataset::is_pattern(path);
+  return !found && request.camera_file && may_hold_images ? dataset::list_images(path) : found;
 }
 
 /// Files that belong to other kinds of recordings.
@@ -114,6 +118,17 @@ Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t nu
   return std::optional(std::move(truth));
 }
 
+std::optional<int> dataset::camera_number(const fs::path& path) {
+  constexpr std::string_view kPrefix = "camera:";
+  constexpr std::size_t kMaxNumber = 1000;
+  const std::string text = path.string();
+  if (!text.starts_with(kPrefix)) {
+    return std::nullopt;
+  }
+  const auto number = parse_index(std::string_view(text).substr(kPrefix.size()));
+  return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
+}
+
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
   if (is_file(path) && is_bag(path)) {
@@ -121,6 +136,10 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   }
   const bool is_stream = dataset::camera_number(path) || is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
+  const bool is_kitti = dataset::is_folder(path) && looks_like_kitti(path);
+  if (!is_stream && !listing && !is_kitti) {
+    return refuse(path);
+  }
   if (const Status status = check_unused(request, listing.has_value(), is_stream); !status) {
     return status.error();
   }
@@ -130,9 +149,6 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   if (listing) {
     return listing->and_then(
         [&](const dataset::Listing& found) { return dataset::open_listing(found, request); });
-  }
-  if (!dataset::is_folder(path) || !looks_like_kitti(path)) {
-    return refuse(path);
   }
   return KittiSequence::open(path, request).map([](const FrameSource& source) { return source; });
 }

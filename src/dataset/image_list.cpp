@@ -97,7 +97,7 @@ Expected<Listing> list_images(const fs::path& given) {
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());
   });
-  result.name = absolute_folder(result.folder).filename().string();
+  result.name = recording_name(result.folder);
   return result;
 }
 

@@ -79,7 +79,7 @@ Expected<Listing> list_euroc(const fs::path& camera) {
   Listing listing;
   listing.kind = "EuRoC recording";
   listing.folder = camera / "data";
-  listing.name = (mav.filename() == "mav0" ? mav.parent_path() : mav).filename().string();
+  listing.name = recording_name(mav);
   listing.camera_file = camera / "sensor.yaml";
   listing.ground_truth = if_exists(mav / "state_groundtruth_estimate0/data.csv");
   return read_list(camera / "data.csv", kNanosecond_s, std::move(listing));
@@ -89,7 +89,7 @@ Expected<Listing> list_tum(const fs::path& folder) {
   Listing listing;
   listing.kind = "TUM RGB-D recording";
   listing.folder = folder;
-  listing.name = absolute_folder(folder).filename().string();
+  listing.name = recording_name(folder);
   listing.camera_file = if_exists(folder / "camera.yaml");
   listing.ground_truth = if_exists(folder / "groundtruth.txt");
   return read_list(folder / "rgb.txt", 1.0, std::move(listing));
@@ -99,7 +99,7 @@ Expected<Listing> list_own(const fs::path& folder) {
   const fs::path images = is_folder(folder / "images") ? folder / "images" : folder;
   Expected<Listing> listing = list_images(images);
   if (listing) {
-    listing->name = absolute_folder(folder).filename().string();
+    listing->name = recording_name(folder);
     listing->camera_file = folder / "camera.yaml";
     listing->times_file = if_exists(folder / "times.txt");
     listing->ground_truth = if_exists(folder / "poses.txt");

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kBlack = 128;
 
-/// `x,y,w,h`; nullopt: no four whole numbers.
+/// `X,Y,WIDTH,HEIGHT`; nullopt: no four whole numbers.
 std::optional<cv::Rect> parse_rectangle(const std::string& part) {
   constexpr std::size_t kMax = 1000000;  // of pixels; sums of two stay inside an int
   std::string spaced = part;
@@ -44,10 +44,15 @@ Status add_part(const std::string& part, cv::Mat& mask) {
     mask(inside).setTo(0);
     return {};
   }
+  if (part.find_first_not_of("0123456789.,- ") == std::string::npos) {
+    return fail(fmt::format(
+        "--mask {}: expected X,Y,WIDTH,HEIGHT in whole pixels of the frames, or an image", part));
+  }
   const auto image = io::read_image(part, false);
   if (!image) {
-    return fail(fmt::format("--mask: expected x,y,w,h in whole pixels or an image, found {}",
-                            image.error().message));
+    return fail(
+        fmt::format("--mask: expected X,Y,WIDTH,HEIGHT in whole pixels or an image, found {}",
+                    image.error().message));
   }
   if (image->size() != mask.size()) {
     return fail(fmt::format("{}: expected a mask of {}x{} pixels, as the frames, found {}x{}", part,

@@ -6,7 +6,6 @@
 
 #include "dataset/frame_files.hpp"
 #include "dataset/ground_truth.hpp"
-#include "text/text_file.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -24,18 +23,22 @@ Status check_stream_size(const cv::Size& size, const Camera& camera, const std::
   return {};
 }
 
-}  // namespace
-
-std::optional<int> camera_number(const fs::path& path) {
-  constexpr std::string_view kPrefix = "camera:";
-  constexpr std::size_t kMaxNumber = 1000;
-  const std::string text = path.string();
-  if (!text.starts_with(kPrefix)) {
-    return std::nullopt;
+/// What the container says may be wrong; what --frames says is what is read.
+Status check_length(const PoseFile& truth,
+                    const FrameList& frames,
+                    const FrameSourceRequest& request) {
+  const std::size_t num_expected = frames.range.begin + frames.stream->expected_frames;
+  if (!truth.timestamps_s.empty() || frames.stream->expected_frames == 0 ||
+      truth.poses.size() >= num_expected) {
+    return {};
   }
-  const auto number = parse_index(std::string_view(text).substr(kPrefix.size()));
-  return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
+  return fail(fmt::format(
+      "{}: expected a pose for each of {} frames, as the video's container counts them, found {} "
+      "poses; --frames A:B takes fewer frames",
+      request.ground_truth->string(), num_expected, truth.poses.size()));
 }
+
+}  // namespace
 
 Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const CameraFile& camera,
@@ -71,6 +74,9 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     const auto truth = read_truth(*request.ground_truth, request.camera_file);
     if (!truth) {
       return truth.error();
+    }
+    if (const Status fits = check_length(*truth, frames, request); !fits) {
+      return fits.error();
     }
     frames.ground_truth_file = request.ground_truth;
     frames.match = [truth = *truth, request](const std::vector<double>& times_s) {

@@ -72,16 +72,22 @@ Rigid3 motion_error(std::span<const Rigid3> estimate,
   return estimated.inverse() * truth;
 }
 
-double mean_rotation_error_deg(std::span<const Rigid3> estimate,
-                               std::span<const Rigid3> ground_truth) {
+/// The RPE.
+void add_step_errors(std::span<const Rigid3> estimate,
+                     std::span<const Rigid3> ground_truth,
+                     Metrics& metrics) {
   if (estimate.size() < 2) {
-    return 0.0;
+    return;
   }
+  double sum_m = 0.0;
   double sum_rad = 0.0;
   for (std::size_t i = 1; i < estimate.size(); ++i) {
-    sum_rad += motion_error(estimate, ground_truth, i - 1, i).angle_rad();
+    const Rigid3 error = motion_error(estimate, ground_truth, i - 1, i);
+    sum_m += error.translation.norm();
+    sum_rad += error.angle_rad();
   }
-  return kDegPerRad * sum_rad / static_cast<double>(estimate.size() - 1);
+  metrics.rpe_translation_m = sum_m / static_cast<double>(estimate.size() - 1);
+  metrics.rpe_rotation_deg = kDegPerRad * sum_rad / static_cast<double>(estimate.size() - 1);
 }
 
 /// First frame more than `length_m` behind `first`; the number of frames when there is none.
@@ -175,7 +181,7 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   metrics.ate_rmse.scale_m = position_rmse_m(align(est, truth, Alignment::kScale), truth);
   metrics.ate_rmse.se3_m = position_rmse_m(align(est, truth, Alignment::kSe3), truth);
   metrics.ate_rmse.sim3_m = position_rmse_m(align(est, truth, Alignment::kSim3), truth);
-  metrics.rpe_rotation_deg = mean_rotation_error_deg(est, truth);
+  add_step_errors(est, truth, metrics);
   return metrics;
 }
 

@@ -43,7 +43,9 @@ struct Metrics {
   std::vector<double> segment_lengths_m;
   int num_segments = 0;
   AbsoluteTrajectoryError ate_rmse;
-  double rpe_rotation_deg = 0.0;  ///< mean over steps of 1 frame
+  // Mean over steps of 1 frame.
+  double rpe_translation_m = 0.0;
+  double rpe_rotation_deg = 0.0;
 };
 
 /// KITTI devkit (vo_facts 4c: every 10th start frame), offset, ATE, RPE. Both have the same length

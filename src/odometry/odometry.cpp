@@ -34,6 +34,15 @@ Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera)
   return {};
 }
 
+Status check_mask(const cv::Mat& mask, const Camera& camera) {
+  const cv::Size size(camera.width_px, camera.height_px);
+  if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
+    return fail(fmt::format("mask: expected {}x{} pixels of CV_8UC1, found {}x{} of {}", size.width,
+                            size.height, mask.cols, mask.rows, cv::typeToString(mask.type())));
+  }
+  return {};
+}
+
 }  // namespace
 
 struct Odometry::Impl {
@@ -41,14 +50,16 @@ struct Odometry::Impl {
   PhasedOdometry odometry;
 };
 
-Expected<Odometry> Odometry::create(const Camera& camera, const Options& options) {
-  if (Status status = check_camera(camera); !status) {
+Expected<Odometry> Odometry::create(const Camera& camera,
+                                    const Options& options,
+                                    const cv::Mat& mask) {
+  Status status = check_camera(camera);
+  status = status ? check_options(options) : status;
+  status = status ? check_mask(mask, camera) : status;
+  if (!status) {
     return status.error();
   }
-  if (Status status = check_options(options); !status) {
-    return status.error();
-  }
-  Expected<PhasedOdometry> odometry = PhasedOdometry::create(camera, options);
+  Expected<PhasedOdometry> odometry = PhasedOdometry::create(camera, options, mask);
   if (!odometry) {
     return odometry.error();
   }

@@ -120,6 +120,8 @@ class ResultWriter {
     if (refined_) {
       keep_first(written,
                  write_kitti_trajectory(folder / "trajectory_refined_kitti.txt", *refined_));
+      keep_first(written,
+                 write_tum_trajectory(folder / "trajectory_refined_tum.txt", times_s, *refined_));
     }
     report = make_report();
     keep_first(written, drive_.written);

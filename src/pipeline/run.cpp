@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "dataset/camera_height.hpp"
 #include "pipeline/checkpoint.hpp"
 #include "pipeline/drive_loop.hpp"
 #include "pipeline/frame_pipeline.hpp"
@@ -24,22 +25,6 @@ namespace stemvo {
 namespace {
 
 using pipeline::Run;
-
-/// Another camera is not on KITTI's car: what its camera file does not say is not known.
-Config with_camera_height(Config config, const FrameSource& source) {
-  constexpr const char* kSource = "scale.source";
-  const bool is_chosen = config.scale.source != ScaleSource::kCameraHeight ||
-                         config.keys_in_file.contains(kSource) ||
-                         config.keys_overridden.contains(kSource);
-  if (!source.is_kitti() && !source.camera_height_m() && !is_chosen) {
-    config.scale.source = ScaleSource::kNone;
-  }
-  // A file's height is some camera's, often the default; that of the camera file is this one's.
-  if (source.camera_height_m() && !config.keys_overridden.contains("scale.camera_height_m")) {
-    config.scale.camera_height_m = *source.camera_height_m();
-  }
-  return config;
-}
 
 Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
@@ -103,15 +88,17 @@ Expected<std::string> identity_of(const Run& run) {
                      c.height_px, pipeline::config_text(run, 0), internal::sha256_hex(files));
 }
 
-/// What a run writes at its end, or after a second: beside the frames of one that was killed
-/// before, an earlier run's would pass for its own. Links stay, and all where no run has been.
-Status remove_earlier_results(const std::filesystem::path& out_dir) {
+bool has_earlier_results(const std::filesystem::path& out_dir) {
   const auto frames = read_text_file(out_dir / "frames.csv");
-  if (!frames || !frames->starts_with(frames_csv_header())) {
-    return {};
-  }
+  return frames && frames->starts_with(frames_csv_header());
+}
+
+/// What a run writes at its end, or after a second: beside the frames of one that was killed
+/// before, an earlier run's would pass for its own. Links stay.
+Status remove_earlier_results(const std::filesystem::path& out_dir) {
   for (const char* name : {"metrics.json", "trajectory_kitti.txt", "report.html", "trajectory.png",
-                           "trajectory_tum.txt", "trajectory_refined_kitti.txt", "map.ply"}) {
+                           "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+                           "trajectory_refined_tum.txt", "map.ply"}) {
     std::error_code code;
     if (is_regular_file(symlink_status(out_dir / name, code))) {
       if (Status status = remove_file(out_dir / name); !status) {
@@ -124,7 +111,8 @@ Status remove_earlier_results(const std::filesystem::path& out_dir) {
 
 /// What an earlier run left in the folder is removed, unless this one goes on from it.
 Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunRequest& request,
-                                                                 const std::string& identity) {
+                                                                 const std::string& identity,
+                                                                 bool has_earlier) {
   const std::filesystem::path& out = request.out_dir;
   auto checkpoint = request.resume ? pipeline::read_checkpoint(out, identity)
                                    : std::optional<pipeline::Checkpoint>();
@@ -138,7 +126,7 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
   }
   if (status && !*checkpoint) {
     status = remove_file(pipeline::checkpoint_file(out));
-    status = status ? remove_earlier_results(out) : status;
+    status = status && has_earlier ? remove_earlier_results(out) : status;
   }
   if (status) {  // from now on it can be seen how far the run is
     status = write_text_file(out / "frames.csv",
@@ -151,8 +139,9 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
 Status check_inputs_are_spared(const RunRequest& request, const FrameSource& sequence) {
   std::vector<std::filesystem::path> results;
   for (const char* name :
-       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt", "report.html",
-        "trajectory.png", "frames.csv", "metrics.json", "config.yaml", "checkpoint"}) {
+       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+        "trajectory_refined_tum.txt", "report.html", "trajectory.png", "frames.csv", "metrics.json",
+        "config.yaml", "checkpoint"}) {
     results.push_back(request.out_dir / name);
   }
   std::vector<std::filesystem::path> inputs = inputs_of(request, sequence);
@@ -195,8 +184,10 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-/// What the input was taken for, and where a run that may go on begins.
-void note_start(const Run& run, const std::optional<pipeline::Checkpoint>& checkpoint) {
+/// What the input was taken for, where a run that may go on begins, and what is lost.
+void note_start(const Run& run,
+                const std::optional<pipeline::Checkpoint>& checkpoint,
+                bool has_earlier) {
   const auto& [request, sequence, odometry] = run;
   if (!request.note) {
     return;
@@ -207,6 +198,11 @@ void note_start(const Run& run, const std::optional<pipeline::Checkpoint>& check
     request.note(
         checkpoint ? fmt::format("goes on at frame {}", sequence.range().begin + checkpoint->frame)
                    : "starts at the first frame: no checkpoint in " + request.out_dir.string());
+  }
+  if (has_earlier && !checkpoint) {
+    request.note(
+        fmt::format("results of an earlier run in {} are replaced (another --out keeps them)",
+                    request.out_dir.string()));
   }
 }
 
@@ -226,7 +222,8 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (!lock || !identity) {
     return lock ? identity.error() : lock.error();
   }
-  auto checkpoint = prepare_out_folder(request, *identity);
+  const bool has_earlier = has_earlier_results(request.out_dir);
+  auto checkpoint = prepare_out_folder(request, *identity, has_earlier);
   if (!checkpoint) {
     return checkpoint.error();
   }
@@ -234,7 +231,7 @@ Expected<RunSummary> run_source(const RunRequest& request,
   if (request.measure_times) {
     recorder.emplace();
   }
-  note_start(run, *checkpoint);
+  note_start(run, *checkpoint, has_earlier);
   pipeline::Drive done = pipeline::run_drive(run, *identity, *std::move(checkpoint), progress);
   if (done.frames.empty()) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
@@ -267,7 +264,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
     return fail("--resume: expected a recording, found a live camera");
   }
   RunRequest effective = request;
-  effective.config = with_camera_height(request.config, *sequence);
+  effective.config = dataset::with_camera_height(request.config, sequence->frames());
   if (request.out_dir.empty()) {
     effective.out_dir = std::filesystem::path("results") / sequence->name();
   }

@@ -15,9 +15,8 @@
 
 namespace stemvo {
 
-/// Everything `stemvo run` was asked for. The camera is that of `config`. A camera file's
-/// camera_height sets scale.camera_height_m where --set did not; without one scale.source becomes
-/// none where neither --set nor a configuration file named it.
+/// Everything `stemvo run` was asked for. The camera is that of `config`, the height
+/// as dataset::with_camera_height says.
 struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;  ///< empty: results/ and the recording's name
   std::filesystem::path models_dir;
@@ -49,7 +48,7 @@ struct RunSummary {
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
-/// (trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt with odometry.mode map,
+/// (trajectory_kitti.txt, trajectory_tum.txt, with odometry.mode map both of trajectory_refined_*,
 /// frames.csv, config.yaml, metrics.json, report.html, trajectory.png, map.ply, pictures/%06d.png;
 /// until the end also checkpoint; an earlier run's are removed when this one starts). A wrong
 /// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that

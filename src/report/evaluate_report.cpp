@@ -61,6 +61,7 @@ void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
   table.add({row.name, number_or_dash(m.t_rel_percent, 2), number_or_dash(m.r_rel_deg_per_100m, 3),
              fmt::format("{:.2f}", m.average_offset_m),
              fmt::format("{:.2f}", m.ate_rmse.after_m(alignment)),
+             fmt::format("{:.4f}", m.rpe_translation_m),
              fmt::format("{:.4f}", m.rpe_rotation_deg)});
 }
 
@@ -114,8 +115,8 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
 
 std::string format_evaluation_table(const EvaluationReport& report) {
   const Metrics& zero_motion = report.zero_motion.metrics;
-  TextTable table("lrrrrr");
-  table.add({"estimate", "t_rel %", "r_rel deg/100 m", "offset m", "ATE m", "RPE deg"});
+  TextTable table("lrrrrrr");
+  table.add({"estimate", "t_rel %", "r_rel deg/100 m", "offset m", "ATE m", "RPE m", "RPE deg"});
   table.rule();
   for (const EvaluationRow& row : report.rows) {
     add_row(table, row, report.alignment);
@@ -135,8 +136,8 @@ std::string format_evaluation_table(const EvaluationReport& report) {
   }
   return fmt::format(
       "ground truth  {}, {} poses, {:.1f} m\nalignment     {} (the last row: none)\n\n{}\n{}\n"
-      "offset: mean of |dx| + |dz|; ATE: root mean square position error; RPE: mean rotation error "
-      "per frame\n{}",
+      "offset: mean of |dx| + |dz|; ATE: root mean square position error; RPE: mean error of "
+      "the step of one frame\n{}",
       report.ground_truth, report.num_poses, zero_motion.path_length_m, to_string(report.alignment),
       table.str(), segments, unmatched);
 }

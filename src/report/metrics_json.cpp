@@ -19,6 +19,7 @@ Json refined_json(const Metrics& metrics) {
   return {{"average_offset_m", metrics.average_offset_m},
           {"t_rel_percent", metrics.t_rel_percent},
           {"r_rel_deg_per_100m", metrics.r_rel_deg_per_100m},
+          {"rpe_translation_m", metrics.rpe_translation_m},
           {"rpe_rotation_deg", metrics.rpe_rotation_deg}};
 }
 
@@ -74,6 +75,7 @@ void add_metrics(Json& json, const std::optional<Metrics>& metrics) {
                         {"segment_lengths_m", m.segment_lengths_m},
                         {"segments", m.num_segments},
                         {"ate_rmse_m", m.ate_rmse},
+                        {"rpe_translation_m", m.rpe_translation_m},
                         {"rpe_rotation_deg", m.rpe_rotation_deg}};
   for (const auto& [key, value] : numbers.items()) {
     json[key] = metrics ? value : Json();

@@ -76,8 +76,10 @@ std::string error_table(const MetricsReport& report) {
     table.add({"position ATE", format_length(m.ate_rmse.after_m(alignment), 2), "m",
                std::string(to_string(alignment)), note});
   }
-  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
+  table.add({"translation per frame", fmt::format("{:.4f}", m.rpe_translation_m), "m", fitted,
              "mean over steps of one frame (RPE)"});
+  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
+             "the same steps"});
   return table.str();
 }
 

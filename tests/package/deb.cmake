@@ -45,21 +45,3 @@ try ro; try run --fr; try run x --set stem.mo\n")
 run("completions" bash "${work}/completions.sh")
 expect("commands" "${output}" "\\[robustness\\]\n\\[--frames\\]")
 expect("keys" "${output}" "\\[stem.model=\\]\n$")
-find_program(zsh zsh)
-if(zsh)
-  file(WRITE "${work}/completions.zsh" "
-compadd() { while [[ $1 != -- ]]; do shift; done; shift; for one in $@; do [[ $one == \${words[CURRENT]}* ]] && print -r -- \"[$one]\"; done }
-try() { words=(stemvo \"$@\"); CURRENT=\${#words}; source '${root}/usr/share/zsh/vendor-completions/_stemvo' }
-try ro; try run --fr; try run x --set stem.mo; true\n")
-  run("completions of zsh" "${zsh}" -f "${work}/completions.zsh")
-  expect("words" "${output}" "\\[robustness\\]\n\\[--frames\\]\n\\[stem.model=\\]\n$")
-endif()
-find_program(fish fish)
-if(fish)
-  file(WRITE "${work}/completions.fish" "source '${root}/usr/share/fish/vendor_completions.d/stemvo.fish'
-for line in 'stemvo ro' 'stemvo run --fr' 'stemvo run x --set stem.mo'
-    complete -C $line | string replace -r '.*' '[\$0]'
-end\n")
-  run("completions of fish" "${fish}" "${work}/completions.fish")
-  expect("words" "${output}" "\\[robustness\\]\n\\[--frames\\]\n\\[stem.model=\\]\n$")
-endif()

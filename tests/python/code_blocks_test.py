@@ -21,7 +21,7 @@ FRAMES = 25
 
 # Commands that build, install, fetch, or need hours: how they begin, and what runs them, or their tool, instead.
 RUN_ELSEWHERE = {
-    "make demo": ".ci/run",
+    "make demo": "tests/python/code_blocks_test.py",
     "make test": ".ci/run",
     "make build": ".ci/run",
     "ctest --preset": ".ci/run",
@@ -133,6 +133,13 @@ class CodeBlocks(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}")
         self.assertGreater(num_run, 15)
 
+    def test_the_demo(self):
+        # What `make demo` does with a program that is built.
+        done = subprocess.run([ROOT / "tools/demo.sh"], capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("build/demo/out/report.html", done.stdout)
+        self.assertTrue((ROOT / "build/demo/out/map.ply").exists())
+
     def test_camera_files(self):
         for block in documented.blocks("yaml"):
             with self.subTest(block.place):
@@ -147,8 +154,8 @@ class CodeBlocks(unittest.TestCase):
             self.assertIn(block.text, compiled, f"{block.place}: no program of examples/, which the test `package` compiles and runs")
 
     def test_nothing_else_is_code(self):
-        # python: all of them are run by package_test.py. text and mermaid: nothing to run.
-        self.assertLessEqual({block.language for block in documented.blocks()}, {"", "cpp", "mermaid", "python", "text", "yaml"})
+        # python: all of them are run by package_test.py; cmake: by package/clean_root.sh. text and mermaid: nothing to run.
+        self.assertLessEqual({block.language for block in documented.blocks()}, {"", "cmake", "cpp", "mermaid", "python", "text", "yaml"})
         self.assertEqual([block.place for block in documented.blocks("text") if re.search(r"\b(stemvo|make|tools|build)\b", block.text)], [])
 
     def test_what_runs_elsewhere_is_still_there(self):

@@ -2,27 +2,82 @@
 """The Python package as a user gets it: `pip install .` into a fresh environment, the page's program,
 the program's own trajectory byte for byte, and bad input."""
 
+import csv
+import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 
 import documented
+import PIL.Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 FRAMES = 12
+OPTIONS = {"camera_file": "--camera", "frames": "--frames", "ground_truth": "--gt", "tolerance_s": "--gt-tolerance", "times": "--times", "masks": "--mask"}
 
-TRAJECTORY = """
-import sys, stemvo
-recording = stemvo.read_recording(sys.argv[1])
-odometry = stemvo.Odometry(recording.camera)
-for image, timestamp in recording:
-    result = odometry.process(image, timestamp)
-    assert result.timestamp == timestamp and result.state and result.num_matches >= 0
-    print(*(f"{value + 0.0:.12e}" for value in result.world_from_camera[:3].ravel()))  # as KITTI's file is written
+# What `stemvo run` writes, of the same recording: FOLDER, and as JSON what else read_recording takes.
+TRACK = """
+import json, pathlib, sys
+import numpy as np, stemvo
+out, path, more = pathlib.Path(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3])
+recording = stemvo.read_recording(path, **more)
+odometry = stemvo.Odometry(recording)
+results = [odometry.process(image, timestamp) for image, timestamp in recording]
+def write(name, poses):  # as KITTI's file is written
+    lines = [" ".join(f"{value + 0.0:.12e}" for value in pose[:3].ravel()) for pose in poses]
+    (out / name).write_text("\\n".join(lines) + "\\n")
+poses = np.stack([result.world_from_camera for result in results])
+write("trajectory_kitti.txt", poses)
+write("trajectory_refined_kitti.txt", odometry.refined_trajectory())
+truth, frames, scale = recording.ground_truth, recording.ground_truth_frames, odometry.scale_source
+assert (truth is None) == (frames is None) and (truth is None or len(truth) == len(frames))
+errors = truth is not None and stemvo.evaluate(poses[frames], truth, "sim3" if scale == "none" else "none")
+print(json.dumps({"states": [[r.state, r.num_matches, r.num_inliers, r.road, r.timestamp] for r in results], "scale_source": scale,
+                  "errors": errors or None, "true_frames": None if frames is None else frames.tolist()}))
+"""
+
+# A video through OpenCV's package: made of the images of a folder; then tracked, as TRACK does it.
+VIDEO = """
+import pathlib, sys
+import cv2, stemvo
+images = sorted(pathlib.Path(sys.argv[1]).glob("*.png"))
+writer = cv2.VideoWriter(sys.argv[2], cv2.VideoWriter_fourcc(*"FFV1"), 10.0, cv2.imread(str(images[0])).shape[1::-1])
+for image in images:
+    writer.write(cv2.imread(str(image)))
+writer.release()
+view = stemvo.FrameView(sys.argv[3], masks=sys.argv[4:])
+odometry, video = stemvo.Odometry(view), cv2.VideoCapture(sys.argv[2])
+while (read := video.read())[0]:
+    pose = odometry.process(view.apply(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))).world_from_camera
+    print(*(f"{value + 0.0:.12e}" for value in pose[:3].ravel()))
+"""
+
+# Where the viewer puts a path of half the size whose frames 1 to 3 have a true pose.
+FITTED = """
+import types
+import numpy as np
+from stemvo.view import View
+logged = {}
+rr = types.SimpleNamespace(log=lambda name, entity, **_: logged.update({name: entity}), LineStrips3D=lambda strips, colors: strips,
+                           Transform3D=lambda translation, mat3x3: (translation, mat3x3), ViewCoordinates=types.SimpleNamespace(RIGHT_HAND_Y_DOWN=0))
+turn = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+poses = np.tile(np.eye(4), (5, 1, 1))
+poses[:, :3, 3] = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [1, 2, 3], [9, 9, 9]])
+truth = np.linalg.inv(turn @ poses[1]) @ turn @ poses[1:4]
+truth[:, :3, 3] *= 2.0
+recording = types.SimpleNamespace(ground_truth=truth, ground_truth_frames=np.array([1, 2, 3]))
+for scale_source, factor in (("none", 2.0), ("camera_height", 1.0)):
+    view = View(rr, recording, scale_source)
+    view.fit(list(poses))
+    translation, matrix = logged["world/estimate"]
+    moved = poses[1:4, :3, 3] @ matrix.T + translation
+    assert np.allclose(moved, truth[:, :3, 3] * factor / 2.0), (scale_source, moved)
+assert np.array_equal(logged["world/truth"][0], truth[:, :3, 3])
 """
 
 # Each line must raise ValueError, or what stands behind it, with one line that holds the text.
@@ -51,6 +106,13 @@ cases = [
     (lambda: stemvo.Odometry(camera, 3), "options: expected"),
     (lambda: stemvo.Options.load("/nowhere.yaml"), "/nowhere.yaml"),
     (lambda: stemvo.read_recording("/nowhere"), "/nowhere"),
+    (lambda: stemvo.read_recording("/nowhere", frames="4:2"), "expected A < B"),
+    (lambda: stemvo.read_recording(sys.executable), "stemvo.FrameView"),
+    (lambda: stemvo.read_recording("camera:0"), "stemvo.FrameView"),
+    (lambda: stemvo.FrameView("/nowhere.yaml"), "/nowhere.yaml"),
+    (lambda: stemvo.Odometry("camera"), "expected Camera, Recording or FrameView"),
+    (lambda: stemvo.align(poses, poses[:3]), "expected a frame of 5 poses for each of 3"),
+    (lambda: stemvo.align(poses, poses[:1], [5]), "expected a frame of 5 poses"),
     (lambda: stemvo.evaluate("/nowhere", poses), "/nowhere"),
     (lambda: stemvo.evaluate(poses, poses[:4]), "expected 4 poses"),
     (lambda: stemvo.evaluate(poses * 2.0, poses), "estimate[0]: expected a rotation"),
@@ -85,7 +147,7 @@ class Package(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         call(sys.executable, "-m", "venv", cls.folder / "venv")
         cls.python = cls.folder / "venv/bin/python"
-        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,view]",
+        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,video,view]",
              env={**os.environ, "PYTHONPATH": "", "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count())})
         call(PROGRAM, "synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
 
@@ -93,19 +155,92 @@ class Package(unittest.TestCase):
         # Neither the checkout nor the tools: only what was installed.
         return call(self.python, "-I", "-c", program, *arguments, cwd=self.folder)
 
-    def test_same_trajectory_as_the_program(self):
+    def compare(self, recording, **more):
+        """What both make of a recording; `more`: as read_recording takes it."""
+        program, python = self.folder / "by_program", self.folder / "by_python"
+        for folder in (program, python):
+            shutil.rmtree(folder, ignore_errors=True)
+        python.mkdir()
+        options = [text for key, value in more.items() for one in (value if isinstance(value, list) else [value]) for text in (OPTIONS[key], one)]
+        call(PROGRAM, "run", recording, "--out", program, "--quiet", *options)
+        done = json.loads(self.run_python(TRACK, python, recording, json.dumps(more, default=str)))
+        for name in ("trajectory_kitti.txt", "trajectory_refined_kitti.txt"):
+            self.assertEqual((python / name).read_text(), (program / name).read_text(), f"{recording}: {name}")
+        rows = list(csv.DictReader((program / "frames.csv").read_text().splitlines()))
+        states = [[row["state"], int(row["matches"]), int(row["inliers"]), row["road"], float(row["timestamp_s"])] for row in rows]
+        self.assertEqual(done["states"], states, recording)
+        metrics = json.loads((program / "metrics.json").read_text())
+        self.assertEqual(done["scale_source"], metrics["scale_source"], recording)
+        for key, error in (done["errors"] or {}).items():  # of matrices where the program has quaternions
+            expected = metrics[key][metrics["alignment"]] if key == "ate_rmse_m" else metrics[key]
+            self.assertEqual(error is None, expected is None, key)
+            self.assertAlmostEqual(error or 0.0, expected or 0.0, delta=1e-9, msg=f"{recording}: {key}")
+        self.assertEqual(done["true_frames"] is None, metrics["ate_rmse_m"] is None, recording)
+        return done
+
+    def camera_file(self, name, size, *more):
+        """Of the rendered drive's camera, for images of another size."""
+        numbers = next(line for line in (self.folder / "drive/sequences/00/calib.txt").read_text().splitlines() if line.startswith("P2:")).split()
+        scale = size[0] / 620
+        intrinsics = [scale * float(numbers[i]) for i in (1, 6, 3, 7)]
+        file = self.folder / name
+        file.write_text(f"resolution: {list(size)}\nintrinsics: {intrinsics}\n" + "".join(f"{line}\n" for line in more))
+        return file
+
+    def test_kitti(self):
         sequence = self.folder / "drive/sequences/00"
-        call(PROGRAM, "run", sequence, "--out", self.folder / "out")
-        expected = (self.folder / "out/trajectory_kitti.txt").read_text()
-        self.assertEqual(self.run_python(TRAJECTORY, sequence), expected)
-        lines = expected.splitlines()
-        self.assertEqual(len(lines), FRAMES)
-        self.assertNotEqual(lines[0], lines[-1])
+        done = self.compare(sequence)
+        self.assertEqual([done["scale_source"], len(done["states"])], ["camera_height", FRAMES])
+        self.assertLess(len(self.compare(sequence, frames="2:9", masks=["0,150,620,38"])["states"]), FRAMES)
+
+    def test_a_folder_of_images(self):
+        images = self.folder / "plain"
+        shutil.copytree(self.folder / "drive/sequences/00/image_2", images)
+        (images / "000005.png").write_bytes(b"no image")
+        times = self.folder / "times.txt"
+        times.write_text("".join(f"{100 + 0.1 * i}\n" for i in range(FRAMES)))
+        truth = self.folder / "truth.txt"
+        poses = [line.split() for line in (self.folder / "drive/poses/00.txt").read_text().splitlines()]
+        truth.write_text("".join(f"{100.02 + 0.1 * i} {pose[3]} {pose[7]} {pose[11]} 0 0 0 1\n" for i, pose in enumerate(poses) if i not in (0, 4)))
+        lens = ("distortion_model: radial-tangential", "distortion_coefficients: [-0.1, 0.02, 0.001, 0.0]")
+        unknown = self.compare(images, camera_file=self.camera_file("lens.yaml", (620, 188), *lens), times=times, ground_truth=truth, tolerance_s=0.03)
+        self.assertEqual([unknown["scale_source"], unknown["true_frames"]], ["none", [i for i in range(FRAMES) if i not in (0, 4)]])
+        self.assertEqual(unknown["states"][5][0], "no_image")
+        known = self.compare(images, camera_file=self.camera_file("height.yaml", (620, 188), *lens, "camera_height: 1.65"), times=times)
+        self.assertEqual([known["scale_source"], known["true_frames"]], ["camera_height", None])
+
+    def test_large_frames(self):
+        large = self.folder / "large"
+        large.mkdir()
+        for file in sorted((self.folder / "drive/sequences/00/image_2").glob("*.png"))[:5]:
+            PIL.Image.open(file).resize((2480, 752)).save(large / file.name)
+        self.compare(large, camera_file=self.camera_file("large.yaml", (2480, 752), "distortion_model: none", "rate_hz: 10"), masks=["0,600,2480,152"])
+
+    @unittest.skipUnless("STEMVO_SHARED_DATA" in os.environ, "STEMVO_SHARED_DATA is not set")
+    def test_real_recordings(self):
+        data = pathlib.Path(os.environ["STEMVO_SHARED_DATA"])
+        camera = self.folder / "freiburg2.yaml"  # as its authors publish it
+        camera.write_text("resolution: [640, 480]\nintrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
+                          "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\n")
+        for recording, more in (("kitti/sequences/03", {"frames": "0:20"}), ("euroc", {}), ("tum", {"camera_file": camera}), ("handheld", {"frames": "0:20"})):
+            self.compare(data / recording, **more)
+
+    def test_a_video(self):
+        video, mask = self.folder / "drive.avi", "0,150,620,38"
+        camera = self.camera_file("camera.yaml", (620, 188), "distortion_model: none", "camera_height: 1.65")
+        tracked = self.run_python(VIDEO, self.folder / "drive/sequences/00/image_2", video, camera, mask)
+        call(PROGRAM, "run", video, "--camera", camera, "--mask", mask, "--out", self.folder / "video", "--quiet")
+        self.assertEqual(tracked, (self.folder / "video/trajectory_kitti.txt").read_text())
+        self.assertEqual(tracked.count("\n"), FRAMES)
 
     def test_the_page(self):
+        self.test_a_video()  # which leaves drive.avi and camera.yaml
         said = "".join(self.run_python(block.text) for block in documented.blocks("python"))
         self.assertIn("tracking", said)
         self.assertIn("ate_rmse_m", said)
+
+    def test_the_view_is_where_the_report_is(self):
+        self.run_python(FITTED)
 
     def view(self, *arguments):
         return subprocess.run(list(map(str, [self.python, "-I", "-m", "stemvo.view", *arguments])),
@@ -120,7 +255,7 @@ class Package(unittest.TestCase):
             done = self.view(*arguments, "--save", file)
             self.assertEqual(done.returncode, 0, done.stderr)
             written = file.read_bytes()
-            for entity in (b"/world/camera/image", b"/world/path/0", b"/plots/inliers", b"/state"):
+            for entity in (b"/world/truth", b"/world/estimate/camera/image", b"/world/estimate/path/0", b"/plots/inliers", b"/state"):
                 self.assertIn(entity, written, name)
         for arguments, text in ((["/nowhere"], "/nowhere/trajectory_kitti.txt"), ([], "expected RESULT"),
                                 (["--live", sequence, "--set", "stem.filtre=1"], "stem.filtre: unknown key")):
@@ -147,7 +282,10 @@ class Package(unittest.TestCase):
         done = subprocess.run([python, "-I", "-c", code], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertTrue(done.stdout.startswith(f"{FRAMES}\n"), done.stdout[:100])
-        for name in ("libopencv_core", "libavcodec", "libonnxruntime", "libdeflate"):
+        self.assertLess(wheel.stat().st_size, 40e6)
+        for name in ("libavcodec", "libgdal"):  # what videos need, and GPL's codecs
+            self.assertNotIn(name, done.stdout)
+        for name in ("libopencv_core", "libonnxruntime", "libdeflate"):
             loaded = [line for line in done.stdout.splitlines() if name in line]
             self.assertTrue(loaded, name)
             self.assertTrue(all(str(self.folder) in line for line in loaded), loaded[0])

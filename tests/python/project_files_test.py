@@ -41,7 +41,7 @@ class Evaluation(unittest.TestCase):
             poses = pathlib.Path(folder) / "poses.txt"
             poses.write_text("".join(f"1 0 0 {i % 3} 0 1 0 0 0 0 1 {i}\n" for i in range(30)))
             done = self.evaluate(poses, poses)
-            self.assertEqual((done.returncode, done.stdout), (0, f"{poses}: ATE 0.0000 m, RPE 0.0000 deg/frame\n"), done.stderr)
+            self.assertEqual((done.returncode, done.stdout), (0, f"{poses}: ATE 0.0000 m, RPE 0.0000 m and 0.0000 deg a frame\n"), done.stderr)
             refused = self.evaluate(poses, ROOT / "LICENSE")
         self.assertEqual((refused.returncode, refused.stdout), (1, ""))
         self.assertRegex(refused.stderr, "^error: .*LICENSE:1: [^\n]+\n$")

@@ -148,6 +148,21 @@ TEST_F(RecordingsRun, AVideoWithTruthByTime) {
   EXPECT_EQ(metrics().at("frames"), 5);
 }
 
+TEST_F(RecordingsRun, AVideoWithTooFewTruePosesIsRefusedBeforeTheRun) {
+  const std::string video = write_video();
+  std::string truth;
+  for (int i = 0; i < kNumFrames - 1; ++i) {
+    truth += fmt::format("1 0 0 0 0 1 0 0 0 0 1 {}\n", i);
+  }
+  const std::string file = folder_ / "truth.txt";
+  write_file(file, truth);
+  const ProgramResult result = run(video, {"--camera", camera_, "--gt", file});
+  expect_error(result, 1, {"truth.txt: expected a pose for each of 12 frames", "found 11 poses"});
+  EXPECT_FALSE(fs::exists(out_));
+  const ProgramResult fewer = run(video, {"--camera", camera_, "--gt", file, "--frames", "0:11"});
+  EXPECT_EQ(fewer.exit_code, 0) << fewer.err;
+}
+
 TEST_F(RecordingsRun, AVideoThatIsCutOff) {
   const std::string video = write_video();
   const std::string whole = read_file(video);
@@ -216,7 +231,31 @@ TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {
   EXPECT_TRUE(fs::exists(folder_ / "results/00/trajectory_kitti.txt"));
 }
 
+TEST_F(RecordingsRun, FoldersOfImagesHaveTheNamesOfTheirRecordings) {
+  const fs::path here = fs::current_path();
+  fs::create_directories(folder_.path() / "first");
+  fs::create_directories(folder_.path() / "second/mav0/cam0");
+  fs::create_directory_symlink(sequence_ / "image_2", folder_.path() / "first/images");
+  fs::create_directory_symlink(sequence_ / "image_2", folder_.path() / "second/mav0/cam0/data");
+  write_file(camera_, camera_text_ + "rate_hz: 10\n");
+  const auto run_here = [&](const std::string& input) {
+    fs::current_path(folder_.path());
+    const ProgramResult result = run_stemvo({"run", input, "--camera", camera_, "--frames", "0:3"});
+    fs::current_path(here);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result;
+  };
+  const ProgramResult first = run_here("first/images");
+  EXPECT_THAT(first.out, HasSubstr("results: results/first\n"));
+  EXPECT_THAT(first.err, Not(HasSubstr("earlier")));
+  EXPECT_THAT(run_here("second/mav0/cam0/data/").out, HasSubstr("results: results/second\n"));
+  EXPECT_THAT(run_here("first/images/0*.png").err,
+              HasSubstr("results of an earlier run in results/first are replaced"));
+}
+
 TEST_F(RecordingsRun, ACameraThatIsNotThereIsOneLine) {
+  expect_error(run(folder_ / "gone.mp4", {"--camera", camera_}), 1,
+               {"gone.mp4", "check the path", "stemvo run --help"});
   expect_error(run("camera:987", {"--camera", camera_}), 1, {"/dev/video987"});
 }
 

@@ -299,6 +299,44 @@ TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
   }
 }
 
+/// As ROS 2 prints it; `rest` follows `distortion_model: `.
+std::string message(const std::string& rest) {
+  return "header:\n  stamp:\n    sec: 1\n    nanosec: 2\n  frame_id: head\nheight: 480\nwidth: "
+         "640\n"
+         "distortion_model: " +
+         rest +
+         "k:\n- 520.0\n- 0.0\n- 325.5\n- 0.0\n- 521.0\n- 249.5\n- 0.0\n- 0.0\n- 1.0\n"
+         "r:\n- 1.0\np:\n- 500.0\nbinning_x: 0\nroi:\n  x_offset: 0\n---\n";
+}
+
+TEST_F(CameraFileTest, AMessageOfRos) {
+  const std::string five = "plumb_bob\nd:\n- 0.2\n- -0.7\n- 0.0\n- 0.001\n- 0.9\n";
+  std::string first = message(five);  // as ROS 1 prints it
+  first.replace(first.find("\nk:\n"), 4, "\nK:\n");
+  first.replace(first.find("\nd:\n"), 4, "\nD:\n");
+  for (const std::string& text : {message(five), first}) {
+    const auto file = read_camera_file(folder_.file("camera.yaml", text));
+    ASSERT_TRUE(file) << file.error().message;
+    EXPECT_EQ(file->lens.camera.width_px, 640);
+    EXPECT_EQ(file->lens.camera.height_px, 480);
+    EXPECT_EQ(file->lens.camera.fy_px, 521.0);
+    EXPECT_EQ(file->lens.camera.cx_px, 325.5);
+    EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+  }
+  const auto none = read_camera_file(folder_.file("camera.yaml", message("plumb_bob\nd: []\n")));
+  ASSERT_TRUE(none) << none.error().message;
+  EXPECT_EQ(none->lens.distortion, Distortion::kNone);
+  expect_refused(message("rational_polynomial\nd: [1]\n"), {"camera.yaml:8: distortion_model"});
+  expect_refused(message("plumb_bob\n"), {"d: [k1, k2, p1, p2]", "no such key"});
+  std::string text = message(five);
+  text.replace(text.find("- 520.0\n"), 8, "");
+  expect_refused(text, {"camera.yaml:16: k: expected [fx, 0, cx, 0, fy", "found 8 numbers"});
+  text = message(five);
+  text.replace(text.find("width: 640\n"), 11, "");
+  expect_refused(text, {"expected width and height, found height alone"});
+  expect_refused(message(five) + message(five), {"not YAML: expected one document"});
+}
+
 TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
   std::string text = kOpenCv;
   text.replace(text.find("flags: 0"), 8, "fisheye_model: 1");

@@ -70,6 +70,7 @@ TEST(Evaluate, OnePercentOfScaleIsOnePercentOfTranslation) {
   EXPECT_NEAR(metrics.t_rel_percent.value(), 100.0 * sum / count, 1e-9);
   EXPECT_NEAR(metrics.t_rel_percent.value(), 1.0, 0.01);
   EXPECT_LE(metrics.r_rel_deg_per_100m.value(), 1e-9);
+  EXPECT_NEAR(metrics.rpe_translation_m, 0.01, 1e-9);
   EXPECT_NEAR(metrics.path_length_m, 1000.0, 1e-9);
   EXPECT_NEAR(metrics.average_offset_m, 5.0, 1e-9);  // mean of 0 .. 10 m
   EXPECT_NEAR(metrics.null_offset_m, 500.0, 1e-9);

@@ -57,6 +57,27 @@ TEST(OdometryCreate, AnOptionOutOfRangeIsAnErrorThatNamesIt) {
   EXPECT_THAT(error_of(options), AllOf(HasSubstr("stem.model"), HasSubstr("'resnet'")));
 }
 
+TEST(OdometryCreate, AMaskThatDoesNotFitIsRefusedAndOneThatDoesKeepsPointsAway) {
+  const auto error_of_mask = [](const cv::Mat& mask) {
+    const auto odometry = Odometry::create(kCamera, {}, mask);
+    return odometry ? "no error" : odometry.error().message;
+  };
+  EXPECT_THAT(error_of_mask(cv::Mat(95, 320, CV_8UC1)),
+              HasSubstr("mask: expected 320x96 pixels of CV_8UC1, found 320x95 of CV_8UC1"));
+  EXPECT_THAT(error_of_mask(cv::Mat(96, 320, CV_8UC3)), HasSubstr("found 320x96 of CV_8UC3"));
+  cv::Mat right_half(96, 320, CV_8UC1, cv::Scalar(255));
+  right_half.colRange(0, 160).setTo(0);
+  auto odometry = Odometry::create(kCamera, {}, right_half);
+  ASSERT_TRUE(odometry) << odometry.error().message;
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(odometry->process(image_at(i), PixelOrder::kRgb));
+  }
+  ASSERT_FALSE(odometry->tracked_points().empty());
+  for (const TrackedPoint& point : odometry->tracked_points()) {
+    EXPECT_GE(point.uv.x(), 158.0);
+  }
+}
+
 TEST(OdometryCreate, StepsOfTheGroundTruthAreNotGuessed) {
   Options options;
   options.scale.source = ScaleSource::kGroundTruth;

@@ -237,6 +237,7 @@ TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_FALSE(fs::exists(request_.out_dir / "trajectory_refined_kitti.txt"));
+  EXPECT_FALSE(fs::exists(request_.out_dir / "trajectory_refined_tum.txt"));
   EXPECT_FALSE(summary->report.refined.has_value());
   request_.write_map = true;
   EXPECT_THAT(error_of(request_), HasSubstr("--map: expected odometry.mode map"));

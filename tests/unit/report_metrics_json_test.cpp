@@ -27,6 +27,7 @@ MetricsReport example() {
   metrics.segment_lengths_m = {100, 200};
   metrics.num_segments = 5;
   metrics.ate_rmse = {4.0, 3.0, 2.0, 1.0};
+  metrics.rpe_translation_m = 0.0123;
   metrics.rpe_rotation_deg = 0.0456;
   Metrics refined = metrics;
   refined.average_offset_m = 0.25;
@@ -77,6 +78,7 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["ate_rmse_m"]["scale"], 3.0);
   EXPECT_EQ(json["ate_rmse_m"]["se3"], 2.0);
   EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
+  EXPECT_EQ(json["rpe_translation_m"], 0.0123);
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["alignment"], "none");
   EXPECT_EQ(json["refined"]["t_rel_percent"], 0.97);
@@ -86,7 +88,7 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
       "cx_px": 600.5, "cy_px": 180.25, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_EQ(json.size(), 22U);
+  EXPECT_EQ(json.size(), 23U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
@@ -96,7 +98,7 @@ TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   const nlohmann::json json = written(report);
   for (const char* key : {"alignment", "path_length_m", "average_offset_m", "null_offset_m",
                           "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments",
-                          "ate_rmse_m", "rpe_rotation_deg", "refined"}) {
+                          "ate_rmse_m", "rpe_translation_m", "rpe_rotation_deg", "refined"}) {
     ASSERT_TRUE(json.contains(key)) << key;
     EXPECT_TRUE(json[key].is_null()) << key;
   }
@@ -137,6 +139,7 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   EXPECT_THAT(table, ContainsRegex("ATE +3\\.00  m +scale"));
   EXPECT_THAT(table, ContainsRegex("ATE +2\\.00  m +se3"));
   EXPECT_THAT(table, ContainsRegex("ATE +1\\.00  m +sim3"));
+  EXPECT_THAT(table, ContainsRegex("translation per frame +0\\.0123  m +none"));
   EXPECT_THAT(table, HasSubstr("mean over 5 segments of 100..200 m"));
   EXPECT_THAT(table, HasSubstr("each step rescaled to its true length"));
   EXPECT_THAT(table, HasSubstr("measured on 75.0 % of the frames"));

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Recordings and evaluation: the program's readers and metrics in Python.
+// Evaluation: the program's metrics in Python.
+#include <algorithm>
 #include <filesystem>
+#include <numeric>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
-#include "dataset/frame_source.hpp"
 #include "dataset/ground_truth.hpp"
 #include "report/evaluate_report.hpp"
 
@@ -66,64 +68,41 @@ nb::dict evaluate_poses(const PosesArgument& estimate,
   result["ate_rmse_m"] = metrics.ate_rmse.after_m(alignment);
   result["average_offset_m"] = metrics.average_offset_m;
   result["path_length_m"] = metrics.path_length_m;
+  result["rpe_translation_m"] = metrics.rpe_translation_m;
   result["rpe_rotation_deg"] = metrics.rpe_rotation_deg;
   return result;
 }
 
-FrameSource open_recording(const Path& path, const std::optional<Path>& camera_file) {
-  FrameSourceRequest request;
-  request.sequence_dir = path;
-  request.camera_file = camera_file;
-  auto opened = [&] {
-    const nb::gil_scoped_release release;
-    return open_source(request);
-  }();
-  FrameSource source = value_or_raise(std::move(opened));
-  if (source.stream()) {
+DoubleArray align_poses(const AnyArray& estimate,
+                        const AnyArray& truth,
+                        const std::optional<std::vector<std::size_t>>& frames,
+                        const std::string& align) {
+  const Alignment alignment = value_or_raise(parse_alignment(align));
+  const Trajectory poses = value_or_raise(trajectory_of(estimate, "estimate"));
+  const Trajectory true_poses = value_or_raise(trajectory_of(truth, "truth"));
+  std::vector<std::size_t> which = frames.value_or(std::vector<std::size_t>(poses.size()));
+  if (!frames) {
+    std::iota(which.begin(), which.end(), std::size_t{0});
+  }
+  if (which.size() != true_poses.size() ||
+      std::ranges::any_of(which, [&](std::size_t frame) { return frame >= poses.size(); })) {
     throw nb::value_error(
-        fmt::format("{}: expected a folder of images, found a video or a camera", path.string())
+        fmt::format("frames: expected a frame of {} poses for each of {} in truth, found {}",
+                    poses.size(), true_poses.size(), which.size())
             .c_str());
   }
-  return source;
-}
-
-std::pair<ByteArray, double> frame_of(const FrameSource& source, std::size_t index) {
-  if (index >= source.size()) {
-    throw nb::index_error("frame: behind the last");
-  }
-  auto image = [&] {
-    const nb::gil_scoped_release release;
-    return source.read(index);
-  }();
-  return {array_of(value_or_raise(std::move(image))), source.time_s(index)};
-}
-
-nb::object truth_of(const FrameSource& source) {
-  if (!source.ground_truth()) {
-    return nb::none();
-  }
-  return nb::cast(array_of(*source.ground_truth()));
+  return array_of(align_trajectory(poses, which, true_poses, alignment));
 }
 
 }  // namespace
 
-void bind_files(nb::module_& module) {
-  nb::class_<FrameSource>(module, "Recording",
-                          "Frames of a folder: `for image, timestamp in recording`")
-      .def("__len__", &FrameSource::size)
-      .def("__getitem__", &frame_of, "index"_a)
-      .def_prop_ro("camera", [](const FrameSource& s) { return s.camera(); })
-      .def_prop_ro("camera_height_m", [](const FrameSource& s) { return s.camera_height_m(); })
-      .def_prop_ro(
-          "timestamps", [](const FrameSource& s) { return array_of(s.timestamps_s()); },
-          nb::rv_policy::move)
-      .def_prop_ro("ground_truth", &truth_of,
-                   nb::sig("def ground_truth(self) -> numpy.typing.NDArray[numpy.float64] | None"),
-                   "Nx4x4 of the frames that have a true pose");
-  module.def("read_recording", &open_recording, "path"_a, "camera_file"_a = nb::none(),
-             "What `stemvo run` reads, but for videos and live cameras");
+void bind_evaluation(nb::module_& module) {
   module.def("evaluate", &evaluate_poses, "estimate"_a, "truth"_a, "align"_a = "none",
              "Files or Nx4x4 arrays; align: none, scale, se3, sim3");
+  module.def(
+      "align", &align_poses, "estimate"_a, "truth"_a, "frames"_a = nb::none(), "align"_a = "sim3",
+      "The estimate as report.html draws it: moved to start at the first true pose, fitted to "
+      "the truth. frames: indices of the poses that have a true one; None: all");
 }
 
 }  // namespace stemvo::python
