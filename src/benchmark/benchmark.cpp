@@ -154,6 +154,10 @@ class Benchmark {
     const Json official = published.at("sequences").value(name, Json::object());
     const Json publications = published_rows(published.at("published"), name);
     truths_[name] = opened ? opened->ground_truth() : std::nullopt;
+    if (opened) {
+      const auto files = pipeline::input_files(*opened, Config{}, request_.models_dir);
+      inputs_.insert(inputs_.end(), files.begin(), files.end());
+    }
     const bool is_complete = opened && !official.empty() && is_official(official, *opened);
     if (!opened) {
       summary_.failures.push_back(fmt::format("{}: {}", name, opened.error().message));
@@ -194,6 +198,9 @@ class Benchmark {
     summary_.json = to_text(report_);
     return summary_;
   }
+
+  /// Of the sequences in the plan.
+  [[nodiscard]] const std::vector<fs::path>& inputs() const { return inputs_; }
 
  private:
   [[nodiscard]] fs::path sequence_dir(const std::string& name) const {
@@ -343,6 +350,7 @@ class Benchmark {
   Json report_ = {{"stemvo_version", version()}, {"interrupted", false}};
   Json speed_ = Json::array();
   std::map<std::string, std::optional<Trajectory>> truths_;
+  std::vector<fs::path> inputs_;
   benchmark::SequencePaths paths_;
   std::size_t num_runs_ = 0;
   std::size_t num_begun_ = 0;
@@ -360,10 +368,6 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   if (!published) {
     return published.error();
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir);
-  if (!lock) {
-    return lock.error();
-  }
   Benchmark benchmark(request);
   try {
     const Json json = Json::parse(*published, nullptr, true, /*ignore_comments=*/true);
@@ -374,7 +378,10 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
     return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",
                             request.published.string(), error.what()));
   }
-  return benchmark.run();
+  const auto lock = pipeline::open_out_folder(
+      request.out_dir, {"benchmark.md", "benchmark.json", "speed.json", "report.html"},
+      benchmark.inputs());
+  return lock ? benchmark.run() : lock.error();
 }
 
 }  // namespace stemvo

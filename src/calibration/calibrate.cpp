@@ -38,9 +38,9 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  std::vector<fs::path> inputs = pipeline::input_files(sequence, request.config);
+  std::vector<fs::path> inputs =
+      pipeline::input_files(sequence, request.config, request.models_dir);
   inputs.push_back(calibration_file(request));
-  inputs.push_back(request.sequence_dir / "times.txt");
   const Status status = check_spares_inputs({request.out_file}, inputs);
   return status ? check_can_write(request.out_file) : status;
 }

@@ -8,13 +8,13 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cereal/archives/binary.hpp>
 #include <cereal/types/map.hpp>
 #include <cereal/types/vector.hpp>
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
 #include "features/patch_alignment.hpp"
+#include "features/state_reader.hpp"
 
 namespace Eigen {
 
@@ -41,12 +41,15 @@ void save(Archive& archive, const Mat& mat) {
   }
 }
 
-template <typename Archive>
-void load(Archive& archive, Mat& mat) {
+inline void load(stemvo::StateReader& archive, Mat& mat) {
   int rows = 0;
   int cols = 0;
   int type = 0;
   archive(rows, cols, type);
+  stemvo::StateReader::expect(rows >= 0 && cols >= 0 && type == CV_MAT_TYPE(type) &&
+                              CV_MAT_DEPTH(type) <= CV_64F);
+  const std::size_t num_values = static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols);
+  stemvo::StateReader::expect(num_values <= archive.num_left() / CV_ELEM_SIZE(type));
   mat = Mat(rows, cols, type);
   for (int row = 0; row < rows; ++row) {
     archive(cereal::binary_data(mat.ptr(row), mat.elemSize() * static_cast<std::size_t>(cols)));

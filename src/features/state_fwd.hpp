@@ -3,13 +3,12 @@
 
 namespace cereal {
 class BinaryOutputArchive;
-class BinaryInputArchive;
 }  // namespace cereal
 
 namespace stemvo {
 
 /// What a state is written to and read from (odometry/state_archive.hpp).
 using StateWriter = cereal::BinaryOutputArchive;
-using StateReader = cereal::BinaryInputArchive;
+class StateReader;
 
 }  // namespace stemvo

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/phased_odometry.hpp"
 
+#include <exception>
+#include <new>
 #include <sstream>
 #include <utility>
 
@@ -58,10 +60,14 @@ std::string PhasedOdometry::state() const {
   return std::move(bytes).str();
 }
 
-void PhasedOdometry::set_state(const std::string& state) {
-  std::istringstream bytes(state);
-  StateReader reader(bytes);
+Status PhasedOdometry::set_state(const std::string& state) try {
+  StateReader reader(state);
   channel_odometry_.read_state(reader);
+  return {};
+} catch (const std::bad_alloc&) {
+  throw;
+} catch (const std::exception&) {  // also OpenCV's, of images that no front end prepared
+  return fail("expected the state of an odometry, found other data");
 }
 
 }  // namespace stemvo

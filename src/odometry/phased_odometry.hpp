@@ -43,8 +43,8 @@ class PhasedOdometry {
   /// Everything known between track() and localize() of a frame, while no other phase but prepare()
   /// runs. One created alike goes on from it with localize(), and prepare() of the next frame.
   [[nodiscard]] std::string state() const;
-  /// `state`: as it was given by this program; throws if it is not.
-  void set_state(const std::string& state);
+  /// Error: no odometry created alike gave it; this one is of no use then.
+  [[nodiscard]] Status set_state(const std::string& state);
 
   /// Of the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }

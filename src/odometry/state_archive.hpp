@@ -96,6 +96,10 @@ void serialize(Archive& archive, FrameResult& result) {
           result.homography_score, result.fundamental_score, result.homography_ratio, result.model,
           result.road, result.road_reason, result.camera, result.principal_point_sigma_px,
           result.scale_sigma, result.times, result.problem);
+  StateReader::expect(result.state >= FrameState::kFirst && result.state <= FrameState::kNoImage &&
+                      result.road >= RoadState::kDisabled && result.road <= RoadState::kMeasured &&
+                      result.model >= TwoViewModel::kNone &&
+                      result.model <= TwoViewModel::kEssential);
 }
 
 }  // namespace stemvo

@@ -52,6 +52,8 @@ template <typename... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+template <typename... Functions>  // clang 16 does not deduce it
+Overloaded(Functions...) -> Overloaded<Functions...>;
 
 /// One key: everything that reading, writing, checking and explaining it needs.
 struct Field {

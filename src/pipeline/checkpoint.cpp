@@ -55,9 +55,16 @@ std::string pack(const Checkpoint& checkpoint, const std::string& identity) {
   return text.replace(0, start, first_line(std::string_view(text).substr(start)));
 }
 
-Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& out_dir,
-                                                    const std::string& identity) {
-  const std::filesystem::path file = checkpoint_file(out_dir);
+Error damaged_checkpoint(const std::filesystem::path& file) {
+  return fail(
+      fmt::format("--resume: {}: expected a checkpoint, found damaged data; without "
+                  "--resume the run starts over",
+                  file.string()));
+}
+
+Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,
+                                                    const std::string& identity,
+                                                    std::size_t num_frames) {
   std::error_code code;
   if (!std::filesystem::exists(file, code)) {
     return std::optional<Checkpoint>();
@@ -66,27 +73,29 @@ Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path&
   if (!text) {
     return fail("--resume: " + text.error().message);
   }
-  const std::size_t start = text->find('\n') + 1;
-  if (!text->starts_with(first_line(std::string_view(*text).substr(start)))) {
-    return fail(
-        fmt::format("--resume: {}: expected a checkpoint, found damaged data; without "
-                    "--resume the run starts over",
-                    file.string()));
+  const std::string_view content = std::string_view(*text).substr(text->find('\n') + 1);
+  if (!text->starts_with(first_line(content))) {
+    return damaged_checkpoint(file);
   }
-  std::istringstream bytes(text->substr(start));
-  StateReader reader(bytes);
-  std::string found;
-  reader(found);
-  if (found != identity) {
-    return fail(
-        fmt::format("--resume: {}: expected the checkpoint of this program, input and "
-                    "configuration, found another one's; give another --out, or what it "
-                    "was; without --resume the run starts over",
-                    file.string()));
+  try {  // what the sum does not tell, the reader does
+    StateReader reader(content);
+    std::string found;
+    reader(found);
+    if (found != identity) {
+      return fail(
+          fmt::format("--resume: {}: expected the checkpoint of this program, input and "
+                      "configuration, found another one's; give another --out, or what it "
+                      "was; without --resume the run starts over",
+                      file.string()));
+    }
+    std::optional<Checkpoint> checkpoint(std::in_place);
+    reader(*checkpoint);
+    StateReader::expect(reader.num_left() == 0 && checkpoint->frame < num_frames &&
+                        checkpoint->frame == checkpoint->drive.frames.size());
+    return checkpoint;
+  } catch (const cereal::Exception&) {
+    return damaged_checkpoint(file);
   }
-  std::optional<Checkpoint> checkpoint(std::in_place);
-  reader(*checkpoint);
-  return checkpoint;
 }
 
 }  // namespace pipeline

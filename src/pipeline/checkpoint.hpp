@@ -23,8 +23,12 @@ struct Checkpoint {
 /// The file's contents. `identity`: the program and everything the results depend on.
 [[nodiscard]] std::string pack(const Checkpoint& checkpoint, const std::string& identity);
 
-/// Nullopt: there is none. Error, starting with "--resume: ": damaged, or of another identity.
-[[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(
-    const std::filesystem::path& out_dir, const std::string& identity);
+/// Of `num_frames` frames at most. Nullopt: there is none. Error, starting with "--resume: ":
+/// damaged, or of another identity.
+[[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,
+                                                                  const std::string& identity,
+                                                                  std::size_t num_frames);
+/// .. that it is damaged.
+[[nodiscard]] Error damaged_checkpoint(const std::filesystem::path& file);
 
 }  // namespace stemvo::pipeline

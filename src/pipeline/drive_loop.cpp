@@ -49,7 +49,6 @@ class DriveLoop {
     FrameRun frames;
     drive_.csv = frames_csv_header();
     if (from) {
-      run_.odometry.set_state(from->odometry);
       drive_ = std::move(from->drive);
       frames.tracked = from->frame;
     }

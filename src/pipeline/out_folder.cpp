@@ -12,7 +12,8 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "dataset/frame_files.hpp"
+#include "models/manifest.hpp"
+#include "text/spared_inputs.hpp"
 
 namespace stemvo::pipeline {
 
@@ -32,17 +33,6 @@ int open_nameless(const fs::path& folder) {
     ::unlink(probe.c_str());
   }
   return named;
-}
-
-std::vector<fs::path> old_frames(const fs::path& folder) {
-  std::vector<fs::path> found = dataset::list_folder(folder).value_or(std::vector<fs::path>());
-  std::erase_if(found, [](const fs::path& file) {
-    const std::string stem = file.stem().string();
-    const bool is_number = stem.size() == 6 && stem.find_first_not_of("0123456789") == stem.npos;
-    std::error_code code;
-    return !is_number || file.extension() != ".png" || !fs::is_regular_file(file, code);
-  });
-  return found;
 }
 
 }  // namespace
@@ -86,44 +76,50 @@ Expected<FolderLock> lock_folder(const fs::path& folder) {
   return lock;
 }
 
-Expected<FolderLock> open_out_folder(const fs::path& folder) {
-  const Status status = create_out_folder(folder);
+Expected<FolderLock> open_out_folder(const fs::path& folder,
+                                     const std::vector<std::string>& names,
+                                     const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> outputs;
+  for (const std::string& name : names) {
+    outputs.push_back(folder / name);
+  }
+  const Status status =
+      check_spares_inputs(outputs, inputs).and_then([&] { return create_out_folder(folder); });
   return status ? lock_folder(folder) : status.error();
 }
 
-Status prepare_pictures(const fs::path& out_dir) {
-  const fs::path folder = out_dir / "pictures";
-  std::error_code code;
-  if (fs::is_symlink(folder, code)) {
-    return fail(
-        fmt::format("{}: expected a folder of the results' own, found a link", folder.string()));
-  }
-  if (const Status status = create_out_folder(folder); !status) {
-    return status;
-  }
-  for (const fs::path& file : old_frames(folder)) {
-    if (!fs::exists(out_dir / "frames.csv", code)) {
-      return fail(
-          fmt::format("{}: expected images of an earlier run, with its frames.csv in {}, "
-                      "or none, found {}",
-                      folder.string(), out_dir.string(), file.filename().string()));
-    }
-    if (!fs::remove(file, code) && code) {
-      return fail(fmt::format("{}: an earlier run's frame cannot be removed ({})", file.string(),
-                              code.message()));
-    }
-  }
-  return {};
-}
-
-std::vector<fs::path> input_files(const FrameSource& source, const Config& config) {
+std::vector<fs::path> input_files(const FrameSource& source,
+                                  const Config& config,
+                                  const fs::path& models_dir) {
   std::vector<fs::path> files = source.frames().files;
-  files.insert(files.end(), {config.file, config.stem.model});
+  files.insert(files.end(), {config.file, config.stem.model, models_dir / "manifest.yaml"});
   for (const auto& file : {source.ground_truth_file(), source.given_calibration()}) {
     if (file) {
       files.push_back(*file);
     }
   }
+  if (!source.frames().files.empty()) {
+    const fs::path folder = source.file(0).parent_path();
+    for (const char* name :
+         {"calib.txt", "times.txt", "camera.yaml", "rgb.txt", "data.csv", "sensor.yaml"}) {
+      files.insert(files.end(), {folder / name, folder.parent_path() / name});
+    }
+  }
+  if (const auto model = find_model(config.stem.model, config.stem.layer, models_dir)) {
+    files.push_back(model->file);
+  }
+  return files;
+}
+
+std::vector<fs::path> input_files(const FrameSourceRequest& request,
+                                  const FrameSource& source,
+                                  const Config& config,
+                                  const fs::path& models_dir) {
+  std::vector<fs::path> files = input_files(source, config, models_dir);
+  for (const auto& file : {request.times, request.camera_file}) {
+    files.push_back(file.value_or(""));
+  }
+  files.insert(files.end(), request.masks.begin(), request.masks.end());
   return files;
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "config/config.hpp"
@@ -22,17 +23,23 @@ using FolderLock = std::shared_ptr<void>;
 /// Creates the folder (and those above it) and proves that files can be written there. Error: the
 /// folder, what was expected, what the system says.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
-/// The same, and no other process has it while the lock lives. Error: one has it now.
-[[nodiscard]] Expected<FolderLock> open_out_folder(const std::filesystem::path& folder);
+/// The same, and no other process has it while the lock lives; every command with a folder asks
+/// for it so. Errors, before anything is created: one of the files or folders it is to hold
+/// (`names`) is one of the `inputs`, also through a link; another process has it now.
+[[nodiscard]] Expected<FolderLock> open_out_folder(
+    const std::filesystem::path& folder,
+    const std::vector<std::string>& names,
+    const std::vector<std::filesystem::path>& inputs);
 
-/// Creates OUT_DIR/pictures and removes what an earlier run left there, so that images of one run
-/// are not taken for another's: files of six digits and ".png", nothing else. Error: they are not
-/// an earlier run's (the folder is a link, or no frames.csv lies in OUT_DIR), or one cannot be
-/// removed.
-[[nodiscard]] Status prepare_pictures(const std::filesystem::path& out_dir);
-
-/// Every file that is read for a source's frames and its configuration, as far as they know it.
-[[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSource& source,
-                                                             const Config& config);
+/// Every file that is read for a source's frames, its configuration and its model, as far as they
+/// know it; some need not be there.
+[[nodiscard]] std::vector<std::filesystem::path> input_files(
+    const FrameSource& source, const Config& config, const std::filesystem::path& models_dir);
+/// The same with what was asked for: `--mask` may also be a rectangle, which is no file.
+[[nodiscard]] std::vector<std::filesystem::path> input_files(
+    const FrameSourceRequest& request,
+    const FrameSource& source,
+    const Config& config,
+    const std::filesystem::path& models_dir);
 
 }  // namespace stemvo::pipeline

@@ -68,10 +68,11 @@ double stretch_at(std::span<const Rigid3> refined,
   return before > 0.0 ? path_length(written, begin, end) / before : 1.0;
 }
 
-/// "frames 10:20 of 03", in the folder's numbering.
+/// "frames 10:20 of 03", in the folder's numbering; "frames 10: of 03" where the end is not known.
 std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
   const std::size_t begin = sequence.range().begin;
-  return one_line(fmt::format("frames {}:{} of {}", begin, begin + num_frames, sequence.name()));
+  const std::string end = num_frames > 0 ? std::to_string(begin + num_frames) : "";
+  return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name()));
 }
 
 /// Those of the frames with a road, or a pose, that was measured: of all of them.

@@ -45,7 +45,7 @@ struct Drive {
 void keep_first(Status& first, Status next);
 
 /// What config.yaml holds: the effective configuration under comments that say which program,
-/// frames and model made the results. `num_frames`: of a stream, those read.
+/// frames and model made the results. `num_frames`: of a stream, those read; 0: not yet known.
 [[nodiscard]] std::string config_text(const Run& run, std::size_t num_frames);
 
 /// Everything that is written at the end; `report` becomes what metrics.json holds:

@@ -10,6 +10,7 @@
 #include "dataset/camera_height.hpp"
 #include "pipeline/checkpoint.hpp"
 #include "pipeline/drive_loop.hpp"
+#include "pipeline/earlier_run.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
@@ -17,7 +18,6 @@
 #include "pipeline/thread_scope.hpp"
 #include "report/frames_csv.hpp"
 #include "stem/model_file.hpp"
-#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -50,17 +50,6 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// All that is read, as far as it is known; `--mask` may also be a rectangle, which is no file.
-std::vector<std::filesystem::path> inputs_of(const RunRequest& request,
-                                             const FrameSource& sequence) {
-  std::vector<std::filesystem::path> files = pipeline::input_files(sequence, request.config);
-  for (const auto& file : {request.times, request.camera_file}) {
-    files.push_back(file.value_or(""));
-  }
-  files.insert(files.end(), request.masks.begin(), request.masks.end());
-  return files;
-}
-
 /// Which file it is, and which version of it.
 std::string version_of(const std::filesystem::path& file) {
   std::error_code code;
@@ -78,7 +67,9 @@ Expected<std::string> identity_of(const Run& run) {
     return program.error();
   }
   std::string files;
-  for (const std::filesystem::path& file : inputs_of(run.request, run.sequence)) {
+  const RunRequest& request = run.request;
+  for (const std::filesystem::path& file :
+       pipeline::input_files(request, run.sequence, request.config, request.models_dir)) {
     files += version_of(file) + '\n';
   }
   const Camera& c = run.sequence.camera();
@@ -88,45 +79,32 @@ Expected<std::string> identity_of(const Run& run) {
                      c.height_px, pipeline::config_text(run, 0), internal::sha256_hex(files));
 }
 
-bool has_earlier_results(const std::filesystem::path& out_dir) {
-  const auto frames = read_text_file(out_dir / "frames.csv");
-  return frames && frames->starts_with(frames_csv_header());
-}
-
-/// What a run writes at its end, or after a second: beside the frames of one that was killed
-/// before, an earlier run's would pass for its own. Links stay.
-Status remove_earlier_results(const std::filesystem::path& out_dir) {
-  for (const char* name : {"metrics.json", "trajectory_kitti.txt", "report.html", "trajectory.png",
-                           "trajectory_tum.txt", "trajectory_refined_kitti.txt",
-                           "trajectory_refined_tum.txt", "map.ply"}) {
-    std::error_code code;
-    if (is_regular_file(symlink_status(out_dir / name, code))) {
-      if (Status status = remove_file(out_dir / name); !status) {
-        return status;
-      }
-    }
-  }
-  return {};
-}
-
-/// What an earlier run left in the folder is removed, unless this one goes on from it.
-Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunRequest& request,
-                                                                 const std::string& identity,
-                                                                 bool has_earlier) {
+/// What an earlier run left in the folder is removed, unless this one goes on from it. Whenever it
+/// is killed, all under final names is of one run: config.yaml comes before frames and results.
+Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const Run& run,
+                                                                 const std::string& identity) {
+  const RunRequest& request = run.request;
   const std::filesystem::path& out = request.out_dir;
-  auto checkpoint = request.resume ? pipeline::read_checkpoint(out, identity)
+  const auto file = pipeline::checkpoint_file(out);
+  auto checkpoint = request.resume ? pipeline::read_checkpoint(file, identity, run.sequence.size())
                                    : std::optional<pipeline::Checkpoint>();
   if (!checkpoint) {
     return checkpoint;
   }
-  Status status;
-  if (request.image_every > 0) {
-    status = *checkpoint ? pipeline::create_out_folder(out / "pictures")
-                         : pipeline::prepare_pictures(out);
+  if (*checkpoint && !run.odometry.set_state((*checkpoint)->odometry)) {
+    return pipeline::damaged_checkpoint(file);
   }
-  if (status && !*checkpoint) {
-    status = remove_file(pipeline::checkpoint_file(out));
-    status = status && has_earlier ? remove_earlier_results(out) : status;
+  Status status;
+  if (!*checkpoint) {
+    status = request.image_every > 0 ? pipeline::check_pictures(out) : Status();
+    status = status ? remove_file(file) : status;
+    status = status ? pipeline::remove_earlier_results(out) : status;
+  }
+  if (status && request.image_every > 0) {
+    status = pipeline::create_out_folder(out / "pictures");
+  }
+  if (status) {
+    status = write_text_file(out / "config.yaml", pipeline::config_text(run, 0));
   }
   if (status) {  // from now on it can be seen how far the run is
     status = write_text_file(out / "frames.csv",
@@ -136,27 +114,21 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const RunReques
 }
 
 /// Results must not take the place of what they are made from.
-Status check_inputs_are_spared(const RunRequest& request, const FrameSource& sequence) {
-  std::vector<std::filesystem::path> results;
-  for (const char* name :
-       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
-        "trajectory_refined_tum.txt", "report.html", "trajectory.png", "frames.csv", "metrics.json",
-        "config.yaml", "checkpoint"}) {
-    results.push_back(request.out_dir / name);
-  }
-  std::vector<std::filesystem::path> inputs = inputs_of(request, sequence);
+Expected<pipeline::FolderLock> open_folder(const RunRequest& request, const FrameSource& sequence) {
+  std::vector<std::string> names = pipeline::run_files();
+  auto inputs = pipeline::input_files(request, sequence, request.config, request.models_dir);
   // The configuration of an earlier run may be that of the next, in the same folder.
   const auto config = read_text_file(request.config.file);
   if (config && config->starts_with("# stemvo ")) {
     std::erase(inputs, request.config.file);
   }
   if (request.image_every > 0) {
-    results.push_back(request.out_dir / "pictures");
+    names.emplace_back("pictures");
     if (!sequence.frames().files.empty()) {  // a live camera has none
       inputs.push_back(sequence.file(0).parent_path());
     }
   }
-  return check_spares_inputs(results, inputs);
+  return pipeline::open_out_folder(request.out_dir, names, inputs);
 }
 
 std::string describe_truth(const RunRequest& request, const FrameSource& sequence) {
@@ -215,15 +187,13 @@ Expected<RunSummary> run_source(const RunRequest& request,
     return odometry.error();
   }
   const Run run{request, sequence, *odometry};
-  const auto lock = check_inputs_are_spared(request, sequence).and_then([&] {
-    return pipeline::open_out_folder(request.out_dir);
-  });
+  const auto lock = open_folder(request, sequence);
   const auto identity = identity_of(run);
   if (!lock || !identity) {
     return lock ? identity.error() : lock.error();
   }
-  const bool has_earlier = has_earlier_results(request.out_dir);
-  auto checkpoint = prepare_out_folder(request, *identity, has_earlier);
+  const bool has_earlier = pipeline::has_earlier_run(request.out_dir);
+  auto checkpoint = prepare_out_folder(run, *identity);
   if (!checkpoint) {
     return checkpoint.error();
   }

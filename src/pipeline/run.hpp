@@ -50,7 +50,8 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, with odometry.mode map both of trajectory_refined_*,
 /// frames.csv, config.yaml, metrics.json, report.html, trajectory.png, map.ply, pictures/%06d.png;
-/// until the end also checkpoint; an earlier run's are removed when this one starts). A wrong
+/// until the end also checkpoint; an earlier run's are removed when this one starts, config.yaml is
+/// written then). A wrong
 /// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that
 /// cannot be written) is an error before work starts. A frame that cannot be read is a warning and
 /// gets a pose. When a result cannot be written the others still are; `written` says so. One run

@@ -106,6 +106,15 @@ class Robustness {
     return create_each();
   }
 
+  [[nodiscard]] std::vector<std::filesystem::path> inputs() const {
+    std::vector<std::filesystem::path> inputs;
+    for (const FrameSource& source : sources_) {
+      const auto files = pipeline::input_files(source, request_.config, request_.models_dir);
+      inputs.insert(inputs.end(), files.begin(), files.end());
+    }
+    return inputs;
+  }
+
   Expected<RobustnessReport> run() {
     for (const PlannedRow& planned : planned_) {
       std::optional<Row> row = run_row(planned);
@@ -265,7 +274,9 @@ Expected<RobustnessReport> run_robustness(const RobustnessRequest& request) {
   if (const Status status = robustness.plan(); !status) {
     return status.error();
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir);
+  const auto lock = pipeline::open_out_folder(
+      request.out_dir, {"robustness.csv", "robustness.json", "robustness.txt", "report.html"},
+      robustness.inputs());
   if (!lock) {
     return lock.error();
   }

@@ -2,7 +2,9 @@
 #include "search/records.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdint>
 #include <string_view>
 #include <system_error>
 
@@ -147,9 +149,33 @@ Expected<std::string> unsealed(const std::string& line, const std::string& first
   return text;
 }
 
+/// Of the lines' members. A cast of a number that is none may be undefined, or give another one.
+bool has_whole_numbers(const Json& json, int depth = 0) {
+  static constexpr std::array kWhole = {
+      "rung",         "filter",      "filter_frames", "held_out_filter_frames",
+      "frames",       "block",       "last",          "filters",
+      "sampling_px",  "first_frame", "num_frames",    "first",
+      "only_sequence"};
+  constexpr std::uint64_t kMax = 1000000000;
+  constexpr int kMaxDepth = 8;  // of the deepest, path_xz_m, 5
+  const auto is_sound = [&](const auto& member) {
+    const Json& value = member.value();
+    const bool is_whole =
+        !json.is_object() || !value.is_number() ||
+        std::ranges::find(kWhole, member.key()) == kWhole.end() ||
+        (value.is_number_unsigned() && value.template get<std::uint64_t>() <= kMax);
+    return is_whole && (!value.is_structured() || has_whole_numbers(value, depth + 1));
+  };
+  const auto members = json.items();
+  return depth <= kMaxDepth && std::all_of(members.begin(), members.end(), is_sound);
+}
+
 /// Error, without file and line: sealed or not, it is input, and no search wrote it.
 Status add_line(const std::string& text, SearchRecords& records) try {
   const Json json = Json::parse(text);
+  if (!has_whole_numbers(json)) {
+    return fail("expected whole numbers of up to 1e9 where a search counts, found others");
+  }
   if (records.first_line.empty()) {
     json.get_to(records.identity);
     records.first_line = text;
@@ -273,8 +299,8 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
   const bool is_new = before->num_good_bytes == 0;  // or killed before its first line was written
   const std::string change = is_new ? "" : before->identity.change_to(identity, false);
   if (!change.empty()) {
-    return fail(fmt::format("--resume: {}: {} since; give another --out, or what it was",
-                            file.string(), change));
+    return fail(
+        fmt::format("{}: {} since; give another --out, or what it was", file.string(), change));
   }
   opened.records_ = std::move(before->records);
   opened.warnings_ = std::move(before->warnings);

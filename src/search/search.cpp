@@ -2,6 +2,7 @@
 #include "search/search.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -108,6 +109,47 @@ std::vector<LayerIdentity> join_layers(const SearchIdentity& parts, const Scores
   return joined;
 }
 
+/// What a search writes; `inputs` are not among it.
+Expected<pipeline::FolderLock> open_folder(const fs::path& out_dir,
+                                           const std::vector<fs::path>& inputs) {
+  return pipeline::open_out_folder(out_dir,
+                                   {kRecordsFile, "filters.csv", "filters.json", "config.yaml",
+                                    "best.yaml", "report.html", "sheet.png"},
+                                   inputs);
+}
+
+std::vector<fs::path> inputs_of(const SearchRequest& request, const SearchPlan& plan) {
+  Config config = request.config;
+  config.stem.model = request.model;
+  std::vector<fs::path> inputs;
+  for (const PlanSequence& one : plan.sequences) {
+    const auto files = pipeline::input_files(one.sequence, config, request.models_dir);
+    inputs.insert(inputs.end(), files.begin(), files.end());
+  }
+  return inputs;
+}
+
+/// The parts joined so far grow to all. Error: the folder holds another search, or other results.
+Status write_joined(const fs::path& file,
+                    const SearchIdentity& identity,
+                    const FilterRecords& records,
+                    Scores scores) {
+  auto joined = RecordFile::open(file, identity, /*resume=*/true);
+  if (!joined) {
+    return joined.error();
+  }
+  for (const FilterRecord& record : joined->records()) {
+    if (const Status agrees = add_record(record, scores); !agrees) {
+      return fail(fmt::format("{}: {}; give another --out", file.string(), agrees.error().message));
+    }
+  }
+  std::vector<FilterRecord> missing;
+  const FilterRecords& there = joined->records();
+  std::set_difference(records.begin(), records.end(), there.begin(), there.end(),
+                      std::back_inserter(missing));
+  return joined->append(missing);
+}
+
 }  // namespace
 
 Config search_defaults() {
@@ -129,7 +171,7 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!plan) {
     return plan.error();
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir);
+  const auto lock = open_folder(request.out_dir, inputs_of(request, *plan));
   if (!lock) {
     return lock.error();
   }
@@ -158,7 +200,9 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   SearchIdentity identity;
   Scores scores;
   std::vector<std::string> warnings;
+  std::vector<fs::path> inputs;
   for (const std::filesystem::path& folder : parts) {
+    inputs.push_back(folder / kRecordsFile);
     const auto part = read_part(folder);
     if (!part) {
       return part.error();
@@ -181,12 +225,11 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
-  const auto lock = pipeline::open_out_folder(out_dir);
+  const auto lock = open_folder(out_dir, inputs);
   if (!lock) {
     return lock.error();
   }
-  auto file = RecordFile::open(out_dir / kRecordsFile, identity, /*resume=*/false);
-  const Status written = file ? file->append({records->begin(), records->end()}) : file.error();
+  const Status written = write_joined(out_dir / kRecordsFile, identity, *records, scores);
   if (!written) {
     return written.error();
   }

@@ -9,8 +9,11 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
+
+#include "stem/constant_sizes.hpp"
 
 namespace stemvo::internal {
 namespace {
@@ -100,15 +103,29 @@ using Field = ProtobufReader::Field;
 
 // Numbers of onnx.proto.
 enum ModelField : std::uint64_t { kModelGraph = 7, kModelFunctions = 25 };
-enum GraphField : std::uint64_t { kGraphNode = 1, kGraphInitializer = 5, kGraphSparse = 15 };
-enum NodeField : std::uint64_t { kNodeType = 4, kNodeAttribute = 5, kNodeDomain = 7 };
+enum GraphField : std::uint64_t {
+  kGraphNode = 1,
+  kGraphInitializer = 5,
+  kGraphInput = 11,
+  kGraphSparse = 15
+};
+enum ValueField : std::uint64_t { kValueName = 1 };
+enum NodeField : std::uint64_t {
+  kNodeInput = 1,
+  kNodeOutput = 2,
+  kNodeType = 4,
+  kNodeAttribute = 5,
+  kNodeDomain = 7
+};
 enum AttributeField : std::uint64_t {
   kAttributeName = 1,
   kAttributeTensor = 5,
   kAttributeGraph = 6,
   kAttributeInts = 8,
   kAttributeTensors = 10,
-  kAttributeGraphs = 11
+  kAttributeGraphs = 11,
+  kAttributeSparse = 22,
+  kAttributeSparses = 23
 };
 enum TensorField : std::uint64_t {
   kTensorType = 2,
@@ -212,6 +229,9 @@ Status check_attribute(std::string_view message) {
       case kAttributeGraph:
       case kAttributeGraphs:
         return fail("expected a graph without loops and branches, found one");
+      case kAttributeSparse:
+      case kAttributeSparses:
+        return fail("expected dense constants, found sparse ones");
       case kAttributeTensor:
       case kAttributeTensors:
         return check_tensor(field.bytes, /*is_weight=*/false);
@@ -223,10 +243,18 @@ Status check_attribute(std::string_view message) {
   });
 }
 
-Status check_node(std::string_view message) {
+/// An upper bound, by the bytes it takes: the smallest kinds have two values in one.
+std::size_t max_values(std::string_view tensor) { return 2 * tensor.size(); }
+
+Status check_node(std::string_view message, ConstantSizes& constants) {
   std::string_view type;
   std::string_view domain;
+  std::vector<std::string_view> inputs;
+  std::vector<std::string_view> outputs;
   Status status = for_each_field(message, [&](const Field& field) -> Status {
+    if (field.number == kNodeInput || field.number == kNodeOutput) {
+      (field.number == kNodeInput ? inputs : outputs).push_back(field.bytes);
+    }
     type = field.number == kNodeType ? field.bytes : type;
     domain = field.number == kNodeDomain ? field.bytes : domain;
     return {};
@@ -237,18 +265,52 @@ Status check_node(std::string_view message) {
   status = !status ? status : for_each_field(message, [&](const Field& field) -> Status {
     return field.number == kNodeAttribute ? check_attribute(field.bytes) : Status();
   });
+  if (status && type == "Constant") {
+    std::ranges::for_each(outputs,
+                          [&](const auto& name) { constants.add(name, max_values(message)); });
+  } else if (status) {
+    status = constants.add_node(type, inputs, outputs);
+  }
   return status ? status
                 : Status(fail(fmt::format("operator {}: {}", type, status.error().message)));
 }
 
+/// What there is before the first node; it stands behind them in the file.
+ConstantSizes constants_of(std::string_view graph) {
+  ConstantSizes constants;
+  std::vector<std::string_view> inputs;
+  // Damage is found by who reads it next.
+  static_cast<void>(for_each_field(graph, [&](const Field& field) -> Status {
+    if (field.number != kGraphInitializer && field.number != kGraphInput) {
+      return {};
+    }
+    const bool is_tensor = field.number == kGraphInitializer;
+    std::string_view name;
+    Status status = for_each_field(field.bytes, [&](const Field& one) -> Status {
+      const std::uint64_t number_of_name = is_tensor ? std::uint64_t{kTensorName} : kValueName;
+      name = one.number == number_of_name ? one.bytes : name;
+      return {};
+    });
+    if (is_tensor) {
+      constants.add(name, max_values(field.bytes));
+    } else {
+      inputs.push_back(name);
+    }
+    return status;
+  }));
+  std::ranges::for_each(inputs, [&](const auto& name) { constants.add_variable(name); });
+  return constants;
+}
+
 Status check_graph(std::string_view message) {
   std::size_t num_nodes = 0;
+  ConstantSizes constants = constants_of(message);
   return for_each_field(message, [&](const Field& field) -> Status {
     switch (field.number) {
       case kGraphNode:
         return ++num_nodes > kMaxNodes
                    ? fail(fmt::format("expected at most {} operators, found more", kMaxNodes))
-                   : check_node(field.bytes);
+                   : check_node(field.bytes, constants);
       case kGraphInitializer:
         return check_tensor(field.bytes, /*is_weight=*/true);
       case kGraphSparse:

@@ -22,7 +22,7 @@ inline constexpr int kMaxSecondsOfProbe = 10;    ///< for one small image
 /// What can be told of the bytes of an .onnx before ONNX Runtime sees them. Error, starting with
 /// `label`: no ONNX file; data in other files; operators that are not ONNX's own; loops and
 /// branches; kernels, strides, paddings and dilations over kMaxKernel_px; weights that are not
-/// finite.
+/// finite; constants that are computed while it is loaded and may be large.
 [[nodiscard]] Status check_foreign_model(const std::string& label, std::string_view model);
 
 }  // namespace stemvo::internal

@@ -37,11 +37,12 @@ Error cannot(const char* what, const fs::path& path, const std::error_code& code
 /// A user may have put results or masks beside it.
 bool holds_only_a_drive(const fs::path& folder) {
   std::error_code code;
-  return std::all_of(
+  const bool is_only = std::all_of(
       fs::directory_iterator(folder, code), fs::directory_iterator(), [](const auto& entry) {
         const std::string name = entry.path().filename().string();
         return name == kMark || std::ranges::find(kContents, name) != kContents.end();
       });
+  return is_only && !code;
 }
 
 /// OUT/sequences/NAME and OUT/poses in KITTI's layout. Everything is made beside them, and takes
@@ -91,8 +92,12 @@ struct Output {
   /// In place of an unfinished drive.
   [[nodiscard]] Status make_folders(bool with_depth) const {
     std::error_code code;
+    const bool is_empty = fs::is_empty(sequence_dir, code);
+    if (code) {
+      return cannot("list the folder", sequence_dir, code);
+    }
     const bool is_ours = fs::exists(sequence_dir / kMark, code) && holds_only_a_drive(sequence_dir);
-    if (!is_ours && !fs::is_empty(sequence_dir, code)) {
+    if (!is_ours && !is_empty) {
       return fail(fmt::format("{}: expected an unfinished drive or none, found something else",
                               sequence_dir.string()));
     }

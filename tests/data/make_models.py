@@ -127,6 +127,19 @@ def hostile():
     broken[1, 1] = np.nan
     write("hostile_nan", [conv], [image], [channels], [numpy_helper.from_array(broken, "weights")])
     write("hostile_infinite", [helper.make_node("Log", ["image"], ["channels"])], [image], [channels])
+    # Of 100 bytes a million million values, which nothing but the constants decide.
+    tile = [helper.make_node("Tile", ["one" if i == 0 else f"t{i}", "repeats"], [f"t{i + 1}"]) for i in range(8)]
+    one = [numpy_helper.from_array(np.ones([1, 3, 1, 1], np.float32), "one"), numpy_helper.from_array(np.array([1, 1, 8, 8]), "repeats")]
+    write("hostile_tile", [*tile, helper.make_node("Resize", ["image", "", "scales"], ["like"]),
+                           helper.make_node("Add", ["like", "t8"], ["channels"])], [image], [channels],
+          [*one, numpy_helper.from_array(np.ones(4, np.float32), "scales")])
+    # A weight added to itself, transposed, again and again: each time as many values as pairs.
+    add = [node for i in range(6) for node in (
+        helper.make_node("Reshape", [f"a{i}", "column"], [f"c{i}"]), helper.make_node("Reshape", [f"a{i}", "row"], [f"r{i}"]),
+        helper.make_node("Add", [f"c{i}", f"r{i}"], [f"a{i + 1}"]))]
+    write("hostile_pairs", [*add, helper.make_node("Add", ["image", "a6"], ["channels"])], [image], [channels],
+          [numpy_helper.from_array(np.ones(4, np.float32), "a0"), numpy_helper.from_array(np.array([-1, 1]), "column"),
+           numpy_helper.from_array(np.array([1, -1]), "row")])
     # Some 10^10 multiplications per operator: slower than any first layer.
     box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
     slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],

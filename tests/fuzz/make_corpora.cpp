@@ -9,9 +9,12 @@
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "checkpoint_odometry.hpp"
 #include "config/config.hpp"
 #include "evaluation/trajectory.hpp"
+#include "pipeline/checkpoint.hpp"
 #include "report/metrics_json.hpp"
 #include "search/records.hpp"
 #include "text/text_file.hpp"
@@ -148,6 +151,35 @@ void records(const fs::path& out) {
   Corpus::done(file ? file->append({record}) : Status(file.error()));
 }
 
+cv::Mat picture(int type, int rows, int cols) {
+  cv::Mat image(rows, cols, type);
+  cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 255);
+  for (int i = 0; i < cols / 2 * image.channels(); ++i) {
+    image.row(rows / 2).data[i] = static_cast<unsigned char>(3 * i);
+  }
+  return image;
+}
+
+/// Without the first line, which the fuzzer makes.
+void checkpoints(const fs::path& out) {
+  namespace pipeline = stemvo::pipeline;
+  const Corpus corpus(out, "checkpoint");
+  stemvo::PhasedOdometry odometry = stemvo::fuzz::small_odometry();
+  pipeline::Checkpoint checkpoint;
+  for (const int shift_px : {0, 2, 4}) {
+    const cv::Mat wide = picture(CV_8UC1, 12, 20);
+    cv::Mat image;
+    cv::resize(wide, image, cv::Size(80, 48), 0, 0, cv::INTER_CUBIC);
+    odometry.track(odometry.prepare(image.colRange(shift_px, shift_px + 64).clone()));
+    checkpoint.odometry = odometry.state();
+    const std::string text = pipeline::pack(checkpoint, stemvo::fuzz::kIdentity);
+    corpus.text(fmt::format("{}_frames", checkpoint.frame), text.substr(text.find('\n') + 1));
+    odometry.localize();
+    checkpoint.drive.frames.push_back(odometry.optimize());
+    ++checkpoint.frame;
+  }
+}
+
 void yaml_and_models(const fs::path& source, const fs::path& out) {
   const Corpus configuration(out, "configuration");
   configuration.text("all", stemvo::dump_config({}));
@@ -162,15 +194,6 @@ void yaml_and_models(const fs::path& source, const fs::path& out) {
       models.copy(file.path());
     }
   }
-}
-
-cv::Mat picture(int type, int rows, int cols) {
-  cv::Mat image(rows, cols, type);
-  cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 255);
-  for (int i = 0; i < cols / 2 * image.channels(); ++i) {
-    image.row(rows / 2).data[i] = static_cast<unsigned char>(3 * i);
-  }
-  return image;
 }
 
 void images(const fs::path& out) {
@@ -208,6 +231,7 @@ int main(int num_arguments, char** arguments) {
   recordings(out);
   metrics(out);
   records(out);
+  checkpoints(out);
   yaml_and_models(source, out);
   images(out);
   return 0;

@@ -15,6 +15,7 @@
 
 #include "options/option_fields.hpp"
 #include "support/program_test.hpp"
+#include "support/sealed_records.hpp"
 #include "support/search_program.hpp"
 #include "support/tiny_stem.hpp"
 
@@ -261,8 +262,8 @@ TEST_F(BadInputTable, ManifestAndModel) {
 }
 
 TEST_F(BadInputTable, HostileModels) {
-  for (const char* name :
-       {"kernel", "stride", "size", "domain", "loop", "external", "nan", "infinite", "rank"}) {
+  for (const char* name : {"kernel", "stride", "size", "domain", "loop", "external", "nan",
+                           "infinite", "rank", "tile", "pairs"}) {
     const TempFolder folder;
     const testing::TinyStem stem{.name = std::string("hostile_") + name, .kernel = 1, .stride = 1};
     testing::write_models(folder, stem);
@@ -321,16 +322,37 @@ TEST_F(BadInputTable, Records) {
     EXPECT_THAT(good, HasSubstr(from));
     return text(from + " -> " + to, replace_first(good, from, to));
   };
-  expect_refused_with_faults(
-      records, "\"rung\":0", {"search", "--merge", part, "--out", folder_ / "merged"}, {},
-      {text("empty", ""), text("identity alone", good.substr(0, good.find('\n') + 1)),
-       with("\"rung\":0", "\"rung\":99"), with("\"rung\":0", "\"rung\":-1"),
-       with("\"filter\":0", "\"filter\":5"), with("\"drives\":[{", "\"drives\":[],\"x\":[{"),
-       with("\"sequences\":[{", "\"sequences\":[],\"x\":[{"),
-       with("\"layers\":[{", "\"layers\":[],\"x\":[{"),
-       with("\"rungs\":[{", "\"rungs\":[],\"x\":[{"),
-       with("\"of\":{\"program\":", "\"of\":{\"x\":"), with("\"sha256\":\"", "\"sha256\":\"0"),
-       with("\"detected\":true", "\"detected\":1e300")});
+  std::vector<Fault> more = {text("empty", ""),
+                             text("identity alone", good.substr(0, good.find('\n') + 1)),
+                             with("\"rung\":0", "\"rung\":99"),
+                             with("\"rung\":0", "\"rung\":-1"),
+                             with("\"filter\":0", "\"filter\":5"),
+                             with("\"drives\":[{", "\"drives\":[],\"x\":[{"),
+                             with("\"sequences\":[{", "\"sequences\":[],\"x\":[{"),
+                             with("\"layers\":[{", "\"layers\":[],\"x\":[{"),
+                             with("\"rungs\":[{", "\"rungs\":[],\"x\":[{"),
+                             with("\"of\":{\"program\":", "\"of\":{\"x\":"),
+                             with("\"sha256\":\"", "\"sha256\":\"0"),
+                             with("\"detected\":true", "\"detected\":1e300")};
+  // Behind a seal that fits: of the right form, and numbers that no search counts to.
+  const auto add_sealed = [&](const std::string& from, const std::string& to) {
+    EXPECT_THAT(good, HasSubstr(from));
+    more.push_back(
+        text("sealed " + from + " -> " + to, test::seal_again(replace_first(good, from, to))));
+  };
+  add_sealed("\"of\":{\"program\":", "\"of\":{\"x\":");
+  add_sealed("\"drives\":[{", "\"drives\":[],\"x\":[{");
+  add_sealed("\"sequences\":[{", "\"sequences\":[],\"x\":[{");
+  add_sealed("\"rung\":0", "\"rung\":0,\"x\":" + std::string(1000, '[') + std::string(1000, ']'));
+  for (const char* key : {"rung", "filter", "first", "last", "num_frames", "first_frame", "filters",
+                          "block", "sampling_px", "filter_frames"}) {
+    for (const char* value : {"1e300", "-1", "4294967296", "0.5"}) {
+      const std::string from = fmt::format("\"{}\":", key);
+      add_sealed(from, fmt::format("{}{},\"x\":", from, value));
+    }
+  }
+  expect_refused_with_faults(records, "\"rung\":0",
+                             {"search", "--merge", part, "--out", folder_ / "merged"}, {}, more);
 }
 
 /// Every key with every value that it cannot have; and that it can have those at its ends, which

@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 
 #include "support/program_test.hpp"
 
@@ -47,16 +48,19 @@ TEST_F(Benchmark, InterruptedAndResumedGivesTheSameBytes) {
   EXPECT_THAT(
       read_file(folder_ / "whole/report.html"),
       AllOf(HasSubstr("stemvo benchmark "), HasSubstr("# paper"), HasSubstr("max_features: ")));
-  test::RunningProgram program(STEMVO_PROGRAM, command("resumed"));
-  const std::string second = folder_ / "resumed/runs/00/default_ground_truth/frames.csv";
-  for (int i = 0; i < 6000 && !fs::exists(second); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  for (const auto& [signal, in] :
+       {std::pair(SIGINT, "00/default_ground_truth"), std::pair(SIGHUP, "00/paper_ground_truth")}) {
+    test::RunningProgram program(STEMVO_PROGRAM, command("resumed"));
+    const std::string begun = folder_ / ("resumed/runs/" + std::string(in) + "/frames.csv");
+    for (int i = 0; i < 6000 && !fs::exists(begun); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    program.send(signal);
+    const ProgramResult stopped = program.wait();
+    ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("the same command goes on from there"));
+    EXPECT_THAT(reports("resumed"), HasSubstr("not run yet"));
   }
-  program.send(SIGINT);
-  const ProgramResult stopped = program.wait();
-  ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
-  EXPECT_THAT(stopped.err, HasSubstr("the same command goes on from there"));
-  EXPECT_THAT(reports("resumed"), HasSubstr("not run yet"));
   const ProgramResult resumed = run_stemvo(command("resumed"));
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_THAT(resumed.err, Not(HasSubstr("1/8 00, default, camera_height")));  // was done
@@ -75,6 +79,20 @@ TEST_F(Benchmark, DefaultsBeatThePaperAndThePublishedStayAway) {
   EXPECT_LT(offset(1), offset(3));          // the paper's recipe, per-step ground-truth scale
   // A drive of that name is not KITTI's sequence.
   EXPECT_THAT(reports("out"), AllOf(HasSubstr("clip 0:30 of 4541"), Not(HasSubstr("476.4"))));
+}
+
+TEST_F(Benchmark, APipeInPlaceOfAResultIsSaidAtOnce) {
+  std::vector<std::string> words = command("out");
+  words.insert(words.end(), {"--sequences", "00"});
+  ASSERT_EQ(run_stemvo(words).exit_code, 0);
+  const fs::path metrics = folder_ / "out/runs/00/default_camera_height/metrics.json";
+  fs::remove(metrics);
+  ASSERT_EQ(::mkfifo(metrics.c_str(), 0600), 0);
+  const auto start = std::chrono::steady_clock::now();
+  const ProgramResult result = run_stemvo(words);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr(metrics.string() + ": cannot write"));
 }
 
 TEST_F(Benchmark, ABrokenSequenceIsARowAndTheExitCode) {

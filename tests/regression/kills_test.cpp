@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// 100 kills. Each time the command goes on with what the kill before left.
+// 100 kills. Each time the command goes on with what the kill before left; the first of a run with
+// what an earlier run of another configuration did.
 #include <chrono>
 #include <csignal>
 #include <functional>
@@ -15,6 +16,8 @@
 
 namespace stemvo {
 namespace {
+
+using ::testing::AnyOf;
 
 /// A command that goes on where it was stopped.
 struct Command {
@@ -35,15 +38,54 @@ class Kills : public ::testing::TestWithParam<Command> {
       fs::create_directory_symlink(drive_ / "sequences/00", folder_ / "sequences" / name);
       fs::create_symlink(drive_ / "poses/00.txt", folder_ / "poses" / (std::string(name) + ".txt"));
     }
+    test::link_long_drive(drive_ / "sequences/00", long_drive_, 400);
   }
   [[nodiscard]] std::vector<std::string> arguments(const std::string& out) const {
     const bool takes_root = GetParam().name == "benchmark";
-    std::vector<std::string> words = {GetParam().name,
-                                      takes_root ? folder_.path() : folder_ / "sequences/00",
-                                      "--out", folder_ / out, "--quiet"};
+    const fs::path input = takes_root ? folder_.path()
+                           : is_run() ? long_drive_
+                                      : folder_ / "sequences/00";
+    std::vector<std::string> words = {GetParam().name, input, "--out", folder_ / out};
     words.insert(words.end(), GetParam().arguments.begin(), GetParam().arguments.end());
     return words;
   }
+  [[nodiscard]] static bool is_run() { return GetParam().name == "run"; }
+
+  /// What lies in "killed" before its first command.
+  void begin() const {
+    fs::remove_all(folder_ / "killed");
+    if (is_run()) {
+      fs::copy(folder_ / "earlier", folder_ / "killed", fs::copy_options::recursive);
+    }
+  }
+
+  /// All that lies in "killed" is of one run: of that whose config.yaml lies there.
+  void expect_of_one_run() const {
+    const auto file = [this](const std::string& out, const fs::path& name) {
+      return read_file(folder_ / out / name);
+    };
+    const std::string header =
+        file("whole", "frames.csv").substr(0, file("whole", "frames.csv").find('\n') + 1);
+    const bool is_earlier = file("killed", "config.yaml") == file("earlier", "config.yaml");
+    const std::string of = is_earlier ? "earlier" : "whole";
+    EXPECT_TRUE(file("killed", "config.yaml") == file(of, "config.yaml"));
+    if (is_earlier) {
+      EXPECT_THAT(file("killed", "frames.csv"), AnyOf(header, file("earlier", "frames.csv")));
+    }
+    for (const auto& entry : fs::recursive_directory_iterator(folder_ / "killed")) {
+      const fs::path name = fs::relative(entry.path(), folder_ / "killed");
+      if (name.extension() == ".unfinished" || name == "checkpoint" || name == "frames.csv") {
+        continue;
+      }
+      EXPECT_TRUE(fs::exists(folder_ / of / name)) << name;
+      if (name.parent_path() == "pictures") {
+        EXPECT_TRUE(read_file(entry.path()) == file(of, name)) << name;
+      } else if (name == "trajectory_kitti.txt") {
+        EXPECT_THAT(file(of, name), StartsWith(read_file(entry.path())));
+      }
+    }
+  }
+
   [[nodiscard]] std::string results(const std::string& out) const {
     std::string bytes;
     for (const std::string& name : GetParam().results) {
@@ -54,25 +96,39 @@ class Kills : public ::testing::TestWithParam<Command> {
 
   TempFolder folder_;
   fs::path drive_ = test::rendered_drive({.frames = 60, .width_px = 320, .height_px = 96});
+  fs::path long_drive_ = folder_ / "long";
 };
 
 TEST_P(Kills, LeaveWholeFilesAndTheSameResults) {
   const auto start = std::chrono::steady_clock::now();
   const ProgramResult whole = run_stemvo(arguments("whole"));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  const std::chrono::duration<double> whole_time = std::chrono::steady_clock::now() - start;
+  std::chrono::duration<double> longest = std::chrono::steady_clock::now() - start;
+  if (is_run()) {
+    longest = std::chrono::milliseconds(1500);  // checkpoints come to the disk after one
+    ASSERT_EQ(run_stemvo({"run", long_drive_, "--out", folder_ / "earlier", "--frames", "0:20",
+                          "--pictures", "3", "--set", "features.max_features=300"})
+                  .exit_code,
+              0);
+  }
+  begin();
   std::mt19937 random(1);
   std::uniform_real_distribution<double> share(0.0, 1.0);
   int num_killed = 0;
+  int num_gone_on = 0;
   while (num_killed < GetParam().num_kills) {
     test::RunningProgram program(STEMVO_PROGRAM, arguments("killed"));
-    std::this_thread::sleep_for(share(random) * whole_time);
+    std::this_thread::sleep_for(share(random) * longest);
     program.send(SIGKILL);
     const ProgramResult result = program.wait();
+    num_gone_on += result.err.find("goes on at frame ") != std::string::npos ? 1 : 0;
     test::expect_whole_files(folder_ / "killed");
+    if (is_run()) {
+      expect_of_one_run();
+    }
     if (result.exit_code == 0) {  // it was faster
       EXPECT_TRUE(results("killed") == results("whole"));
-      fs::remove_all(folder_ / "killed");
+      begin();
     } else {
       ASSERT_EQ(result.exit_code, 128 + SIGKILL) << result.err;
       ++num_killed;
@@ -81,6 +137,10 @@ TEST_P(Kills, LeaveWholeFilesAndTheSameResults) {
   const ProgramResult last = run_stemvo(arguments("killed"));
   ASSERT_EQ(last.exit_code, 0) << last.err;
   EXPECT_TRUE(results("killed") == results("whole"));
+  if (is_run()) {
+    RecordProperty("gone_on", num_gone_on);
+    EXPECT_GE(num_gone_on, 5) << "of " << num_killed << ", from a checkpoint";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -93,9 +153,10 @@ INSTANTIATE_TEST_SUITE_P(
                                "trajectory_refined_kitti.txt", "map.ply"}},
                       Command{"search",
                               30,
-                              {"--resume", "--exhaustive", "--filters", "0:6", "--block", "2"},
+                              {"--resume", "--exhaustive", "--filters", "0:6", "--block", "2",
+                               "--quiet"},
                               {"filters.csv", "filters.json", "best.yaml", "sheet.png"}},
-                      Command{"benchmark", 30, {}, {"benchmark.md", "benchmark.json"}}),
+                      Command{"benchmark", 30, {"--quiet"}, {"benchmark.md", "benchmark.json"}}),
     ::testing::PrintToStringParamName());
 
 }  // namespace

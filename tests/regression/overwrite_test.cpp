@@ -81,6 +81,75 @@ TEST_F(Overwrite, ResultsOfARunSpareWhatItReads) {
       << "a run is repeated with its own configuration";
 }
 
+/// Each output of each command, where it is a link to each kind of input.
+TEST_F(Overwrite, NoResultIsAnInput) {
+  write_file(folder_ / "my.yaml", "stem: {model: gray}\n");
+  const std::string config = folder_ / "my.yaml";
+  const std::string truth = folder_ / "poses/00.txt";
+  const fs::path frame = sequence_ / "image_2/000003.png";
+  struct Row {
+    std::vector<std::string> command;
+    std::vector<std::string> names;
+    std::vector<fs::path> inputs;
+  };
+  const std::vector<fs::path> all = {config, frame, sequence_ / "calib.txt",
+                                     sequence_ / "times.txt", truth};
+  const std::vector<Row> rows = {
+      {{"run", sequence_, "--config", config, "--gt", truth},
+       {"metrics.json", "trajectory_kitti.txt", "trajectory_tum.txt", "report.html",
+        "trajectory.png", "frames.csv", "config.yaml", "checkpoint", "map.ply",
+        "trajectory_refined_kitti.txt"},
+       all},
+      {{"search", sequence_, "--config", config, "--model", "gray", "--resume"},
+       {"records.jsonl", "filters.csv", "filters.json", "config.yaml", "best.yaml", "report.html",
+        "sheet.png"},
+       all},
+      {{"robustness", sequence_, "--config", config},
+       {"robustness.csv", "robustness.json", "robustness.txt", "report.html"},
+       all},
+      {{"benchmark", folder_.path()},
+       {"benchmark.md", "benchmark.json", "speed.json", "report.html"},
+       {frame, sequence_ / "calib.txt", sequence_ / "times.txt", truth}},
+      {{"channel", sequence_, "--config", config},
+       {"000000_input.png"},
+       {sequence_ / "image_2/000000.png", config}}};
+  const auto expect_spared = [&](const Row& row, const std::string& name, const fs::path& input) {
+    const std::string bytes = read_file(input);
+    const fs::path output = fs::path(out_) / name;
+    fs::create_directories(out_);
+    fs::create_symlink(input, output);
+    std::vector<std::string> words = row.command;
+    words.insert(words.end(), {"--out", out_});
+    expect_error(run_stemvo(words), 1, {output, "no input, found " + input.string()});
+    EXPECT_TRUE(read_file(input) == bytes) << name;
+    fs::remove_all(out_);
+  };
+  for (const Row& row : rows) {
+    for (const std::string& name : row.names) {
+      expect_spared(row, name, row.inputs.front());
+    }
+    for (const fs::path& input : row.inputs) {
+      expect_spared(row, row.names.front(), input);
+    }
+  }
+}
+
+TEST_F(Overwrite, ASearchSparesItsConfiguration) {
+  const std::string config = out_ + "/config.yaml";
+  fs::create_directories(out_);
+  write_file(config, "# mine\nseed: 3\n");
+  expect_error(run_stemvo({"search", sequence_, "--config", config, "--out", out_}), 1,
+               {config, "no input"});
+  EXPECT_EQ(read_file(config), "# mine\nseed: 3\n");
+}
+
+TEST_F(Overwrite, ChannelsAreNotWrittenAmongTheFrames) {
+  const std::string folder = sequence_ / "image_2";
+  expect_error(run_stemvo({"channel", sequence_, "--set", "stem.model=gray", "--out", folder}), 1,
+               {folder, "no input"});
+  EXPECT_FALSE(fs::exists(folder + "/000000_input.png"));
+}
+
 TEST_F(Overwrite, PicturesRemoveTheirOwnOnly) {
   fs::create_directories(out_);
   fs::copy(sequence_ / "image_2", folder_ / "mine");

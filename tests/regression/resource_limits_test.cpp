@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include "support/program_test.hpp"
 
@@ -12,12 +13,14 @@ namespace {
 /// Runs the program where it may have so much of a resource only.
 class ResourceLimits : public ::testing::Test {
  protected:
-  [[nodiscard]] ProgramResult run_under(const std::string& limit) const {
+  [[nodiscard]] static ProgramResult under(const std::string& limit, const std::string& words) {
     // What the test was called with open counts against the limit.
-    const std::string command = "for fd in {3..30}; do eval \"exec $fd>&-\"; done; ulimit -c 0; " +
-                                limit + "; exec " + STEMVO_PROGRAM + " run " + drive_.string() +
-                                " --quiet --out " + (folder_ / "out").string();
-    return test::run_program("/bin/bash", {"-c", command});
+    return test::run_program(
+        "/bin/bash", {"-c", "for fd in {3..30}; do eval \"exec $fd>&-\"; done; ulimit -c 0; " +
+                                limit + "; exec " + STEMVO_PROGRAM + " " + words});
+  }
+  [[nodiscard]] ProgramResult run_under(const std::string& limit) const {
+    return under(limit, "run " + drive_.string() + " --quiet --out " + (folder_ / "out").string());
   }
 
   /// One line that is no bug's, or all frames were read.
@@ -46,6 +49,28 @@ TEST_F(ResourceLimits, TooFewOpenFiles) {
   for (const int limit : {4, 7, 9, 10, 12}) {
     expect_said("ulimit -n " + std::to_string(limit), "open files");
   }
+}
+
+TEST_F(ResourceLimits, TooFewOpenFilesToRender) {
+  expect_error(under("ulimit -n 4", "synth " + (folder_ / "drive").string() + " --frames 2"), 1,
+               {"drive", "open files"});
+}
+
+/// The limit does not bind root, and counts all that a user has: asked as nobody, who has nothing.
+TEST_F(ResourceLimits, TooFewProcesses) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "expected root, who can be nobody";
+  }
+  const fs::path out = folder_ / "out";
+  fs::create_directories(out);
+  fs::permissions(folder_.path(), fs::perms::all);
+  fs::permissions(out, fs::perms::all);
+  const ProgramResult result = test::run_program(
+      "/bin/bash", {"-c", std::string("exec setpriv --reuid 65534 --clear-groups /bin/bash -c "
+                                      "'ulimit -c 0; ulimit -u 1; exec ") +
+                              STEMVO_PROGRAM + " run " + drive_.string() + " --quiet --out " +
+                              out.string() + "'"});
+  expect_error(result, 1, {"out of threads: expected more than 'ulimit -u' allows"});
 }
 
 /// From where the program's libraries are loaded on: the dynamic loader says what it lacks.

@@ -2,14 +2,18 @@
 // `run --resume` ends with the bytes of a run that was not interrupted.
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <libdeflate.h>
 
 #include "support/program_test.hpp"
 #include "support/write_video.hpp"
@@ -21,21 +25,11 @@ class Resume : public ::testing::Test {
  protected:
   static constexpr int kNumFrames = 240;
 
-  /// A drive there and back again, so that it lasts; one frame is no image.
+  /// One frame is no image.
   Resume() {
-    const fs::path drive = test::rendered_drive() / "sequences/00";
-    fs::create_directories(sequence_ / "image_2");
-    fs::copy(drive / "calib.txt", sequence_ / "calib.txt");
-    std::ofstream times(sequence_ / "times.txt");
-    for (int i = 0; i < kNumFrames; ++i) {
-      times << 0.1 * i << "\n";
-      if (i != 33) {
-        fs::create_symlink(drive / frame_name(i % 120 < 60 ? i % 120 : 119 - i % 120),
-                           sequence_ / frame_name(i));
-      } else {
-        std::ofstream(sequence_ / frame_name(i)) << "no image";
-      }
-    }
+    test::link_long_drive(test::rendered_drive() / "sequences/00", sequence_, kNumFrames);
+    fs::remove(sequence_ / frame_name(33));
+    write_file(sequence_ / frame_name(33), "no image");
   }
 
   static std::string frame_name(int i) {
@@ -179,6 +173,25 @@ TEST_F(Resume, WhatCannotBeGoneOnFromIsNamed) {
   damaged[sound.size() / 2] ^= 1;
   std::ofstream(file, std::ios::binary) << damaged;
   expect_refused({"--resume"}, "found damaged data");
+  // Under the sum of what is there: cut behind the identity, bytes of the state, a huge count.
+  const std::string content = sound.substr(sound.find('\n') + 1);
+  const auto write_summed = [&](const std::string& bytes) {
+    write_file(file, fmt::format("stemvo checkpoint {:08x}\n{}",
+                                 libdeflate_crc32(0, bytes.data(), bytes.size()), bytes));
+  };
+  for (const std::size_t size : {std::size_t{0}, std::size_t{5}, content.size() / 2}) {
+    write_summed(content.substr(0, size));
+    expect_refused({"--resume"}, "found damaged data");
+  }
+  std::uint64_t identity_size = 0;
+  std::memcpy(&identity_size, content.data(), sizeof(identity_size));
+  for (const std::size_t at :
+       {0UL, sizeof(identity_size) + identity_size, 2 * sizeof(identity_size) + identity_size}) {
+    std::string other = content;
+    other.replace(at, 8, "\xff\xff\xff\xff\xff\xff\xff\x7f");
+    write_summed(other);
+    expect_refused({"--resume"}, "found damaged data");
+  }
 
   const ProgramResult anew = test::run_program(STEMVO_PROGRAM, run("out"));
   EXPECT_EQ(anew.exit_code, 0) << anew.err;

@@ -66,23 +66,26 @@ TEST_F(Search, KilledWithTheDefaultBlockKeepsTheBlocksThatEnded) {
 TEST_F(Search, InterruptedLeavesAPartOfTheTableAndGoesOn) {
   const Words asked = {"--exhaustive", "--filters", "0:6", "--block", "2", "--threads", "1"};
   ASSERT_EQ(search("whole", asked).exit_code, 0);
-  test::RunningProgram program(STEMVO_PROGRAM, command("stopped", asked));
-  const fs::path records = folder_ / "stopped/records.jsonl";
-  for (int i = 0; i < 15000 && count_lines(records) < 3; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  }
-  program.send(SIGINT);
-  const ProgramResult stopped = program.wait();
-  ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
-  EXPECT_THAT(stopped.err, HasSubstr("interrupted; what is done is kept, --resume goes on"));
-  EXPECT_FALSE(result("stopped")["complete"].get<bool>());
-  const std::size_t rows = count_lines(folder_ / "stopped/filters.csv") - 1;
-  EXPECT_EQ(rows, count_lines(records) - 1);
-  EXPECT_EQ(result("stopped")["filters"].size(), rows);
-  EXPECT_GE(rows, 2U);
-  EXPECT_LT(rows, 10U);
   Words resumed = asked;
   resumed.emplace_back("--resume");
+  const fs::path records = folder_ / "stopped/records.jsonl";
+  for (const int signal : {SIGINT, SIGHUP}) {
+    const std::size_t before = count_lines(records);
+    test::RunningProgram program(STEMVO_PROGRAM, command("stopped", resumed));
+    for (int i = 0; i < 15000 && count_lines(records) < std::max<std::size_t>(before + 1, 3); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    program.send(signal);
+    const ProgramResult stopped = program.wait();
+    ASSERT_EQ(stopped.exit_code, 130) << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("interrupted; what is done is kept, --resume goes on"));
+    EXPECT_FALSE(result("stopped")["complete"].get<bool>());
+    const std::size_t rows = count_lines(folder_ / "stopped/filters.csv") - 1;
+    EXPECT_EQ(rows, count_lines(records) - 1);
+    EXPECT_EQ(result("stopped")["filters"].size(), rows);
+    EXPECT_GE(rows, 2U);
+    EXPECT_LT(rows, 10U);
+  }
   ASSERT_EQ(search("stopped", resumed).exit_code, 0);
   EXPECT_EQ(table("stopped"), table("whole"));
   for (const char* file : {"/filters.json", "/best.yaml", "/config.yaml", "/sheet.png"}) {

@@ -24,6 +24,24 @@ TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   EXPECT_EQ(table("merged"), table("whole"));
   EXPECT_EQ(read_file(folder_ / "merged/filters.json"), read_file(folder_ / "whole/filters.json"));
   EXPECT_TRUE(fs::exists(folder_ / "merged/sheet.png"));
+  // As a kill in the middle leaves it, and from the end.
+  const fs::path records = folder_ / "merged/records.jsonl";
+  const std::string joined = read_file(records);
+  for (const std::size_t size : {joined.size() * 2 / 3, joined.find('\n') / 2, joined.size()}) {
+    write_file(records, joined.substr(0, size));
+    fs::remove(folder_ / "merged/filters.csv");
+    ASSERT_EQ(
+        run_stemvo({"search", "--merge", folder_ / "b", folder_ / "a", "--out", folder_ / "merged"})
+            .exit_code,
+        0);
+    EXPECT_TRUE(read_file(records) == joined) << size;
+    EXPECT_EQ(table("merged"), table("whole"));
+  }
+  const std::string part = read_file(folder_ / "a/records.jsonl");
+  expect_error(
+      run_stemvo({"search", "--merge", folder_ / "b", folder_ / "a", "--out", folder_ / "a"}), 1,
+      {"a/records.jsonl", "no input"});
+  EXPECT_TRUE(read_file(folder_ / "a/records.jsonl") == part);
   const ProgramResult run =
       run_stemvo({"run", sequence_.string(), "--config", folder_ / "whole/best.yaml", "--out",
                   folder_ / "run", "--quiet"});

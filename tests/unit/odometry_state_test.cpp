@@ -75,7 +75,7 @@ TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
   }
   for (const std::size_t first : {0, 6, 17, 18, 19, 29}) {
     PhasedOdometry again = odometry();
-    again.set_state(states[first]);
+    ASSERT_TRUE(again.set_state(states[first]));
     EXPECT_TRUE(again.state() == states[first]) << first;
     for (std::size_t i = first; i < std::size_t{kNumFrames}; ++i) {
       if (i > first) {
