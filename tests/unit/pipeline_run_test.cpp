@@ -304,7 +304,7 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
 
 TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
   fs::create_directories(request_.out_dir / "trajectory_tum.txt");
-  fs::create_directories(request_.out_dir / "config.yaml");
+  fs::create_directories(request_.out_dir / "report.html");
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;

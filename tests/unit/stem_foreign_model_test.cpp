@@ -81,12 +81,15 @@ TEST(ForeignModel, WhatIsNoModelIsRefusedBeforeTheRuntimeSeesIt) {
 
 TEST(ForeignModel, AGraphOfTooManyOperatorsIsRefused) {
   const auto with_nodes = [](std::size_t count) {
-    std::string model = "\x3a";  // the graph, its length, empty nodes
-    for (std::size_t rest = 2 * count; rest > 0; rest >>= 7U) {
+    const std::string node =
+        "\x0a\x0a\x22\x08"
+        "Constant";
+    std::string model = "\x3a";  // the graph, its length, nodes
+    for (std::size_t rest = node.size() * count; rest > 0; rest >>= 7U) {
       model += static_cast<char>((rest & 0x7fU) | (rest > 0x7fU ? 0x80U : 0U));
     }
     for (std::size_t i = 0; i < count; ++i) {
-      model += std::string("\x0a\x00", 2);
+      model += node;
     }
     return check_foreign_model("many", model);
   };
