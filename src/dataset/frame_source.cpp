@@ -136,8 +136,7 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   }
   const bool is_stream = dataset::camera_number(path) || is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
-  const bool is_kitti = dataset::is_folder(path) && looks_like_kitti(path);
-  if (!is_stream && !listing && !is_kitti) {
+  if (!is_stream && !listing && !dataset::is_folder(path)) {
     return refuse(path);
   }
   if (const Status status = check_unused(request, listing.has_value(), is_stream); !status) {
@@ -149,6 +148,9 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   if (listing) {
     return listing->and_then(
         [&](const dataset::Listing& found) { return dataset::open_listing(found, request); });
+  }
+  if (!looks_like_kitti(path)) {
+    return refuse(path);
   }
   return KittiSequence::open(path, request).map([](const FrameSource& source) { return source; });
 }

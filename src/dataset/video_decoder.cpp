@@ -14,7 +14,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-#ifdef STEMVO_VIDEO_MODULE
 Expected<OpenDecoder*> load_module() {
   std::error_code code;
   const fs::path program = fs::read_symlink("/proc/self/exe", code);
@@ -33,13 +32,6 @@ Expected<OpenDecoder*> load_module() {
       "{}: expected the module that decodes videos beside the program, found none that loads{}",
       places.front().lexically_normal().string(), why));
 }
-#else
-Expected<OpenDecoder*> load_module() {
-  return fail(
-      "videos and cameras are read by the program stemvo, not by this build of its library: "
-      "hand in images");
-}
-#endif
 
 Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const cv::Size& size) {
   static const Expected<OpenDecoder*> module = load_module();

@@ -33,8 +33,7 @@ class VideoDecoder {
   [[nodiscard]] virtual double position_ms() const = 0;
 };
 
-/// By FFmpeg. Null: not a video. Error: this build has no videos (the Python package), or the
-/// module is not where it was installed.
+/// By FFmpeg. Null: not a video. Error: the module is not where it was installed.
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(
     const std::filesystem::path& file);
 /// Camera N of the machine (V4L2), asked for images of this size. Null: no such camera. Errors: as

@@ -236,7 +236,7 @@ TEST_F(ImageFolderTest, RangeOutside) {
 
 TEST_F(ImageFolderTest, FolderProblems) {
   request_.sequence_dir = temp_ / "none";
-  EXPECT_THAT(error_of(), HasSubstr("none: expected a folder of images"));
+  EXPECT_THAT(error_of(), HasSubstr("none: expected a folder, a video file"));
   fs::create_directories(temp_ / "none");
   EXPECT_THAT(error_of(), HasSubstr("none: expected images (.png, .jpg, .jpeg), found none"));
   request_.sequence_dir = images_;
