@@ -10,7 +10,7 @@ help:
 	@echo "make test          install what is missing, build, run the tests"
 	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
-	@echo "make cluster       install Ray, for tools/search_cluster.py (make test does too)"
+	@echo "make cluster       install Ray, for tools/search_cluster.py (make test-all does too)"
 	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
 	@echo "make format        rewrite the C++ sources in the project's format"
 	@echo "make check-format  fail where a source is not in that format or names no licence"
@@ -30,8 +30,6 @@ demo: build
 	@tools/demo.sh
 
 test: build
-	@tools/setup.sh cluster || echo "==> Without Ray: the test of the cluster is skipped"
-	@tools/setup.sh peers || echo "==> Without OpenCV's Python package: the test of what the benchmark compares with is skipped"
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running the tests"
@@ -40,6 +38,8 @@ test: build
 test-all: test test-long
 
 test-long:
+	@tools/setup.sh cluster || echo "==> Without Ray: the test of the cluster is skipped"
+	@tools/setup.sh peers || echo "==> Without OpenCV's Python package: the test of what the benchmark compares with is skipped"
 	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
 	@tools/setup.sh root || echo "==> Without debootstrap: the test that installs the package in an empty root is skipped"
 	@tools/setup.sh docs

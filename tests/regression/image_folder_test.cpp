@@ -318,7 +318,7 @@ TEST_F(OtherCameras, HandheldJpegsWithPosesAndTimes) {
        (data / "poses.txt").string(), "--times", (data / "times.txt").string(), "--frames", "0:60"},
       60);
   const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
-  EXPECT_EQ(metrics.at("sequence"), "images");
+  EXPECT_EQ(metrics.at("sequence"), "handheld");
   EXPECT_EQ(metrics.at("alignment"), "sim3");
 }
 
