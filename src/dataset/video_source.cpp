@@ -10,8 +10,6 @@
 namespace stemvo::dataset {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// The lens' image: the driver of a camera may give another size than it was asked for.
 Status check_stream_size(const cv::Size& size, const Camera& camera, const std::string& owner) {
   if (size != cv::Size(camera.width_px, camera.height_px)) {

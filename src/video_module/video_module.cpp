@@ -2,7 +2,6 @@
 // Loaded by dataset/video_decoder.cpp; the only source that links OpenCV's videoio.
 #include <cstdlib>
 #include <memory>
-#include <utility>
 
 #include <opencv2/videoio.hpp>
 
@@ -14,7 +13,7 @@ namespace {
 
 class OpenCvDecoder final : public VideoDecoder {
  public:
-  explicit OpenCvDecoder(cv::VideoCapture capture) : capture_(std::move(capture)) {}
+  explicit OpenCvDecoder(const cv::VideoCapture& capture) : capture_(capture) {}  // shared
 
   bool grab() override { return capture_.grab(); }
   cv::Mat retrieve() override {
@@ -55,10 +54,9 @@ cv::VideoCapture open_camera(int number, int width_px, int height_px) {
 
 extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_decoder(
     const char* file, int number, int width_px, int height_px) {
-  cv::VideoCapture capture =
+  const cv::VideoCapture capture =
       file != nullptr ? open_file(file) : open_camera(number, width_px, height_px);
-  return capture.isOpened() ? std::make_unique<OpenCvDecoder>(std::move(capture)).release()
-                            : nullptr;
+  return capture.isOpened() ? std::make_unique<OpenCvDecoder>(capture).release() : nullptr;
 }
 
 }  // namespace stemvo::dataset
