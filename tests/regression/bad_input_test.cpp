@@ -49,7 +49,8 @@ TEST_F(BadInput, WhatIsBrokenRunsUnbroken) { EXPECT_EQ(run().exit_code, 0); }
 
 TEST_F(BadInput, MissingSequence) {
   const std::string none = folder_ / "none";
-  expect_error(run_stemvo({"run", none, "--out", out_}), 1, {none, "expected", "found nothing of that name"});
+  expect_error(run_stemvo({"run", none, "--out", out_}), 1,
+               {none, "expected", "found nothing of that name"});
   EXPECT_FALSE(fs::exists(out_));
 }
 
