@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include "text/text_file.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -28,8 +30,10 @@ Status check_spares_inputs(const std::vector<fs::path>& outputs,
                            const std::vector<fs::path>& inputs) {
   std::map<Identity, fs::path> written;
   for (const fs::path& file : outputs) {
-    if (const auto found = identity(file)) {
-      written.emplace(*found, file);
+    for (const fs::path& place : {file, unfinished(file)}) {
+      if (const auto found = identity(place)) {
+        written.emplace(*found, place);
+      }
     }
   }
   for (const fs::path& input : inputs) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "text/text_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -32,8 +33,6 @@ std::optional<double> to_finite(std::string_view word) {
   return is_good ? std::optional(number) : std::nullopt;
 }
 
-fs::path beside(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
-
 Status refuse_folder(const fs::path& file) {
   std::error_code ignored;
   return fs::is_directory(file, ignored)
@@ -42,14 +41,16 @@ Status refuse_folder(const fs::path& file) {
              : Status();
 }
 
-/// On the disk when it returns. Errors name `file`.
-Status write_in_place(const fs::path& file, const fs::path& place, std::string_view text) {
+/// On the disk when it returns. `mode`: how the place is opened. Errors name `file`.
+Status write_in_place(const fs::path& file,
+                      const fs::path& place,
+                      int mode,
+                      std::string_view text) {
   const auto failed = [&] {
     return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
   };
   // A pipe that nobody reads is an error; it would wait for ever.
-  const int descriptor =
-      ::open(place.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NONBLOCK, 0666);
+  const int descriptor = ::open(place.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | mode, 0666);
   if (descriptor < 0 || ::fcntl(descriptor, F_SETFL, 0) != 0) {
     return failed();
   }
@@ -64,7 +65,16 @@ Status write_in_place(const fs::path& file, const fs::path& place, std::string_v
   return std::fclose(stream) == 0 || !status ? status : Status(failed());
 }
 
+/// In place of what a kill left there; never through a link.
+Status write_beside(const fs::path& file, const fs::path& place, std::string_view text) {
+  std::error_code ignored;
+  fs::remove(place, ignored);
+  return write_in_place(file, place, O_CREAT | O_EXCL, text);
+}
+
 }  // namespace
+
+fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
 
 Expected<std::string> read_text_file(const fs::path& file) {
   std::error_code ignored;
@@ -106,18 +116,18 @@ Status write_text_file(const fs::path& file, std::string_view text) {
   }
   std::error_code code;
   if (fs::exists(file, code) && !fs::is_regular_file(file, code)) {
-    return write_in_place(file, file, text);  // a pipe or a device cannot be replaced
+    return write_in_place(file, file, O_TRUNC, text);  // a pipe or a device cannot be replaced
   }
   const fs::path target = fs::is_symlink(file, code) ? fs::weakly_canonical(file, code) : file;
-  Status status = write_in_place(file, beside(target), text);
+  Status status = write_beside(file, unfinished(target), text);
   if (status) {
-    fs::rename(beside(target), target, code);
+    fs::rename(unfinished(target), target, code);
     if (code) {
       status = fail(fmt::format("{}: cannot write: {}", file.string(), code.message()));
     }
   }
   if (!status) {
-    fs::remove(beside(target), code);
+    fs::remove(unfinished(target), code);
   }
   return status;
 }
@@ -127,14 +137,14 @@ Status check_can_write(const fs::path& file) {
     return status;
   }
   std::error_code ignored;
-  const Status status = write_in_place(file, beside(file), "can be written");
-  fs::remove(beside(file), ignored);
+  const Status status = write_beside(file, unfinished(file), "can be written");
+  fs::remove(unfinished(file), ignored);
   return status;
 }
 
 Status remove_file(const fs::path& file) {
   std::error_code code;
-  fs::remove(beside(file), code);
+  fs::remove(unfinished(file), code);
   fs::remove(file, code);
   return code ? Status(
                     fail(fmt::format("{}: cannot be removed ({})", file.string(), code.message())))
@@ -162,14 +172,18 @@ std::vector<std::string_view> split_lines(std::string_view text) {
   return lines;
 }
 
-std::vector<std::string_view> split_words(std::string_view line) {
+std::string_view take_word(std::string_view& line) {
   constexpr std::string_view kBlanks = " \t";
+  line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
+  const std::string_view word = line.substr(0, line.find_first_of(kBlanks));
+  line.remove_prefix(word.size());
+  return word;
+}
+
+std::vector<std::string_view> split_words(std::string_view line) {
   std::vector<std::string_view> words;
-  std::size_t begin = line.find_first_not_of(kBlanks);
-  while (begin != std::string_view::npos) {
-    const std::size_t end = line.find_first_of(kBlanks, begin);
-    words.push_back(line.substr(begin, end - begin));
-    begin = line.find_first_not_of(kBlanks, end);
+  for (auto word = take_word(line); !word.empty(); word = take_word(line)) {
+    words.push_back(word);
   }
   return words;
 }
@@ -191,7 +205,8 @@ std::optional<std::size_t> parse_index(std::string_view text) {
 Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t count) {
   constexpr double kLargest = 1e20;  // squares and sums stay finite
   std::vector<double> numbers;
-  for (const std::string_view word : split_words(line)) {
+  std::size_t num_found = 0;
+  for (auto word = take_word(line); !word.empty(); word = take_word(line)) {
     const std::optional<double> number = to_finite(word);
     if (!number) {
       return fail(fmt::format("expected a finite number, found '{}'",
@@ -200,11 +215,13 @@ Expected<std::vector<double>> parse_numbers(std::string_view line, std::size_t c
     if (!(std::abs(*number) <= kLargest)) {
       return fail(fmt::format("expected a number of size up to {}, found {}", kLargest, *number));
     }
-    numbers.push_back(*number);
+    if (++num_found <= count) {  // a line of a hostile file may have millions
+      numbers.push_back(*number);
+    }
   }
-  if (numbers.size() != count) {
-    return fail(fmt::format("expected {} number{}, found {}", count, count == 1 ? "" : "s",
-                            numbers.size()));
+  if (num_found != count) {
+    return fail(
+        fmt::format("expected {} number{}, found {}", count, count == 1 ? "" : "s", num_found));
   }
   return numbers;
 }

@@ -15,8 +15,10 @@ namespace stemvo {
 /// The whole file as it is. Error: missing, a folder, unreadable. Throws std::system_error where
 /// the process may open no more files.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file);
+/// Where a file is written before it takes its name; what lies there is replaced.
+[[nodiscard]] std::filesystem::path unfinished(const std::filesystem::path& file);
 /// Replaces the file at once: whoever reads it finds the old or the new one, whole, also after a
-/// kill or a full disk. Written beside as NAME.unfinished, synced, renamed; a pipe or device in
+/// kill or a full disk. Written beside as unfinished(), synced, renamed; a pipe or device in
 /// place. Error: a folder, it cannot be created, or the disk took less than all of it.
 [[nodiscard]] Status write_text_file(const std::filesystem::path& file, std::string_view text);
 /// Proves that write_text_file can, without touching the file.
@@ -29,7 +31,9 @@ namespace stemvo {
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.
 [[nodiscard]] std::vector<std::string_view> split_lines(std::string_view text);
-/// Words between blanks and tabs.
+/// The next word between blanks and tabs, which the line loses; empty: there is none.
+[[nodiscard]] std::string_view take_word(std::string_view& line);
+/// All of them.
 [[nodiscard]] std::vector<std::string_view> split_words(std::string_view line);
 
 /// "file:line", line counted from 1, for messages.

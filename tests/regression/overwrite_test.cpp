@@ -98,7 +98,7 @@ TEST_F(Overwrite, NoResultIsAnInput) {
       {{"run", sequence_, "--config", config, "--gt", truth},
        {"metrics.json", "trajectory_kitti.txt", "trajectory_tum.txt", "report.html",
         "trajectory.png", "frames.csv", "config.yaml", "checkpoint", "map.ply",
-        "trajectory_refined_kitti.txt"},
+        "trajectory_refined_kitti.txt", "trajectory_refined_tum.txt", "metrics.json.unfinished"},
        all},
       {{"search", sequence_, "--config", config, "--model", "gray", "--resume"},
        {"records.jsonl", "filters.csv", "filters.json", "config.yaml", "best.yaml", "report.html",

@@ -276,6 +276,9 @@ TEST_F(SyntheticDriveTest, AnEarlierDriveStaysUntilTheNewOneIsWhole) {
   std::ofstream(folder / "mask.png") << "a user's";
   EXPECT_FALSE(render_synthetic_drive(root_ / "out", small(3)));
   EXPECT_EQ(bytes_of(folder / "mask.png"), "a user's");
+  fs::rename(folder / "mask.png", folder / "image_2/mask.png");
+  EXPECT_FALSE(render_synthetic_drive(root_ / "out", small(3)));
+  EXPECT_EQ(bytes_of(folder / "image_2/mask.png"), "a user's");
   EXPECT_TRUE(fs::exists(folder / "image_2/000004.png"));
   EXPECT_FALSE(fs::exists(root_ / "out/sequences/00.unfinished"));
   EXPECT_FALSE(fs::exists(root_ / "out/poses/00.txt.unfinished"));

@@ -92,5 +92,15 @@ TEST(WriteTextFile, FollowsALinkToTheFile) {
   EXPECT_EQ(read_all(file), "new");
 }
 
+TEST(WriteTextFile, NotThroughALinkWhereItIsUnfinished) {
+  const TempFolder folder;
+  const fs::path precious = folder.file("precious", "old");
+  fs::create_symlink(precious, unfinished(folder / "new.txt"));
+  ASSERT_TRUE(write_text_file(folder / "new.txt", "new"));
+  EXPECT_EQ(read_all(precious), "old");
+  EXPECT_FALSE(fs::is_symlink(folder / "new.txt"));
+  EXPECT_EQ(num_files(folder), 2);
+}
+
 }  // namespace
 }  // namespace stemvo
