@@ -6,7 +6,7 @@
 
 int main(int argc, char** argv) {
   const stemvo::Camera camera{718.86, 718.86, 607.19, 185.22, 1241, 376};  // fx fy cx cy, size
-  auto odometry = stemvo::Odometry::create(camera);  // defaults: stemvo/options.hpp
+  auto odometry = stemvo::Odometry::create(camera);  // options.hpp: 1.65 m above the road
   if (!odometry) return std::cerr << odometry.error().message << "\n", 1;
   for (int i = 1; i < argc; ++i) {
     const auto frame = odometry->process(cv::imread(argv[i]), stemvo::PixelOrder::kBgr);
