@@ -284,17 +284,23 @@ TEST_F(CameraFileTest, OddRowsOfAMatrix) {
   expect_refused("cam0: {T_cam_imu: [&row [1, 0, 0, 0], *row, *row]}\n", {"camera.yaml"});
 }
 
+/// The camera of kOpenCv, kRos and message().
+void expect_their_camera(const dataset::Lens& lens) {
+  EXPECT_EQ(lens.camera.width_px, 640);
+  EXPECT_EQ(lens.camera.height_px, 480);
+  EXPECT_EQ(lens.camera.fx_px, 520.0);
+  EXPECT_EQ(lens.camera.fy_px, 521.0);
+  EXPECT_EQ(lens.camera.cx_px, 325.5);
+  EXPECT_EQ(lens.camera.cy_px, 249.5);
+  EXPECT_EQ(lens.distortion, Distortion::kRadialTangential);
+  EXPECT_THAT(lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+}
+
 TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
   for (const char* text : {kOpenCv, kRos}) {
     const auto file = read_camera_file(folder_.file("camera.yaml", text));
     ASSERT_TRUE(file) << file.error().message;
-    EXPECT_EQ(file->lens.camera.width_px, 640);
-    EXPECT_EQ(file->lens.camera.fx_px, 520.0);
-    EXPECT_EQ(file->lens.camera.fy_px, 521.0);
-    EXPECT_EQ(file->lens.camera.cx_px, 325.5);
-    EXPECT_EQ(file->lens.camera.cy_px, 249.5);
-    EXPECT_EQ(file->lens.distortion, Distortion::kRadialTangential);
-    EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+    expect_their_camera(file->lens);
     EXPECT_FALSE(file->rate_hz);
   }
 }
@@ -317,11 +323,7 @@ TEST_F(CameraFileTest, AMessageOfRos) {
   for (const std::string& text : {message(five), first}) {
     const auto file = read_camera_file(folder_.file("camera.yaml", text));
     ASSERT_TRUE(file) << file.error().message;
-    EXPECT_EQ(file->lens.camera.width_px, 640);
-    EXPECT_EQ(file->lens.camera.height_px, 480);
-    EXPECT_EQ(file->lens.camera.fy_px, 521.0);
-    EXPECT_EQ(file->lens.camera.cx_px, 325.5);
-    EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+    expect_their_camera(file->lens);
   }
   const auto none = read_camera_file(folder_.file("camera.yaml", message("plumb_bob\nd: []\n")));
   ASSERT_TRUE(none) << none.error().message;
