@@ -16,9 +16,9 @@ namespace {
 
 /// Which camera's projection row a line is; nullopt: another line.
 std::optional<int> camera_of(std::string_view line) {
-  const std::vector<std::string_view> words = split_words(line);
-  for (int i = 0; i < 4 && !words.empty(); ++i) {
-    if (words.front() == fmt::format("P{}:", i) || words.front() == fmt::format("P_rect_0{}:", i)) {
+  const std::string_view name = take_word(line);
+  for (int i = 0; i < 4; ++i) {
+    if (name == fmt::format("P{}:", i) || name == fmt::format("P_rect_0{}:", i)) {
       return i;
     }
   }

@@ -18,16 +18,26 @@ namespace fs = std::filesystem;
 
 enum class Format { kKitti, kTum, kEuroc };
 
+/// Up to `limit`: a line of a hostile file may have millions.
+std::size_t count_words(std::string_view line, std::size_t limit) {
+  std::size_t count = 0;
+  while (count < limit && !take_word(line).empty()) {
+    ++count;
+  }
+  return count;
+}
+
 Format format_of(std::string_view text) {
   bool has_comment = false;  // KITTI's have none
   for (const std::string_view line : split_lines(text)) {
-    const std::vector<std::string_view> words = split_words(line);
-    const bool is_comment = !words.empty() && words.front().starts_with('#');
+    std::string_view rest = line;
+    const std::string_view first = take_word(rest);
+    const bool is_comment = first.starts_with('#');
     has_comment = has_comment || is_comment;
-    if (!words.empty() && !is_comment) {
-      return line.find(',') != std::string_view::npos ? Format::kEuroc
-             : has_comment || words.size() == 8       ? Format::kTum
-                                                      : Format::kKitti;
+    if (!first.empty() && !is_comment) {
+      return line.find(',') != std::string_view::npos   ? Format::kEuroc
+             : has_comment || count_words(line, 9) == 8 ? Format::kTum
+                                                        : Format::kKitti;
     }
   }
   return has_comment ? Format::kTum : Format::kKitti;
@@ -106,7 +116,7 @@ Expected<PoseFile> read_rows(const fs::path& file, std::string_view text, Format
   const double unit_s = format == Format::kEuroc ? 1e-9 : 1.0;
   std::vector<std::string_view> lines = split_lines(text);
   // Empty lines at the end of a file are no poses; within KITTI's they would shift the frames.
-  while (!lines.empty() && split_words(lines.back()).empty()) {
+  while (!lines.empty() && count_words(lines.back(), 1) == 0) {
     lines.pop_back();
   }
   PoseFile result;
@@ -114,7 +124,7 @@ Expected<PoseFile> read_rows(const fs::path& file, std::string_view text, Format
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string line(format == Format::kKitti ? lines[i]
                                                     : lines[i].substr(0, lines[i].find('#')));
-    if (format != Format::kKitti && split_words(line).empty()) {
+    if (format != Format::kKitti && count_words(line, 1) == 0) {
       continue;
     }
     const Expected<TimedPose> row = parse_row(format, line);
