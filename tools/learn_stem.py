@@ -79,16 +79,17 @@ def learn(scatter, nuisance, options):
                        else discriminant.generalised_eigenvectors(signal, noise, count))
     filters = discriminant.with_signs(filters, signal)
     step = ROUNDING * np.abs(filters).max()
-    filters = np.rint(filters / step)
+    units = np.rint(filters / step)
     if has_norm:
         # It subtracts the mean over the channels. A last filter that makes all of them sum to zero
         # leaves the others as they were learned.
-        filters = np.vstack([filters, -filters.sum(axis=0)])
-    filters = filters * step
+        units = np.vstack([units, -units.sum(axis=0)])
+    filters = units * step
     # One gray plane serves gray cameras and colour ones alike. Filters with free colours mostly learn
     # differences of colours, to which a gray camera is blind.
     weights = filters.reshape(FILTERS, 1, options.kernel, options.kernel)
-    bias = -filters.sum(axis=1) * np.rint(scatter.mean().mean())
+    # Summed as whole numbers: in no order do they leave 1e-16 where the sum is zero.
+    bias = -(units.sum(axis=1) * step) * np.rint(scatter.mean().mean())
     # Samples in the middle of stride x stride pixels, as those of the image made smaller by the stride.
     padding = (max(0, options.kernel - options.stride) // 2,) * 4
     layer_norm = stem_module.LayerNorm(np.ones(FILTERS), np.zeros(FILTERS), options.floor**2) if has_norm else None
