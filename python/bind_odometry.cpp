@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
@@ -130,7 +131,11 @@ void bind_camera(nb::module_& module) {
       .def_ro("cx", &Camera::cx_px)
       .def_ro("cy", &Camera::cy_px)
       .def_ro("width", &Camera::width_px)
-      .def_ro("height", &Camera::height_px);
+      .def_ro("height", &Camera::height_px)
+      .def("__repr__", [](const Camera& c) {
+        return fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})", c.fx_px,
+                           c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px);
+      });
 }
 
 void bind_options(nb::module_& module) {
@@ -166,7 +171,13 @@ void bind_result(nb::module_& module) {
           "Of log(metres per unit)")
       .def_prop_ro(
           "camera", [](const Result& r) { return r.frame.camera; }, "With what was learnt so far")
-      .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; });
+      .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; })
+      .def("__repr__", [](const Result& r) {
+        const auto& at = r.frame.world_from_camera.translation;
+        return fmt::format("Result({}, {} of {} inliers, at {:.3f} {:.3f} {:.3f})",
+                           to_string(r.frame.state), r.frame.num_inliers, r.frame.num_matches,
+                           at.x(), at.y(), at.z());
+      });
 }
 
 Config config_of(const nb::object& options) {
@@ -202,7 +213,7 @@ void bind_odometry(nb::module_& module) {
   nb::class_<SafeOdometry>(module, "Odometry", "Images in, poses out, one at a time")
       .def("__init__", &make_odometry, "camera"_a, "options"_a = nb::none(),
            nb::sig("def __init__(self, camera: Camera | Recording | FrameView, "
-                   "options: Options | dict[str, object] | None = None) -> None"),
+                   "options: Options | dict[str, typing.Any] | None = None) -> None"),
            "A Recording or a FrameView brings its mask and its camera's height with it")
       .def_prop_ro("scale_source", &SafeOdometry::scale_source,
                    "scale.source; 'none': the path is up to scale")

@@ -127,6 +127,15 @@ void bind_recording(nb::module_& module) {
            nb::sig("def __getitem__(self, index: int) -> "
                    "tuple[numpy.typing.NDArray[numpy.uint8] | None, float]"),
            "Image (RGB, or gray) and time; None and a warning: it cannot be read")
+      .def(
+          "__iter__", [](nb::handle self) { return nb::steal(PySeqIter_New(self.ptr())); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator["
+                  "tuple[numpy.typing.NDArray[numpy.uint8] | None, float]]"))
+      .def("__repr__",
+           [](const FrameSource& s) {
+             return fmt::format("Recording({} frames, {}x{})", s.size(), s.camera().width_px,
+                                s.camera().height_px);
+           })
       .def_prop_ro("camera", [](const FrameSource& s) { return s.camera(); })
       .def_prop_ro("camera_height_m", [](const FrameSource& s) { return s.camera_height_m(); })
       .def_prop_ro(

@@ -14,7 +14,7 @@ cp CHANGELOG.md "$PAGES/changelog.md"
 cp CONTRIBUTING.md "$PAGES/contributing.md"
 cp examples/README.md "$PAGES/examples.md"
 # Links as they are in the repository, to pages of the site; files that are no pages are named only.
-sed -i -E -e 's#\]\((\.\./)?docs/#](#g' -e 's#\]\((\.\./)?CHANGELOG\.md#](changelog.md#g' -e 's#\]\((\.\./)?CONTRIBUTING\.md#](contributing.md#g' \
+sed -i -E -e 's#(\]\(|<img src=")(\.\./)?docs/#\1#g' -e 's#\]\((\.\./)?CHANGELOG\.md#](changelog.md#g' -e 's#\]\((\.\./)?CONTRIBUTING\.md#](contributing.md#g' \
   -e 's#\]\((\.\./)?examples/README\.md#](examples.md#g' -e 's#\]\((\.\./)?README\.md#](index.md#g' \
   -e 's#\[([^]]*)\]\((\.\./)?(config|examples|bench|tests|tools|src|include|models|ci)/[^)]*\)#\1#g' \
   -e 's#\[([^]]*)\]\([a-z_]+\.(cpp|py|txt)\)#\1#g' "$PAGES"/*.md
@@ -26,4 +26,8 @@ if grep -rlE '<(script|link|img)[^>]+(src|href)="(https?:)?//' build/docs --incl
   echo "docs: the pages above fetch something from the network" >&2
   exit 1
 fi
+# mkdocs looks at Markdown's links only.
+while IFS=: read -r page image; do
+  [[ -s $(dirname "$page")/$image ]] || { echo "docs: $page: expected the image $image, found none" >&2; exit 1; }
+done < <(grep -roP '<img [^>]*src="\K(?!data:)[^"]+' build/docs --include='*.html' | sort -u)
 echo "docs: build/docs/index.html"

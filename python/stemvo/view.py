@@ -9,8 +9,10 @@
 import argparse
 import csv
 import json
+import os
 import pathlib
 import sys
+import sysconfig
 
 import numpy as np
 
@@ -160,6 +162,15 @@ def options_of(pairs):
     return values
 
 
+def open_window(rr):
+    """The viewer of rerun-sdk stands beside this Python, which need not be on PATH."""
+    os.environ["PATH"] = os.pathsep.join([sysconfig.get_path("scripts"), os.environ.get("PATH", "")])
+    try:
+        rr.spawn()
+    except RuntimeError as error:
+        raise ValueError(f"rerun: {str(error).splitlines()[0]} Give --save FILE.rrd and open that file elsewhere.") from None
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m stemvo.view", description=__doc__.partition("\n")[0])
     parser.add_argument("result", nargs="?", type=pathlib.Path, metavar="RESULT", help="the --out of `stemvo run`")
@@ -180,9 +191,11 @@ def main(arguments=None):
         def open_recording(frames=None):
             return stemvo.read_recording(folder, given.camera, frames=frames) if folder else None
 
-        rr.init("stemvo", spawn=given.save is None)
+        rr.init("stemvo")
         if given.save:
             rr.save(given.save)
+        else:
+            open_window(rr)
         if given.live:
             show_live(rr, open_recording(), options_of(given.set))
         else:

@@ -117,6 +117,8 @@ try_cmake() {
   inside chown -R someone /home/someone/poses
   as_someone "cmake -S poses -B built >/dev/null && cmake --build built >/dev/null && built/poses car/sequences/00/image_2/*.png" >"$WORK/positions"
   [[ $(wc -l <"$WORK/positions") == 4 ]] || { echo "expected 4 positions, found:"; cat "$WORK/positions"; exit 1; }
+  grep -oP '`\Kg\+\+ [^`]*pkg-config[^`]*' "$SOURCE/README.md" >"$HOME_DIR/poses/without_cmake"
+  as_someone "cd poses && sh -e without_cmake && ./poses ../car/sequences/00/image_2/*.png" | cmp - "$WORK/positions"
 }
 
 remove

@@ -63,11 +63,16 @@ if(NOT count EQUAL 4 OR NOT last MATCHES " ([0-9.]+)\n$" OR CMAKE_MATCH_1 LESS 1
   message(FATAL_ERROR "images_to_poses: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
 endif()
 
-# The same program by pkg-config, whose output the shell splits at spaces.
+# The same program by README's command, whose output of pkg-config the shell splits at spaces.
 file(CREATE_LINK "${prefix}" "${work}/prefix" SYMBOLIC)
 set(ENV{PKG_CONFIG_PATH} "${work}/prefix/lib/pkgconfig")
-run("compile with pkg-config" sh -c "c++ -std=c++20 '${examples}/images_to_poses.cpp' -o '${work}/by_pkg_config' $(pkg-config --cflags --libs stemvo) -lopencv_imgcodecs")
-run("images_to_poses by pkg-config" "${work}/by_pkg_config" ${frames})
+if(NOT readme MATCHES "`(g\\+\\+ [^`]+pkg-config[^`]+)`")
+  message(FATAL_ERROR "README.md: expected a command with pkg-config, found none")
+endif()
+set(command "${CMAKE_MATCH_1}")
+file(COPY_FILE "${examples}/images_to_poses.cpp" "${work}/main.cpp")
+run("compile with pkg-config" ${CMAKE_COMMAND} -E chdir "${work}" sh -c "${command}")
+run("images_to_poses by pkg-config" "${work}/poses" ${frames})
 if(NOT output STREQUAL positions_by_cmake)
   message(FATAL_ERROR "pkg-config: expected the same positions, found:\n${output}")
 endif()

@@ -80,6 +80,22 @@ for scale_source, factor in (("none", 2.0), ("camera_height", 1.0)):
 assert np.array_equal(logged["world/truth"][0], truth[:, :3, 3])
 """
 
+# The viewer is found beside the Python that runs, and where there is none one line says what to do.
+FOUND = """
+import os, shutil, sys, types
+from stemvo.view import open_window
+def spawn():
+    assert shutil.which("rerun").startswith(sys.prefix), shutil.which("rerun")
+    raise RuntimeError("none found\\nmore")
+os.environ["PATH"] = "/usr/bin:/bin"
+try:
+    open_window(types.SimpleNamespace(spawn=spawn))
+except ValueError as error:
+    assert "none found" in str(error) and "--save" in str(error) and "\\n" not in str(error), error
+else:
+    raise SystemExit("expected an error, found none")
+"""
+
 # Each line must raise ValueError, or what stands behind it, with one line that holds the text.
 BAD_INPUT = """
 import sys, numpy as np, stemvo
@@ -147,7 +163,7 @@ class Package(unittest.TestCase):
         cls.folder = pathlib.Path(folder.name)
         call(sys.executable, "-m", "venv", cls.folder / "venv")
         cls.python = cls.folder / "venv/bin/python"
-        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,video,view]",
+        call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,video,view]", "mypy==2.4.1",
              env={**os.environ, "PYTHONPATH": "", "CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count())})
         call(PROGRAM, "synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
 
@@ -242,6 +258,9 @@ class Package(unittest.TestCase):
     def test_the_view_is_where_the_report_is(self):
         self.run_python(FITTED)
 
+    def test_the_viewer_of_an_environment_that_is_not_active(self):
+        self.run_python(FOUND)
+
     def view(self, *arguments):
         return subprocess.run(list(map(str, [self.python, "-I", "-m", "stemvo.view", *arguments])),
                               capture_output=True, text=True, cwd=self.folder, timeout=300)
@@ -296,7 +315,8 @@ class Package(unittest.TestCase):
     def test_types(self):
         folder = pathlib.Path(self.run_python("import stemvo; print(stemvo.__path__[0])").strip())
         self.assertTrue((folder / "py.typed").exists())
-        self.assertIn("def process(self, image", (folder / "_core.pyi").read_text())
+        for block in documented.blocks("python"):
+            call(self.python, "-m", "mypy", "--strict", "--ignore-missing-imports", "-c", block.text, cwd=self.folder)
 
 
 if __name__ == "__main__":
