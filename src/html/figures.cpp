@@ -18,7 +18,6 @@ json logarithmic(const std::string& title) {
   json axis = titled(title);
   axis["type"] = "log";
   axis["tickformat"] = "~g";
-  axis["dtick"] = "D2";  // 1, 2, 5, 10, ..
   return axis;
 }
 

@@ -37,7 +37,7 @@ void add_ratios(const RobustnessReport& report, html::Page& page) {
         below.push_back(found.ratio - found.low);
       }
     }
-    traces.push_back({{"name", "over " + report.contenders[control]},
+    traces.push_back({{"name", report.contenders[control]},
                       {"mode", "markers"},
                       {"x", x},
                       {"y", y},

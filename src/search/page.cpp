@@ -122,19 +122,20 @@ std::string subtitle_of(const Results& results) {
         fmt::format("{}{} {}:{}{}", names.empty() ? "" : ", ", sequence.name, sequence.first_frame,
                     sequence.end_frame(), sequence.held_out ? " (held out)" : "");
   }
+  const bool is_behind =
+      !results.rows.empty() && results.identity.layer_of(results.rows.front().key).baseline;
   return fmt::format(
-      "{} rows; frames {}; {}", results.rows.size(), names,
-      results.identity.rungs.size() == 1 ? "every filter over every frame" : "successive halving");
+      "{} rows; frames {}; {}{}", results.rows.size(), names,
+      results.identity.rungs.size() == 1 ? "every filter over every frame" : "successive halving",
+      is_behind ? "; the baseline " + to_string(results.rows.front().key) + " ranks before it" : "");
 }
 
 }  // namespace
 
 Status write_page(const Results& results, const Pictures& pictures, const std::string& table) {
-  const bool has_best =
-      !results.rows.empty() && results.rows.front().status == FilterStatus::kRanked;
-  html::Page page(
-      has_best ? "Best filter: " + to_string(results.rows.front().key) : std::string("Search"),
-      subtitle_of(results));
+  const ShownFilters shown = choose_rows(results.identity, results.rows);
+  html::Page page(shown.empty() ? "Search" : "Best filter: " + to_string(shown.front().second->key),
+                  subtitle_of(results));
   add_ranking(results, page);
   add_scatter(results, page);
   if (pictures.ground_truth) {

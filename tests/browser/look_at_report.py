@@ -39,6 +39,24 @@ def middle_of_path(page):
     }})()""")
 
 
+def swipe(page):
+    """How far the page is scrolled by a finger that goes up over each figure, down at the page's end."""
+    client = page.context.new_cdp_session(page)
+    moved = []
+    for figure in page.locator(".figure").all():
+        figure.evaluate("(div) => scrollTo(0, div.getBoundingClientRect().top + scrollY - 150)")
+        box, before = figure.bounding_box(), page.evaluate("scrollY")
+        way = 10 if page.evaluate("scrollY + 2 * innerHeight") > page.evaluate("document.body.scrollHeight") else -10
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        client.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [{"x": x, "y": y}]})
+        for step in range(1, 11):
+            client.send("Input.dispatchTouchEvent", {"type": "touchMove", "touchPoints": [{"x": x, "y": y + way * step}]})
+        client.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        page.wait_for_timeout(200)
+        moved.append(abs(page.evaluate("scrollY") - before))
+    return moved
+
+
 def use(page, found):
     """What a page with a slider over frames does by keyboard, mouse and wheel."""
     page.focus(SLIDER)
@@ -57,7 +75,7 @@ def use(page, found):
         page.wait_for_timeout(200)
     found["zoom"] = [before, x_range(page)]
 
-    page.locator("section", has=page.locator("h2", has_text="Error over distance")).locator(".figure").hover()
+    page.locator("section", has=page.locator("h2", has_text="Time per stage")).locator(".figure").hover()
     before = page.evaluate("scrollY")
     page.mouse.wheel(0, 100)
     page.wait_for_timeout(200)
@@ -73,6 +91,15 @@ def look(browser, report, screenshot):
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
     found["categories"] = page.locator(".xtick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    found["log_ticks"] = page.evaluate("""figures.flatMap(({ div }) => Object.keys(div._fullLayout)
+        .filter((key) => /^[xy]axis/.test(key) && div._fullLayout[key].type === "log")
+        .map((key) => div.querySelectorAll("." + key[0] + "tick text").length))""")
+    found["colours"] = page.evaluate("""(() => {
+        const colours = {};
+        for (const { div } of figures)
+            for (const { name, type, line, marker } of div._fullData)
+                (colours[name] ??= []).push(type === "bar" || !line ? marker.color : line.color);
+        return Object.fromEntries(Object.entries(colours).map(([name, found]) => [name, [...new Set(found)]])); })()""")
     found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     if page.locator(SLIDER).is_visible():
         use(page, found)
@@ -86,6 +113,7 @@ def look(browser, report, screenshot):
     found["buttons_over_legend"] = page.evaluate("""figures.filter(({ div }) => {
         const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
         return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
+    found["swiped"] = swipe(page)
     page.close()
     return found
 

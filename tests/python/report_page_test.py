@@ -4,6 +4,7 @@
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -43,6 +44,9 @@ class ReportPage(unittest.TestCase):
         self.assertNotEqual(found["light"], found["dark"])
         self.assertLessEqual(found["phone_width"], 380)
         self.assertEqual(found["buttons_over_legend"], 0)
+        self.assertTrue(all(count > 1 for count in found["log_ticks"]), found["log_ticks"])
+        self.assertTrue(all(len(colours) == 1 for colours in found["colours"].values()), found["colours"])
+        self.assertTrue(all(moved > 20 for moved in found["swiped"]), found["swiped"])
 
     def test_search(self):
         out = self.folder / "search"
@@ -53,6 +57,17 @@ class ReportPage(unittest.TestCase):
         self.assertEqual(found["headings"], ["Filters by rank", "Error and matches", "Paths from above", "Channels", "All filters", "Command",
                                              "Configuration of all rows"])
         self.assertEqual(len(found["images"]), 1)
+
+    def test_a_recording_without_ground_truth(self):
+        images = self.folder / "plain"
+        shutil.copytree(self.folder / "drive/sequences/00/image_2", images)
+        (self.folder / "camera.yaml").write_text("resolution: [620, 188]\nintrinsics: [359, 359, 303, 92]\ndistortion_model: none\nrate_hz: 10\n")
+        call("run", images, "--camera", self.folder / "camera.yaml", "--out", self.folder / "plain_result", "--quiet")
+        found = look_at(self.folder / "plain_result/report.html")
+        self.expect_a_sound_page(found)
+        self.assertIn("Path from above", found["headings"])
+        self.assertNotIn("Error over distance", found["headings"])
+        self.assertIn("Command", found["headings"])
 
     def test_benchmark(self):
         out = self.folder / "benchmark"
