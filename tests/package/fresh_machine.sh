@@ -19,13 +19,13 @@ make_root() {
   # Debian's debootstrap has neither Ubuntu's newer names nor its keys.
   [[ -e /usr/share/debootstrap/scripts/$RELEASE ]] || more=("$(sed -n '/old-releases/d; s/.*default_mirror //p' /usr/share/debootstrap/scripts/gutsy | head -n 1)" gutsy)
   debootstrap --variant=minbase ${more:+--no-check-gpg --components=main,universe} "$RELEASE" "$ROOT" "${more[@]}" >"$ROOT.log" || { tail "$ROOT.log"; exit 1; }
-  cp -r /etc/apt/apt.conf.d /etc/apt/apt.conf "$ROOT/etc/apt/" 2>/dev/null || true  # a proxy, where there is one
-  cp /etc/resolv.conf /etc/hosts "$ROOT/etc/"
-  cp /etc/ssl/certs/ca-certificates.crt "$ROOT/root/certificates.crt"
 }
 
 mkdir -p "$2"
 [[ -d $ROOT ]] || make_root
+cp -r /etc/apt/apt.conf.d /etc/apt/apt.conf "$ROOT/etc/apt/" 2>/dev/null || true  # a proxy, where there is one
+cp /etc/resolv.conf /etc/hosts "$ROOT/etc/"
+cp /etc/ssl/certs/ca-certificates.crt "$ROOT/root/certificates.crt"
 mount -t proc proc "$ROOT/proc"
 inside apt-get update >/dev/null
 inside env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends git make >"$ROOT.log" 2>&1 || { tail "$ROOT.log"; exit 1; }
