@@ -49,8 +49,8 @@ Expected<int> draw(ChannelArguments& arguments) {
 void add_options(CLI::App& command, ChannelArguments& arguments) {
   arguments.request.frames = FrameRangeRequest{0, 1};
   command
-      .add_option("SEQUENCE_DIR", arguments.request.sequence_dir,
-                  "Sequence in KITTI's layout; with --camera, images")
+      .add_option("INPUT", arguments.request.sequence_dir,
+                  "A recording: a folder, a video, a pattern of images (see 'stemvo run --help')")
       ->required()
       ->type_name("");
   add_out_folder(command, arguments.request.out_dir, "Folder for the images; created");
@@ -59,7 +59,7 @@ void add_options(CLI::App& command, ChannelArguments& arguments) {
   add_range_option(command, "--filters", arguments.request.filters,
                    "Filters A to B-1; default: all");
   add_file_option(command, "--camera", arguments.request.camera_file,
-                  "SEQUENCE_DIR is a folder of images or a pattern (see 'stemvo run --help')");
+                  "Camera file of a recording that holds none");
   add_config_options(command, arguments.config);
 }
 

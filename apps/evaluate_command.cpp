@@ -20,8 +20,8 @@ trajectories are moved to start at the identity; nothing else is fitted unless -
 Examples:
   stemvo evaluate --gt kitti/poses/03.txt result/trajectory_kitti.txt
   stemvo evaluate --gt mav0/state_groundtruth_estimate0/data.csv result/trajectory_tum.txt --align sim3
-  stemvo evaluate --gt kitti/poses/03.txt a.txt b.txt --align sim3 --json numbers.json
-  stemvo evaluate --gt kitti/poses/03.txt a.txt --json - | jq .estimates[0].t_rel_percent)";
+  stemvo evaluate --gt kitti/poses/03.txt a.txt b.txt --align sim3 --json > numbers.json
+  stemvo evaluate --gt kitti/poses/03.txt a.txt --json | jq .estimates[0].t_rel_percent)";
 
 struct EvaluateArguments {
   EvaluationRequest request;
@@ -30,21 +30,12 @@ struct EvaluateArguments {
 
 Expected<int> evaluate(EvaluateArguments& arguments) {
   arguments.request.alignment = parse_alignment(arguments.alignment).value();
-  if (arguments.request.json == "-") {
-    arguments.request.json.reset();
-    choose_json();
-  }
   const Expected<EvaluationReport> report = evaluate_files(arguments.request);
   if (!report) {
     return report.error();
   }
   print(format_evaluation_table(*report));
   print_json(evaluation_document(*report));
-  if (arguments.request.json) {
-    if (const Status status = write_evaluation_json(*arguments.request.json, *report); !status) {
-      return status.error();
-    }
-  }
   return kExitDone;
 }
 
@@ -63,8 +54,6 @@ void add_options(CLI::App& command, EvaluateArguments& arguments) {
   add_tolerance_option(command, arguments.request.tolerance_s);
   add_file_option(command, "--camera", arguments.request.camera_file,
                   "With EuRoC's poses: the camera file with T_BS");
-  add_file_option(command, "--json", arguments.request.json,
-                  "Write the numbers to this file as well; -: to standard output, alone");
 }
 
 }  // namespace

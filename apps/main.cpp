@@ -87,10 +87,8 @@ int run_program(int argc, char** argv) {
                          add_models, add_benchmark, add_robustness, add_search}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
-    if (command->get_option_no_throw("--json") == nullptr) {  // evaluate's takes a file
-      command->add_flag_callback("--json", choose_json,
-                                 "The result as one JSON document on standard output");
-    }
+    command->add_flag_callback("--json", choose_json,
+                               "The result as one JSON document on standard output");
   }
   app.require_subcommand(0, 1);
   try {

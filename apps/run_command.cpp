@@ -130,8 +130,9 @@ void add_options(CLI::App& command, RunArguments& arguments) {
   add_file_option(command, "--gt", request.ground_truth,
                   "Ground truth: poses in KITTI's, TUM's or EuRoC's format");
   add_tolerance_option(command, request.ground_truth_tolerance_s);
-  add_file_option(command, "--camera", request.camera_file,
-                  "Camera file; INPUT may be any folder of images or a pattern (see below)");
+  add_file_option(
+      command, "--camera", request.camera_file,
+      "Camera file; INPUT may be any folder of images, a pattern or a video (see below)");
   add_file_option(command, "--times", request.times,
                   "Of images: a time in seconds per image; default: the camera's rate_hz");
   add_file_option(command, "--calib", request.calibration,

@@ -37,11 +37,10 @@ def error_percent(contest, row):
         return None
     begin, _ = frame_range(contest.options.frames)
     lines = contest.truth.read_text(encoding="utf-8").splitlines()[begin:begin + contest.frames[row.name]]
-    truth, numbers = contest.scratch / "truth.txt", contest.scratch / "numbers.json"
+    truth = contest.scratch / "truth.txt"
     truth.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    subprocess.run([contest.options.program, "evaluate", "--gt", truth, contest.trajectory(row), "--json", numbers], check=True,
-                   stdout=subprocess.DEVNULL)
-    return json.loads(numbers.read_text(encoding="utf-8"))["estimates"][0]["t_rel_percent"]
+    done = subprocess.run([contest.options.program, "evaluate", "--gt", truth, contest.trajectory(row), "--json"], check=True, stdout=subprocess.PIPE)
+    return json.loads(done.stdout)["estimates"][0]["t_rel_percent"]
 
 
 def lengths(contest, row):

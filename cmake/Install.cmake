@@ -19,6 +19,7 @@ if(TARGET stemvo_app)
   set_target_properties(stemvo_app PROPERTIES INSTALL_RPATH "$ORIGIN/${runtime_from_bin}")
   install(TARGETS stemvo_app)
   install(TARGETS stemvo_video LIBRARY DESTINATION ${runtime_dir})
+  install(FILES third_party/plotly/LICENSE.txt DESTINATION share/doc/stemvo/plotly)  # which the program writes into reports
 endif()
 
 # ONNX Runtime under its own name, and a link for its SONAME: older releases carry the whole version

@@ -11,6 +11,8 @@ if(TARGET stemvo_app)
   install(FILES cmake/package/completions.fish DESTINATION share/fish/vendor_completions.d RENAME stemvo.fish)
 endif()
 
+install(FILES cmake/package/copyright DESTINATION share/doc/stemvo)
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "stemvo's authors")
 set(CPACK_STRIP_FILES ON)

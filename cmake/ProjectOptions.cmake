@@ -2,7 +2,7 @@
 option(STEMVO_WARNINGS_AS_ERRORS "Treat warnings as errors (set by the presets)" OFF)
 option(STEMVO_SANITIZE "Address and undefined-behaviour sanitizers" OFF)
 option(STEMVO_SANITIZE_THREAD "Thread sanitizer; of the tests only those of work in several threads are built" OFF)
-option(STEMVO_FUZZ "Build tests/fuzz (clang's libFuzzer) in place of the other tests" OFF)
+option(STEMVO_FUZZ "Build tests/fuzz (clang's libFuzzer) beside the other tests" OFF)
 
 add_library(stemvo_options INTERFACE)
 target_compile_options(stemvo_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor

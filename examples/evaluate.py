@@ -8,7 +8,7 @@ import json
 import subprocess
 import sys
 
-done = subprocess.run(["stemvo", "evaluate", "--gt", *sys.argv[1:], "--align", "sim3", "--json", "-"], stdout=subprocess.PIPE, check=False)
+done = subprocess.run(["stemvo", "evaluate", "--gt", *sys.argv[1:], "--align", "sim3", "--json"], stdout=subprocess.PIPE, check=False)
 if done.returncode != 0:
     sys.exit(done.returncode)  # stemvo has said why
 for estimate in json.loads(done.stdout)["estimates"]:

@@ -36,6 +36,8 @@ Error refuse(const fs::path& path) {
       "TUM's (rgb.txt), camera.yaml beside images, or --camera FILE, found neither";
   if (dataset::is_pattern(path)) {
     problem = "expected --camera FILE beside a pattern, found none";
+  } else if (dataset::is_image_file(path)) {
+    problem = "expected a recording, found one image; give its folder, or a quoted pattern";
   } else if (is_bag(path)) {
     problem =
         "expected a recording, found a ROS bag; 'python -m stemvo.bag BAG FOLDER' makes one of it";
@@ -131,7 +133,7 @@ std::optional<int> dataset::camera_number(const fs::path& path) {
 
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
-  if (is_file(path) && is_bag(path)) {
+  if (is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
     return refuse(path);
   }
   const bool is_stream = dataset::camera_number(path) || is_file(path);

@@ -52,18 +52,18 @@ bool comes_before(std::string_view a, std::string_view b) {
   return std::make_tuple(sort_key(a), a) < std::make_tuple(sort_key(b), b);
 }
 
-bool matches_pattern(std::string_view name, std::string_view pattern) {
-  std::string escaped;  // brackets and backslashes stand for themselves
-  for (const char c : pattern) {
-    escaped += c == '[' || c == '\\' ? "\\" : "";
-    escaped += c;
-  }
-  return fnmatch(escaped.c_str(), std::string(name).c_str(), 0) == 0;
+bool matches_pattern(const std::string& name, const std::string& pattern) {
+  return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+}
+
+bool is_image_file(const fs::path& file) {
+  std::error_code code;
+  return has_image_name(file) && fs::is_regular_file(file, code);
 }
 
 bool is_pattern(const fs::path& path) {
   std::error_code code;
-  return path.string().find_first_of("*?") != std::string::npos && !fs::exists(path, code);
+  return path.string().find_first_of("*?[") != std::string::npos && !fs::exists(path, code);
 }
 
 Expected<Listing> list_images(const fs::path& given) {
@@ -74,12 +74,13 @@ Expected<Listing> list_images(const fs::path& given) {
     pattern = given.filename().string();
   }
   if (is_pattern(result.folder)) {
-    return fail(fmt::format("{}: expected * and ? in the last part only, found them in '{}'",
+    return fail(fmt::format("{}: expected *, ? and [..] in the last part only, found them in '{}'",
                             given.string(), result.folder.string()));
   }
   if (!is_folder(result.folder)) {
-    return fail(fmt::format("{}: expected a folder of images or a pattern with * or ?, found none",
-                            result.folder.string()));
+    return fail(
+        fmt::format("{}: expected a folder of images or a pattern with *, ? or [..], found none",
+                    result.folder.string()));
   }
   const auto found = list_folder(result.folder);
   if (!found) {

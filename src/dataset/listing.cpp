@@ -62,15 +62,19 @@ Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing
   return listing;
 }
 
-/// The folder with data.csv of the camera, if it is EuRoC's.
+/// The folder with data.csv of the camera, if it is EuRoC's; one of the two files may be missing
+/// where the folder's name says what it is.
 std::optional<fs::path> find_euroc_camera(const fs::path& folder) {
-  for (const char* inside : {"mav0/cam0", "cam0", ""}) {
-    const fs::path camera = *inside == '\0' ? folder : folder / inside;
-    if (is_there(camera / "data.csv") && is_there(camera / "sensor.yaml")) {
-      return absolute_folder(camera);
+  const auto has = [&](const fs::path& inside, const char* file) {
+    return is_there(folder / inside / file);
+  };
+  for (const char* inside : {"mav0/cam0", "cam0"}) {
+    if (has(inside, "data.csv") || has(inside, "sensor.yaml")) {
+      return absolute_folder(folder / inside);
     }
   }
-  return std::nullopt;
+  return has("", "data.csv") && has("", "sensor.yaml") ? std::optional(absolute_folder(folder))
+                                                       : std::nullopt;
 }
 
 Expected<Listing> list_euroc(const fs::path& camera) {

@@ -38,10 +38,12 @@ struct Listing {
 /// wildcards elsewhere than in the last part; none found.
 [[nodiscard]] Expected<Listing> list_images(const std::filesystem::path& folder_or_pattern);
 
-/// Whether this is no path that exists and has * or ?.
+/// A file whose name says that it is an image.
+[[nodiscard]] bool is_image_file(const std::filesystem::path& file);
+/// Whether this is no path that exists and has *, ? or [.
 [[nodiscard]] bool is_pattern(const std::filesystem::path& path);
-/// `*` stands for any characters, `?` for one.
-[[nodiscard]] bool matches_pattern(std::string_view name, std::string_view pattern);
+/// The shell's patterns: `*` stands for any characters, `?` for one, `[0-4]` for one of these.
+[[nodiscard]] bool matches_pattern(const std::string& name, const std::string& pattern);
 /// Whether `a` comes before `b`: character by character, but whole numbers by their value, so that
 /// frame2 comes before frame10. Of equals (frame2, frame02) the order of characters decides.
 [[nodiscard]] bool comes_before(std::string_view a, std::string_view b);

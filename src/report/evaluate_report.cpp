@@ -9,8 +9,6 @@
 
 #include "dataset/ground_truth.hpp"
 #include "report/metrics_keys.hpp"
-#include "text/spared_inputs.hpp"
-#include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
 namespace stemvo {
@@ -76,16 +74,6 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 }  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
-  if (request.json) {
-    std::vector<std::filesystem::path> inputs = request.estimates;
-    inputs.push_back(request.ground_truth);
-    if (request.camera_file) {
-      inputs.push_back(*request.camera_file);
-    }
-    if (const Status status = check_spares_inputs({*request.json}, inputs); !status) {
-      return status.error();
-    }
-  }
   const auto truth = dataset::read_truth(request.ground_truth, request.camera_file);
   if (!truth) {
     return truth.error();
@@ -153,10 +141,6 @@ nlohmann::ordered_json evaluation_document(const EvaluationReport& report) {
   }
   json["zero_motion"] = row_json(report.zero_motion);
   return json;
-}
-
-Status write_evaluation_json(const std::filesystem::path& file, const EvaluationReport& report) {
-  return write_text_file(file, to_text(evaluation_document(report)));
 }
 
 Expected<Alignment> parse_alignment(const std::string& text) {

@@ -23,8 +23,7 @@ struct EvaluationRequest {
   Alignment alignment = Alignment::kNone;
   double tolerance_s = kTimeTolerance_s;  ///< between a pose and its true one
   std::optional<std::filesystem::path> camera_file =
-      std::nullopt;                                          ///< with EuRoC's: as read_truth says
-  std::optional<std::filesystem::path> json = std::nullopt;  ///< where the numbers will be written
+      std::nullopt;  ///< with EuRoC's: as read_truth says
 };
 
 /// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
@@ -46,16 +45,14 @@ struct EvaluationReport {
 
 /// Poses are matched by time (pair_by_time) where both files have times, else line by line. Both
 /// then start at the identity. Errors: those of the readers; without times another number of poses
-/// than the ground truth; with times fewer than two pairs; `json` is one of the files.
+/// than the ground truth; with times fewer than two pairs.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);
 
 /// One aligned row per estimate and the zero-motion baseline; names the alignment. Ends with a
 /// newline.
 [[nodiscard]] std::string format_evaluation_table(const EvaluationReport& report);
 /// The same as JSON: {ground_truth, poses, alignment, estimates: [{file, t_rel_percent, ...}],
-/// zero_motion: {...}}, with the keys of metrics.json. Error: the file cannot be written.
-[[nodiscard]] Status write_evaluation_json(const std::filesystem::path& file,
-                                           const EvaluationReport& report);
+/// zero_motion: {...}}, with the keys of metrics.json.
 [[nodiscard]] nlohmann::ordered_json evaluation_document(const EvaluationReport& report);
 
 /// `none`, `scale`, `se3`, `sim3`. Error: another word (lists the known ones).

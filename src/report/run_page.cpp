@@ -203,7 +203,8 @@ class RunFigures {
       steps.push_back(
           rounded((run_.estimate[i].translation - run_.estimate[i - 1].translation).norm()));
     }
-    json traces = {over_frames("length of a step", "y2", [](const FrameResult&) { return 0; })};
+    json traces =
+        json::array({over_frames("length of a step", "y2", [](const FrameResult&) { return 0; })});
     traces[0]["y"] = steps;
     add_principal_point(traces, 0, "principal point, x", "#009e73");
     add_principal_point(traces, 1, "principal point, y", "#cc79a7");

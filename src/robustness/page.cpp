@@ -55,13 +55,13 @@ void add_ratios(const RobustnessReport& report, html::Page& page) {
                  {"dragmode", "pan"},
                  {"xaxis", html::logarithmic("rotation error, times the control's")},
                  {"yaxis", {{"autorange", "reversed"}}}};
-  layout["shapes"] = {{{"type", "line"},
-                       {"yref", "paper"},
-                       {"x0", 1},
-                       {"x1", 1},
-                       {"y0", 0},
-                       {"y1", 1},
-                       {"line", {{"width", 1}, {"color", "#999999"}}}}};
+  layout["shapes"] = json::array({{{"type", "line"},
+                                   {"yref", "paper"},
+                                   {"x0", 1},
+                                   {"x1", 1},
+                                   {"y0", 0},
+                                   {"y1", 1},
+                                   {"line", {{"width", 1}, {"color", "#999999"}}}}});
   page.add_figure({"Against the controls",
                    report.contenders.front() +
                        " is better left of 1. Bars are 95 % intervals; where one holds 1 the two "

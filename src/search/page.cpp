@@ -127,7 +127,8 @@ std::string subtitle_of(const Results& results) {
   return fmt::format(
       "{} rows; frames {}; {}{}", results.rows.size(), names,
       results.identity.rungs.size() == 1 ? "every filter over every frame" : "successive halving",
-      is_behind ? "; the baseline " + to_string(results.rows.front().key) + " ranks before it" : "");
+      is_behind ? "; the baseline " + to_string(results.rows.front().key) + " ranks before it"
+                : "");
 }
 
 }  // namespace

@@ -41,9 +41,11 @@ void add_loose_leaves(
   for (int i = 0; i < count; ++i) {
     const Vec3 outward = random_direction(draw);
     const Vec3 at = centre + draw.in(0.9, 1.22) * semi.cwiseProduct(outward);
-    const Vec3 x = draw.in(0.07, 0.2) * random_direction(draw);
-    const Vec3 y =
-        draw.in(0.07, 0.2) * (0.6 * outward + random_direction(draw)).cross(x).normalized();
+    Vec3 x = random_direction(
+        draw);  // one draw a statement: in a product each compiler has its own order
+    x *= draw.in(0.07, 0.2);
+    Vec3 y = (0.6 * outward + random_direction(draw)).cross(x).normalized();
+    y *= draw.in(0.07, 0.2);
     style.light = draw.in_float(0.4, 1.7);
     const double u = draw.in(0.0, 8.0);
     scene.add_face(

@@ -68,7 +68,8 @@ try_package() {
   cp "$WORK"/stemvo_*.deb "$ROOT/tmp/package.deb"
   install /tmp/package.deb
   for file in bin/stemvo share/man/man1/stemvo.1 share/bash-completion/completions/stemvo share/zsh/vendor-completions/_stemvo \
-    share/fish/vendor_completions.d/stemvo.fish lib/libstemvo.a lib/pkgconfig/stemvo.pc lib/cmake/stemvo/stemvoConfig.cmake include/stemvo/odometry.hpp; do
+    share/fish/vendor_completions.d/stemvo.fish lib/libstemvo.a lib/pkgconfig/stemvo.pc lib/cmake/stemvo/stemvoConfig.cmake include/stemvo/odometry.hpp \
+    share/doc/stemvo/{copyright,LICENSE,plotly/LICENSE.txt,onnxruntime/LICENSE}; do
     expect_file "/usr/$file"
   done
   as_someone "stemvo --version && stemvo run drive/sequences/00 --quiet"

@@ -45,7 +45,7 @@ class Evo(unittest.TestCase):
 
     def check(self, name, kind, truth, poses, *more):
         file = self.folder / "result" / name
-        ours = {align: json.loads(output_of(PROGRAM, "evaluate", "--gt", truth, file, "--align", align, *more, "--json", "-"))["estimates"][0]
+        ours = {align: json.loads(output_of(PROGRAM, "evaluate", "--gt", truth, file, "--align", align, *more, "--json"))["estimates"][0]
                 for align in ("none", "se3", "sim3")}
         theirs = json.loads(output_of(EVO, ROOT / "tests/evo/judge.py", kind, truth, "tum" if "tum" in name else "kitti", file))
         self.assertEqual((theirs["poses"], ours["none"]["compared_poses"]), (poses, poses))

@@ -27,23 +27,6 @@ class Overwrite : public ::testing::Test {
   std::string out_ = folder_ / "out";
 };
 
-TEST_F(Overwrite, EvaluateSparesWhatItReads) {
-  const std::string truth = copy_of_poses("truth.txt");
-  const std::string estimate = copy_of_poses("estimate.txt");
-  const std::string poses = read_file(truth);
-  fs::create_symlink(truth, folder_ / "link.json");
-  fs::create_symlink("estimate.txt", folder_ / "also.txt");
-  for (const std::string& json : {truth, estimate, (folder_ / "link.json").string()}) {
-    expect_error(run_stemvo({"evaluate", "--gt", truth, folder_ / "also.txt", "--json", json}), 1,
-                 {json, "expected a file to write that is no input"});
-  }
-  EXPECT_EQ(read_file(truth), poses);
-  EXPECT_EQ(read_file(estimate), poses);
-  EXPECT_EQ(
-      run_stemvo({"evaluate", "--gt", truth, estimate, "--json", folder_ / "new.json"}).exit_code,
-      0);
-}
-
 TEST_F(Overwrite, SynthSparesWhatItDidNotRender) {
   const std::string image = read_file(sequence_ / "image_2/000003.png");
   const std::string poses = read_file(folder_ / "poses/00.txt");

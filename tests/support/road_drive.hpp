@@ -34,8 +34,9 @@ struct RoadDrive {
     SceneRandom random(11);
     std::vector<Eigen::Vector3d> points;
     for (int i = 0; i < 800; ++i) {
-      points.emplace_back(random.uniform(-12.0, 12.0), random.uniform(-4.0, 0.5),
-                          random.uniform(6.0, 60.0));
+      const double z = random.uniform(6.0, 60.0);
+      const double y = random.uniform(-4.0, 0.5);
+      points.emplace_back(random.uniform(-12.0, 12.0), y, z);
     }
     const Rigid3 step(Eigen::Quaterniond::Identity(), {0.0, 0.0, kStep_m});
     return {DriveTracks::repeat(step, num_frames), points, 0.0, 11, RoadScene().camera};

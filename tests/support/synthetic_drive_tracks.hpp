@@ -26,7 +26,8 @@ class DriveTracks {
     world_from_camera = repeat(motion, num_frames);
     for (int i = 0; i < 1500; ++i) {
       const double side = random_.uniform(-1.0, 1.0);
-      points.emplace_back(side * 12.0, random_.uniform(-4.0, 2.0), random_.uniform(5.0, 60.0));
+      const double z = random_.uniform(5.0, 60.0);
+      points.emplace_back(side * 12.0, random_.uniform(-4.0, 2.0), z);
     }
     observe_all();
   }
@@ -119,7 +120,7 @@ class DriveTracks {
       }
       const Eigen::Vector2d uv = camera.project(x);
       if (is_inside(camera, uv)) {
-        const Eigen::Vector2d noise(random_.normal(noise_px_), random_.normal(noise_px_));
+        const Eigen::Vector2d noise = random_.noise(noise_px_);
         seen.emplace(static_cast<int>(i), uv + noise);
       }
     }
@@ -140,8 +141,9 @@ inline std::vector<Eigen::Vector3d> points_along(const std::vector<Rigid3>& path
     const auto at =
         static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(path.size()) - 1e-6));
     const double side = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
-    const Eigen::Vector3d in_camera(side * random.uniform(3.0, 14.0), random.uniform(-4.0, 1.6),
-                                    random.uniform(5.0, 60.0));
+    const double z = random.uniform(5.0, 60.0);
+    const double y = random.uniform(-4.0, 1.6);
+    const Eigen::Vector3d in_camera(side * random.uniform(3.0, 14.0), y, z);
     points.push_back(path[at] * in_camera);
   }
   return points;

@@ -50,6 +50,11 @@ class SceneRandom {
     return std::uniform_real_distribution<double>(low, high)(engine_);
   }
   double normal(double sigma) { return sigma * std::normal_distribution<double>()(engine_); }
+  // One draw a statement: among the arguments of a call each compiler has its own order.
+  Eigen::Vector2d noise(double sigma) {
+    const double y = normal(sigma);
+    return {normal(sigma), y};
+  }
   Eigen::Vector3d direction() {
     Eigen::Vector3d v;
     do {
@@ -61,7 +66,9 @@ class SceneRandom {
     return {uniform(0.0, camera.width_px - 1.0), uniform(0.0, camera.height_px - 1.0)};
   }
   Rigid3 motion(double max_rotation_rad) {
-    return {so3_exp(uniform(0.0, max_rotation_rad) * direction()), direction()};
+    const Eigen::Vector3d axis = direction();
+    const double angle_rad = uniform(0.0, max_rotation_rad);
+    return {so3_exp(angle_rad * axis), direction()};
   }
 
  private:
@@ -78,9 +85,7 @@ inline void add_match(const SceneOptions& options,
                       const Eigen::Vector3d& point,
                       SceneRandom& random,
                       Scene& scene) {
-  const auto noise = [&] {
-    return Eigen::Vector2d(random.normal(options.noise_px), random.normal(options.noise_px));
-  };
+  const auto noise = [&] { return random.noise(options.noise_px); };
   const bool outlier = random.uniform(0.0, 1.0) < options.outlier_ratio;
   const Eigen::Vector2d cur = scene.camera.project(scene.cur_from_prev * point);
   scene.points_in_prev.push_back(point);
@@ -97,8 +102,8 @@ inline Scene make_scene(const SceneOptions& options) {
   scene.cur_from_prev = options.cur_from_prev.value_or(random.motion(options.max_rotation_rad));
   if (options.planar) {
     // Tilted by up to 45 degrees against the image plane.
-    scene.plane_normal =
-        (Eigen::Vector3d::UnitZ() + random.uniform(0.2, 0.9) * random.direction()).normalized();
+    const Eigen::Vector3d tilt = random.direction();
+    scene.plane_normal = (Eigen::Vector3d::UnitZ() + random.uniform(0.2, 0.9) * tilt).normalized();
     scene.plane_distance = random.uniform(options.min_depth, 0.5 * options.max_depth);
   }
   const int max_attempts = 100 * options.num_points;

@@ -45,7 +45,8 @@ TEST(Pattern, StarsAndQuestionMarks) {
   EXPECT_TRUE(matches_pattern("frame_12.png", "frame_??.png"));
   EXPECT_TRUE(matches_pattern("a.b.png", "*.png"));
   EXPECT_TRUE(matches_pattern("aab", "*ab"));
-  EXPECT_TRUE(matches_pattern("a[1].png", "a[1].*")) << "brackets stand for themselves";
+  EXPECT_TRUE(matches_pattern("frame_12.png", "frame_[0-2][1-3].png"));
+  EXPECT_FALSE(matches_pattern("frame_12.png", "frame_[3-9]*"));
   EXPECT_FALSE(matches_pattern("frame_12.png", "frame_?.png"));
   EXPECT_FALSE(matches_pattern("frame_12.png", "right_*"));
   EXPECT_FALSE(matches_pattern("frame_12.png", "*.jpg"));
@@ -87,6 +88,7 @@ TEST_F(ImageList, ImagesOfAPattern) {
   }
   EXPECT_THAT(names(folder_ / "left_*"), ElementsAre("left_9.png", "left_10.png"));
   EXPECT_THAT(names(folder_ / "*_?.png"), ElementsAre("left_9.png", "right_9.png"));
+  EXPECT_THAT(names(folder_ / "[l-m]*_[8-9].png"), ElementsAre("left_9.png"));
   EXPECT_THAT(error_of(folder_ / "up_*.png"), HasSubstr("up_*.png: expected images"));
 }
 
@@ -100,8 +102,10 @@ TEST_F(ImageList, AFolderWhoseNameHasWildcardsIsAFolder) {
 TEST_F(ImageList, Problems) {
   EXPECT_THAT(error_of(folder_ / "none"), HasSubstr("none: expected a folder of images"));
   EXPECT_THAT(error_of(folder_ / "none" / "*.png"), HasSubstr("none: expected a folder of images"));
-  EXPECT_THAT(error_of(folder_ / "*" / "a.png"), HasSubstr("expected * and ? in the last part"));
-  EXPECT_THAT(error_of(folder_ / "*" / "*.png"), HasSubstr("expected * and ? in the last part"));
+  EXPECT_THAT(error_of(folder_ / "*" / "a.png"),
+              HasSubstr("expected *, ? and [..] in the last part"));
+  EXPECT_THAT(error_of(folder_ / "*" / "*.png"),
+              HasSubstr("expected *, ? and [..] in the last part"));
   EXPECT_THAT(error_of(folder_.path()), HasSubstr("expected images (.png, .jpg, .jpeg), found"));
   EXPECT_THAT(error_of(folder_.file("a.png", "x")), HasSubstr("expected a folder of images"));
 }

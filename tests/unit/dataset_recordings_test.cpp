@@ -242,6 +242,19 @@ TEST_F(Recordings, WhatIsNoVideoOrOfAnotherSizeIsRefused) {
   EXPECT_THAT(error_of(video), HasSubstr("--times"));
 }
 
+TEST_F(Recordings, WhatIsMissingOrMeantIsSaid) {
+  const fs::path folder = write_euroc();
+  fs::remove(folder / "mav0/cam0/sensor.yaml");
+  EXPECT_THAT(error_of(request(folder)), HasSubstr("cam0/sensor.yaml: cannot read"));
+  FrameSourceRequest own_camera = request(folder);
+  own_camera.camera_file = camera("");
+  EXPECT_EQ(error_of(own_camera), "(opened)");
+  FrameSourceRequest one = request(folder / "mav0/cam0/data/0.png");
+  cv::imwrite(one.sequence_dir.string(), frame(0));
+  one.camera_file = camera("");
+  EXPECT_THAT(error_of(one), HasSubstr("found one image; give its folder, or a quoted pattern"));
+}
+
 TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
   fs::rename(write_video(), temp_ / "concat:drive.avi");
   const fs::path here = fs::current_path();

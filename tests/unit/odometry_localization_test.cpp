@@ -19,7 +19,7 @@ struct Seen {
       const Eigen::Vector2d uv = random.pixel(camera);
       const Eigen::Vector3d x = random.uniform(4.0, 50.0) * camera.normalize(uv).homogeneous();
       const bool is_wrong = random.uniform(0.0, 1.0) < wrong_share;
-      const Eigen::Vector2d noise(random.normal(noise_px), random.normal(noise_px));
+      const Eigen::Vector2d noise = random.noise(noise_px);
       landmarks.points.push_back(world_from_camera * x);
       landmarks.uv.push_back(is_wrong ? random.pixel(camera) : Eigen::Vector2d(uv + noise));
     }

@@ -26,7 +26,7 @@ struct Moved {
       const Eigen::Vector2d uv = random.pixel(camera);
       const double depth_m = random.uniform(min_depth_m, 2.0 * min_depth_m);
       seen.points.push_back(world_from_camera * (depth_m * camera.normalize(uv).homogeneous()));
-      seen.uv.push_back(uv + Eigen::Vector2d(random.normal(noise_px), random.normal(noise_px)));
+      seen.uv.push_back(uv + random.noise(noise_px));
     }
   }
   [[nodiscard]] std::optional<Rigid3> turned(double min_flow_px) const {

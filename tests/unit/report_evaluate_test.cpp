@@ -175,8 +175,7 @@ TEST(EvaluateFiles, TableAndJsonSayTheSame) {
   EXPECT_THAT(table, HasSubstr("(zero motion)"));
   EXPECT_THAT(table, HasSubstr("segments of 100..800 m"));
 
-  ASSERT_TRUE(write_evaluation_json(files.folder / "out.json", *report));
-  const auto json = nlohmann::json::parse(read_all(files.folder / "out.json"));
+  const auto json = evaluation_document(*report);
   EXPECT_EQ(json["alignment"], "scale");
   EXPECT_EQ(json["poses"], 300);
   ASSERT_EQ(json["estimates"].size(), 1U);
