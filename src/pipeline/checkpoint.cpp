@@ -55,11 +55,11 @@ std::string pack(const Checkpoint& checkpoint, const std::string& identity) {
   return text.replace(0, start, first_line(std::string_view(text).substr(start)));
 }
 
-Error damaged_checkpoint(const std::filesystem::path& file) {
+Error damaged_checkpoint(const std::filesystem::path& file, const std::string& why) {
   return fail(
-      fmt::format("--resume: {}: expected a checkpoint, found damaged data; without "
+      fmt::format("--resume: {}: expected a checkpoint, found damaged data{}; without "
                   "--resume the run starts over",
-                  file.string()));
+                  file.string(), why.empty() ? why : fmt::format(" ({})", why)));
 }
 
 Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,

@@ -28,7 +28,8 @@ struct Checkpoint {
 [[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,
                                                                   const std::string& identity,
                                                                   std::size_t num_frames);
-/// .. that it is damaged.
-[[nodiscard]] Error damaged_checkpoint(const std::filesystem::path& file);
+/// .. that it is damaged. `why`: as far as it is known.
+[[nodiscard]] Error damaged_checkpoint(const std::filesystem::path& file,
+                                       const std::string& why = "");
 
 }  // namespace stemvo::pipeline
