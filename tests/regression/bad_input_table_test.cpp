@@ -84,6 +84,7 @@ std::vector<Fault> faults(const std::string& number) {
          fs::remove(file);
          fs::create_directory(file);
        }},
+      {"70 MB", [](const fs::path& file) { fs::resize_file(file, 70000000); }},
       {"missing", [](const fs::path& file) { fs::remove(file); }},
       {"loop",
        [](const fs::path& file) {
