@@ -10,9 +10,9 @@
 
 namespace stemvo::apps {
 
-/// Keeps files away from a closed standard output, a closed pipe from ending the program, and what
-/// libraries print (libpng, libjpeg) from standard error, which is ours; what ends the program says
-/// so.
+/// Keeps files away from a closed standard output (to print there is an error), a closed pipe from
+/// ending the program, and what libraries print (libpng, libjpeg) from standard error, which is
+/// ours; what ends the program says so.
 void prepare_console();
 
 /// What an exception that nobody caught means: what ran out (memory, threads, open files), else
