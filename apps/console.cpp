@@ -109,6 +109,8 @@ void print(std::string_view text) {
   }
 }
 
+void print_help(std::string_view text) { write_out(text); }
+
 void choose_json() { is_json = true; }
 
 void print_json(const nlohmann::ordered_json& document) {

@@ -21,6 +21,8 @@ void prepare_console();
 
 /// Results for people, to standard output; nothing with --json. A failure is told by flush_console.
 void print(std::string_view text);
+/// Help and version, also with --json.
+void print_help(std::string_view text);
 /// --json: what print_json gets is all of standard output.
 void choose_json();
 /// A command's result as one document; nothing without --json. Once, and not after an error.

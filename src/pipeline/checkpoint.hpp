@@ -20,8 +20,13 @@ struct Checkpoint {
 
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir);
 
-/// The file's contents. `identity`: the program and everything the results depend on.
-[[nodiscard]] std::string pack(const Checkpoint& checkpoint, const std::string& identity);
+/// The contents of the file of a Checkpoint, whose drive took `elapsed_s`; megabytes, so that none
+/// is made. `identity`: the program and everything the results depend on.
+[[nodiscard]] std::string pack(std::size_t frame,
+                               const std::string& odometry,
+                               const Drive& drive,
+                               double elapsed_s,
+                               const std::string& identity);
 
 /// Of `num_frames` frames at most. Nullopt: there is none. Error, starting with "--resume: ":
 /// damaged, or of another identity.

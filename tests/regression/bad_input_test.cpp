@@ -90,10 +90,13 @@ TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
     fs::resize_file(folder_ / name, size_MB * 1000000);
     return folder_ / name;
   };
-  for (const char* option : {"--config", "--calib", "--camera"}) {
-    const std::string file = large(std::string(option).substr(2) + ".yaml", 5);
+  for (const char* option : {"--config", "--calib"}) {
+    const std::string file = large(std::string(option).substr(2), 5);
     expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5.0 MB"});
   }
+  const std::string camera = large("camera.yaml", 5);
+  expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
+               {camera + ": expected at most 4 MB, found 5.0 MB"});
   const std::string poses = large("poses.txt", 70);
   expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70.0 MB"});
 }
