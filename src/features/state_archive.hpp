@@ -47,8 +47,8 @@ inline void load(stemvo::StateReader& archive, Mat& mat) {
   int cols = 0;
   int type = 0;
   archive(rows, cols, type);
-  stemvo::StateReader::expect(rows >= 0 && cols >= 0 && type == CV_MAT_TYPE(type) &&
-                              CV_MAT_DEPTH(type) <= CV_64F);
+  stemvo::StateReader::expect(rows >= 0 && cols >= 0 && (rows == 0) == (cols == 0) &&
+                              type == CV_MAT_TYPE(type) && CV_MAT_DEPTH(type) <= CV_64F);
   const std::size_t num_values = static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols);
   stemvo::StateReader::expect(num_values <= archive.num_left() / CV_ELEM_SIZE(type));
   mat = Mat(rows, cols, type);

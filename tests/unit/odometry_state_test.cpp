@@ -3,8 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <ctime>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -156,6 +158,24 @@ TEST_P(OdometryState, AForgedOneIsRefusedOrGoneOnFrom) {
        << " at " << at << " made " << number;
   }
   EXPECT_GT(num_refused, kNumTrials / 5) << places.size();
+}
+
+/// Found while fuzzing: the rows, each of nothing, were counted.
+TEST_P(OdometryState, AnImageOfNoColumnsIsRefused) {
+  PhasedOdometry one = odometry();
+  track(one, 0);
+  std::string state = one.state();
+  const std::array<std::int32_t, 2> size = {sequence_.camera().height_px,
+                                            sequence_.camera().width_px};
+  const std::array<std::int32_t, 2> forged = {2147483647, 0};
+  const std::size_t at =
+      state.find(std::string_view(reinterpret_cast<const char*>(size.data()), sizeof(size)));
+  ASSERT_NE(at, state.npos);
+  std::memcpy(state.data() + at, forged.data(), sizeof(forged));
+  PhasedOdometry again = odometry();
+  const std::clock_t start = std::clock();
+  EXPECT_FALSE(again.set_state(state));
+  EXPECT_LT(std::clock() - start, CLOCKS_PER_SEC / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Options,
