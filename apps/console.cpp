@@ -83,10 +83,11 @@ void prepare_console() {
   // out (backtrace(3), notes): from here on it is there.
   void* frame = nullptr;
   backtrace(&frame, 1);
-  // A file opened while descriptor 1 is closed would become standard output.
+  // A file opened while descriptor 1 is closed would become standard output. Only to be read: what
+  // is printed there fails.
   int descriptor = 0;
   do {
-    descriptor = ::open("/dev/null", O_RDWR);
+    descriptor = ::open("/dev/null", O_RDONLY);
   } while (descriptor >= 0 && descriptor <= STDERR_FILENO);
   if (descriptor >= 0) {
     ::close(descriptor);
@@ -107,6 +108,8 @@ void print(std::string_view text) {
     write_out(text);
   }
 }
+
+void print_help(std::string_view text) { write_out(text); }
 
 void choose_json() { is_json = true; }
 

@@ -10,9 +10,9 @@
 
 namespace stemvo::apps {
 
-/// Keeps files away from a closed standard output, a closed pipe from ending the program, and what
-/// libraries print (libpng, libjpeg) from standard error, which is ours; what ends the program says
-/// so.
+/// Keeps files away from a closed standard output (to print there is an error), a closed pipe from
+/// ending the program, and what libraries print (libpng, libjpeg) from standard error, which is
+/// ours; what ends the program says so.
 void prepare_console();
 
 /// What an exception that nobody caught means: what ran out (memory, threads, open files), else
@@ -21,6 +21,8 @@ void prepare_console();
 
 /// Results for people, to standard output; nothing with --json. A failure is told by flush_console.
 void print(std::string_view text);
+/// Help and version, also with --json.
+void print_help(std::string_view text);
 /// --json: what print_json gets is all of standard output.
 void choose_json();
 /// A command's result as one document; nothing without --json. Once, and not after an error.

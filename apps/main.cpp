@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <exception>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/core/utils/logger.hpp>
+#include <sys/resource.h>
 
 #include "commands.hpp"
 #include "config/config.hpp"
@@ -44,7 +46,9 @@ std::string expected_command(const CLI::App& app, const std::string& found) {
 /// Wrong usage on one line, as every other error. --help and --version are no errors.
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) {
-    app.exit(error, std::cout, std::cerr);
+    std::ostringstream help;
+    app.exit(error, help, help);
+    print_help(help.str());
     return kExitDone;
   }
   std::string command = "stemvo";
@@ -68,7 +72,23 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   return kExitUsage;
 }
 
+/// Of the main thread and, as the C library has it, of every other. OpenCV and ONNX Runtime ran
+/// with an eighth of it.
+Status check_stack() {
+  constexpr rlim_t kLeastBytes = 1U << 20U;
+  struct rlimit limit = {};
+  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kLeastBytes) {
+    return {};
+  }
+  return fail(fmt::format("out of stack: expected at least {} kB, found {} ('ulimit -s')",
+                          kLeastBytes >> 10U, limit.rlim_cur >> 10U));
+}
+
 int run_program(int argc, char** argv) {
+  if (const Status status = check_stack(); !status) {
+    print_error(status.error().message);
+    return kExitFailed;
+  }
   CLI::App app("stemvo: camera frames in, a trajectory out, seen through one learned filter.",
                "stemvo");
   app.set_version_flag("--version", "stemvo " + std::string(version()));

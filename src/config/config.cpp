@@ -34,8 +34,9 @@ std::vector<Field> fields_of(Config& config) {
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
-  const auto root = read_text_file(file).and_then(
-      [&](const std::string& text) { return config::parse_document(text, file.string()); });
+  const auto root = read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
+    return config::parse_document(text, file.string());
+  });
   if (!root) {
     return root.error();
   }

@@ -138,7 +138,7 @@ class Reader {
 
  private:
   Status read_values() {
-    Expected<std::string> text = read_text_file(file_);
+    Expected<std::string> text = read_text_file(file_, kMaxSettings_MB);
     if (!text) {
       return text.error();
     }

@@ -61,7 +61,7 @@ Expected<Camera> to_camera(const Matrix34d& p) {
 }  // namespace
 
 Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index) {
-  const auto lines = read_lines(file);
+  const auto lines = read_lines(file, kMaxSettings_MB);
   if (!lines) {
     return lines.error();
   }
@@ -78,7 +78,7 @@ Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index)
 Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
                                            const Camera& given,
                                            const Camera& refined) {
-  const auto lines = read_lines(file);
+  const auto lines = read_lines(file, kMaxSettings_MB);
   if (!lines) {
     return lines.error();
   }

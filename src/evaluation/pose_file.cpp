@@ -170,14 +170,16 @@ std::size_t nearest(std::span<const double> times_s, double time_s) {
 }  // namespace
 
 Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
-  return read_text_file(file)
+  return read_text_file(file, kMaxRows_MB)
       .and_then([&](const std::string& text) { return read_rows(file, text, Format::kKitti); })
       .map([](const PoseFile& read) { return read.poses; });
 }
 
 Expected<PoseFile> read_pose_file(const fs::path& file) {
-  Expected<PoseFile> result = read_text_file(file).and_then(
-      [&](const std::string& text) { return read_rows(file, text, format_of(text)); });
+  Expected<PoseFile> result =
+      read_text_file(file, kMaxRows_MB).and_then([&](const std::string& text) {
+        return read_rows(file, text, format_of(text));
+      });
   if (result) {
     sort_by_time(*result);
   }

@@ -128,14 +128,22 @@ void DescriptorFrontEnd::write_state(StateWriter& writer) const {
   }
 }
 
-void DescriptorFrontEnd::read_state(StateReader& reader) {
+void DescriptorFrontEnd::read_state(StateReader& reader, int num_frames) {
   bool has_image = false;
   reader(has_image, last_frame_, track_ids_, matched_, num_tracks_);
   if (has_image) {
     ChannelImage channel;
     reader(channel);
+    StateReader::expect(!channel.pixels.empty());
     last_ = std::dynamic_pointer_cast<const Described>(prepare(channel));
   }
+  constexpr int kMaxTracks = 1 << 30;
+  const std::size_t num_keypoints = has_image ? last_->uv.size() : 0;
+  StateReader::expect(last_frame_ >= (has_image ? 0 : -1) && last_frame_ < num_frames &&
+                      num_tracks_ >= 0 && num_tracks_ <= kMaxTracks &&
+                      track_ids_.size() == num_keypoints);
+  StateReader::expect(
+      std::ranges::all_of(matched_, [&](std::size_t i) { return i < num_keypoints; }));
 }
 
 }  // namespace stemvo

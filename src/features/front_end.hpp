@@ -65,8 +65,9 @@ class FrontEnd {
   virtual void look_for(TrackPoints /*expected*/) {}  // NOLINT: an override keeps it
 
   /// What it knows between process() and keep(); one of the same options goes on from there.
+  /// `num_frames`: so many were processed.
   virtual void write_state(StateWriter& writer) const = 0;
-  virtual void read_state(StateReader& reader) = 0;
+  virtual void read_state(StateReader& reader, int num_frames) = 0;
 
  protected:
   /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.

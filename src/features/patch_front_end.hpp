@@ -40,6 +40,7 @@ class PatchFrontEnd final : public PointFrontEnd {
                                                                      const View& to) override;
   void write_tracks(StateWriter& writer) const override;
   void read_tracks(StateReader& reader) override;
+  [[nodiscard]] bool has_track(int id) const override { return tracks_.contains(id); }
   [[nodiscard]] std::optional<cv::Point2f> find_again(const TrackingImage& image,
                                                       const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,

@@ -21,7 +21,7 @@ class PointFrontEnd : public FrontEnd {
   void keep(const std::vector<char>& is_good) override;
   void look_for(TrackPoints expected) override { expected_ = std::move(expected); }
   void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader) override;
+  void read_state(StateReader& reader, int num_frames) override;
 
  protected:
   /// With the pyramid that the derived class tracks on.
@@ -61,6 +61,7 @@ class PointFrontEnd : public FrontEnd {
   /// What the derived class knows of the tracks.
   virtual void write_tracks(StateWriter& /*writer*/) const {}
   virtual void read_tracks(StateReader& /*reader*/) {}
+  [[nodiscard]] virtual bool has_track(int /*id*/) const { return true; }
   /// A track that ended, near `point` of the image; nullopt: it is not there.
   [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const TrackingImage& /*image*/,
                                                               const Point& /*point*/) {
@@ -77,6 +78,7 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
   void replenish(View& view);
   void find_expected(View& view);
+  void expect_sound() const;
 
   FeatureOptions options_;
   View last_;

@@ -4,6 +4,7 @@
 // How the state of a front end becomes bytes and is made of them again, by cereal. Only source
 // files include this; a class with a state has a template `serialize` of its own.
 
+#include <algorithm>
 #include <type_traits>
 
 #include <Eigen/Core>
@@ -46,8 +47,8 @@ inline void load(stemvo::StateReader& archive, Mat& mat) {
   int cols = 0;
   int type = 0;
   archive(rows, cols, type);
-  stemvo::StateReader::expect(rows >= 0 && cols >= 0 && type == CV_MAT_TYPE(type) &&
-                              CV_MAT_DEPTH(type) <= CV_64F);
+  stemvo::StateReader::expect(rows >= 0 && cols >= 0 && (rows == 0) == (cols == 0) &&
+                              type == CV_MAT_TYPE(type) && CV_MAT_DEPTH(type) <= CV_64F);
   const std::size_t num_values = static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols);
   stemvo::StateReader::expect(num_values <= archive.num_left() / CV_ELEM_SIZE(type));
   mat = Mat(rows, cols, type);
@@ -75,10 +76,13 @@ void serialize_bytes(Archive& archive, T& value) {
 template <typename Archive>
 void serialize(Archive& archive, PixelMap& map) {
   archive(map.scale, map.offset_px);
+  StateReader::expect_of<Archive>(map.scale.minCoeff() > 1e-2 && map.scale.maxCoeff() < 1e4 &&
+                                  map.offset_px.cwiseAbs().maxCoeff() < 1e6);
 }
 template <typename Archive>
 void serialize(Archive& archive, ChannelImage& image) {
   archive(image.pixels, image.map);
+  StateReader::expect_of<Archive>(image.pixels.empty() || image.pixels.type() == CV_8UC1);
 }
 template <typename Archive>
 void serialize(Archive& archive, Patch& patch) {
@@ -96,6 +100,13 @@ template <typename Archive>
 void serialize(Archive& archive, Matches& matches) {
   archive(matches.prev_uv, matches.cur_uv, matches.track_ids, matches.prev_frame,
           matches.num_keypoints);
+  StateReader::expect_of<Archive>(matches.prev_uv.size() == matches.cur_uv.size() &&
+                                  matches.track_ids.size() == matches.cur_uv.size());
+}
+/// They are looked up by their ids.
+template <typename Archive, typename Points, typename Id>
+void expect_ordered(const Points& points, Id id) {
+  StateReader::expect_of<Archive>(std::ranges::is_sorted(points, {}, id));
 }
 
 }  // namespace stemvo

@@ -31,6 +31,11 @@ class StateReader : public cereal::InputArchive<StateReader, cereal::AllowEmptyC
       throw cereal::Exception("expected a state, found other bytes");
     }
   }
+  /// In what reads and writes alike: of what was read.
+  template <typename Archive>
+  static void expect_of(bool is_sound) {
+    expect(is_sound || !std::is_same_v<Archive, StateReader>);
+  }
 
  private:
   std::string_view rest_;

@@ -31,11 +31,24 @@ Expected<fs::path> manifest_beside(const fs::path& file) {
   return manifest;
 }
 
+/// What lies at a path that no model has.
+const char* describe_file(const fs::path& path) {
+  std::error_code ignored;
+  return !fs::exists(path, ignored)           ? "no such file"
+         : fs::is_directory(path, ignored)    ? "a folder"
+         : fs::is_regular_file(path, ignored) ? "another file"
+                                              : "a pipe or device";
+}
+
 }  // namespace
 
 Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
                                               const fs::path& models_dir) {
   const bool is_path = model.ends_with(".onnx");
+  if (!is_path && model.find('/') != model.npos) {
+    return fail(fmt::format("{}: expected the name of a model or the path of an .onnx, found {}",
+                            model, describe_file(model)));
+  }
   const auto manifest =
       is_path ? manifest_beside(model) : Expected<fs::path>(models_dir / kManifest);
   const auto entries = manifest.and_then(load_manifest);

@@ -221,8 +221,9 @@ Expected<YAML::Node> models_of(const fs::path& file, const std::string& text) {
 }  // namespace
 
 Expected<std::vector<ModelEntry>> load_manifest(const fs::path& file) {
-  const auto models =
-      read_text_file(file).and_then([&](const std::string& text) { return models_of(file, text); });
+  const auto models = read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
+    return models_of(file, text);
+  });
   if (!models) {
     return models.error();
   }

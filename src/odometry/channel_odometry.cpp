@@ -129,14 +129,21 @@ void ChannelOdometry::read_state(StateReader& reader) {
   TrackedFrame& frame = work.tracked;
   reader(num_tracked_, stretch_tracked_, frame.number, frame.has_image, frame.matches, frame.image,
          frame.road, work.times, work.problem);
+  constexpr int kMaxFrames = 1 << 30;
+  StateReader::expect(num_tracked_ > 0 && num_tracked_ <= kMaxFrames &&
+                      frame.number == num_tracked_ - 1 && frame.matches.prev_frame >= -1 &&
+                      frame.matches.prev_frame < frame.number);
+  const bool is_image = frame.image.size() == cv::Size(camera_.width_px, camera_.height_px) &&
+                        (frame.image.type() == CV_8UC1 || frame.image.type() == CV_8UC3);
+  StateReader::expect(frame.has_image == is_image && (!asks_road_ || !is_image || frame.road));
   stretch_.set_limits(stretch_tracked_);
   for (auto* image : {&work.image, &optimized_.image}) {
     ChannelImage channel;
     reader(channel);
     *image = channel.pixels.empty() ? nullptr : front_end_->prepare(channel);
   }
-  front_end_->read_state(reader);
-  estimator_->read_state(reader);
+  front_end_->read_state(reader, num_tracked_);
+  estimator_->read_state(reader, frame.number);
 }
 
 }  // namespace stemvo

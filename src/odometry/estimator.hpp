@@ -56,8 +56,9 @@ class Estimator {
   [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
 
   /// What it knows between two frames; one of the same options goes on from there.
+  /// `num_frames`: so many are optimized.
   virtual void write_state(StateWriter& writer) const = 0;
-  virtual void read_state(StateReader& reader) = 0;
+  virtual void read_state(StateReader& reader, int num_frames) = 0;
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.

@@ -53,6 +53,8 @@ class Initializer {
   void serialize(Archive& archive) {
     archive(reference_, waiting_);
   }
+  /// Of so many frames, when it was read.
+  [[nodiscard]] bool is_sound(int num_frames) const;
 
  private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as

@@ -178,6 +178,10 @@ double PairEstimator::measure_length(const TrackedFrame& frame) {
 
 void PairEstimator::write_state(StateWriter& writer) const { writer(*this); }
 
-void PairEstimator::read_state(StateReader& reader) { reader(*this); }
+void PairEstimator::read_state(StateReader& reader, int num_frames) {
+  reader(*this);
+  StateReader::expect(std::ssize(trajectory_) == num_frames && last_image_ >= -1 &&
+                      last_image_ < num_frames && chain_.is_sound(num_frames));
+}
 
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <iterator>
 #include <optional>
 
 #include <Eigen/Core>
@@ -45,6 +46,12 @@ class SelfCalibration {
   template <typename Archive>
   void serialize(Archive& archive) {
     archive(camera_, believed_, mean_, information_, num_runs_, run_);
+  }
+  /// When it was read.
+  [[nodiscard]] bool is_sound() const {
+    constexpr int kMaxRuns = 1 << 30;
+    return camera_.width_px == given_.width_px && camera_.height_px == given_.height_px &&
+           num_runs_ >= 0 && num_runs_ <= kMaxRuns && std::ssize(run_.keyframes) < kNumKeyframes;
   }
 
  private:

@@ -3,6 +3,7 @@
 
 // The same of an odometry's state.
 
+#include <cmath>
 #include <set>
 #include <string>
 #include <string_view>
@@ -49,6 +50,13 @@ void serialize(Archive& archive, Rigid3& pose) {
 template <typename Archive>
 void serialize(Archive& archive, Camera& camera) {
   serialize_bytes(archive, camera);
+  constexpr double kLargest_px = 1e9;
+  const auto is_size = [](int side) { return side > 0 && side <= kMaxImageSide_px; };
+  const auto is_focal = [](double f_px) { return f_px > 1e-9 && f_px < kLargest_px; };
+  StateReader::expect_of<Archive>(is_focal(camera.fx_px) && is_focal(camera.fy_px) &&
+                                  std::abs(camera.cx_px) < kLargest_px &&
+                                  std::abs(camera.cy_px) < kLargest_px &&
+                                  is_size(camera.width_px) && is_size(camera.height_px));
 }
 template <typename Archive>
 void serialize(Archive& archive, RoadImage::Level& level) {
@@ -57,10 +65,17 @@ void serialize(Archive& archive, RoadImage::Level& level) {
 template <typename Archive>
 void serialize(Archive& archive, RoadImage& road) {
   archive(road.pixels, road.map, road.full);
+  const auto& [camera, first_row, values] = road.full;
+  const cv::Size below(road.pixels.cols, road.pixels.rows - first_row);
+  StateReader::expect_of<Archive>(
+      !road.pixels.empty() && road.pixels.type() == CV_8UC1 && first_row >= 0 &&
+      camera.width_px == road.pixels.cols && camera.height_px == road.pixels.rows &&
+      (values.empty() || (values.type() == CV_32FC4 && values.size() == below)));
 }
 template <typename Archive>
 void serialize(Archive& archive, View& view) {
   archive(view.frame, view.world_from_camera, view.points, view.road);
+  expect_ordered<Archive>(view.points, &TrackPoint::track_id);
 }
 template <typename Archive>
 void serialize(Archive& archive, FrameBetween& frame) {
@@ -69,10 +84,20 @@ void serialize(Archive& archive, FrameBetween& frame) {
 template <typename Archive>
 void serialize(Archive& archive, Keyframe& keyframe) {
   archive(keyframe.frame, keyframe.world_from_camera, keyframe.points, keyframe.followers);
+  expect_ordered<Archive>(keyframe.points, &TrackPoint::track_id);
 }
 template <typename Archive>
 void serialize(Archive& archive, Window& window) {
   archive(window.keyframes, window.landmarks);
+  int last = -1;  // frames are counted once, in order
+  for (const Keyframe& keyframe : window.keyframes) {
+    StateReader::expect_of<Archive>(keyframe.frame > last);
+    last = keyframe.frame;
+    for (const FrameBetween& follower : keyframe.followers) {
+      StateReader::expect_of<Archive>(follower.frame > last);
+      last = follower.frame;
+    }
+  }
 }
 template <typename Archive>
 void serialize(Archive& archive, WindowMotion& motion) {

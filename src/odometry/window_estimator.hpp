@@ -33,7 +33,7 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override;
   [[nodiscard]] std::vector<MapLandmark> landmarks() const override;
   void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader) override;
+  void read_state(StateReader& reader, int num_frames) override;
 
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();

@@ -54,6 +54,8 @@ class WindowHistory {
   void serialize(Archive& archive) {
     archive(motions_, landmarks_, tracks_, scale_, scale_of_frame_, first_scaled_frame_);
   }
+  /// Of this window and so many frames, when it was read: every motion leads to a later frame.
+  [[nodiscard]] bool is_sound(const Window& window, int num_frames) const;
 
  private:
   /// What is known of a track that the window sees.

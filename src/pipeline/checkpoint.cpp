@@ -25,11 +25,7 @@ namespace pipeline {
 
 template <typename Archive>
 void serialize(Archive& archive, Drive& drive) {
-  archive(drive.frames, drive.csv, drive.images, drive.warnings, drive.elapsed_before_s);
-}
-template <typename Archive>
-void serialize(Archive& archive, Checkpoint& checkpoint) {
-  archive(checkpoint.frame, checkpoint.odometry, checkpoint.drive);
+  archive(drive.frames, drive.csv, drive.images, drive.warnings);
 }
 
 namespace {
@@ -45,21 +41,25 @@ std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir) {
   return out_dir / "checkpoint";
 }
 
-std::string pack(const Checkpoint& checkpoint, const std::string& identity) {
+std::string pack(std::size_t frame,
+                 const std::string& odometry,
+                 const Drive& drive,
+                 double elapsed_s,
+                 const std::string& identity) {
   std::ostringstream bytes;
   bytes << first_line({});  // its room
   StateWriter writer(bytes);
-  writer(identity, checkpoint);
+  writer(identity, frame, odometry, drive, elapsed_s);
   std::string text = std::move(bytes).str();  // megabytes: never twice
   const std::size_t start = text.find('\n') + 1;
   return text.replace(0, start, first_line(std::string_view(text).substr(start)));
 }
 
-Error damaged_checkpoint(const std::filesystem::path& file) {
+Error damaged_checkpoint(const std::filesystem::path& file, const std::string& why) {
   return fail(
-      fmt::format("--resume: {}: expected a checkpoint, found damaged data; without "
+      fmt::format("--resume: {}: expected a checkpoint, found damaged data{}; without "
                   "--resume the run starts over",
-                  file.string()));
+                  file.string(), why.empty() ? why : fmt::format(" ({})", why)));
 }
 
 Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,
@@ -89,7 +89,8 @@ Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path&
                       file.string()));
     }
     std::optional<Checkpoint> checkpoint(std::in_place);
-    reader(*checkpoint);
+    reader(checkpoint->frame, checkpoint->odometry, checkpoint->drive,
+           checkpoint->drive.elapsed_before_s);
     StateReader::expect(reader.num_left() == 0 && checkpoint->frame < num_frames &&
                         checkpoint->frame == checkpoint->drive.frames.size());
     return checkpoint;

@@ -20,15 +20,21 @@ struct Checkpoint {
 
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& out_dir);
 
-/// The file's contents. `identity`: the program and everything the results depend on.
-[[nodiscard]] std::string pack(const Checkpoint& checkpoint, const std::string& identity);
+/// The contents of the file of a Checkpoint, whose drive took `elapsed_s`; megabytes, so that none
+/// is made. `identity`: the program and everything the results depend on.
+[[nodiscard]] std::string pack(std::size_t frame,
+                               const std::string& odometry,
+                               const Drive& drive,
+                               double elapsed_s,
+                               const std::string& identity);
 
 /// Of `num_frames` frames at most. Nullopt: there is none. Error, starting with "--resume: ":
 /// damaged, or of another identity.
 [[nodiscard]] Expected<std::optional<Checkpoint>> read_checkpoint(const std::filesystem::path& file,
                                                                   const std::string& identity,
                                                                   std::size_t num_frames);
-/// .. that it is damaged.
-[[nodiscard]] Error damaged_checkpoint(const std::filesystem::path& file);
+/// .. that it is damaged. `why`: as far as it is known.
+[[nodiscard]] Error damaged_checkpoint(const std::filesystem::path& file,
+                                       const std::string& why = "");
 
 }  // namespace stemvo::pipeline

@@ -133,9 +133,9 @@ class DriveLoop {
 
   void keep_checkpoint(std::size_t frame, Clock::time_point now) {
     try {
-      Drive so_far = drive_;
-      so_far.elapsed_before_s += Seconds(now - run_.request.started).count();
-      checkpoint_ = pack({frame, run_.odometry.state(), std::move(so_far)}, identity_);
+      const double elapsed_s =
+          drive_.elapsed_before_s + Seconds(now - run_.request.started).count();
+      checkpoint_ = pack(frame, run_.odometry.state(), drive_, elapsed_s, identity_);
     } catch (const std::bad_alloc&) {  // NOLINT: the one before stays; the drive needs none
     }
   }
@@ -149,14 +149,15 @@ class DriveLoop {
     }
     last_files_ = Clock::now();
     // What cannot be written now is written, or reported, at the end; so is all where no thread is
-    // to be had.
+    // to be had. The future keeps what its thread does not let go.
     writing_ = std::async([out = run_.request.out_dir, csv = drive_.csv,
                            trajectory = drive_.trajectory(run_),
-                           checkpoint = std::exchange(checkpoint_, {})] {
-      static_cast<void>(write_text_file(out / "frames.csv", csv));
-      static_cast<void>(write_kitti_trajectory(out / "trajectory_kitti.txt", trajectory));
+                           checkpoint = std::exchange(checkpoint_, {})]() mutable {
+      static_cast<void>(write_text_file(out / "frames.csv", std::exchange(csv, {})));
+      static_cast<void>(
+          write_kitti_trajectory(out / "trajectory_kitti.txt", std::exchange(trajectory, {})));
       if (!checkpoint.empty()) {
-        static_cast<void>(write_text_file(checkpoint_file(out), checkpoint));
+        static_cast<void>(write_text_file(checkpoint_file(out), std::exchange(checkpoint, {})));
       }
     });
   }

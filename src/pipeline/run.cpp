@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/run.hpp"
 
+#include <exception>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
@@ -91,7 +93,9 @@ Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const Run& run,
   if (!checkpoint) {
     return checkpoint;
   }
-  if (*checkpoint && !run.odometry.set_state((*checkpoint)->odometry)) {
+  if (*checkpoint &&
+      (!run.odometry.set_state((*checkpoint)->odometry) ||
+       run.odometry.frames().estimator().trajectory().size() != (*checkpoint)->frame)) {
     return pipeline::damaged_checkpoint(file);
   }
   Status status;
@@ -178,6 +182,25 @@ void note_start(const Run& run,
   }
 }
 
+Expected<RunSummary> finish_run(const Run& run,
+                                const std::string& identity,
+                                std::optional<pipeline::Checkpoint> from,
+                                const RunProgress& progress) {
+  const RunRequest& request = run.request;
+  pipeline::Drive done = pipeline::run_drive(run, identity, std::move(from), progress);
+  if (done.frames.empty()) {
+    return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
+                            request.sequence_dir.string()));
+  }
+  MetricsReport report;
+  Status written = pipeline::write_results(run, done, report);
+  if (!done.interrupted && written) {
+    written = remove_file(pipeline::checkpoint_file(request.out_dir));
+  }
+  return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
+                    std::move(written)};
+}
+
 Expected<RunSummary> run_source(const RunRequest& request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
@@ -202,18 +225,23 @@ Expected<RunSummary> run_source(const RunRequest& request,
     recorder.emplace();
   }
   note_start(run, *checkpoint, has_earlier);
-  pipeline::Drive done = pipeline::run_drive(run, *identity, *std::move(checkpoint), progress);
-  if (done.frames.empty()) {
-    return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
-                            request.sequence_dir.string()));
+  if (!*checkpoint) {
+    return finish_run(run, *identity, std::nullopt, progress);
   }
-  MetricsReport report;
-  Status written = pipeline::write_results(run, done, report);
-  if (!done.interrupted && written) {
-    written = remove_file(pipeline::checkpoint_file(request.out_dir));
+  // Whatever the checks of a forged state did not see ends as they do.
+  const auto damaged = [&](const std::exception& error) {
+    return pipeline::damaged_checkpoint(pipeline::checkpoint_file(request.out_dir), error.what());
+  };
+  try {
+    return finish_run(run, *identity, *std::move(checkpoint), progress);
+  } catch (const std::logic_error& error) {
+    return damaged(error);
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) {
+      throw;
+    }
+    return damaged(error);
   }
-  return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
-                    std::move(written)};
 }
 
 }  // namespace

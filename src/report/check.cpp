@@ -2,6 +2,7 @@
 #include "report/check.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -25,8 +26,10 @@ std::string first_line(std::string_view text) {
 
 /// `{max: 1.0}`, `{min: 0.99}` or both under each metric's name.
 Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
-  const Expected<YAML::Node> root = read_text_file(file).and_then(
-      [&](const std::string& text) { return config::parse_document(text, file.string()); });
+  const Expected<YAML::Node> root =
+      read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
+        return config::parse_document(text, file.string());
+      });
   if (!root) {
     return fail(first_line(root.error().message));
   }
@@ -54,6 +57,8 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
                      fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
                                  bounds_node.IsScalar() ? bounds_node.Scalar() : "no bound"));
     }
+    double min = std::numeric_limits<double>::lowest();
+    double max = std::numeric_limits<double>::max();
     for (const auto& bound : bounds_node) {
       const YAML::Node& name_node = bound.first;
       const std::string name = name_node.Scalar();
@@ -66,6 +71,11 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
       const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
       if (!limit) {
         return fail_at(name_node, fmt::format("{}.{}: {}", key, name, limit.error().message));
+      }
+      (name == "max" ? max : min) = limit->front();
+      if (min > max) {
+        return fail_at(name_node,
+                       fmt::format("{}: expected min up to max, found {} and {}", key, min, max));
       }
       bounds.push_back(
           {key, name == "max", limit->front(), key_node.Mark().line + 1, std::nullopt, false});

@@ -24,7 +24,8 @@ struct ThresholdResult {
 /// dotted (`ate_rmse_m.none: {max: 3}`); min and max may stand together and are two results, in the
 /// file's order. A metric that is null fails. Errors (file, and line where there is one): file
 /// missing, not JSON, not YAML, no thresholds, a key twice, a bound other than min and max, a bound
-/// that is not a finite number, a key the metrics do not have, a metric that is not a number.
+/// that is not a finite number, min above max, a key the metrics do not have, a metric that is not
+/// a number.
 [[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(
     const std::filesystem::path& metrics_file, const std::filesystem::path& thresholds_file);
 

@@ -12,7 +12,6 @@
 namespace stemvo::search {
 namespace {
 
-constexpr double kMinTracked = 0.5;
 constexpr std::size_t kMaxPathPoints = 400;
 constexpr std::size_t kMaxDense = 400;
 /// Of the path so far; chosen among prefixes of clips (docs/search.md).
@@ -82,7 +81,7 @@ DriveScore FilterDrive::score() const {
   score.frames = num_frames();
   score.inliers = static_cast<double>(num_inliers_) / num_steps;
   score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
-  score.detected = num_frames() == 1 || *score.tracked >= kMinTracked;
+  score.detected = num_frames() == 1 || *score.tracked >= DriveScore::kMinTracked;
   score.reason = score.detected ? "" : missing_reason();
   if (outcomes_[kMeasured] > 0) {  // else the numbers would be those of the zero-motion baseline
     add_errors(score);

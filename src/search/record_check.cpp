@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+
+#include "search/race.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -21,15 +25,15 @@ constexpr std::size_t kMaxPoints = 1000;
 bool is_number(double value) { return value >= 0.0 && value <= kMaxNumber; }
 
 Status check_numbers(const DriveScore& score) {
-  for (const auto& [name, value] :
-       {std::pair("t_rel_percent", score.t_rel_percent),
-        std::pair("r_rel_deg_per_100m", score.r_rel_deg_per_100m),
-        std::pair("average_offset_m", score.average_offset_m), std::pair("E_t_m", score.E_t_m),
-        std::pair("E_r_deg", score.E_r_deg), std::pair("inliers", score.inliers),
-        std::pair("tracked", score.tracked),
-        std::pair("early_error_percent", score.early_error_percent)}) {
-    if (value && !is_number(*value)) {
-      return fail(fmt::format("{}: expected 0 to {}, found {}", name, kMaxNumber, *value));
+  for (const auto& [name, value, max] :
+       {std::tuple("t_rel_percent", score.t_rel_percent, kMaxNumber),
+        std::tuple("r_rel_deg_per_100m", score.r_rel_deg_per_100m, kMaxNumber),
+        std::tuple("average_offset_m", score.average_offset_m, kMaxNumber),
+        std::tuple("E_t_m", score.E_t_m, kMaxNumber), std::tuple("E_r_deg", score.E_r_deg, 180.0),
+        std::tuple("inliers", score.inliers, kMaxNumber), std::tuple("tracked", score.tracked, 1.0),
+        std::tuple("early_error_percent", score.early_error_percent, kMaxNumber)}) {
+    if (value && !(*value >= 0.0 && *value <= max)) {
+      return fail(fmt::format("{}: expected 0 to {}, found {}", name, max, *value));
     }
   }
   if (score.dense_t_percent.size() > kMaxPoints || score.path_xz_m.size() > kMaxPoints ||
@@ -47,21 +51,53 @@ Status check_numbers(const DriveScore& score) {
   return {};
 }
 
-Status check_score(const DriveScore& score, const SequenceIdentity& sequence) {
+/// The numbers that a drive has, and those that go with them.
+Status check_shape(const DriveScore& score, bool is_whole) {
+  const bool has_run = score.frames > 0;
+  if (score.tracked.has_value() != has_run || score.inliers.has_value() != has_run) {
+    return fail("tracked, inliers: expected of a drive with frames, and only there");
+  }
+  const double tracked = score.tracked.value_or(0.0);
+  const bool is_detected = has_run && (score.frames == 1 || tracked >= DriveScore::kMinTracked);
+  if (score.detected != is_detected || score.reason.empty() != is_detected) {
+    return fail(
+        fmt::format("detected, reason: expected what tracked, {}, says, found another", tracked));
+  }
+  const bool is_measured = tracked > 0.0;
+  const bool has_errors = score.average_offset_m && score.E_t_m && score.E_r_deg &&
+                          score.early_error_percent && !score.path_xz_m.empty();
+  const bool has_any = score.average_offset_m || score.E_t_m || score.E_r_deg ||
+                       score.early_error_percent || !score.path_xz_m.empty() ||
+                       score.t_rel_percent || score.r_rel_deg_per_100m;
+  if (has_errors != is_measured || has_any != is_measured) {
+    return fail("expected errors and a path where motion was measured, and only there");
+  }
+  // Where a segment of the metrics fits, the shorter ones of the dense errors do.
+  const bool may_be_dense = is_measured && is_whole;
+  if (score.dense_t_percent.empty() ? may_be_dense && score.t_rel_percent : !may_be_dense) {
+    return fail("dense_t_percent: expected of a drive over all frames, and only there");
+  }
+  return {};
+}
+
+Status check_score(const DriveScore& score, const SequenceIdentity& sequence, const Rung& rung) {
   if (score.sequence != sequence.name) {
     return fail(
         fmt::format("expected a drive of {}, found one of {}", sequence.name, score.sequence));
   }
-  if (score.frames > sequence.num_frames) {
-    return fail(fmt::format("{}: expected at most {} frames, found {}", sequence.name,
-                            sequence.num_frames, score.frames));
+  const std::size_t num_frames = frames_at(rung, sequence.num_frames);
+  if (score.frames > 0 && score.frames != num_frames) {
+    return fail(
+        fmt::format("{}: expected {} frames, found {}", sequence.name, num_frames, score.frames));
   }
-  return check_numbers(score);
+  const Status status = check_numbers(score);
+  return status ? check_shape(score, num_frames == sequence.num_frames) : status;
 }
 
 /// Those that a record of this rung tells of.
 std::vector<SequenceIdentity> sequences_of(const SearchIdentity& identity, bool is_last_rung) {
   std::vector<SequenceIdentity> sequences;
+  std::set<std::string> names;
   for (std::size_t i = 0; i < identity.sequences.size(); ++i) {
     const SequenceIdentity& one = identity.sequences[i];
     if (identity.only_sequence.value_or(i) == i && (is_last_rung || !one.held_out)) {
@@ -87,12 +123,21 @@ Status check_identity(const SearchIdentity& identity) {
       return fail(fmt::format("layer {}: expected filters inside 0:{}, found {}:{}", layer.layer,
                               kMaxFilter, layer.first, layer.last));
     }
+    const auto overlaps = [&](const LayerIdentity& one) {
+      return one.is_layer_of(layer.key(0)) && one.first < layer.last && layer.first < one.last;
+    };
+    if (std::ranges::count_if(identity.layers, overlaps) > 1) {  // itself
+      return fail(fmt::format("expected filters of {} {} once, found them again", layer.model,
+                              layer.layer));
+    }
   }
+  std::set<std::string> names;
   for (std::size_t i = 0; i < identity.sequences.size(); ++i) {
     const SequenceIdentity& one = identity.sequences[i];
     const bool is_last = i + 1 == identity.sequences.size();
+    const bool is_new = one.held_out || names.insert(one.name).second;
     if (one.num_frames > kMaxFrames || one.first_frame > kMaxFrames || (one.held_out && !is_last) ||
-        !one.name.ends_with(one.disturbance)) {
+        !one.name.ends_with(one.disturbance) || !is_new) {
       return fail(fmt::format("{}: expected a sequence that a search has", one.name));
     }
   }
@@ -107,18 +152,22 @@ Status check_identity(const SearchIdentity& identity) {
 }
 
 Status check_record(const FilterRecord& record, const SearchIdentity& identity) {
-  const bool is_known = std::ranges::any_of(identity.layers, [&](const LayerIdentity& layer) {
-    return layer.is_layer_of(record.key) && layer.first <= record.key.filter &&
-           record.key.filter < layer.last;
+  const auto layer = std::ranges::find_if(identity.layers, [&](const LayerIdentity& one) {
+    return one.is_layer_of(record.key) && one.first <= record.key.filter &&
+           record.key.filter < one.last;
   });
-  if (!is_known) {
+  if (layer == identity.layers.end()) {
     return fail(fmt::format("expected a filter of the search, found {}", to_string(record.key)));
   }
   if (record.rung >= identity.rungs.size()) {
     return fail(
         fmt::format("expected a rung below {}, found {}", identity.rungs.size(), record.rung));
   }
-  const auto sequences = sequences_of(identity, record.rung + 1 == identity.rungs.size());
+  const bool is_last_rung = record.rung + 1 == identity.rungs.size();
+  if (layer->baseline && !is_last_rung) {
+    return fail(fmt::format("expected a baseline on the last rung, found rung {}", record.rung));
+  }
+  const auto sequences = sequences_of(identity, is_last_rung);
   std::vector<DriveScore> drives = record.drives;
   if (record.held_out) {
     drives.push_back(*record.held_out);
@@ -128,10 +177,17 @@ Status check_record(const FilterRecord& record, const SearchIdentity& identity) 
     return fail(fmt::format("expected drives over {} sequences, found {}", sequences.size(),
                             drives.size()));
   }
+  std::size_t num_frames = 0;
   for (std::size_t i = 0; i < drives.size(); ++i) {
-    if (Status status = check_score(drives[i], sequences[i]); !status) {
+    if (Status status = check_score(drives[i], sequences[i], identity.rungs[record.rung]);
+        !status) {
       return status;
     }
+    num_frames += drives[i].frames;
+  }
+  if (record.filter_frames + record.held_out_filter_frames > num_frames) {
+    return fail(fmt::format("filter_frames: expected at most {} of these drives, found {}",
+                            num_frames, record.filter_frames + record.held_out_filter_frames));
   }
   return {};
 }

@@ -183,11 +183,13 @@ Status add_line(const std::string& text, SearchRecords& records) try {
   }
   FilterRecord record = json.get<FilterRecord>();
   json.get_to(record.key);
-  Status status = check_record(record, records.identity);
-  if (status) {
-    records.records.insert(record);
+  if (Status status = check_record(record, records.identity); !status) {
+    return status;
   }
-  return status;
+  return records.records.insert(record).second
+             ? Status()
+             : Status(fail(fmt::format("expected {} once on rung {}, found it again",
+                                       to_string(record.key), record.rung)));
 } catch (const Json::exception& problem) {
   return fail(fmt::format("expected a line of a search, found another one ({})", problem.what()));
 }

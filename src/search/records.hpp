@@ -43,6 +43,7 @@ struct FilterKey {
 
 /// A filter's odometry over one sequence, as far as it ran, with the true length of each step.
 struct DriveScore {
+  static constexpr double kMinTracked = 0.5;  ///< less: the pose was not detected
   std::string sequence;
   std::size_t frames = 0;
   bool detected = false;

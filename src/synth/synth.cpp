@@ -17,6 +17,7 @@
 #include "internal_check.hpp"
 #include "io/png.hpp"
 #include "pipeline/out_folder.hpp"
+#include "stem/model_file.hpp"
 #include "synth/renderer.hpp"
 #include "text/text_file.hpp"
 
@@ -25,8 +26,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Says in a folder that it holds nothing but what was rendered, which is this.
+/// Says in a folder that it holds nothing but what was rendered, which is this; in it the hashes of
+/// the texts, which a user may have edited.
 constexpr std::string_view kMark = "rendered_by_stemvo";
+constexpr std::string_view kPoses = "poses.txt";
+constexpr std::array<std::string_view, 4> kTexts = {"calib.txt", "times.txt", "camera.yaml",
+                                                    kPoses};
 constexpr std::array<std::string_view, 6> kContents = {"image_2",   "depth",       "calib.txt",
                                                        "times.txt", "camera.yaml", "poses.txt"};
 
@@ -104,7 +109,35 @@ struct Output {
                         path.string()));
       }
     }
+    return check_texts();
+  }
+
+  /// Error: one was edited.
+  [[nodiscard]] Status check_texts() const {
+    const std::string mark = read_text_file(final_dir_ / kMark).value_or("");
+    for (std::string_view line : split_lines(mark)) {
+      const std::string_view hash = take_word(line);
+      const std::string_view name = take_word(line);
+      const fs::path file = name == kPoses ? final_poses_ : final_dir_ / name;
+      const auto text = read_text_file(file);
+      if (text && internal::sha256_hex(*text) != hash) {
+        return fail(
+            fmt::format("{}: expected it as stemvo rendered it, so that a new drive may replace "
+                        "it, found it changed (--name gives another name)",
+                        file.string()));
+      }
+    }
     return {};
+  }
+
+  [[nodiscard]] Status mark_texts() const {
+    std::string mark;
+    for (const std::string_view name : kTexts) {
+      if (const auto text = read_text_file(sequence_dir / name)) {
+        mark += fmt::format("{} {}\n", internal::sha256_hex(*text), name);
+      }
+    }
+    return write_text_file(sequence_dir / kMark, mark);
   }
 
   /// In place of an unfinished drive.
@@ -150,10 +183,13 @@ struct Output {
 
   /// In place of an earlier drive.
   [[nodiscard]] Status finish() const {
+    if (Status status = mark_texts(); !status) {
+      return status;
+    }
     std::error_code code;
     fs::remove_all(final_dir_, code);
     if (!code) {
-      fs::rename(sequence_dir / "poses.txt", final_poses_, code);
+      fs::rename(sequence_dir / kPoses, final_poses_, code);
     }
     if (!code) {
       fs::rename(sequence_dir, final_dir_, code);
@@ -219,7 +255,7 @@ struct Output {
       }
     }
     return write_text_file(sequence_dir / "times.txt", times).and_then([&] {
-      return write_text_file(sequence_dir / "poses.txt", poses);
+      return write_text_file(sequence_dir / kPoses, poses);
     });
   }
 

@@ -8,19 +8,18 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30U;
 
 std::string last_system_error() { return std::generic_category().message(errno); }
 
@@ -31,6 +30,38 @@ std::optional<double> to_finite(std::string_view word) {
   const auto [end, error] = std::from_chars(digits.begin(), digits.end(), number);
   const bool is_good = error == std::errc() && end == digits.end() && std::isfinite(number);
   return is_good ? std::optional(number) : std::nullopt;
+}
+
+/// For the reason in errno.
+Error cannot_read(const fs::path& file) {
+  // What runs out is no fault of the file: it ends the program, as a lack of memory does.
+  if (errno == EMFILE || errno == ENFILE || errno == ENOMEM) {
+    throw std::system_error(errno, std::generic_category(), file.string() + ": cannot read");
+  }
+  return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
+}
+
+Expected<std::string> read_opened(int descriptor, const fs::path& file, int max_MB) {
+  const auto max_bytes = static_cast<std::size_t>(max_MB) * 1000000;
+  std::string text;
+  struct stat status = {};
+  if (::fstat(descriptor, &status) == 0) {
+    const auto size = static_cast<std::size_t>(status.st_size);
+    if (size > max_bytes) {
+      return fail(fmt::format("{}: expected at most {} MB, found {:.1f} MB", file.string(), max_MB,
+                              1e-6 * static_cast<double>(size)));
+    }
+    text.reserve(size);
+  }
+  std::array<char, 1 << 16> buffer;
+  ssize_t num_read = 0;
+  while ((num_read = ::read(descriptor, buffer.data(), buffer.size())) > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(num_read));
+    if (text.size() > max_bytes) {  // the size of files of /proc is not told
+      return fail(fmt::format("{}: expected at most {} MB, found more", file.string(), max_MB));
+    }
+  }
+  return num_read == 0 ? Expected<std::string>(std::move(text)) : cannot_read(file);
 }
 
 Status refuse_folder(const fs::path& file) {
@@ -76,7 +107,7 @@ Status write_beside(const fs::path& file, const fs::path& place, std::string_vie
 
 fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
 
-Expected<std::string> read_text_file(const fs::path& file) {
+Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) {
     return fail(fmt::format("{}: expected a file, found a folder", file.string()));
@@ -85,27 +116,12 @@ Expected<std::string> read_text_file(const fs::path& file) {
   if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) {
     return fail(fmt::format("{}: expected a file, found a pipe or device", file.string()));
   }
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  std::string text;
-  if (const auto size = fs::file_size(file, ignored); !ignored) {
-    if (size > kMaxFileBytes) {
-      return fail(fmt::format("{}: expected at most {} bytes, found {}", file.string(),
-                              kMaxFileBytes, size));
-    }
-    text.reserve(size);
-  }
-  std::array<char, 1 << 16> buffer;
-  while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) ||
-         stream.gcount() > 0) {
-    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  if (!stream.eof()) {  // not opened, or failed in the middle
-    // What runs out is no fault of the file: it ends the program, as a lack of memory does.
-    if (errno == EMFILE || errno == ENFILE || errno == ENOMEM) {
-      throw std::system_error(errno, std::generic_category(), file.string() + ": cannot read");
-    }
-    return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
+  // Without O_NONBLOCK reading some regular files of /proc waits for ever.
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  const auto text = descriptor < 0 ? Expected<std::string>(cannot_read(file))
+                                   : read_opened(descriptor, file, max_MB);
+  if (descriptor >= 0) {
+    ::close(descriptor);
   }
   return text;
 }
@@ -151,8 +167,8 @@ Status remove_file(const fs::path& file) {
               : Status();
 }
 
-Expected<std::vector<std::string>> read_lines(const fs::path& file) {
-  return read_text_file(file).map([](const std::string& text) {
+Expected<std::vector<std::string>> read_lines(const fs::path& file, int max_MB) {
+  return read_text_file(file, max_MB).map([](const std::string& text) {
     const std::vector<std::string_view> lines = split_lines(text);
     return std::vector<std::string>(lines.begin(), lines.end());
   });

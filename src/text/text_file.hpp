@@ -12,9 +12,16 @@
 
 namespace stemvo {
 
-/// The whole file as it is. Error: missing, a folder, unreadable. Throws std::system_error where
-/// the process may open no more files.
-[[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file);
+/// What files hold at most, MB: calibrations, configurations and other settings; poses, times and
+/// lists; any.
+inline constexpr int kMaxSettings_MB = 4;
+inline constexpr int kMaxRows_MB = 64;
+inline constexpr int kMaxFile_MB = 1024;
+
+/// The whole file as it is. Error: missing, a folder, unreadable, larger. Throws std::system_error
+/// where the process may open no more files.
+[[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file,
+                                                   int max_MB = kMaxFile_MB);
 /// Where a file is written before it takes its name; what lies there is replaced.
 [[nodiscard]] std::filesystem::path unfinished(const std::filesystem::path& file);
 /// Replaces the file at once: whoever reads it finds the old or the new one, whole, also after a
@@ -28,7 +35,8 @@ namespace stemvo {
 [[nodiscard]] Status remove_file(const std::filesystem::path& file);
 
 /// All lines of a file without their ends. Errors: those of read_text_file.
-[[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file);
+[[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file,
+                                                            int max_MB = kMaxRows_MB);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.
 [[nodiscard]] std::vector<std::string_view> split_lines(std::string_view text);
 /// The next word between blanks and tabs, which the line loses; empty: there is none.

@@ -165,18 +165,18 @@ void checkpoints(const fs::path& out) {
   namespace pipeline = stemvo::pipeline;
   const Corpus corpus(out, "checkpoint");
   stemvo::PhasedOdometry odometry = stemvo::fuzz::small_odometry();
-  pipeline::Checkpoint checkpoint;
+  pipeline::Drive drive;
   for (const int shift_px : {0, 2, 4}) {
     const cv::Mat wide = picture(CV_8UC1, 12, 20);
     cv::Mat image;
     cv::resize(wide, image, cv::Size(80, 48), 0, 0, cv::INTER_CUBIC);
     odometry.track(odometry.prepare(image.colRange(shift_px, shift_px + 64).clone()));
-    checkpoint.odometry = odometry.state();
-    const std::string text = pipeline::pack(checkpoint, stemvo::fuzz::kIdentity);
-    corpus.text(fmt::format("{}_frames", checkpoint.frame), text.substr(text.find('\n') + 1));
+    const std::size_t frame = drive.frames.size();
+    const std::string text =
+        pipeline::pack(frame, odometry.state(), drive, 0.0, stemvo::fuzz::kIdentity);
+    corpus.text(fmt::format("{}_frames", frame), text.substr(text.find('\n') + 1));
     odometry.localize();
-    checkpoint.drive.frames.push_back(odometry.optimize());
-    ++checkpoint.frame;
+    drive.frames.push_back(odometry.optimize());
   }
 }
 

@@ -139,6 +139,9 @@ class BadInputTable : public ::testing::Test {
   static Fault text(const std::string& name, const std::string& content) {
     return {name, [content](const fs::path& file) { write_file(file, content); }};
   }
+  static Fault large() {
+    return {"70 MB", [](const fs::path& file) { fs::resize_file(file, 70000000); }};
+  }
   [[nodiscard]] Words run(const Words& more = {}) const {
     Words words = {"run",     sequence_.string(), "--out", folder_ / "out",
                    "--quiet", "--frames",         "0:1"};
@@ -155,7 +158,7 @@ TEST_F(BadInputTable, Calibration) {
              "P0: 360 0 310 0 0 360 94 0 0 0 1 0\nP2: 361 0 310 0 0 361 94 0 0 0 1 0\n");
   expect_refused_with_faults(
       sequence_ / "calib.txt", "361", run(), {},
-      {text("empty", ""), text("eleven numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1\n"),
+      {large(), text("empty", ""), text("eleven numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1\n"),
        text("thirteen numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1 0 0\n"),
        text("no focal length", "P2: 0 0 310 0 0 0 94 0 0 0 1 0\n"),
        text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
@@ -171,7 +174,7 @@ TEST_F(BadInputTable, Poses) {
     expect_refused_with_faults(
         folder_ / name, "0.125",
         {"evaluate", "--gt", folder_ / "truth.txt", folder_ / "estimate.txt"}, {},
-        {text("empty", ""), text("eleven numbers", "1 0 0 0 0 1 0 0 0 0 1\n"),
+        {large(), text("empty", ""), text("eleven numbers", "1 0 0 0 0 1 0 0 0 0 1\n"),
          text("no rotation", "2 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
          text("reflection", "-1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
          text("1e160", "1 0 0 1e160 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
@@ -195,7 +198,7 @@ TEST_F(BadInputTable, TumPoses) {
 TEST_F(BadInputTable, Times) {
   write_file(sequence_ / "times.txt", "0.0\n0.125\n0.25\n");
   expect_refused_with_faults(sequence_ / "times.txt", "0.125", run(), {"cut"},
-                             {text("empty", ""), text("two columns", "0 1\n1 2\n2 3\n"),
+                             {large(), text("empty", ""), text("two columns", "0 1\n1 2\n2 3\n"),
                               text("backwards", "2\n1\n3\n"), text("twice", "1\n1\n1\n")});
 }
 

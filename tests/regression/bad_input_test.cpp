@@ -73,6 +73,44 @@ TEST_F(BadInput, PipesAndDevicesAreNoFiles) {
   }
 }
 
+/// Regular files, as stat has them, that can be read for ever, or only once something happens.
+TEST_F(BadInput, FilesOfTheKernelEndAtOnce) {
+  for (const char* file : {"/proc/kmsg", "/proc/kpagecount", "/proc/self/mem"}) {
+    if (fs::exists(file)) {
+      const ProgramResult result = run({"--gt", file});
+      EXPECT_EQ(result.exit_code, 1) << file;
+      EXPECT_THAT(result.err, HasSubstr(std::string("error: ") + file)) << file;
+    }
+  }
+}
+
+TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
+  const auto large = [&](const std::string& name, std::uintmax_t size_MB) {
+    write_file(folder_ / name, "");
+    fs::resize_file(folder_ / name, size_MB * 1000000);
+    return folder_ / name;
+  };
+  for (const char* option : {"--config", "--calib"}) {
+    const std::string file = large(std::string(option).substr(2), 5);
+    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5.0 MB"});
+  }
+  const std::string camera = large("camera.yaml", 5);
+  expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
+               {camera + ": expected at most 4 MB, found 5.0 MB"});
+  const std::string poses = large("poses.txt", 70);
+  expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70.0 MB"});
+}
+
+TEST_F(BadInput, WhatIsNoModelIsNamed) {
+  for (const auto& [path, found] :
+       {std::pair<std::string, std::string>("/dev/zero", "a pipe or device"),
+        {folder_.path(), "a folder"},
+        {folder_ / "none.h5", "no such file"}}) {
+    expect_error(run({"--set", "stem.model=" + path}), 1, {path + ": expected the name", found});
+    expect_error(run_stemvo({"models", path}), 1, {path + ": expected the name", found});
+  }
+}
+
 TEST_F(BadInput, NoImages) {
   fs::remove_all(sequence_ / "image_2");
   expect_error(run(), 1, {sequence_.string(), "image_2"});

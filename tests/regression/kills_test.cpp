@@ -103,6 +103,9 @@ TEST_P(Kills, LeaveWholeFilesAndTheSameResults) {
   const auto start = std::chrono::steady_clock::now();
   const ProgramResult whole = run_stemvo(arguments("whole"));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  for (const std::string& name : GetParam().results) {
+    EXPECT_TRUE(fs::exists(folder_ / "whole" / name)) << name;
+  }
   std::chrono::duration<double> longest = std::chrono::steady_clock::now() - start;
   if (is_run()) {
     longest = std::chrono::milliseconds(1500);  // checkpoints come to the disk after one
@@ -146,17 +149,17 @@ TEST_P(Kills, LeaveWholeFilesAndTheSameResults) {
 INSTANTIATE_TEST_SUITE_P(
     Commands,
     Kills,
-    ::testing::Values(Command{"run",
-                              40,
-                              {"--resume", "--map", "--pictures", "5"},
-                              {"trajectory_kitti.txt", "trajectory_tum.txt",
-                               "trajectory_refined_kitti.txt", "map.ply"}},
-                      Command{"search",
-                              30,
-                              {"--resume", "--exhaustive", "--filters", "0:6", "--block", "2",
-                               "--quiet"},
-                              {"filters.csv", "filters.json", "best.yaml", "sheet.png"}},
-                      Command{"benchmark", 30, {"--quiet"}, {"benchmark.md", "benchmark.json"}}),
+    ::testing::Values(
+        Command{"run",
+                40,
+                {"--resume", "--map", "--pictures", "5"},
+                {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+                 "trajectory_refined_tum.txt", "map.ply"}},
+        Command{"search",
+                30,
+                {"--resume", "--exhaustive", "--filters", "0:6", "--block", "2", "--quiet"},
+                {"filters.csv", "filters.json", "best.yaml", "sheet.png"}},
+        Command{"benchmark", 30, {"--quiet"}, {"benchmark.md", "benchmark.json"}}),
     ::testing::PrintToStringParamName());
 
 }  // namespace

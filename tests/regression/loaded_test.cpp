@@ -13,7 +13,8 @@ namespace {
 std::string results(const fs::path& out) {
   std::string bytes;
   for (const char* name :
-       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt", "map.ply"}) {
+       {"trajectory_kitti.txt", "trajectory_tum.txt", "trajectory_refined_kitti.txt",
+        "trajectory_refined_tum.txt", "map.ply"}) {
     bytes += read_file(out / name);
   }
   return bytes;

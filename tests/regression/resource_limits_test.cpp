@@ -56,6 +56,14 @@ TEST_F(ResourceLimits, TooFewOpenFilesToRender) {
                {"drive", "open files"});
 }
 
+TEST_F(ResourceLimits, TooSmallAStack) {
+  for (const int kib : {64, 512}) {
+    expect_error(run_under("ulimit -s " + std::to_string(kib)), 1,
+                 {"out of stack: expected at least 1024 kB, found " + std::to_string(kib)});
+  }
+  EXPECT_EQ(run_under("ulimit -s 1024").exit_code, 0);
+}
+
 /// The limit does not bind root, and counts all that a user has: asked as nobody, who has nothing.
 TEST_F(ResourceLimits, TooFewProcesses) {
   if (::geteuid() != 0) {

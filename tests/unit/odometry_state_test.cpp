@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: MIT
 // An odometry that goes on from another one's state gives what that one would have given.
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <ctime>
+#include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -97,6 +103,79 @@ TEST_P(OdometryState, GoesOnAsIfItHadNotStopped) {
       EXPECT_EQ(b.landmarks()[i].rgb, a.landmarks()[i].rgb);
     }
   }
+}
+
+/// Somebody changed it. Whatever is taken for a state can be gone on from: track ids have tracks,
+/// frames are there, pixels lie in their image.
+TEST_P(OdometryState, AForgedOneIsRefusedOrGoneOnFrom) {
+  constexpr std::size_t kFrame = 24;
+  PhasedOdometry whole = odometry();
+  for (std::size_t i = 0; i < kFrame; ++i) {
+    track(whole, i);
+    whole.localize();
+    static_cast<void>(whole.optimize());
+  }
+  track(whole, kFrame);
+  const std::string state = whole.state();
+  const auto number_at = [&](std::size_t at) {
+    std::int32_t number = 0;
+    std::memcpy(&number, state.data() + at, sizeof(number));
+    return number;
+  };
+  // Of ids and sizes: most of a state is pixels and floats, which have no bytes like these.
+  std::vector<std::size_t> places;
+  for (std::size_t at = 0; at + sizeof(std::int32_t) <= state.size(); ++at) {
+    if (number_at(at) > 255 && number_at(at) < 2000) {
+      places.push_back(at);
+    }
+  }
+  std::mt19937 random(11);
+  int num_refused = 0;
+  constexpr int kNumTrials = 100;
+  for (int trial = 0; trial < kNumTrials; ++trial) {
+    const std::size_t at = places[random() % places.size()];
+    const std::array<std::int32_t, 6> numbers = {-1,      0,           number_at(at) + 1,
+                                                 1000000, -2147483647, 2147483647};
+    const std::int32_t number = numbers[random() % numbers.size()];
+    std::string forged = state;
+    std::memcpy(forged.data() + at, &number, sizeof(number));
+    PhasedOdometry again = odometry();
+    if (!again.set_state(forged)) {
+      ++num_refused;
+      continue;
+    }
+    EXPECT_NO_THROW({
+      again.localize();
+      static_cast<void>(again.optimize());
+      for (std::size_t i = kFrame + 1; i < kFrame + 2; ++i) {
+        track(again, i);
+        again.localize();
+        static_cast<void>(again.optimize());
+      }
+      static_cast<void>(again.frames().estimator().refined_trajectory());
+      static_cast<void>(again.frames().estimator().landmarks());
+    }) << number_at(at)
+       << " at " << at << " made " << number;
+  }
+  EXPECT_GT(num_refused, kNumTrials / 5) << places.size();
+}
+
+/// Found while fuzzing: the rows, each of nothing, were counted.
+TEST_P(OdometryState, AnImageOfNoColumnsIsRefused) {
+  PhasedOdometry one = odometry();
+  track(one, 0);
+  std::string state = one.state();
+  const std::array<std::int32_t, 2> size = {sequence_.camera().height_px,
+                                            sequence_.camera().width_px};
+  const std::array<std::int32_t, 2> forged = {2147483647, 0};
+  const std::size_t at =
+      state.find(std::string_view(reinterpret_cast<const char*>(size.data()), sizeof(size)));
+  ASSERT_NE(at, state.npos);
+  std::memcpy(state.data() + at, forged.data(), sizeof(forged));
+  PhasedOdometry again = odometry();
+  const std::clock_t start = std::clock();
+  EXPECT_FALSE(again.set_state(state));
+  EXPECT_LT(std::clock() - start, CLOCKS_PER_SEC / 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Options,

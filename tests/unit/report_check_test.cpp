@@ -113,6 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
         std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 number, found 0"),
         std::tuple("frames: {min: 1}\nframes: {min: 2}\n", ":2: expected frames once"),
         std::tuple("frames: {min: 1, min: 2}\n", "expected min once"),
+        std::tuple("frames: {min: 1}\nt_rel_percent: {max: 1, min: 2}\n",
+                   ":2: t_rel_percent: expected min up to max, found 2 and 1"),
         std::tuple("frames: {min: 1\n", "not YAML"),
         std::tuple("- frames\n", "expected lines like"),
         std::tuple("", "expected lines like"),

@@ -52,6 +52,12 @@ FilterRecord record(int filter, double t_rel = 1.0) {
   score.detected = true;
   score.t_rel_percent = t_rel;
   score.r_rel_deg_per_100m = 1.0 / 3.0;
+  score.average_offset_m = 0.5;
+  score.E_t_m = 0.01;
+  score.E_r_deg = 0.02;
+  score.early_error_percent = 1.25;
+  score.inliers = 200.0;
+  score.tracked = 0.75;
   score.dense_t_percent = {0.5, 0.1234, 2.0};
   score.block = 2;
   score.path_xz_m = {{0.0, 0.0}, {0.25, 1.5}};
@@ -187,20 +193,56 @@ TEST_F(Records, WhatNoSearchWritesIsNamedAndLeftOut) {
   of_another.drives[0].sequence = "01";
   FilterRecord beyond = record(1);
   beyond.drives[0].t_rel_percent = 1e300;
+  const auto changed = [](auto change) {
+    FilterRecord bad = record(1);
+    change(bad.drives[0]);
+    return bad;
+  };
+  FilterRecord more_work = record(1);
+  more_work.filter_frames = 101;
   for (const auto& [bad, reason] :
-       {std::pair(record(7), "expected a filter of the search, found net stem 7"),
+       {std::pair(changed([](DriveScore& score) { score.tracked = 7.0; }),
+                  "tracked: expected 0 to 1, found 7"),
+        std::pair(changed([](DriveScore& score) { score.tracked = 0.4; }),
+                  "detected, reason: expected what tracked, 0.4, says"),
+        std::pair(changed([](DriveScore& score) { score.tracked.reset(); }),
+                  "tracked, inliers: expected of a drive with frames"),
+        std::pair(changed([](DriveScore& score) { score.E_r_deg = 181.0; }),
+                  "E_r_deg: expected 0 to 180, found 181"),
+        std::pair(changed([](DriveScore& score) { score.E_t_m.reset(); }), "expected errors and a"),
+        std::pair(changed([](DriveScore& score) { score.path_xz_m.clear(); }), "and a path where"),
+        std::pair(changed([](DriveScore& score) { score.dense_t_percent.clear(); }),
+                  "dense_t_percent: expected of a drive over all frames"),
+        std::pair(changed([](DriveScore& score) { score.frames = 60; }),
+                  "00: expected 100 frames, found 60"),
+        std::pair(more_work, "filter_frames: expected at most 100 of these drives, found 101"),
+        std::pair(record(0, 3.0), "expected net stem 0 once on rung 0, found it again"),
+        std::pair(record(7), "expected a filter of the search, found net stem 7"),
         std::pair(no_rung, "expected a rung below 1, found 9"),
         std::pair(no_drives, "expected drives over 1 sequences, found 0"),
         std::pair(of_another, "expected a drive of 00, found one of 01"),
         std::pair(beyond, "t_rel_percent: expected 0 to")}) {
     std::filesystem::remove_all(folder_ / "a");
-    write("a", identity(0, 3), {record(0), bad});
+    write("a", identity(0, 3), {record(0)});
+    if (auto writer = RecordFile::open(file("a"), identity(0, 3), true)) {
+      ASSERT_TRUE(writer->append({bad}));
+    }
     const auto content = read_records(file("a"));
     ASSERT_TRUE(content) << content.error().message;
     EXPECT_EQ(content->records.size(), 1U) << reason;
     ASSERT_EQ(content->warnings.size(), 1U) << reason;
     EXPECT_THAT(content->warnings.front(), HasSubstr(reason));
   }
+  SearchIdentity twice = identity(0, 3);
+  twice.layers.push_back(twice.layers[0]);
+  write("layers", twice, {});
+  EXPECT_THAT(read_records(file("layers")).error().message,
+              HasSubstr("expected filters of net stem once"));
+  twice = identity(0, 3);
+  twice.sequences.push_back(twice.sequences[0]);
+  write("sequences", twice, {});
+  EXPECT_THAT(read_records(file("sequences")).error().message,
+              HasSubstr("00: expected a sequence"));
   SearchIdentity no_sequences = identity(0, 3);
   no_sequences.sequences.clear();
   std::filesystem::remove_all(folder_ / "a");
