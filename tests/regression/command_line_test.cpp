@@ -125,7 +125,7 @@ TEST(CommandLine, OutputThatCannotBeWrittenIsAnError) {
   const std::string bounds = folder.file("bounds.yaml", "frames: {min: 1}\n");
   for (const std::string& command :
        {std::string("--version"), std::string("--help"), std::string("models"),
-        "evaluate " + poses + " --gt " + poses, "evaluate --json - " + poses + " --gt " + poses,
+        "evaluate " + poses + " --gt " + poses, "evaluate --json " + poses + " --gt " + poses,
         "check " + metrics + " --against " + bounds}) {
     for (const char* closed : {" >&-", " > /dev/full"}) {
       const ProgramResult result = shell(program + " " + command + closed);

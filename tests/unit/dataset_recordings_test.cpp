@@ -248,6 +248,7 @@ TEST_F(Recordings, WhatIsMissingOrMeantIsSaid) {
   EXPECT_THAT(error_of(request(folder)), HasSubstr("cam0/sensor.yaml: cannot read"));
   FrameSourceRequest own_camera = request(folder);
   own_camera.camera_file = camera("");
+  fs::remove_all(folder / "mav0/state_groundtruth_estimate0");  // of the body
   EXPECT_EQ(error_of(own_camera), "(opened)");
   FrameSourceRequest one = request(folder / "mav0/cam0/data/0.png");
   cv::imwrite(one.sequence_dir.string(), frame(0));
