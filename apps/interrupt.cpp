@@ -3,8 +3,12 @@
 
 #include <atomic>
 #include <csignal>
+#include <string_view>
 
 #include <signal.h>
+#include <unistd.h>
+
+#include "commands.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -15,6 +19,14 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 void on_signal(int /*number*/) { interrupted = true; }
 
+/// What a graph's Div or Mod makes of the least number and -1: ONNX Runtime looks for 0 only.
+void on_division(int /*number*/) {
+  constexpr std::string_view kMessage =
+      "error: a division of whole numbers that has no result: the model cannot be used\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kMessage.data(), kMessage.size());
+  ::_exit(kExitFailed);
+}
+
 }  // namespace
 
 void catch_interrupts() {
@@ -24,6 +36,7 @@ void catch_interrupts() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  std::signal(SIGFPE, on_division);
   std::signal(SIGXFSZ, SIG_IGN);  // a limit of file size is an error of the write, as a full disk
   struct sigaction before = {};
   sigaction(SIGHUP, nullptr, &before);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # fuzz.sh SECONDS [TARGET..]: every fuzzer of tests/fuzz (or those named) for that time, one per core, with clang 16
-# (`tools/setup.sh fuzz`). Ends with 1 and the file of the find, with the command that repeats it.
+# (`tools/setup.sh fuzz`). STEMVO_FUZZ_SEED: of its choices; else each call has another. Ends with 1 and the file of the find, with the command that repeats it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -25,7 +25,7 @@ rm -f "$BUILD"/*.run.log
 # fuzz_one TARGET: what libraries print of broken input is not shown (2: the program's stderr; reports stay).
 fuzz_one() {
   local target=$1 program=$BUILD/tests/fuzz/fuzz_$1 log=$BUILD/$1.run.log find_file
-  if ! "$program" "$BUILD/corpora/$target" -max_total_time="$SECONDS_EACH" "${LIMITS[@]}" -close_fd_mask=2 \
+  if ! "$program" "$BUILD/corpora/$target" -seed="${STEMVO_FUZZ_SEED:-0}" -max_total_time="$SECONDS_EACH" "${LIMITS[@]}" -close_fd_mask=2 \
     -artifact_prefix="$FINDS/${target}_" -print_final_stats=1 2>"$log"; then
     find_file=$(sed -n 's/.*Test unit written to //p' "$log" | tail -n 1)
     echo "fuzz: $target: $(grep -m1 -E 'ERROR:|runtime error|broken promise' "$log" || echo failed) (log: $log)" >&2

@@ -12,6 +12,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "dataset/listing.hpp"
 #include "models/manifest.hpp"
 #include "text/spared_inputs.hpp"
 
@@ -76,6 +77,22 @@ Expected<FolderLock> lock_folder(const fs::path& folder) {
   return lock;
 }
 
+namespace {
+
+/// trajectory.png would be a frame of the next run.
+Status check_holds_no_images(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  for (const fs::path& input : inputs) {
+    std::error_code code;
+    if (dataset::is_image_file(input) && fs::equivalent(input.parent_path(), folder, code)) {
+      return fail(fmt::format("{}: expected a folder without the recording's images, found {}",
+                              folder.string(), input.filename().string()));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 Expected<FolderLock> open_out_folder(const fs::path& folder,
                                      const std::vector<std::string>& names,
                                      const std::vector<fs::path>& inputs) {
@@ -83,8 +100,9 @@ Expected<FolderLock> open_out_folder(const fs::path& folder,
   for (const std::string& name : names) {
     outputs.push_back(folder / name);
   }
-  const Status status =
-      check_spares_inputs(outputs, inputs).and_then([&] { return create_out_folder(folder); });
+  const Status status = check_spares_inputs(outputs, inputs)
+                            .and_then([&] { return check_holds_no_images(folder, inputs); })
+                            .and_then([&] { return create_out_folder(folder); });
   return status ? lock_folder(folder) : status.error();
 }
 

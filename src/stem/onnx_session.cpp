@@ -99,7 +99,10 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
   const OnnxHandle<OrtStatus> status(raw, api_->ReleaseStatus);
   std::string message = api_->GetErrorMessage(raw);
   std::replace(message.begin(), message.end(), '\n', ' ');
-  return fail(fmt::format("{}: ONNX Runtime: {}", label_, message));
+  const bool is_memory = message.find("bad_alloc") != std::string::npos ||
+                         message.find("Failed to allocate memory") != std::string::npos;
+  return fail(
+      fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "", message));
 }
 
 Expected<OnnxSession> OnnxSession::create(const std::string& label,

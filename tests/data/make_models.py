@@ -140,6 +140,16 @@ def hostile():
     write("hostile_pairs", [*add, helper.make_node("Add", ["image", "a6"], ["channels"])], [image], [channels],
           [numpy_helper.from_array(np.ones(4, np.float32), "a0"), numpy_helper.from_array(np.array([-1, 1]), "column"),
            numpy_helper.from_array(np.array([1, -1]), "row")])
+    # The least whole number by -1, of constants and of what a run alone knows.
+    least, minus = np.array([-2**63]), np.array([-1])
+    use = [helper.make_node("Cast", ["divided"], ["float"], to=TensorProto.FLOAT), helper.make_node("ReduceSum", ["float"], ["sum"], keepdims=0),
+           helper.make_node("Add", ["image", "sum"], ["channels"])]
+    write("hostile_divide", [helper.make_node("Div", ["least", "minus"], ["divided"]), *use], [image], [channels],
+          [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus")])
+    later = [helper.make_node("Cast", ["image"], ["whole"], to=TensorProto.INT64), helper.make_node("Mul", ["whole", "nothing"], ["zero"]),
+             helper.make_node("Add", ["zero", "least"], ["a"]), helper.make_node("Add", ["zero", "minus"], ["b"])]
+    write("hostile_divide_later", [*later, helper.make_node("Div", ["a", "b"], ["divided"]), *use], [image], [channels],
+          [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus"), numpy_helper.from_array(np.array([0]), "nothing")])
     # Some 10^10 multiplications per operator: slower than any first layer.
     box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
     slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],

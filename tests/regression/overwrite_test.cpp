@@ -151,6 +151,12 @@ TEST_F(Overwrite, ChannelsAreNotWrittenAmongTheFrames) {
   EXPECT_FALSE(fs::exists(folder + "/000000_input.png"));
 }
 
+TEST_F(Overwrite, ResultsAreNotWrittenAmongTheFrames) {
+  const std::string folder = sequence_ / "image_2";
+  expect_error(run({"--out", folder}), 1, {folder, "without the recording's images, found 0000"});
+  EXPECT_FALSE(fs::exists(folder + "/trajectory.png"));
+}
+
 TEST_F(Overwrite, PicturesRemoveTheirOwnOnly) {
   fs::create_directories(out_);
   fs::copy(sequence_ / "image_2", folder_ / "mine");
