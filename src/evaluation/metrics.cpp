@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "evaluation/metrics.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "evaluation/pose_file.hpp"
@@ -92,11 +93,9 @@ void add_step_errors(std::span<const Rigid3> estimate,
 
 /// First frame more than `length_m` behind `first`; the number of frames when there is none.
 std::size_t segment_end(std::span<const double> distances, std::size_t first, double length_m) {
-  std::size_t last = first;
-  while (last < distances.size() && !(distances[last] > distances[first] + length_m)) {
-    ++last;
-  }
-  return last;
+  const auto end = std::upper_bound(distances.begin() + static_cast<std::ptrdiff_t>(first),
+                                    distances.end(), distances[first] + length_m);
+  return static_cast<std::size_t>(end - distances.begin());
 }
 
 /// t_rel and r_rel: mean over all segments of all lengths, each divided by its nominal length.
