@@ -148,9 +148,11 @@ void PointFrontEnd::count_lost(const View& from,
 void PointFrontEnd::find_expected(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
   std::size_t num_found = 0;
+  const std::vector<Point> tracked = view.points;
   for (const TrackPoint& expected : std::exchange(expected_, {})) {
-    if (std::ranges::binary_search(last_good_.points, expected.track_id, {}, &Point::id)) {
-      continue;  // tracked from the last good image
+    if (std::ranges::binary_search(tracked, expected.track_id, {}, &Point::id) ||
+        std::ranges::binary_search(last_good_.points, expected.track_id, {}, &Point::id)) {
+      continue;  // tracked here, or from the last good image
     }
     const Eigen::Vector2d uv = view.image->channel.map.from_input(expected.uv);
     const cv::Point2f start(static_cast<float>(uv.x()), static_cast<float>(uv.y()));

@@ -5,6 +5,7 @@
 // files include this; a class with a state has a template `serialize` of its own.
 
 #include <algorithm>
+#include <functional>
 #include <type_traits>
 
 #include <Eigen/Core>
@@ -103,10 +104,11 @@ void serialize(Archive& archive, Matches& matches) {
   StateReader::expect_of<Archive>(matches.prev_uv.size() == matches.cur_uv.size() &&
                                   matches.track_ids.size() == matches.cur_uv.size());
 }
-/// They are looked up by their ids.
+/// They are looked up by their ids, and each is there once.
 template <typename Archive, typename Points, typename Id>
 void expect_ordered(const Points& points, Id id) {
-  StateReader::expect_of<Archive>(std::ranges::is_sorted(points, {}, id));
+  StateReader::expect_of<Archive>(
+      std::ranges::adjacent_find(points, std::ranges::greater_equal(), id) == points.end());
 }
 
 }  // namespace stemvo
