@@ -37,6 +37,7 @@ RUN_ELSEWHERE = {
     "python -m stemvo.bag": "tests/python/bag_test.py",
     "tools/ablation.py": "tests/python/ablation_test.py",
     "tools/long_drives.py": "tests/python/long_drives_test.py",
+    "tools/planted_camera.py": "tests/python/long_drives_test.py",
     "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",

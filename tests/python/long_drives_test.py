@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""tools/long_drives.py: what is rendered is kept, what changed is rendered anew, runs are watched."""
+"""tools/long_drives.py: what is rendered is kept, what changed is rendered anew, runs are watched; tools/planted_camera.py: a row per calibration."""
 
 import contextlib
 import json
@@ -23,9 +23,13 @@ def write_poses(file, count):
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def long_drives(*arguments):
-    command = [sys.executable, str(ROOT / "tools/long_drives.py"), "--program", PROGRAM, *map(str, arguments)]
+def tool(name, *arguments):
+    command = [sys.executable, str(ROOT / "tools" / name), "--program", PROGRAM, *map(str, arguments)]
     return subprocess.run(command, check=False, capture_output=True, text=True)
+
+
+def long_drives(*arguments):
+    return tool("long_drives.py", *arguments)
 
 
 class RenderedDrives(unittest.TestCase):
@@ -129,6 +133,22 @@ class Command(unittest.TestCase):
                                "--set", "stem.filter=999")
             self.assertEqual(done.returncode, 1)
             self.assertIn("filter", done.stderr)
+
+
+class PlantedCamera(unittest.TestCase):
+    def test_a_row_per_calibration(self):
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            write_poses(folder / "31.txt", 60)
+            done = tool("planted_camera.py", folder / "cache", "--poses", folder, "--sequences", "31", "--size", "310x94",
+                        "--plant", "5,-1.5", "--from-frame", "20")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            true, planted = ([cell.strip() for cell in row.strip("|").split("|")] for row in done.stdout.splitlines()[2:])
+        self.assertEqual((true[1], planted[1]), ("true", "5, -1.5 px off"))
+        self.assertEqual((true[6], planted[6]), ("0.00, 0.00", "5.00, 1.50"))  # straight on, nothing tells of the camera
+        errors = [[float(cell.split(" / ")[0]) for cell in row[2:6]] for row in (true, planted)]
+        self.assertTrue(all(0.0 < error < 20.0 for row in errors for error in row), errors)
+        self.assertNotEqual(*errors)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,18 @@ TEST(SelfCalibration, ARightCameraIsKept) {
   EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
 }
 
+/// However sure its runs are: as much is missed where all turns are to one side.
+TEST(SelfCalibration, ACameraThatIsHalfAPixelOffIsKept) {
+  const Camera truth = testing::kitti_camera();
+  Camera given = truth;
+  given.cx_px += 0.5;
+  SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
+  drive_runs(truth, calibration);
+  const CameraEstimate estimate = *calibration.estimate();
+  EXPECT_GT(std::abs(estimate.change[0]), 2.0 * estimate.sigma[0]);  // told for certain
+  EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
+}
+
 /// Drives miss it by more than their runs' sigmas.
 TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) {
   const SelfCalibration calibration(testing::kitti_camera(), CameraRefinement::kAll);
