@@ -66,10 +66,12 @@ TEST_F(BadInput, MoreBehindTheDocument) {
 TEST_F(BadInput, PipesAndDevicesAreNoFiles) {
   const std::string pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  for (const std::string& file : {pipe, std::string("/dev/zero")}) {
+  for (const auto& [file, kind] : {std::pair(pipe, "a pipe"), {"/dev/zero", "a device"}}) {
     for (const char* option : {"--config", "--gt", "--calib"}) {
-      expect_error(run({option, file}), 1, {file, "expected a file", "pipe or device"});
+      expect_error(run({option, file}), 1, {file + ": expected a file, found " + kind});
     }
+    expect_error(run_stemvo({"run", file, "--camera", pipe, "--out", out_}), 1,
+                 {file + ": expected a folder, a video file", std::string("found ") + kind});
   }
 }
 
@@ -92,20 +94,21 @@ TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
   };
   for (const char* option : {"--config", "--calib"}) {
     const std::string file = large(std::string(option).substr(2), 5);
-    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5.0 MB"});
+    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5 MB"});
   }
   const std::string camera = large("camera.yaml", 5);
   expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
-               {camera + ": expected at most 4 MB, found 5.0 MB"});
+               {camera + ": expected at most 4 MB, found 5 MB"});
+  fs::resize_file(camera, 4000001);
+  expect_error(run({"--config", camera}), 1, {"expected at most 4 MB, found 4.000001 MB"});
   const std::string poses = large("poses.txt", 70);
-  expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70.0 MB"});
+  expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70 MB"});
 }
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {
-  for (const auto& [path, found] :
-       {std::pair<std::string, std::string>("/dev/zero", "a pipe or device"),
-        {folder_.path(), "a folder"},
-        {folder_ / "none.h5", "no such file"}}) {
+  for (const auto& [path, found] : {std::pair<std::string, std::string>("/dev/zero", "a device"),
+                                    {folder_.path(), "a folder"},
+                                    {folder_ / "none.h5", "nothing of that name"}}) {
     expect_error(run({"--set", "stem.model=" + path}), 1, {path + ": expected the name", found});
     expect_error(run_stemvo({"models", path}), 1, {path + ": expected the name", found});
   }
