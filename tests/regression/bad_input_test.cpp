@@ -151,6 +151,23 @@ TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
                                 Not(HasSubstr("libpng"))));
 }
 
+/// By what is cheap to see: neither is read to its end.
+TEST_F(BadInput, ImagesOfAbsurdSizeAreOneWarningEach) {
+  const fs::path images = sequence_ / "image_2";
+  fs::resize_file(images / "000006.png", 900000000);
+  std::string wide = read_file(images / "000007.png");
+  write_file(images / "000007.png", wide.replace(16, 4, std::string("\0\0\x28\0", 4)));
+  write_file(images / "000008.png", "");
+  fs::resize_file(images / "000008.png", 900000000);
+  const ProgramResult result = run({"--quiet"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 3) << result.err;
+  EXPECT_THAT(result.err,
+              AllOf(HasSubstr("000006.png: expected at most 17 MB, found 900 MB"),
+                    HasSubstr("000007.png: expected an image of 620x188 pixels, found 10240x188"),
+                    HasSubstr("000008.png: expected a PNG image, found another kind of file")));
+}
+
 TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {
   const fs::path images = folder_ / "jpeg";
   fs::create_directories(images);
