@@ -247,8 +247,21 @@ TEST_F(BadInput, OutputFolderThatCannotBeWritten) {
   write_file(folder_ / "file", "");
   out_ = folder_ / "file";
   expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+  const std::string pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  out_ = pipe;
+  expect_error(run(), 1, {out_, "found: a pipe of that name"});
   out_ = "/proc/stemvo/out";
   expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+}
+
+/// Before the first frame, not at the end.
+TEST_F(BadInput, PipeInPlaceOfAResult) {
+  fs::create_directories(out_);
+  const std::string metrics = out_ + "/metrics.json";
+  ASSERT_EQ(::mkfifo(metrics.c_str(), 0600), 0);
+  expect_error(run(), 1, {metrics + ": expected a file to write, found a pipe"});
+  EXPECT_FALSE(fs::exists(out_ + "/frames.csv"));
 }
 
 TEST_F(BadInput, Model) {
