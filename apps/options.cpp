@@ -4,6 +4,8 @@
 #include <map>
 #include <system_error>
 
+#include <fmt/format.h>
+
 namespace stemvo::apps {
 namespace {
 
@@ -39,7 +41,16 @@ std::filesystem::path data_folder(const char* name) {
   return std::filesystem::path(STEMVO_SOURCE_DIR) / name;
 }
 
-CLI::Validator in_range(int min, int max) { return CLI::Range(min, max).description(""); }
+CLI::Validator in_range(double min, double max) {
+  const auto check = [min, max](const std::string& text) {
+    double value = 0.0;
+    const bool is_inside =
+        CLI::detail::lexical_cast(text, value) && value >= min && value <= max;  // nan is not
+    return is_inside ? std::string()
+                     : fmt::format("expected a number from {} to {}, found {}", min, max, text);
+  };
+  return {check, ""};
+}
 
 void add_config_options(CLI::App& command, ConfigArguments& arguments) {
   command
@@ -117,7 +128,7 @@ void add_tolerance_option(CLI::App& command, double& tolerance_s) {
       .add_option("--gt-tolerance", tolerance_s,
                   "Most seconds between a frame and its true pose; default 0.01")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 3600.0).description(""));
+      ->check(in_range(0.0, 3600.0));
 }
 
 CLI::Option* add_range_option(CLI::App& command,

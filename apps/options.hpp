@@ -37,8 +37,8 @@ CLI::Option* add_file_option(CLI::App& command,
                              std::optional<std::filesystem::path>& file,
                              const std::string& help);
 
-/// Whole numbers from min to max; leaves the help's line short.
-[[nodiscard]] CLI::Validator in_range(int min, int max);
+/// Numbers from min to max, so finite ones; leaves the help's line short.
+[[nodiscard]] CLI::Validator in_range(double min, double max);
 
 /// --out DIR, which must be given.
 CLI::Option* add_out_folder(CLI::App& command,

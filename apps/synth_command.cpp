@@ -12,6 +12,7 @@
 #include "options.hpp"
 #include "progress.hpp"
 #include "synth/synth.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -33,6 +34,10 @@ struct SynthArguments {
 };
 
 Expected<int> render(SynthArguments& arguments) {
+  if (const Status status = check_options(arguments.options); !status) {
+    print_error(status.error().message + " (see 'stemvo synth --help')");
+    return kExitUsage;
+  }
   Progress progress("frames", /*is_quiet=*/false);
   const Status status =
       render_synthetic_drive(arguments.out_dir, arguments.options, std::ref(progress));
@@ -88,9 +93,10 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
   command.add_option("--seed", options.seed, "Of textures, shading and noise; default 1")
       ->type_name("S")
       ->check([](const std::string& text) {
-        // CLI11 would wrap a negative number around.
-        return text.starts_with('-') ? "expected a whole number of at least 0, found " + text
-                                     : std::string();
+        // CLI11 would wrap others around.
+        return parse_index(text)
+                   ? std::string()
+                   : "expected a whole number from 0 to 18446744073709551615, found " + text;
       });
   command.add_option("--width", options.width_px, "Pixels; default 1241, of a walk 640")
       ->type_name("W")

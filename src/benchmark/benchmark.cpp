@@ -199,6 +199,22 @@ class Benchmark {
     return summary_;
   }
 
+  /// In the folder for the results: its own files, and those of kept runs.
+  [[nodiscard]] std::vector<std::string> outputs() const {
+    std::vector<std::string> names = {"benchmark.md", "benchmark.json", "speed.json",
+                                      "report.html"};
+    for (const Json& sequence : report_["sequences"]) {
+      for (const Json& run : sequence["runs"]) {
+        const fs::path folder = run_dir(sequence, run).lexically_relative(request_.out_dir);
+        for (const char* name : kResultFiles) {
+          names.push_back(folder / name);
+        }
+        names.push_back(folder / kInputsFile);
+      }
+    }
+    return names;
+  }
+
   /// Of the sequences in the plan.
   [[nodiscard]] const std::vector<fs::path>& inputs() const { return inputs_; }
 
@@ -378,9 +394,8 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
     return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",
                             request.published.string(), error.what()));
   }
-  const auto lock = pipeline::open_out_folder(
-      request.out_dir, {"benchmark.md", "benchmark.json", "speed.json", "report.html"},
-      benchmark.inputs());
+  const auto lock =
+      pipeline::open_out_folder(request.out_dir, benchmark.outputs(), benchmark.inputs());
   return lock ? benchmark.run() : lock.error();
 }
 

@@ -137,14 +137,6 @@ Status add_view(FrameList& frames,
   return {};
 }
 
-Expected<cv::Mat> check_size(const fs::path& file, Expected<cv::Mat> image, const Camera& camera) {
-  if (image && (image->cols != camera.width_px || image->rows != camera.height_px)) {
-    return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", file.string(),
-                            camera.width_px, camera.height_px, image->cols, image->rows));
-  }
-  return image;
-}
-
 Expected<io::ImageKind> vote_on_images(
     const std::vector<fs::path>& files,
     const std::function<Expected<io::ImageKind>(const fs::path&)>& kind_of) {

@@ -58,11 +58,6 @@ namespace stemvo::dataset {
 /// Error: the principal point is outside the image, or not a number.
 [[nodiscard]] Status check_center(const Camera& camera);
 
-/// The image as it is. Error: its own, or (file named) it is not of the camera's size.
-[[nodiscard]] Expected<cv::Mat> check_size(const std::filesystem::path& file,
-                                           Expected<cv::Mat> image,
-                                           const Camera& camera);
-
 /// Images that were listed; what the request names goes before what lies beside them.
 [[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
                                                  const FrameSourceRequest& request);

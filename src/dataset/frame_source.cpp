@@ -31,7 +31,7 @@ bool is_bag(const fs::path& path) {
 
 /// Nothing that is known.
 Error refuse(const fs::path& path) {
-  std::string_view problem =
+  std::string problem =
       "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt), EuRoC's (mav0/cam0), "
       "TUM's (rgb.txt), camera.yaml beside images, or --camera FILE, found neither";
   if (dataset::is_pattern(path)) {
@@ -42,9 +42,10 @@ Error refuse(const fs::path& path) {
     problem =
         "expected a recording, found a ROS bag; 'python -m stemvo.bag BAG FOLDER' makes one of it";
   } else if (!dataset::is_folder(path)) {
-    problem =
-        "expected a folder, a video file, a quoted pattern of images or camera:N, found nothing of "
-        "that name; check the path ('stemvo run --help' lists what is read)";
+    problem = fmt::format(
+        "expected a folder, a video file, a quoted pattern of images or camera:N, found {}; check "
+        "the path ('stemvo run --help' lists what is read)",
+        kind_of(path));
   }
   return fail(fmt::format("{}: {}", path.string(), problem));
 }

@@ -103,11 +103,10 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   frames.name = listing.name;
   frames.given_calibration = camera_path;
   frames.camera_height_m = camera_file->camera_height_m;
-  const Status status = add_view(
-      frames, *view, request.masks,
-      [files = frames.files, is_color = *is_color, raw = camera_file->lens.camera](std::size_t i) {
-        return check_size(files[i], io::read_image(files[i], is_color), raw);
-      });
+  const Status status =
+      add_view(frames, *view, request.masks,
+               [files = frames.files, is_color = *is_color, size = view->full_size()](
+                   std::size_t i) { return io::read_image(files[i], is_color, size); });
   return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
 }
 

@@ -184,8 +184,8 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
     return status ? mask.error() : status.error();
   }
   frames.mask = *mask;
-  frames.read = [files = frames.files, is_color, sized = frames.camera](std::size_t index) {
-    return dataset::check_size(files[index], io::read_png(files[index], is_color), sized);
+  frames.read = [files = frames.files, is_color, size = frames.full_size](std::size_t index) {
+    return io::read_png(files[index], is_color, size);
   };
   return KittiSequence(std::move(frames));
 }

@@ -86,7 +86,9 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   status = add_view(
       frames, *view, request.masks, [stream, owner, raw = camera.lens.camera](std::size_t index) {
         auto image = stream->read(index);
-        return image && image->empty() ? image : check_size(owner, std::move(image), raw);
+        const Status fits =
+            image && !image->empty() ? check_stream_size(image->size(), raw, owner) : Status();
+        return fits ? image : fits.error();
       });
   return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "io/image_file.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <new>
 #include <optional>
@@ -11,7 +12,6 @@
 #include <turbojpeg.h>
 
 #include "internal_check.hpp"
-#include "io/png.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::io {
@@ -19,12 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `use` makes of the file's bytes.
-template <typename Use>
-auto with_bytes(const fs::path& file, const Use& use) {
-  return read_text_file(file).and_then([&](const std::string& text) {
-    return use(Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-  });
+Bytes bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 // JPEG's markers: this byte and a code.
@@ -58,13 +54,26 @@ std::optional<std::size_t> find_segment(Bytes bytes, const Predicate& is_wanted)
   return std::nullopt;
 }
 
-/// More than one component.
-bool is_color_jpeg(Bytes bytes) {
-  constexpr std::size_t kNumComponents = 7;  // behind length, precision, height and width
+/// The frame header: length, precision, height, width, number of components. Empty: there is none.
+Bytes jpeg_frame(Bytes bytes) {
+  constexpr std::size_t kSize = 8;
   const auto frame = find_segment(bytes, [](int code) {  // all but three, which define tables
     return code >= 0xc0 && code <= 0xcf && code != 0xc4 && code != 0xc8 && code != 0xcc;
   });
-  return frame && *frame + kNumComponents < bytes.size() && bytes[*frame + kNumComponents] > 1;
+  return frame && *frame + kSize <= bytes.size() ? bytes.subspan(*frame, kSize) : Bytes();
+}
+
+/// More than one component.
+bool is_color_jpeg(Bytes bytes) {
+  const Bytes frame = jpeg_frame(bytes);
+  return !frame.empty() && frame[7] > 1;
+}
+
+std::optional<DeclaredSize> jpeg_size(Bytes bytes) {
+  const Bytes frame = jpeg_frame(bytes);
+  return frame.empty()
+             ? std::nullopt
+             : std::optional(DeclaredSize{256U * frame[5] + frame[6], 256U * frame[3] + frame[4]});
 }
 
 /// By TurboJPEG, which tells damaged data from sound.
@@ -78,10 +87,10 @@ class JpegDecoder {
 
   /// For a printer's four colours: no camera's.
   [[nodiscard]] bool is_print() const { return colors_ == TJCS_CMYK || colors_ == TJCS_YCCK; }
-  [[nodiscard]] Status check_size(const std::string& name) const {
-    return is_known_ ? check_num_pixels(name, static_cast<std::uint64_t>(width_),
-                                        static_cast<std::uint64_t>(height_))
-                     : Status();
+  [[nodiscard]] Status check_size(const std::string& name, const WantedSize& wanted) const {
+    const DeclaredSize found{static_cast<std::uint64_t>(width_),
+                             static_cast<std::uint64_t>(height_)};
+    return is_known_ ? io::check_size(name, found, wanted) : Status();
   }
   /// Empty: damaged.
   [[nodiscard]] cv::Mat decode(bool as_color) {
@@ -113,13 +122,16 @@ class JpegDecoder {
 };
 
 /// The markers are walked to the end first, because the decoder fills what is missing with gray.
-Expected<cv::Mat> decode_jpeg(Bytes bytes, const std::string& name, bool as_color) {
+Expected<cv::Mat> decode_jpeg(Bytes bytes,
+                              const std::string& name,
+                              bool as_color,
+                              const WantedSize& wanted) {
   if (!find_segment(bytes, [](int code) { return code == kEndOfImage; })) {
     return fail(fmt::format("{}: expected a complete JPEG image, found one cut off after {} bytes",
                             name, bytes.size()));
   }
   JpegDecoder decoder(bytes);
-  if (const Status status = decoder.check_size(name); !status) {
+  if (const Status status = decoder.check_size(name, wanted); !status) {
     return status.error();
   }
   if (decoder.is_print()) {
@@ -132,21 +144,58 @@ Expected<cv::Mat> decode_jpeg(Bytes bytes, const std::string& name, bool as_colo
   return image;
 }
 
+/// Of an image file, by its first bytes: no format takes more than 8 bytes for a pixel and a ninth
+/// for what is around them, beside what a camera notes.
+Expected<int> max_MB_of(Bytes start, const std::string& name, const WantedSize& wanted) {
+  constexpr int kNotes_MB = 16;
+  constexpr int kUntold_MB = 128;  // the size stands far behind other things
+  constexpr std::uint64_t kBytesOfPixel = 9;
+  const auto size = is_png(start) ? png_size(start) : jpeg_size(start);
+  if (!size) {
+    return kUntold_MB;
+  }
+  return check_size(name, *size, wanted).map([&] {
+    const std::uint64_t pixels_MB = kBytesOfPixel * size->width * size->height / 1000000;
+    return std::min(kNotes_MB + static_cast<int>(pixels_MB), kMaxFile_MB);
+  });
+}
+
+/// What `decode` makes of the file's bytes, which are read if the first of them say that it is an
+/// image that is wanted. `takes_jpeg`: beside PNG.
+template <typename Decode>
+auto read_and_decode(const fs::path& file,
+                     bool takes_jpeg,
+                     const WantedSize& wanted,
+                     const Decode& decode) {
+  const auto limit = [&](std::string_view text) -> Expected<int> {
+    const Bytes start = bytes_of(text);
+    const bool is_image = is_png(start) || (takes_jpeg && is_jpeg(start));
+    return is_image ? max_MB_of(start, file.string(), wanted)
+                    : Expected<int>(decode(start).error());
+  };
+  return read_text_file(file, limit).and_then([&](const std::string& text) {
+    return decode(bytes_of(text));
+  });
+}
+
 }  // namespace
 
-Expected<cv::Mat> decode_image(Bytes bytes, const std::string& name, bool as_color) {
+Expected<cv::Mat> decode_image(Bytes bytes,
+                               const std::string& name,
+                               bool as_color,
+                               const WantedSize& wanted) {
   if (is_png(bytes)) {
-    return decode_png(bytes, name, as_color);
+    return decode_png(bytes, name, as_color, wanted);
   }
   if (is_jpeg(bytes)) {
-    return decode_jpeg(bytes, name, as_color);
+    return decode_jpeg(bytes, name, as_color, wanted);
   }
   return fail(fmt::format("{}: expected a PNG or JPEG image, found {}", name,
                           bytes.empty() ? "an empty file" : "another kind of file"));
 }
 
 Expected<ImageKind> read_image_kind(const fs::path& file) {
-  return with_bytes(file, [&](Bytes bytes) {
+  return read_and_decode(file, true, {}, [&](Bytes bytes) {
     const bool is_color = is_png(bytes) ? is_color_png(bytes) : is_color_jpeg(bytes);
     return decode_image(bytes, file.string(), is_color).map([&](const cv::Mat& image) {
       return ImageKind{image.size(), is_color};
@@ -154,9 +203,10 @@ Expected<ImageKind> read_image_kind(const fs::path& file) {
   });
 }
 
-Expected<cv::Mat> read_image(const fs::path& file, bool as_color) {
-  return with_bytes(file,
-                    [&](Bytes bytes) { return decode_image(bytes, file.string(), as_color); });
+Expected<cv::Mat> read_image(const fs::path& file, bool as_color, const WantedSize& wanted) {
+  return read_and_decode(file, true, wanted, [&](Bytes bytes) {
+    return decode_image(bytes, file.string(), as_color, wanted);
+  });
 }
 
 std::string encode_jpeg(const cv::Mat& image, int quality) {
@@ -177,8 +227,10 @@ std::string encode_jpeg(const cv::Mat& image, int quality) {
   return bytes;
 }
 
-Expected<cv::Mat> read_png(const fs::path& file, bool as_color) {
-  return with_bytes(file, [&](Bytes bytes) { return decode_png(bytes, file.string(), as_color); });
+Expected<cv::Mat> read_png(const fs::path& file, bool as_color, const WantedSize& wanted) {
+  return read_and_decode(file, false, wanted, [&](Bytes bytes) {
+    return decode_png(bytes, file.string(), as_color, wanted);
+  });
 }
 
 }  // namespace stemvo::io

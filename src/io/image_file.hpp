@@ -3,11 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
 #include <string>
 
 #include <opencv2/core.hpp>
 
+#include "io/png.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::io {
@@ -23,14 +23,20 @@ struct ImageKind {
 /// cut off, or damaged. Of a JPEG the sensor's rows and columns: a wish to be shown turned (EXIF)
 /// is ignored, since the calibration knows nothing of it.
 [[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
-/// The same as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`.
-[[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file, bool as_color);
+/// The same as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. A file that is too
+/// large for the size it declares, or declares another than is wanted, is not read to its end.
+[[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file,
+                                           bool as_color,
+                                           const WantedSize& wanted = {});
 /// The same of a file's bytes; `name` starts its errors.
-[[nodiscard]] Expected<cv::Mat> decode_image(std::span<const std::uint8_t> bytes,
+[[nodiscard]] Expected<cv::Mat> decode_image(Bytes bytes,
                                              const std::string& name,
-                                             bool as_color);
+                                             bool as_color,
+                                             const WantedSize& wanted = {});
 /// The same where only a PNG is expected.
-[[nodiscard]] Expected<cv::Mat> read_png(const std::filesystem::path& file, bool as_color);
+[[nodiscard]] Expected<cv::Mat> read_png(const std::filesystem::path& file,
+                                         bool as_color,
+                                         const WantedSize& wanted = {});
 
 /// 8-bit image, gray or RGB -> the bytes of a JPEG file (baseline, colours at half the size).
 /// `quality`: 1 to 100. Throws std::bad_alloc.

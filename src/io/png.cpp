@@ -219,7 +219,7 @@ class LibpngReader {
     } else if (!as_color && is_color) {
       png_set_rgb_to_gray(png_, PNG_ERROR_ACTION_NONE, 0.299, 0.587);  // ITU-R BT.601
     }
-    png_set_interlace_handling(png_);
+    num_passes_ = png_set_interlace_handling(png_);
     png_read_update_info(png_, info_);
     return true;
   }
@@ -231,13 +231,26 @@ class LibpngReader {
     if (setjmp(png_jmpbuf(png_)) != 0) {
       return false;
     }
-    png_read_image(png_, rows.data());
+    read_passes(rows);
     png_read_end(png_, nullptr);
     return true;
   }
   [[nodiscard]] bool lacks_memory() const { return lacks_memory_; }
 
  private:
+  static constexpr png_uint_32 kPixels = 0x49444154;  ///< IDAT
+
+  void read_passes(std::vector<png_bytep>& rows) {
+    for (int pass = 1; pass <= num_passes_; ++pass) {
+      png_read_rows(png_, rows.data(), nullptr, static_cast<png_uint_32>(rows.size() - 1));
+      is_last_row_ = pass == num_passes_;
+      png_read_row(png_, rows.back(), nullptr);
+    }
+  }
+  /// Packed: what the last row, and the end of the stream, can take.
+  [[nodiscard]] std::size_t max_bytes_at_end() const {
+    return (1U << 13U) + 9 * std::size_t{png_get_image_width(png_, info_)};
+  }
   [[noreturn]] static void fail(png_structp png, png_const_charp message) {
     auto* self = static_cast<LibpngReader*>(png_get_error_ptr(png));
     self->lacks_memory_ = std::strstr(message, "memory") != nullptr;
@@ -248,11 +261,21 @@ class LibpngReader {
     if (size > self->rest_.size()) {
       png_error(png, "cut off");
     }
+    // With the last row it unpacks, and throws away, all that stands behind it.
+    if (self->is_last_row_ && png_get_io_chunk_type(png) == kPixels) {
+      self->num_bytes_at_end_ += size;
+      if (self->num_bytes_at_end_ > self->max_bytes_at_end()) {
+        png_error(png, "more pixels than the header says");
+      }
+    }
     std::copy_n(self->rest_.begin(), size, to);
     self->rest_ = self->rest_.subspan(size);
   }
 
   Bytes rest_;
+  int num_passes_ = 1;  ///< more: interlaced
+  bool is_last_row_ = false;
+  std::size_t num_bytes_at_end_ = 0;
   bool lacks_memory_ = false;
   png_structp png_;
   png_infop info_;
@@ -336,16 +359,35 @@ std::string encode_png(const cv::Mat& image, bool is_fast) {
   return bytes;
 }
 
-Status check_num_pixels(const std::string& name, std::uint64_t width, std::uint64_t height) {
+Status check_size(const std::string& name, const DeclaredSize& found, const WantedSize& wanted) {
   constexpr std::uint64_t kMaxPixels = 1U << 27U;
+  const auto [width, height] = found;
   if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
     return fail(fmt::format("{}: expected an image of at most {} pixels, found {}x{}", name,
                             kMaxPixels, width, height));
   }
+  if (wanted && *wanted != cv::Size(static_cast<int>(width), static_cast<int>(height))) {
+    return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", name,
+                            wanted->width, wanted->height, width, height));
+  }
   return {};
 }
 
-Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color) {
+std::optional<DeclaredSize> png_size(Bytes bytes) {
+  constexpr std::string_view kHeader = "IHDR";  // behind the signature and a length
+  constexpr std::size_t kType = 12;
+  if (!is_png(bytes) || bytes.size() < kType + kHeader.size() + 8 ||
+      !std::equal(kHeader.begin(), kHeader.end(), bytes.begin() + kType)) {
+    return std::nullopt;
+  }
+  const Bytes data = bytes.subspan(kType + kHeader.size());
+  return DeclaredSize{big_endian_32(data), big_endian_32(data.subspan(4))};
+}
+
+Expected<cv::Mat> decode_png(Bytes bytes,
+                             const std::string& name,
+                             bool as_color,
+                             const WantedSize& wanted) {
   if (!is_png(bytes)) {
     return fail(fmt::format("{}: expected a PNG image, found {}", name,
                             bytes.empty() ? "an empty file" : "another kind of file"));
@@ -354,11 +396,8 @@ Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color
     return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
                             name, bytes.size()));
   }
-  Bytes rest = bytes.subspan(kSignature.size());
-  if (const Chunk header = next_chunk(rest); header.type == "IHDR" && header.data.size() == 13) {
-    const Status status =
-        check_num_pixels(name, big_endian_32(header.data), big_endian_32(header.data.subspan(4)));
-    if (!status) {
+  if (const auto size = png_size(bytes)) {
+    if (const Status status = check_size(name, *size, wanted); !status) {
       return status.error();
     }
   }

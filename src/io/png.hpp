@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -13,10 +14,16 @@ namespace stemvo::io {
 
 using Bytes = std::span<const std::uint8_t>;
 
+/// The one size that an image may have; none: any, up to more pixels than a camera has.
+using WantedSize = std::optional<cv::Size>;
+
 /// A complete PNG as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors, starting
-/// with `name`: not a PNG; cut off; damaged. An image is never partly decoded: the chunks are
-/// walked to the end first, because some decoders fill what is missing with gray.
-[[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes, const std::string& name, bool as_color);
+/// with `name`: not a PNG; of another size; cut off; damaged. An image is never partly decoded: the
+/// chunks are walked to the end first, because some decoders fill what is missing with gray.
+[[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes,
+                                           const std::string& name,
+                                           bool as_color,
+                                           const WantedSize& wanted = {});
 
 /// The common kind of PNG, which is what KITTI has, by libdeflate: in a third of the time that
 /// libpng and zlib take. Empty: the file is of another kind (other than 8-bit gray, or RGB with
@@ -32,12 +39,18 @@ using Bytes = std::span<const std::uint8_t>;
 /// std::bad_alloc.
 [[nodiscard]] std::string encode_png(const cv::Mat& image, bool is_fast = false);
 
-/// Error, starting with `name`: more pixels than any camera has. Asked before memory is.
-[[nodiscard]] Status check_num_pixels(const std::string& name,
-                                      std::uint64_t width,
-                                      std::uint64_t height);
+/// As a file declares it, which may be anything.
+struct DeclaredSize {
+  std::uint64_t width = 0;
+  std::uint64_t height = 0;
+};
+/// Error, starting with `name`: another one than is wanted. Asked before memory is.
+[[nodiscard]] Status check_size(const std::string& name,
+                                const DeclaredSize& found,
+                                const WantedSize& wanted);
 
-/// By the first bytes.
+/// By the first bytes. No size: they are too few, or of no PNG.
+[[nodiscard]] std::optional<DeclaredSize> png_size(Bytes bytes);
 [[nodiscard]] bool is_png(Bytes bytes);
 /// Of a PNG: palettes are colour.
 [[nodiscard]] bool is_color_png(Bytes bytes);

@@ -8,6 +8,7 @@
 #include "models/manifest.hpp"
 #include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
@@ -31,15 +32,6 @@ Expected<fs::path> manifest_beside(const fs::path& file) {
   return manifest;
 }
 
-/// What lies at a path that no model has.
-const char* describe_file(const fs::path& path) {
-  std::error_code ignored;
-  return !fs::exists(path, ignored)           ? "no such file"
-         : fs::is_directory(path, ignored)    ? "a folder"
-         : fs::is_regular_file(path, ignored) ? "another file"
-                                              : "a pipe or device";
-}
-
 }  // namespace
 
 Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
@@ -47,7 +39,7 @@ Expected<std::vector<ModelEntry>> find_layers(const std::string& model,
   const bool is_path = model.ends_with(".onnx");
   if (!is_path && model.find('/') != model.npos) {
     return fail(fmt::format("{}: expected the name of a model or the path of an .onnx, found {}",
-                            model, describe_file(model)));
+                            model, kind_of(model)));
   }
   const auto manifest =
       is_path ? manifest_beside(model) : Expected<fs::path>(models_dir / kManifest);

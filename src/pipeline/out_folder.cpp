@@ -15,6 +15,7 @@
 #include "dataset/listing.hpp"
 #include "models/manifest.hpp"
 #include "text/spared_inputs.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::pipeline {
 
@@ -45,11 +46,12 @@ Status create_out_folder(const fs::path& folder) {
   };
   std::error_code code;
   fs::create_directories(folder, code);
+  std::error_code ignored;
+  if (fs::exists(folder, ignored) && !fs::is_directory(folder, ignored)) {
+    return refuse(fmt::format("{} of that name", kind_of(folder)));
+  }
   if (code) {
     return refuse(code.message());
-  }
-  if (!fs::is_directory(folder, code)) {
-    return refuse("a file of that name");
   }
   const int file = open_nameless(folder);
   constexpr std::string_view kText = "can be written\n";
@@ -79,6 +81,18 @@ Expected<FolderLock> lock_folder(const fs::path& folder) {
 
 namespace {
 
+/// Nobody reads a pipe whose bytes come at the end of a run.
+Status check_are_no_pipes(const std::vector<fs::path>& outputs) {
+  for (const fs::path& file : outputs) {
+    std::error_code ignored;
+    if (fs::is_fifo(file, ignored) || fs::is_socket(file, ignored)) {
+      return fail(
+          fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
+    }
+  }
+  return {};
+}
+
 /// trajectory.png would be a frame of the next run.
 Status check_holds_no_images(const fs::path& folder, const std::vector<fs::path>& inputs) {
   for (const fs::path& input : inputs) {
@@ -101,6 +115,7 @@ Expected<FolderLock> open_out_folder(const fs::path& folder,
     outputs.push_back(folder / name);
   }
   const Status status = check_spares_inputs(outputs, inputs)
+                            .and_then([&] { return check_are_no_pipes(outputs); })
                             .and_then([&] { return check_holds_no_images(folder, inputs); })
                             .and_then([&] { return create_out_folder(folder); });
   return status ? lock_folder(folder) : status.error();

@@ -257,6 +257,8 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
   if (!text) {
     return text.error();
   }
+  constexpr std::size_t kMaxWarnings = 5;
+  std::size_t num_left_out = 0;
   SearchRecords records;
   std::size_t& begin = records.num_good_bytes;
   std::size_t line_number = 0;
@@ -272,7 +274,13 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
     if (line_number == 1) {
       return fail(problem);
     }
-    records.warnings.push_back(problem + "; left out");
+    if (++num_left_out <= kMaxWarnings) {
+      records.warnings.push_back(problem + "; left out");
+    }
+  }
+  if (num_left_out > kMaxWarnings) {
+    records.warnings.push_back(
+        fmt::format("{}: {} more lines left out", file.string(), num_left_out - kMaxWarnings));
   }
   return records;
 }

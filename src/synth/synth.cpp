@@ -285,43 +285,6 @@ Settings settings_of(const SyntheticDriveOptions& options) {
           {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px}};
 }
 
-Status check_options(const SyntheticDriveOptions& options, const Settings& settings) {
-  if (options.trajectory && options.walk) {
-    return fail("synth: expected a trajectory or a walk, found both");
-  }
-  if (options.trajectory && options.speed_m_s) {
-    return fail("synth: expected a trajectory or a speed, found both (the poses say how fast)");
-  }
-  struct Limits {
-    const char* name;
-    double value;
-    double low;
-    double high;
-  };
-  const auto& [pace, camera] = settings;
-  const double max_m_s = options.walk ? 1.0 : 60.0;  // faster, a turn on the spot would be a jerk
-  for (const auto& [name, value, low, high] :
-       {Limits{"width", 1.0 * camera.width_px, 16.0, 8192.0},
-        Limits{"height", 1.0 * camera.height_px, 16.0, 8192.0},
-        Limits{"frames", 1.0 * options.num_frames, 1.0, 1e6},  // %06d
-        Limits{"rate", pace.rate_hz, 1.0, 1000.0},
-        Limits{"speed", pace.speed_m_s.value_or(max_m_s), 0.1, max_m_s}}) {
-    if (!(value >= low && value <= high)) {
-      return fail(
-          fmt::format("synth: expected {} from {} to {}, found {}", name, low, high, value));
-    }
-  }
-  constexpr double kMaxWay_m = 2e6;  // a street's knots are kept in memory
-  const double way_m = pace.speed_m_s.value_or(1.0) / pace.rate_hz * options.num_frames;
-  if (way_m > kMaxWay_m) {
-    return fail(
-        fmt::format("synth: expected a way of at most {} km (frames / rate * speed), "
-                    "found {:.0f}",
-                    kMaxWay_m / 1000.0, way_m / 1000.0));
-  }
-  return {};
-}
-
 Expected<std::variant<synth::Drive, synth::Walk>> plan_path(const SyntheticDriveOptions& options,
                                                             const synth::Pace& pace) {
   if (options.walk) {
@@ -359,12 +322,49 @@ Status render_frames(const synth::Renderer& renderer,
 
 }  // namespace
 
+Status check_options(const SyntheticDriveOptions& options) {
+  if (options.trajectory && options.walk) {
+    return fail("synth: expected a trajectory or a walk, found both");
+  }
+  if (options.trajectory && options.speed_m_s) {
+    return fail("synth: expected a trajectory or a speed, found both (the poses say how fast)");
+  }
+  struct Limits {
+    const char* name;
+    double value;
+    double low;
+    double high;
+  };
+  const auto& [pace, camera] = settings_of(options);
+  const double max_m_s = options.walk ? 1.0 : 60.0;  // faster, a turn on the spot would be a jerk
+  for (const auto& [name, value, low, high] :
+       {Limits{"width", 1.0 * camera.width_px, 16.0, 8192.0},
+        Limits{"height", 1.0 * camera.height_px, 16.0, 8192.0},
+        Limits{"frames", 1.0 * options.num_frames, 1.0, 1e6},  // %06d
+        Limits{"rate", pace.rate_hz, 1.0, 1000.0},
+        Limits{"speed", pace.speed_m_s.value_or(max_m_s), 0.1, max_m_s}}) {
+    if (!(value >= low && value <= high)) {
+      return fail(
+          fmt::format("synth: expected {} from {} to {}, found {}", name, low, high, value));
+    }
+  }
+  constexpr double kMaxWay_m = 2e6;  // a street's knots are kept in memory
+  const double way_m = pace.speed_m_s.value_or(1.0) / pace.rate_hz * options.num_frames;
+  if (way_m > kMaxWay_m) {
+    return fail(
+        fmt::format("synth: expected a way of at most {} km (frames / rate * speed), "
+                    "found {:.0f}",
+                    kMaxWay_m / 1000.0, way_m / 1000.0));
+  }
+  return {};
+}
+
 Status render_synthetic_drive(const std::filesystem::path& out_dir,
                               const SyntheticDriveOptions& options,
                               const RenderProgress& progress) {
   const Settings settings = settings_of(options);
   const auto& [pace, camera] = settings;
-  if (const Status valid = check_options(options, settings); !valid) {
+  if (const Status valid = check_options(options); !valid) {
     return valid;
   }
   auto path = plan_path(options, pace);

@@ -33,6 +33,9 @@ struct SyntheticDriveOptions {
 /// Called after each batch of frames: frames done, frames in all; false stops (an interrupt).
 using RenderProgress = std::function<bool(std::size_t, std::size_t)>;
 
+/// Error: values that exclude each other, or are out of range.
+[[nodiscard]] Status check_options(const SyntheticDriveOptions& options);
+
 /// Writes OUT/sequences/NAME/{image_2,calib.txt,times.txt} and OUT/poses/NAME.txt; of a walk also
 /// camera.yaml beside calib.txt. They take the place of an earlier drive when they are whole.
 /// Stopped, an earlier drive stays; where there was none, the frames that were done are one. The

@@ -41,24 +41,32 @@ Error cannot_read(const fs::path& file) {
   return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
 }
 
-Expected<std::string> read_opened(int descriptor, const fs::path& file, int max_MB) {
-  const auto max_bytes = static_cast<std::size_t>(max_MB) * 1000000;
+Expected<std::string> read_opened(int descriptor, const fs::path& file, const SizeLimit& limit) {
+  constexpr std::size_t kBytesOfMB = 1000000;
+  std::array<char, 1 << 16> buffer;
+  ssize_t num_read = ::read(descriptor, buffer.data(), buffer.size());
+  if (num_read < 0) {
+    return cannot_read(file);
+  }
+  const auto max_MB = limit({buffer.data(), static_cast<std::size_t>(num_read)});
+  if (!max_MB) {
+    return max_MB.error();
+  }
+  const std::size_t max_bytes = static_cast<std::size_t>(*max_MB) * kBytesOfMB;
   std::string text;
   struct stat status = {};
   if (::fstat(descriptor, &status) == 0) {
     const auto size = static_cast<std::size_t>(status.st_size);
     if (size > max_bytes) {
-      return fail(fmt::format("{}: expected at most {} MB, found {:.1f} MB", file.string(), max_MB,
-                              1e-6 * static_cast<double>(size)));
+      return fail(fmt::format("{}: expected at most {} MB, found {} MB", file.string(), *max_MB,
+                              static_cast<double>(size) / kBytesOfMB));
     }
     text.reserve(size);
   }
-  std::array<char, 1 << 16> buffer;
-  ssize_t num_read = 0;
-  while ((num_read = ::read(descriptor, buffer.data(), buffer.size())) > 0) {
+  for (; num_read > 0; num_read = ::read(descriptor, buffer.data(), buffer.size())) {
     text.append(buffer.data(), static_cast<std::size_t>(num_read));
     if (text.size() > max_bytes) {  // the size of files of /proc is not told
-      return fail(fmt::format("{}: expected at most {} MB, found more", file.string(), max_MB));
+      return fail(fmt::format("{}: expected at most {} MB, found more", file.string(), *max_MB));
     }
   }
   return num_read == 0 ? Expected<std::string>(std::move(text)) : cannot_read(file);
@@ -78,7 +86,9 @@ Status write_in_place(const fs::path& file,
                       int mode,
                       std::string_view text) {
   const auto failed = [&] {
-    return fail(fmt::format("{}: cannot write: {}", file.string(), last_system_error()));
+    return fail(
+        fmt::format("{}: cannot write: {}", file.string(),
+                    errno == ENXIO ? "found a pipe that nobody reads" : last_system_error()));
   };
   // A pipe that nobody reads is an error; it would wait for ever.
   const int descriptor = ::open(place.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | mode, 0666);
@@ -105,16 +115,36 @@ Status write_beside(const fs::path& file, const fs::path& place, std::string_vie
 
 }  // namespace
 
+std::string_view kind_of(const fs::path& path) {
+  std::error_code ignored;
+  switch (fs::status(path, ignored).type()) {
+    case fs::file_type::regular:
+      return "a file";
+    case fs::file_type::directory:
+      return "a folder";
+    case fs::file_type::fifo:
+      return "a pipe";
+    case fs::file_type::block:
+    case fs::file_type::character:
+      return "a device";
+    case fs::file_type::socket:
+      return "a socket";
+    default:
+      return "nothing of that name";
+  }
+}
+
 fs::path unfinished(const fs::path& file) { return fs::path(file.string() + ".unfinished"); }
 
 Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
+  return read_text_file(file, [max_MB](std::string_view) { return max_MB; });
+}
+
+Expected<std::string> read_text_file(const fs::path& file, const SizeLimit& max_MB) {
   std::error_code ignored;
-  if (fs::is_directory(file, ignored)) {
-    return fail(fmt::format("{}: expected a file, found a folder", file.string()));
-  }
   // Pipes and devices may never end.
   if (fs::exists(file, ignored) && !fs::is_regular_file(file, ignored)) {
-    return fail(fmt::format("{}: expected a file, found a pipe or device", file.string()));
+    return fail(fmt::format("{}: expected a file, found {}", file.string(), kind_of(file)));
   }
   // Without O_NONBLOCK reading some regular files of /proc waits for ever.
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);

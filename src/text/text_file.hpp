@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,10 +19,18 @@ inline constexpr int kMaxSettings_MB = 4;
 inline constexpr int kMaxRows_MB = 64;
 inline constexpr int kMaxFile_MB = 1024;
 
+/// What lies there, for messages: "a file", "a folder", "a pipe", "a device", "a socket", "nothing
+/// of that name".
+[[nodiscard]] std::string_view kind_of(const std::filesystem::path& path);
+
 /// The whole file as it is. Error: missing, a folder, unreadable, larger. Throws std::system_error
 /// where the process may open no more files.
 [[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file,
                                                    int max_MB = kMaxFile_MB);
+/// How many MB a file may hold, by its first bytes (64 kB, or all). Error: it is not read on.
+using SizeLimit = std::function<Expected<int>(std::string_view start)>;
+[[nodiscard]] Expected<std::string> read_text_file(const std::filesystem::path& file,
+                                                   const SizeLimit& max_MB);
 /// Where a file is written before it takes its name; what lies there is replaced.
 [[nodiscard]] std::filesystem::path unfinished(const std::filesystem::path& file);
 /// Replaces the file at once: whoever reads it finds the old or the new one, whole, also after a

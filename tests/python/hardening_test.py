@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The program and its module as they are built: position independent, read-only after relocation, stack and buffers guarded."""
 
+import json
 import os
 import pathlib
 import subprocess
@@ -8,6 +9,7 @@ import unittest
 
 PROGRAM = pathlib.Path(os.environ["STEMVO_PROGRAM"])
 MODULE = PROGRAM.parent / "libstemvo_video.so"
+COMMANDS = PROGRAM.parent / "compile_commands.json"
 
 
 def readelf(option, binary=PROGRAM):
@@ -36,6 +38,12 @@ class Program(unittest.TestCase):
         symbols = readelf("--dyn-syms")
         self.assertIn("__stack_chk_fail", symbols)
         self.assertRegex(symbols, r"__\w+_chk@")
+
+    def test_every_source_is_compiled_with_the_third_level_of_fortify(self):
+        """The program itself looks the same with the first."""
+        for source in json.loads(COMMANDS.read_text()):
+            flags = [word for word in source["command"].split() if "_FORTIFY_SOURCE" in word]
+            self.assertEqual(flags[-1:], ["-D_FORTIFY_SOURCE=3"], source["file"])
 
 
 if __name__ == "__main__":

@@ -66,10 +66,12 @@ TEST_F(BadInput, MoreBehindTheDocument) {
 TEST_F(BadInput, PipesAndDevicesAreNoFiles) {
   const std::string pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  for (const std::string& file : {pipe, std::string("/dev/zero")}) {
+  for (const auto& [file, kind] : {std::pair(pipe, "a pipe"), {"/dev/zero", "a device"}}) {
     for (const char* option : {"--config", "--gt", "--calib"}) {
-      expect_error(run({option, file}), 1, {file, "expected a file", "pipe or device"});
+      expect_error(run({option, file}), 1, {file + ": expected a file, found " + kind});
     }
+    expect_error(run_stemvo({"run", file, "--camera", pipe, "--out", out_}), 1,
+                 {file + ": expected a folder, a video file", std::string("found ") + kind});
   }
 }
 
@@ -92,20 +94,21 @@ TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
   };
   for (const char* option : {"--config", "--calib"}) {
     const std::string file = large(std::string(option).substr(2), 5);
-    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5.0 MB"});
+    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5 MB"});
   }
   const std::string camera = large("camera.yaml", 5);
   expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
-               {camera + ": expected at most 4 MB, found 5.0 MB"});
+               {camera + ": expected at most 4 MB, found 5 MB"});
+  fs::resize_file(camera, 4000001);
+  expect_error(run({"--config", camera}), 1, {"expected at most 4 MB, found 4.000001 MB"});
   const std::string poses = large("poses.txt", 70);
-  expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70.0 MB"});
+  expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70 MB"});
 }
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {
-  for (const auto& [path, found] :
-       {std::pair<std::string, std::string>("/dev/zero", "a pipe or device"),
-        {folder_.path(), "a folder"},
-        {folder_ / "none.h5", "no such file"}}) {
+  for (const auto& [path, found] : {std::pair<std::string, std::string>("/dev/zero", "a device"),
+                                    {folder_.path(), "a folder"},
+                                    {folder_ / "none.h5", "nothing of that name"}}) {
     expect_error(run({"--set", "stem.model=" + path}), 1, {path + ": expected the name", found});
     expect_error(run_stemvo({"models", path}), 1, {path + ": expected the name", found});
   }
@@ -146,6 +149,23 @@ TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
   EXPECT_THAT(result.err, AllOf(HasSubstr("warning: " + images.string() + "/000003.png"),
                                 HasSubstr("000008.png: expected a sound PNG image, found damaged"),
                                 Not(HasSubstr("libpng"))));
+}
+
+/// By what is cheap to see: neither is read to its end.
+TEST_F(BadInput, ImagesOfAbsurdSizeAreOneWarningEach) {
+  const fs::path images = sequence_ / "image_2";
+  fs::resize_file(images / "000006.png", 900000000);
+  std::string wide = read_file(images / "000007.png");
+  write_file(images / "000007.png", wide.replace(16, 4, std::string("\0\0\x28\0", 4)));
+  write_file(images / "000008.png", "");
+  fs::resize_file(images / "000008.png", 900000000);
+  const ProgramResult result = run({"--quiet"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 3) << result.err;
+  EXPECT_THAT(result.err,
+              AllOf(HasSubstr("000006.png: expected at most 17 MB, found 900 MB"),
+                    HasSubstr("000007.png: expected an image of 620x188 pixels, found 10240x188"),
+                    HasSubstr("000008.png: expected a PNG image, found another kind of file")));
 }
 
 TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {
@@ -227,8 +247,21 @@ TEST_F(BadInput, OutputFolderThatCannotBeWritten) {
   write_file(folder_ / "file", "");
   out_ = folder_ / "file";
   expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+  const std::string pipe = folder_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  out_ = pipe;
+  expect_error(run(), 1, {out_, "found: a pipe of that name"});
   out_ = "/proc/stemvo/out";
   expect_error(run(), 1, {out_, "expected an output folder that can be written"});
+}
+
+/// Before the first frame, not at the end.
+TEST_F(BadInput, PipeInPlaceOfAResult) {
+  fs::create_directories(out_);
+  const std::string metrics = out_ + "/metrics.json";
+  ASSERT_EQ(::mkfifo(metrics.c_str(), 0600), 0);
+  expect_error(run(), 1, {metrics + ": expected a file to write, found a pipe"});
+  EXPECT_FALSE(fs::exists(out_ + "/frames.csv"));
 }
 
 TEST_F(BadInput, Model) {
@@ -314,9 +347,6 @@ TEST_F(BadInput, Synth) {
   expect_error(run_stemvo({"synth", folder_ / "file", "--frames", "2"}), 1, {"file"});
   expect_error(run_stemvo({"synth", folder_ / "o", "--trajectory", folder_ / "none.txt"}), 1,
                {"none.txt"});
-  expect_error(run_stemvo({"synth", folder_ / "o", "--rate", "0"}), 1, {"rate", "found 0"});
-  expect_error(run_stemvo({"synth", folder_ / "o", "--walk", "--speed", "3"}), 1,
-               {"speed", "found 3"});
 }
 
 TEST_F(BadInput, Check) {

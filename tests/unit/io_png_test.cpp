@@ -279,6 +279,39 @@ TEST(PngFile, ErrorsNameTheFile) {
   EXPECT_THAT(read_png(folder / "none.png", true).error().message, HasSubstr("cannot read: "));
 }
 
+/// A few bytes behind the pixels are some encoder's; millions would be unpacked for nothing.
+TEST(PngFile, MorePixelsThanTheHeaderSays) {
+  for (const int depth : {8, 16}) {  // ours, libpng's
+    Png png{depth, 0, 10, 10, Bytes(static_cast<std::size_t>(10 * (1 + 10 * depth / 8))), {}};
+    EXPECT_TRUE(decode_png(encoded(png), "a.png", false)) << depth;
+    png.unpacked.resize(std::size_t{1} << 26U);
+    const auto image = decode_png(encoded(png), "a.png", false);
+    ASSERT_FALSE(image) << depth;
+    EXPECT_THAT(image.error().message, HasSubstr("found damaged data")) << depth;
+  }
+}
+
+/// What follows the header does not matter: it is not read.
+TEST(PngFile, AnotherSizeThanIsWantedIsRefusedByTheHeader) {
+  const TempFolder folder;
+  const Bytes png = encoded({8, 0, 9000, 8000, Bytes(10), {}});
+  const auto file = folder.file("a.png", {png.begin(), png.end()});
+  EXPECT_EQ(read_png(file, false, cv::Size(620, 188)).error().message,
+            file.string() + ": expected an image of 620x188 pixels, found 8000x9000");
+}
+
+TEST(PngFile, FilesTooLargeForTheirSizeOrOfAnotherKindAreNotRead) {
+  const TempFolder folder;
+  const Bytes png = encoded(png_of(test_image(CV_8UC1), {0}));
+  for (const auto& [bytes, found] : {std::pair(std::string(png.begin(), png.end()), "found 900 MB"),
+                                     {"\xff\xd8", "found 900 MB"},
+                                     {"x", "found another kind of file"}}) {
+    const auto file = folder.file("a.png", bytes);
+    std::filesystem::resize_file(file, 900000000);
+    EXPECT_THAT(read_image(file, false).error().message, HasSubstr(found));
+  }
+}
+
 TEST(PngFile, RealFramesHaveTheBytesOpenCvGives) {
   STEMVO_NEEDS_SHARED_DATA();
   for (const char* name : {"03/image_0", "02/image_2"}) {

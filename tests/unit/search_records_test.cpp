@@ -171,6 +171,20 @@ TEST_F(Records, AnIdentityThatWasChangedIsAnError) {
 }
 
 /// A line of another search, however whole, is none of this one's.
+TEST_F(Records, ManyLinesThatAreNoRecordsAreCounted) {
+  write("a", identity(0, 3), {record(0)});
+  std::ofstream out(file("a"), std::ios::app);
+  for (int i = 0; i < 1000; ++i) {
+    out << "{\"model\": 1}\n";
+  }
+  out.close();
+  const auto content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  EXPECT_EQ(content->records.size(), 1U);
+  ASSERT_EQ(content->warnings.size(), 6U);
+  EXPECT_EQ(content->warnings.back(), file("a").string() + ": 995 more lines left out");
+}
+
 TEST_F(Records, ALineOfAnotherSearchIsLeftOut) {
   write("a", identity(0, 3), {record(0)});
   write("b", identity(0, 4), {record(1)});
