@@ -46,6 +46,10 @@ std::string expected_command(const CLI::App& app, const std::string& found) {
 /// Wrong usage on one line, as every other error. --help and --version are no errors.
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) {
+bool is_image(const std::string& word) {
+  return word.ends_with(".png") || word.ends_with(".jpg") || word.ends_with(".jpeg");
+}
+
     std::ostringstream help;
     app.exit(error, help, help);
     print_help(help.str());
@@ -66,7 +70,11 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
     }
   }
   if (message.size() > kMaxShown) {
-    message = message.substr(0, kMaxShown) + " ..; a pattern of files must be quoted";
+    message = message.substr(0, kMaxShown) + " ..";
+  }
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr &&
+      std::ranges::any_of(app.remaining(true), is_image)) {
+    message += "; a pattern of files must be quoted";
   }
   print_error(message + " (see '" + command + " --help')");
   return kExitUsage;

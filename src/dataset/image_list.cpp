@@ -93,7 +93,8 @@ Expected<Listing> list_images(const fs::path& given) {
     }
   }
   if (result.files.empty()) {
-    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none", given.string()));
+    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none; check the path",
+                            given.string()));
   }
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());

@@ -151,6 +151,9 @@ TEST_F(ImageFolderRun, PatternsAndJpegs) {
   expect_error(run_path((images_ / "1*.png").string(), {"--camera", camera_}), 1,
                {"1*.png", "expected images (.png, .jpg, .jpeg), found none"});
   expect_error(run_path((images_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
+  expect_error(run_path((images_ / "000000.png").string(),
+                        {(images_ / "000001.png").string(), "--camera", camera_}),
+               2, {"not expected", "; a pattern of files must be quoted"});
 }
 
 TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
@@ -169,7 +172,7 @@ TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
 
 TEST_F(ImageFolderRun, NoCameraFile) {
   expect_error(run_path(images_.string()), 1,
-               {"my images: expected KITTI's layout", "--camera FILE, found neither"});
+               {"my images: images: expected --camera FILE", "found neither; 'stemvo run --help'"});
   expect_error(run_path(images_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
   expect_error(run({"--calib", "c.txt"}), 1, {"c.txt", "--camera or --calib"});
   fs::remove(camera_);

@@ -256,7 +256,8 @@ TEST_F(RecordingsRun, FoldersOfImagesHaveTheNamesOfTheirRecordings) {
 TEST_F(RecordingsRun, ACameraThatIsNotThereIsOneLine) {
   expect_error(run(folder_ / "gone.mp4", {"--camera", camera_}), 1,
                {"gone.mp4", "check the path", "stemvo run --help"});
-  expect_error(run("camera:987", {"--camera", camera_}), 1, {"/dev/video987"});
+  expect_error(run("camera:987", {"--camera", camera_}), 1,
+               {"/dev/video987", "; 'ls -l /dev/video*'"});
 }
 
 TEST_F(RecordingsRun, RealRecordingsOfOthers) {
