@@ -170,6 +170,16 @@ TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
   EXPECT_EQ(num_poses(), 10U);
 }
 
+TEST_F(ImageFolderRun, ACameraThatStandsStillIsSaidToDoSo) {
+  EXPECT_THAT(run().out, Not(HasSubstr("hardly left its place")));
+  for (const auto& file : fs::directory_iterator(images_)) {
+    if (file.path().filename() != "000000.png") {
+      fs::copy_file(images_ / "000000.png", file.path(), fs::copy_options::overwrite_existing);
+    }
+  }
+  EXPECT_THAT(run().out, HasSubstr("the camera hardly left its place (no translation on 100.0 %"));
+}
+
 TEST_F(ImageFolderRun, NoCameraFile) {
   expect_error(run_path(images_.string()), 1,
                {"my images: images: expected --camera FILE", "found neither; 'stemvo run --help'"});
