@@ -90,7 +90,7 @@ TEST_F(ImageFolderTest, OpensAPattern) {
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
   EXPECT_EQ(opened->size(), 2U);
-  EXPECT_EQ(opened->name(), "my drive");
+  EXPECT_EQ(opened->name(), "my drive_frame");
 }
 
 TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
