@@ -194,6 +194,7 @@ class RunFigures {
     json layout = stacked(3);
     layout["yaxis3"].update(html::titled("tracks"));
     layout["yaxis2"].update(html::titled("R_H", 3));
+    layout["yaxis2"]["range"] = {0, 1};  // often one frame only
     layout["yaxis"]["type"] = "category";
     add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
          traces, layout, 0});
