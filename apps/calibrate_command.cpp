@@ -113,8 +113,7 @@ void add_options(CLI::App& command, CalibrateArguments& arguments) {
 
 CLI::App* add_calibrate(CLI::App& app, Action& action) {
   return add_command<CalibrateArguments>(
-      app, action,
-      {"calibrate", "Refine focal length and principal point over a drive", kCalibrateFooter},
+      app, action, {"calibrate", "Refine focal length and principal point", kCalibrateFooter},
       add_options, calibrate);
 }
 

@@ -67,8 +67,7 @@ void add_options(CLI::App& command, ChannelArguments& arguments) {
 
 CLI::App* add_channel(CLI::App& app, Action& action) {
   return add_command<ChannelArguments>(
-      app, action,
-      {"channel", "Draw what the filters make of the frames (paper, Figure 1)", kChannelFooter},
+      app, action, {"channel", "Draw what the filters make of the frames", kChannelFooter},
       add_options, draw);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <exception>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "commands.hpp"
 #include "config/config.hpp"
 #include "console.hpp"
+#include "help_format.hpp"
 #include "interrupt.hpp"
 #include "stemvo/version.hpp"
 
@@ -21,15 +23,16 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kFooter = R"(A first drive, without any data:
-  stemvo synth drive                                  render a street
-  stemvo run drive/sequences/00 --out result          reconstruct it, see result/report.html
+  stemvo synth drive                             render a street
+  stemvo run drive/sequences/00 --out result     then see result/report.html
 With KITTI:
   stemvo run kitti/sequences/00 --out result --set scale.source=ground_truth
 With your own camera (see 'stemvo run --help'):
   stemvo run drive/images --camera camera.yaml --out result
 
 'stemvo COMMAND --help' explains a command; with --json it prints its result for a program. Every configuration key is explained by
-  stemvo --dump-config > my.yaml                      edit it, then: stemvo run ... --config my.yaml
+  stemvo --dump-config > my.yaml
+edit it, then: stemvo run ... --config my.yaml
 
 Exit codes: 0 done, 1 something is wrong with a file, model or key (one line says what), 2 wrong
 usage, 130 interrupted (what was computed is written).)";
@@ -41,6 +44,10 @@ std::string expected_command(const CLI::App& app, const std::string& found) {
     names.push_back(command->get_name());
   }
   return fmt::format("expected a command: {}, found {}", fmt::join(names, ", "), found);
+}
+
+bool is_image(const std::string& word) {
+  return word.ends_with(".png") || word.ends_with(".jpg") || word.ends_with(".jpeg");
 }
 
 /// Wrong usage on one line, as every other error. --help and --version are no errors.
@@ -66,7 +73,11 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
     }
   }
   if (message.size() > kMaxShown) {
-    message = message.substr(0, kMaxShown) + " ..; a pattern of files must be quoted";
+    message = message.substr(0, kMaxShown) + " ..";
+  }
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr &&
+      std::ranges::any_of(app.remaining(true), is_image)) {
+    message += "; a pattern of files must be quoted";
   }
   print_error(message + " (see '" + command + " --help')");
   return kExitUsage;
@@ -92,6 +103,7 @@ int run_program(int argc, char** argv) {
   CLI::App app("stemvo: camera frames in, a trajectory out, seen through one learned filter.",
                "stemvo");
   app.set_version_flag("--version", "stemvo " + std::string(version()));
+  app.formatter(std::make_shared<HelpFormat>());
   app.footer(kFooter);
   Action action;
   app.add_flag_callback(

@@ -16,9 +16,11 @@ namespace {
 
 constexpr const char* kRunFooter =
     R"(INPUT is one of
-  KITTI/sequences/03    image_2/000000.png, .. (colour) or image_0 (gray), calib.txt, times.txt;
-                        ground truth is ../../poses/03.txt from there, where it exists
-  EUROC, or its mav0    cam0/data.csv, cam0/sensor.yaml, state_groundtruth_estimate0/data.csv
+  KITTI/sequences/03    image_2/000000.png, .. (colour) or image_0 (gray),
+                        calib.txt, times.txt; ground truth, where it exists, is
+                        ../../poses/03.txt from there
+  EUROC, or its mav0    cam0/data.csv, cam0/sensor.yaml,
+                        state_groundtruth_estimate0/data.csv
   TUM                   rgb.txt, groundtruth.txt; the camera by --camera
   RECORDING             images/, camera.yaml, and where they exist times.txt and poses.txt
   drive.mp4             a video, decoded by FFmpeg; the camera by --camera
@@ -29,11 +31,12 @@ or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
 
   image_width: 640
   image_height: 480
-  intrinsics: [520.9, 521.0, 325.1, 249.7]                      # fx, fy, cx, cy, pixels
-  distortion_model: radial-tangential                           # or none, or equidistant
-  distortion_coefficients: [0.23, -0.78, -0.003, -0.0001, 0.92] # k1 k2 p1 p2 [k3], or k1 k2 k3 k4
-  rate_hz: 30                                                   # or give --times
-  camera_height: 1.65                                           # metres above the road, if known
+  intrinsics: [520.9, 521.0, 325.1, 249.7]    # fx, fy, cx, cy, pixels
+  distortion_model: radial-tangential         # or none, or equidistant
+  # k1, k2, p1, p2[, k3]; equidistant: k1, k2, k3, k4
+  distortion_coefficients: [0.23, -0.78, -0.003, -0.0001, 0.92]
+  rate_hz: 30                                 # or give --times
+  camera_height: 1.65                         # metres above the road, if known
 
 Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are
 undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
@@ -47,13 +50,18 @@ Until the run is complete also checkpoint, from which --resume goes on.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
-  stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth   the paper's protocol
-  stemvo run kitti/sequences/03 --out result --map                            with a point cloud
+the paper's protocol:
+  stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth
+with a point cloud:
+  stemvo run kitti/sequences/03 --out result --map
+on gray images, the first hundred:
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
-  stemvo run kitti/sequences/03 --out paper --config paper --pictures 10       its recipe, drawn
-  stemvo run drive/images --camera camera.yaml --out result                    your own camera
-  stemvo run drive.mp4 --camera camera.yaml --mask 0,900,1920,180              a video, no bonnet
-  stemvo run 'drive/left_*.png' --camera camera.yaml --times times.txt --out result)";
+the paper's recipe, drawn:
+  stemvo run kitti/sequences/03 --out paper --config paper --pictures 10
+your own camera; a video, without the bonnet; a pattern:
+  stemvo run drive/images --camera camera.yaml --out result
+  stemvo run drive.mp4 --camera camera.yaml --mask 0,900,1920,180
+  stemvo run 'left/*.png' --camera camera.yaml --times times.txt --out result)";
 
 struct RunArguments {
   RunRequest request;

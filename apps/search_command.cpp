@@ -32,8 +32,9 @@ Examples:
   stemvo search kitti/sequences/00 --model stems/efficientnet.onnx --out result
   stemvo search kitti/sequences/00 kitti/sequences/03 --kinds dusk,motion_blur --out result
   stemvo search kitti/sequences/00 --frames 0:100 --held-out kitti/sequences/03 --out result
-  stemvo search kitti/sequences/00 --exhaustive --filters 0:8 --out part0     part of a layer
-  stemvo search --merge part0 part1 --out result                              parts to one table)";
+part of a layer, and such parts to one table:
+  stemvo search kitti/sequences/00 --exhaustive --filters 0:8 --out part0
+  stemvo search --merge part0 part1 --out result)";
 
 struct SearchArguments {
   search::SearchRequest request;
@@ -107,7 +108,7 @@ void add_options(CLI::App& command, SearchArguments& arguments) {
       ->type_name("NAME,..");
   command
       .add_option("--kinds", request.kinds,
-                  "Each sequence also under these disturbances, at their middle strength\n"
+                  "Each sequence also under these disturbances, at their middle strength "
                   "(stemvo robustness --help lists them)")
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -137,9 +138,9 @@ void add_options(CLI::App& command, SearchArguments& arguments) {
   command
       .add_option(
           "--block", request.block,
-          "Filters in flight: what a kill may lose. One pass of the stem serves a block, so the\n"
+          "Filters in flight: what a kill may lose. One pass of the stem serves a block, so the "
           "default is a whole layer, as far as about 1 GB allows")
-      ->type_name("N")
+      ->type_name("FILTERS")
       ->check(in_range(1, 100000));
   add_threads_option(command, request.num_threads);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");

@@ -26,7 +26,7 @@ Examples:
   stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
   stemvo synth slow --rate 30 --speed 5
   stemvo synth walk --walk --frames 600
-  stemvo synth drives --name street7 --seed 7              several drives in one folder)";
+  stemvo synth drives --name street7 --seed 7   several drives in one folder)";
 
 struct SynthArguments {
   std::filesystem::path out_dir;

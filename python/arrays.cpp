@@ -2,8 +2,10 @@
 #include "arrays.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -33,7 +35,40 @@ void write_pose(const Rigid3& pose, double* to) {
   matrix.topRows<3>() = pose.matrix();
 }
 
+/// In the message instead of `option`, as a word of its own.
+void replace_word(std::string& message, std::string_view option, std::string_view argument) {
+  const auto is_part = [&](std::size_t at) {
+    const char next = at < message.size() ? message[at] : ' ';
+    return next == '-' || std::isalnum(static_cast<unsigned char>(next)) != 0;
+  };
+  for (std::size_t at = 0; (at = message.find(option, at)) != std::string::npos;) {
+    if ((at == 0 || message[at - 1] == ' ' || message[at - 1] == '(') &&
+        !is_part(at + option.size())) {
+      message.replace(at, option.size(), argument);
+      at += argument.size();
+    } else {
+      at += option.size();
+    }
+  }
+}
+
 }  // namespace
+
+std::string in_python(std::string message) {
+  constexpr std::string_view kKey = "--set ";
+  if (message.starts_with(kKey)) {
+    message.erase(0, kKey.size());
+  }
+  for (const auto& [option, argument] :
+       {std::pair("--camera FILE", "camera_file"), std::pair("--camera", "camera_file"),
+        std::pair("--times FILE", "times"), std::pair("--times", "times"),
+        std::pair("--calib FILE", "calibration"), std::pair("--calib", "calibration"),
+        std::pair("--gt-tolerance", "tolerance_s"), std::pair("--gt", "ground_truth"),
+        std::pair("--mask", "masks"), std::pair("--frames", "frames")}) {
+    replace_word(message, option, argument);
+  }
+  return message;
+}
 
 Expected<ImageView> view_of(const AnyArray& array) {
   const bool is_color = array.ndim() == 3 && array.shape(2) == 3;

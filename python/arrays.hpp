@@ -23,11 +23,14 @@ using ByteArray = nb::ndarray<nb::numpy, std::uint8_t>;
 using BoolArray = nb::ndarray<nb::numpy, bool>;
 using IndexArray = nb::ndarray<nb::numpy, std::int64_t>;
 
+/// The library's message with the arguments of Python in place of the program's options.
+[[nodiscard]] std::string in_python(std::string message);
+
 /// The value, or a ValueError with the library's message. The GIL is held.
 template <typename T>
 T value_or_raise(Expected<T> result) {
   if (!result) {
-    throw nb::value_error(result.error().message.c_str());
+    throw nb::value_error(in_python(result.error().message).c_str());
   }
   if constexpr (!std::is_void_v<T>) {
     return *std::move(result);

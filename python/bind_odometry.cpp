@@ -46,10 +46,7 @@ void apply(Config& config, const nb::dict& values) {
     const Status status =
         apply_override(config, std::string(nb::str(key).c_str()) + "=" + text_of(value));
     if (!status) {
-      const std::string& message = status.error().message;
-      constexpr std::string_view kProgram = "--set ";
-      throw nb::value_error(
-          message.substr(message.starts_with(kProgram) ? kProgram.size() : 0).c_str());
+      throw nb::value_error(in_python(status.error().message).c_str());
     }
   }
   value_or_raise(validate(config));

@@ -54,8 +54,9 @@ Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& reques
     }
   }
   if (names.empty()) {
-    return fail(fmt::format("{}: expected a folder per sequence, found: {}", folder.string(),
-                            code ? code.message() : "none"));
+    return fail(
+        fmt::format("{}: expected a folder per sequence, found: {} (see 'stemvo benchmark --help')",
+                    folder.string(), code ? code.message() : "none"));
   }
   std::sort(names.begin(), names.end());
   return names;

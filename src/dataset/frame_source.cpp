@@ -33,9 +33,13 @@ bool is_bag(const fs::path& path) {
 Error refuse(const fs::path& path) {
   std::string problem =
       "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt), EuRoC's (mav0/cam0), "
-      "TUM's (rgb.txt), camera.yaml beside images, or --camera FILE, found neither";
-  if (dataset::is_pattern(path)) {
-    problem = "expected --camera FILE beside a pattern, found none";
+      "TUM's (rgb.txt) or images, found none of them; 'stemvo run --help' shows each";
+  if (dataset::is_pattern(path) || dataset::list_images(path)) {
+    problem =
+        "images: expected --camera FILE, or camera.yaml in their folder, found neither; "
+        "'stemvo run --help' shows what it holds";
+  } else if (dataset::is_folder(path / "sequences")) {
+    problem = "expected one recording, found a folder of them; give one, as sequences/00 in it";
   } else if (dataset::is_image_file(path)) {
     problem = "expected a recording, found one image; give its folder, or a quoted pattern";
   } else if (is_bag(path)) {
@@ -55,7 +59,16 @@ std::optional<Expected<dataset::Listing>> find_listing(const FrameSourceRequest&
   const fs::path& path = request.sequence_dir;
   auto found = dataset::find_listing(path);
   const bool may_hold_images = dataset::is_folder(path) || dataset::is_pattern(path);
-  return !found && request.camera_file && may_hold_images ? dataset::list_images(path) : found;
+  if (found || !request.camera_file || !may_hold_images) {
+    return found;
+  }
+  auto images = dataset::list_images(path);
+  if (!images && looks_like_kitti(path)) {
+    return fail(
+        fmt::format("{}: KITTI's layout: expected no --camera, or --calib in its place, found {}",
+                    path.string(), request.camera_file->string()));
+  }
+  return images;
 }
 
 /// Files that belong to other kinds of recordings.

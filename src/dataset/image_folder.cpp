@@ -51,9 +51,11 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
     return kind.error();
   }
   if (kind->size != cv::Size(camera.width_px, camera.height_px)) {
-    return fail(fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}",
-                            folder.string(), camera.width_px, camera.height_px,
-                            camera_file.string(), kind->size.width, kind->size.height));
+    return fail(
+        fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
+                    "give the camera file of that size",
+                    folder.string(), camera.width_px, camera.height_px, camera_file.string(),
+                    kind->size.width, kind->size.height));
   }
   return kind->is_color;
 }

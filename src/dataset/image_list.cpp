@@ -38,6 +38,14 @@ std::string sort_key(std::string_view name) {
   return key;
 }
 
+/// "_left" of "left_*.png"; nothing of "*.png", which is all of a folder.
+std::string name_part(const std::string& pattern) {
+  std::string part = fs::path(pattern).stem().string();
+  std::erase_if(part, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; });
+  part = part.substr(0, part.find_last_not_of("_-") + 1);
+  return part.empty() ? "" : (part.find_first_of("_-") == 0 ? "" : "_") + part;
+}
+
 bool has_image_name(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -93,12 +101,13 @@ Expected<Listing> list_images(const fs::path& given) {
     }
   }
   if (result.files.empty()) {
-    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none", given.string()));
+    return fail(fmt::format("{}: expected images (.png, .jpg, .jpeg), found none; check the path",
+                            given.string()));
   }
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());
   });
-  result.name = recording_name(result.folder);
+  result.name = recording_name(result.folder) + name_part(pattern);
   return result;
 }
 

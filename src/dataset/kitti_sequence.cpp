@@ -144,7 +144,8 @@ bool looks_like_kitti(const fs::path& folder) {
 Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
                                             const SequenceOptions& options) {
   if (!dataset::is_folder(directory)) {
-    return fail(fmt::format("{}: expected a sequence folder, found none", directory.string()));
+    return fail(fmt::format("{}: expected a sequence folder, found none; check the path",
+                            directory.string()));
   }
   const auto camera_index = choose_camera(directory, options.camera);
   if (!camera_index) {

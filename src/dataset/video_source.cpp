@@ -96,9 +96,10 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
 Expected<FrameSource> open_video(const FrameSourceRequest& request) {
   if (!request.camera_file) {
     return fail(
-        fmt::format("{}: a video: expected --camera FILE, found none; 'stemvo run --help' "
-                    "shows what it holds",
-                    request.sequence_dir.string()));
+        fmt::format("{}: {}: expected --camera FILE, found none; 'stemvo run --help' shows what it "
+                    "holds",
+                    request.sequence_dir.string(),
+                    camera_number(request.sequence_dir) ? "a live camera" : "taken for a video"));
   }
   const auto camera = read_camera_file(*request.camera_file);
   if (!camera) {

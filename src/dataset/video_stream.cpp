@@ -35,7 +35,8 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, cons
   }
   if (*decoder == nullptr) {
     return fail(fmt::format(
-        "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none",
+        "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none; "
+        "'ls -l /dev/video*' lists those there are",
         number));
   }
   return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);

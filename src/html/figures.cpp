@@ -12,7 +12,13 @@ json rounded(double value) {
   return std::isfinite(value) ? json(std::round(value * 1e5) / 1e5) : json();
 }
 
-json titled(const std::string& title) { return {{"title", {{"text", title}}}}; }
+json titled(const std::string& title, std::optional<int> hover_digits) {
+  json axis = {{"title", {{"text", title}}}};
+  if (hover_digits) {
+    axis["hoverformat"] = "." + std::to_string(*hover_digits) + "f";
+  }
+  return axis;
+}
 
 json logarithmic(const std::string& title) {
   json axis = titled(title);
@@ -59,8 +65,8 @@ void add_paths_from_above(Page& page,
   }
   json layout = {{"large", true},
                  {"dragmode", "pan"},
-                 {"xaxis", titled("x (right), " + unit)},
-                 {"yaxis", titled("z (forward), " + unit)}};
+                 {"xaxis", titled("x (right), " + unit, 3)},
+                 {"yaxis", titled("z (forward), " + unit, 3)}};
   layout["yaxis"]["scaleanchor"] = "x";
   page.add_figure({heading, note, traces, layout, frame_trace});
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,8 +17,9 @@ namespace stemvo::html {
 
 /// To the fifth decimal, nobody needs a file of digits; null where it is not finite.
 [[nodiscard]] nlohmann::json rounded(double value);
-/// An axis with this title.
-[[nodiscard]] nlohmann::json titled(const std::string& title);
+/// An axis with this title; what is under the mouse has so many decimals.
+[[nodiscard]] nlohmann::json titled(const std::string& title,
+                                    std::optional<int> hover_digits = std::nullopt);
 [[nodiscard]] nlohmann::json logarithmic(const std::string& title);
 
 /// A way seen from above.

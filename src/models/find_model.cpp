@@ -21,7 +21,7 @@ constexpr const char* kManifest = "manifest.yaml";
 Expected<fs::path> manifest_beside(const fs::path& file) {
   std::error_code ignored;
   if (!fs::exists(file, ignored)) {
-    return fail(fmt::format("{}: no such file", file.string()));
+    return fail(fmt::format("{}: no such file; check the path", file.string()));
   }
   const fs::path manifest = fs::absolute(file).parent_path() / kManifest;
   if (!fs::exists(manifest, ignored)) {

@@ -82,6 +82,16 @@ double share_of(const std::vector<FrameResult>& frames, const Predicate& is_one)
          static_cast<double>(frames.size());
 }
 
+/// Of the frames behind the first: those that measured no translation.
+double share_in_place(const std::vector<FrameResult>& frames) {
+  const auto count = std::ranges::count_if(frames, [](const FrameResult& frame) {
+    return frame.state == FrameState::kStationary || frame.state == FrameState::kRotating ||
+           frame.state == FrameState::kLowParallax;
+  });
+  return frames.size() > 1 ? static_cast<double>(count) / static_cast<double>(frames.size() - 1)
+                           : 0.0;
+}
+
 /// As result files hold it.
 Trajectory as_written(const Run& run, Trajectory trajectory) {
   return run.request.config.scale.source == ScaleSource::kGroundTruth
@@ -165,6 +175,7 @@ class ResultWriter {
     report.scale_source = options::to_string(config.scale.source);
     report.tracked_fraction =
         share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
+    report.in_place_fraction = share_in_place(drive_.frames);
     report.camera = {drive_.frames.back().camera, drive_.frames.back().principal_point_sigma_px};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {

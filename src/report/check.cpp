@@ -128,7 +128,7 @@ Expected<std::vector<ThresholdResult>> check_metrics(const std::filesystem::path
   for (ThresholdResult& result : *results) {
     const Json* metric = find_metric(*metrics, result.key);
     if (metric == nullptr) {
-      return fail(fmt::format("{}:{}: expected a metric of {}, found '{}'",
+      return fail(fmt::format("{}:{}: expected a metric of {}, which lists them, found '{}'",
                               thresholds_file.string(), result.line, metrics_file.string(),
                               result.key));
     }

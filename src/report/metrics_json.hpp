@@ -31,7 +31,8 @@ struct MetricsReport {
   int filter = 0;
   double fps = 0.0;  ///< frames over wall time, process start to trajectory written
   std::string scale_source;
-  double tracked_fraction = 0.0;  ///< frames whose pose was measured, over all
+  double tracked_fraction = 0.0;   ///< frames whose pose was measured, over all
+  double in_place_fraction = 0.0;  ///< frames behind the first that measured no translation
   CameraReport camera;
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;

@@ -10,6 +10,8 @@
 namespace stemvo {
 namespace {
 
+constexpr double kInPlace = 0.95;  ///< a larger share of such frames is told
+
 std::string scale_explained(const std::string& source) {
   return source == "ground_truth" ? source + " (each step rescaled to its true length)"
          : source == "constant"   ? source + " (every step the same length: not metric)"
@@ -27,6 +29,11 @@ std::string head(const MetricsReport& report) {
   table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
   table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
                                     100.0 * report.tracked_fraction)});
+  if (report.in_place_fraction > kInPlace) {
+    table.add({"motion", fmt::format("the camera hardly left its place (no translation on {:.1f} % "
+                                     "of the frames): lengths and percentages mean little",
+                                     100.0 * report.in_place_fraction)});
+  }
   if (const auto& sigma = report.camera.sigma_px) {
     table.add(
         {"camera", fmt::format("principal point {:.1f}, {:.1f} px, known to {:.1f}, {:.1f} px",

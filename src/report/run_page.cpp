@@ -105,13 +105,15 @@ class RunFigures {
       traces.back()["line"]["color"] = "#999999";
     }
     traces.push_back(path("estimate", run_.estimate));
+    json up = html::titled("up, " + run_.unit, 3);
+    up["nticks"] = 3;  // a drive is flat
     const json layout = {{"large", true},
                          {"scene",
                           {{"aspectmode", "data"},
-                           {"camera", {{"eye", {{"x", -1.0}, {"y", -2.0}, {"z", 1.0}}}}},
-                           {"xaxis", html::titled("right, " + run_.unit)},
-                           {"yaxis", html::titled("forward, " + run_.unit)},
-                           {"zaxis", html::titled("up, " + run_.unit)}}}};
+                           {"camera", {{"eye", {{"x", -1.35}, {"y", -2.7}, {"z", 1.6}}}}},
+                           {"xaxis", html::titled("right, " + run_.unit, 3)},
+                           {"yaxis", html::titled("forward, " + run_.unit, 3)},
+                           {"zaxis", up}}}};
     add({"Path in space", "", traces, layout, static_cast<int>(traces.size()) - 1});
   }
 
@@ -136,7 +138,7 @@ class RunFigures {
     add({"Error over distance",
          "",
          traces,
-         {{"xaxis", html::titled("true path, m")}, {"yaxis", html::titled("error, m")}},
+         {{"xaxis", html::titled("true path, m", 3)}, {"yaxis", html::titled("error, m", 3)}},
          0});
   }
 
@@ -172,8 +174,8 @@ class RunFigures {
     json layout = {{"grid", {{"rows", 1}, {"columns", 2}, {"pattern", "independent"}}},
                    {"xaxis", html::titled("segment, m")},
                    {"xaxis2", html::titled("segment, m")},
-                   {"yaxis", html::titled("t_rel, %")},
-                   {"yaxis2", html::titled("r_rel, degrees per 100 m")}};
+                   {"yaxis", html::titled("t_rel, %", 2)},
+                   {"yaxis2", html::titled("r_rel, degrees per 100 m", 3)}};
     add({"Error by segment length", "KITTI's segments, from every tenth frame.", each, layout});
   }
 
@@ -191,7 +193,8 @@ class RunFigures {
             "state", "y", [](const FrameResult& r) { return to_string(r.state); }, "markers")};
     json layout = stacked(3);
     layout["yaxis3"].update(html::titled("tracks"));
-    layout["yaxis2"].update(html::titled("R_H"));
+    layout["yaxis2"].update(html::titled("R_H", 3));
+    layout["yaxis2"]["range"] = {0, 1};  // often one frame only
     layout["yaxis"]["type"] = "category";
     add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
          traces, layout, 0});
@@ -215,10 +218,10 @@ class RunFigures {
       traces.push_back(over_frames("sigma of the scale", "y3", [](const FrameResult& r) {
         return r.scale_sigma ? rounded(100.0 * *r.scale_sigma) : json();
       }));
-      layout["yaxis3"].update(html::titled("sigma, %"));
+      layout["yaxis3"].update(html::titled("sigma, %", 2));
     }
-    layout["yaxis2"].update(html::titled("step, " + run_.unit));
-    layout["yaxis"].update(html::titled("moved by, px"));
+    layout["yaxis2"].update(html::titled("step, " + run_.unit, 3));
+    layout["yaxis"].update(html::titled("moved by, px", 2));
     add({"Scale and camera", "Shaded: one sigma, where the principal point is learnt.", traces,
          layout, 0});
   }
@@ -235,7 +238,7 @@ class RunFigures {
          "Stages of different frames overlap: they do not add up to a frame's time.",
          traces,
          {{"xaxis", html::titled("frame")},
-          {"yaxis", html::titled("ms")},
+          {"yaxis", html::titled("ms", 1)},
           {"hovermode", "x unified"}},
          0});
   }

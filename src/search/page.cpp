@@ -86,7 +86,8 @@ void add_ranking(const Results& results, html::Page& page) {
 
 void add_scatter(const Results& results, html::Page& page) {
   const auto t_rel = [](const FilterRow& row) { return row.mean.t_rel_percent; };
-  json layout = {{"xaxis", html::titled("inliers per frame")}, {"yaxis", html::titled("t_rel, %")}};
+  json layout = {{"xaxis", html::titled("inliers per frame")},
+                 {"yaxis", html::titled("t_rel, %", 2)}};
   page.add_figure(
       {"Error and matches", "Of filters stopped early: over the frames they ran.",
        traces_of(results, [](const FilterRow& row) { return row.mean.inliers; }, t_rel), layout});
@@ -96,7 +97,7 @@ void add_scatter(const Results& results, html::Page& page) {
   const auto held_out = [](const FilterRow& row) {
     return row.held_out && row.held_out->detected ? row.held_out->t_rel_percent : std::nullopt;
   };
-  layout = {{"xaxis", html::titled("t_rel, %")}, {"yaxis", html::titled("t_rel held out, %")}};
+  layout = {{"xaxis", html::titled("t_rel, %", 2)}, {"yaxis", html::titled("t_rel held out, %")}};
   page.add_figure(
       {"On the sequence that did not rank", "", traces_of(results, t_rel, held_out), layout});
 }

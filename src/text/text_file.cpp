@@ -38,7 +38,8 @@ Error cannot_read(const fs::path& file) {
   if (errno == EMFILE || errno == ENFILE || errno == ENOMEM) {
     throw std::system_error(errno, std::generic_category(), file.string() + ": cannot read");
   }
-  return fail(fmt::format("{}: cannot read: {}", file.string(), last_system_error()));
+  const char* next = errno == ENOENT ? "; check the path" : "";
+  return fail(fmt::format("{}: cannot read: {}{}", file.string(), last_system_error(), next));
 }
 
 Expected<std::string> read_opened(int descriptor, const fs::path& file, const SizeLimit& limit) {

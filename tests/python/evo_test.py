@@ -43,8 +43,8 @@ class Evo(unittest.TestCase):
         cls.truth = cls.folder / "drive/poses/00.txt"
         cls.timed = list(with_times(np.loadtxt(cls.truth).reshape(-1, 3, 4), np.loadtxt(cls.folder / "drive/sequences/00/times.txt")))
 
-    def check(self, name, kind, truth, poses, *more):
-        file = self.folder / "result" / name
+    def check(self, name, kind, truth, poses, *more, result="result"):
+        file = self.folder / result / name
         ours = {align: json.loads(output_of(PROGRAM, "evaluate", "--gt", truth, file, "--align", align, *more, "--json"))["estimates"][0]
                 for align in ("none", "se3", "sim3")}
         theirs = json.loads(output_of(EVO, ROOT / "tests/evo/judge.py", kind, truth, "tum" if "tum" in name else "kitti", file))
@@ -58,6 +58,15 @@ class Evo(unittest.TestCase):
     def test_every_file(self):
         for name in ("kitti", "refined_kitti", "tum", "refined_tum"):
             self.check(f"trajectory_{name}.txt", "kitti", self.truth, FRAMES)
+
+    @unittest.skipUnless("STEMVO_SHARED_DATA" in os.environ, "STEMVO_SHARED_DATA is not set")
+    def test_a_real_clip(self):
+        kitti, frames = pathlib.Path(os.environ["STEMVO_SHARED_DATA"]) / "kitti", 100
+        output_of(PROGRAM, "run", kitti / "sequences/03", "--frames", f"0:{frames}", "--out", self.folder / "real", "--quiet")
+        truth = self.folder / "03.txt"
+        truth.write_text("".join((kitti / "poses/03.txt").read_text().splitlines(True)[:frames]))
+        for name in ("kitti", "refined_kitti", "tum", "refined_tum"):
+            self.check(f"trajectory_{name}.txt", "kitti", truth, frames, result="real")
 
     def test_truth_of_tum(self):
         truth = self.folder / "groundtruth.txt"

@@ -98,11 +98,15 @@ else:
 
 # Each line must raise ValueError, or what stands behind it, with one line that holds the text.
 BAD_INPUT = """
-import sys, numpy as np, stemvo
+import pathlib, sys, numpy as np, stemvo
 camera = stemvo.Camera(500, 500, 320, 94, 640, 188)
 odometry = stemvo.Odometry(camera)
 gray = np.zeros((188, 640), np.uint8)
 poses = np.tile(np.eye(4), (5, 1, 1))
+images, camera_file = pathlib.Path("listed"), pathlib.Path("listed.yaml")
+images.mkdir()
+(images / "0.png").touch()
+camera_file.write_text("resolution: [640, 188]\\nintrinsics: [500, 500, 320, 94]\\ndistortion_model: none\\n")
 cases = [
     (lambda: odometry.process(gray[:100]), "expected 640x188 pixels"),
     (lambda: odometry.process(gray.astype(np.float32)), "uint8"),
@@ -125,6 +129,9 @@ cases = [
     (lambda: stemvo.read_recording("/nowhere", frames="4:2"), "expected A < B"),
     (lambda: stemvo.read_recording(sys.executable), "stemvo.FrameView"),
     (lambda: stemvo.read_recording("camera:0"), "stemvo.FrameView"),
+    (lambda: stemvo.read_recording(images), "expected camera_file, or camera.yaml in their folder"),
+    (lambda: stemvo.read_recording(images, camera_file), "expected rate_hz (frames per second) or times, found"),
+    (lambda: stemvo.FrameView(camera_file, masks=["1,2"]), "masks 1,2: expected"),
     (lambda: stemvo.FrameView("/nowhere.yaml"), "/nowhere.yaml"),
     (lambda: stemvo.Odometry("camera"), "expected Camera, Recording or FrameView"),
     (lambda: stemvo.align(poses, poses[:3]), "expected a frame of 5 poses for each of 3"),

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -20,13 +21,27 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-const std::vector<std::string> kCommands = {"run",       "evaluate", "channel", "synth",
-                                            "calibrate", "check",    "models",  "benchmark"};
+const std::vector<std::string> kCommands = {"run",        "evaluate", "channel", "synth",
+                                            "calibrate",  "check",    "models",  "benchmark",
+                                            "robustness", "search"};
+
+/// For a terminal of 80 columns; commands to copy stay whole.
+std::vector<std::string> lines_too_long(const std::string& help) {
+  std::istringstream text(help);
+  std::vector<std::string> found;
+  for (std::string line; std::getline(text, line);) {
+    if (line.size() > 80 && !line.starts_with("  stemvo ")) {
+      found.push_back(line);
+    }
+  }
+  return found;
+}
 
 TEST(CommandLine, HelpOfTheProgramNamesEveryCommand) {
   const ProgramResult result = run_stemvo({"--help"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, IsEmpty());
+  EXPECT_THAT(lines_too_long(result.out), IsEmpty());
   for (const std::string& command : kCommands) {
     EXPECT_THAT(result.out, HasSubstr("\n  " + command + " "));
   }
@@ -39,6 +54,7 @@ TEST(CommandLine, EveryCommandHasHelpAndVersion) {
     EXPECT_EQ(help.exit_code, 0) << command;
     EXPECT_THAT(help.out, HasSubstr("Usage: stemvo " + command)) << command;
     EXPECT_THAT(help.err, IsEmpty()) << command;
+    EXPECT_THAT(lines_too_long(help.out), IsEmpty()) << command;
     const ProgramResult version = run_stemvo({command, "--version"});
     EXPECT_EQ(version.exit_code, 0) << command;
     EXPECT_THAT(version.out, StartsWith("stemvo 0.")) << command;

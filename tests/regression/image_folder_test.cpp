@@ -151,6 +151,9 @@ TEST_F(ImageFolderRun, PatternsAndJpegs) {
   expect_error(run_path((images_ / "1*.png").string(), {"--camera", camera_}), 1,
                {"1*.png", "expected images (.png, .jpg, .jpeg), found none"});
   expect_error(run_path((images_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
+  expect_error(run_path((images_ / "000000.png").string(),
+                        {(images_ / "000001.png").string(), "--camera", camera_}),
+               2, {"not expected", "; a pattern of files must be quoted"});
 }
 
 TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
@@ -167,9 +170,19 @@ TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
   EXPECT_EQ(num_poses(), 10U);
 }
 
+TEST_F(ImageFolderRun, ACameraThatStandsStillIsSaidToDoSo) {
+  EXPECT_THAT(run().out, Not(HasSubstr("hardly left its place")));
+  for (const auto& file : fs::directory_iterator(images_)) {
+    if (file.path().filename() != "000000.png") {
+      fs::copy_file(images_ / "000000.png", file.path(), fs::copy_options::overwrite_existing);
+    }
+  }
+  EXPECT_THAT(run().out, HasSubstr("the camera hardly left its place (no translation on 100.0 %"));
+}
+
 TEST_F(ImageFolderRun, NoCameraFile) {
   expect_error(run_path(images_.string()), 1,
-               {"my images: expected KITTI's layout", "--camera FILE, found neither"});
+               {"my images: images: expected --camera FILE", "found neither; 'stemvo run --help'"});
   expect_error(run_path(images_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
   expect_error(run({"--calib", "c.txt"}), 1, {"c.txt", "--camera or --calib"});
   fs::remove(camera_);

@@ -249,14 +249,16 @@ TEST_F(RecordingsRun, FoldersOfImagesHaveTheNamesOfTheirRecordings) {
   EXPECT_THAT(first.out, HasSubstr("results: results/first\n"));
   EXPECT_THAT(first.err, Not(HasSubstr("earlier")));
   EXPECT_THAT(run_here("second/mav0/cam0/data/").out, HasSubstr("results: results/second\n"));
-  EXPECT_THAT(run_here("first/images/0*.png").err,
+  EXPECT_THAT(run_here("first/images/0*0?.png").out, HasSubstr("results: results/first_00\n"));
+  EXPECT_THAT(run_here("first/images/*.png").err,
               HasSubstr("results of an earlier run in results/first are replaced"));
 }
 
 TEST_F(RecordingsRun, ACameraThatIsNotThereIsOneLine) {
   expect_error(run(folder_ / "gone.mp4", {"--camera", camera_}), 1,
                {"gone.mp4", "check the path", "stemvo run --help"});
-  expect_error(run("camera:987", {"--camera", camera_}), 1, {"/dev/video987"});
+  expect_error(run("camera:987", {"--camera", camera_}), 1,
+               {"/dev/video987", "; 'ls -l /dev/video*'"});
 }
 
 TEST_F(RecordingsRun, RealRecordingsOfOthers) {

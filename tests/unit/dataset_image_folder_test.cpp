@@ -90,7 +90,7 @@ TEST_F(ImageFolderTest, OpensAPattern) {
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
   EXPECT_EQ(opened->size(), 2U);
-  EXPECT_EQ(opened->name(), "my drive");
+  EXPECT_EQ(opened->name(), "my drive_frame");
 }
 
 TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
@@ -246,12 +246,20 @@ TEST_F(ImageFolderTest, FolderProblems) {
 
 TEST_F(ImageFolderTest, NeitherCameraFileNorKittisLayout) {
   request_.camera_file.reset();
-  EXPECT_THAT(error_of(), AllOf(HasSubstr("my drive: expected KITTI's layout"),
-                                HasSubstr("--camera FILE, found neither")));
+  const std::string next =
+      "expected --camera FILE, or camera.yaml in their folder, found neither; 'stemvo run --help'";
+  EXPECT_THAT(error_of(), HasSubstr("my drive: images: " + next));
   request_.sequence_dir = temp_ / "none";
   EXPECT_THAT(error_of(), HasSubstr("none: expected a folder, a video file"));
   request_.sequence_dir = images_ / "*.jpg";
-  EXPECT_THAT(error_of(), HasSubstr("*.jpg: expected --camera FILE"));
+  EXPECT_THAT(error_of(), HasSubstr("*.jpg: images: " + next));
+  fs::create_directories(temp_ / "root/sequences");
+  request_.sequence_dir = temp_ / "root";
+  EXPECT_THAT(error_of(),
+              HasSubstr("root: expected one recording, found a folder of them; give one"));
+  request_.sequence_dir = temp_ / "root/sequences";
+  EXPECT_THAT(error_of(),
+              HasSubstr("or images, found none of them; 'stemvo run --help' shows each"));
   request_.sequence_dir = images_;
   request_.times = temp_.file("times.txt", "0\n1\n2\n3\n");
   EXPECT_THAT(error_of(), HasSubstr("times.txt: expected --times beside --camera only"));
@@ -265,6 +273,12 @@ TEST_F(ImageFolderTest, BagsAreNamedWithWhatReadsThem) {
   fs::create_directories(temp_ / "bag");
   request_.sequence_dir = temp_.file("bag/metadata.yaml", "").parent_path();
   EXPECT_THAT(error_of(), HasSubstr("bag: expected a recording, found a ROS bag"));
+}
+
+TEST_F(ImageFolderTest, ACameraFileForKittisLayoutIsRefused) {
+  fs::create_directories(temp_ / "00/image_2");
+  request_.sequence_dir = temp_ / "00";
+  EXPECT_THAT(error_of(), HasSubstr("00: KITTI's layout: expected no --camera, or --calib"));
 }
 
 TEST_F(ImageFolderTest, CameraAndCalibrationAtATimeAreRefused) {

@@ -174,6 +174,15 @@ TEST(MetricsTable, LengthsBelowAMetreHaveThreeSignificantDigits) {
   EXPECT_THAT(table, ContainsRegex("ATE +0\\.00  m +none")) << "nothing but rounding";
 }
 
+TEST(MetricsTable, SaysThatTheCameraHardlyMoved) {
+  MetricsReport report = example();
+  report.in_place_fraction = 0.94;
+  EXPECT_THAT(format_metrics_table(report), Not(HasSubstr("hardly")));
+  report.in_place_fraction = 0.96;
+  EXPECT_THAT(format_metrics_table(report),
+              HasSubstr("hardly left its place (no translation on 96.0 % of the frames)"));
+}
+
 TEST(MetricsTable, SaysWhatIsMissing) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();

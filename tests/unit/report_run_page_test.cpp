@@ -104,6 +104,13 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   EXPECT_EQ(tracks["traces"][0]["x"][1], 102) << "in the folder's numbering";
   EXPECT_EQ(tracks["traces"][0]["y"][200], 600);
   EXPECT_EQ(tracks["traces"][3]["y"][1], "tracking");
+
+  const auto hover = [&](const char* heading, const char* axis) {
+    return section(page, heading)["layout"][axis]["hoverformat"];
+  };
+  EXPECT_EQ(hover("Time per stage", "yaxis"), ".1f");
+  EXPECT_EQ(hover("Scale and camera", "yaxis"), ".2f") << "pixels";
+  EXPECT_EQ(hover("Error over distance", "yaxis"), ".3f");
 }
 
 TEST_F(RunPageTest, FramesWithoutATruePoseAreShownWithoutTheirErrors) {

@@ -173,7 +173,8 @@ TEST_F(Manifest, OtherDocumentsAreRefused) {
   EXPECT_THAT(error_of("models:\n  - name: [\n"), HasSubstr("not YAML"));
   EXPECT_EQ(error_of("models:\n  - 3\n"), ":2: expected keys with values, found a value");
   EXPECT_EQ(load_manifest(folder / "absent.yaml").error().message,
-            (folder / "absent.yaml").string() + ": cannot read: No such file or directory");
+            (folder / "absent.yaml").string() +
+                ": cannot read: No such file or directory; check the path");
   EXPECT_THAT(load_manifest(folder.path()).error().message, HasSubstr("found a folder"));
 }
 
