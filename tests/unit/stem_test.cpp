@@ -232,7 +232,7 @@ TEST_F(StemErrors, NamesAndPaths) {
             (folder / "manifest.yaml").string() +
                 ": stem.model: expected one of plain_k4s4, gray, input_layer, log, census, "
                 "the path of an .onnx, found 'other'");
-  EXPECT_EQ(error_of("/no/such.onnx"), "/no/such.onnx: no such file");
+  EXPECT_EQ(error_of("/no/such.onnx"), "/no/such.onnx: no such file; check the path");
   std::filesystem::copy_file(folder / "plain_k4s4.onnx", folder / "unlisted.onnx");
   EXPECT_EQ(error_of((folder / "unlisted.onnx").string()),
             (folder / "manifest.yaml").string() +
