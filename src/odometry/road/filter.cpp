@@ -13,7 +13,10 @@ namespace {
 
 constexpr double kHuber = 1.5;
 constexpr double kDoubt = 3.0;  ///< standard deviations
-constexpr int kMaxDoubts = 4;
+/// In a row, as many as were believed before, within these: off the road, in a tight turn, dozens
+/// of frames tell the same wrong scale, and the map does not drift as fast.
+constexpr int kMinDoubts = 4;
+constexpr int kMaxDoubts = 32;
 /// A first measurement may be the wrong peak of a search over scales: others must confirm it.
 constexpr double kFirstSigma = 0.1;
 constexpr std::size_t kMaxPositions = 64;  ///< of a path
@@ -44,17 +47,23 @@ bool RoadFilter::update(double log_scale, double sigma) {
   double distance = std::abs(innovation) / std::hypot(measured, sigma_);
   if (distance < kDoubt) {
     num_doubts_ = 0;
+    num_believed_ = std::min(num_believed_, kMaxDoubts - 1) + 1;
   } else {
     const int side = innovation > 0.0 ? 1 : -1;
-    num_doubts_ = num_doubts_ * side > 0 ? num_doubts_ + side : side;
-    if (std::abs(num_doubts_) >= kMaxDoubts) {
+    num_doubts_ = (num_doubts_ > 0) == (side > 0)
+                      ? std::clamp(num_doubts_, -kMaxDoubts, kMaxDoubts) + side
+                      : side;
+    if (std::abs(num_doubts_) >= std::max(num_believed_, kMinDoubts)) {
       num_doubts_ = 0;
+      num_believed_ = 0;
       sigma_ = std::min(std::abs(innovation), kUnknownSigma);
       distance = std::abs(innovation) / std::hypot(measured, sigma_);
     }
   }
-  // Beyond kHuber the measurement's variance grows with its distance.
-  const double variance = measured * measured * std::max(1.0, distance / kHuber);
+  // Beyond kHuber the measurement's variance grows with its distance, beyond kDoubt with its
+  // square.
+  const double growth = std::max(1.0, distance / kHuber) * std::max(1.0, distance / kDoubt);
+  const double variance = measured * measured * growth;
   const double gain = sigma_ * sigma_ / (sigma_ * sigma_ + variance);
   log_scale_ += gain * innovation;
   sigma_ *= std::sqrt(1.0 - gain);

@@ -11,7 +11,8 @@
 namespace stemvo {
 
 /// Kalman filter of log(metres per unit), a random walk. A measurement far from the state counts
-/// little (Huber), but several in a row on the same side say that the state is wrong: it opens up.
+/// little (Huber; still less beyond three sigmas), but several in a row on the same side, as many
+/// as were believed before, say that the state is wrong: it opens up.
 class RoadFilter {
  public:
   explicit RoadFilter(const RoadOptions& options) : options_(options) {}
@@ -32,7 +33,7 @@ class RoadFilter {
   /// Its state, for state_archive.hpp.
   template <typename Archive>
   void serialize(Archive& archive) {
-    archive(is_initialized_, log_scale_, sigma_, num_doubts_);
+    archive(is_initialized_, log_scale_, sigma_, num_doubts_, num_believed_);
   }
 
  private:
@@ -40,7 +41,8 @@ class RoadFilter {
   bool is_initialized_ = false;
   double log_scale_ = 0.0;
   double sigma_ = kUnknownSigma;
-  int num_doubts_ = 0;  ///< measurements in a row on one side; the sign is the side
+  int num_doubts_ = 0;    ///< measurements in a row on one side; the sign is the side
+  int num_believed_ = 0;  ///< since it opened up, as far as it counts
 };
 
 /// The way that the camera came: it lies above the road at the camera's height, but for the car's
