@@ -146,7 +146,7 @@ Expected<cv::Mat> decode_jpeg(Bytes bytes,
 
 /// Of an image file, by its first bytes: no format takes more than 8 bytes for a pixel and a ninth
 /// for what is around them, beside what a camera notes.
-Expected<int> max_MB_of(Bytes start, const std::string& name, const WantedSize& wanted) {
+Expected<int> file_limit_of(Bytes start, const std::string& name, const WantedSize& wanted) {
   constexpr int kNotes_MB = 16;
   constexpr int kUntold_MB = 128;  // the size stands far behind other things
   constexpr std::uint64_t kBytesOfPixel = 9;
@@ -170,7 +170,7 @@ auto read_and_decode(const fs::path& file,
   const auto limit = [&](std::string_view text) -> Expected<int> {
     const Bytes start = bytes_of(text);
     const bool is_image = is_png(start) || (takes_jpeg && is_jpeg(start));
-    return is_image ? max_MB_of(start, file.string(), wanted)
+    return is_image ? file_limit_of(start, file.string(), wanted)
                     : Expected<int>(decode(start).error());
   };
   return read_text_file(file, limit).and_then([&](const std::string& text) {
