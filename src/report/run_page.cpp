@@ -84,9 +84,10 @@ class RunFigures {
     }
     paths.push_back(
         {"estimate", html::seen_from_above(run_.estimate), false, false, descriptions()});
-    html::add_paths_from_above(page_, "Path from above",
-                               "Drag to move, wheel (or + and -) to zoom, double click to see all.",
-                               paths, run_.unit);
+    html::add_paths_from_above(
+        page_, "Path from above",
+        "With a mouse: drag to move, wheel (or + and -) to zoom, double click to see all.", paths,
+        run_.unit);
   }
 
   void add_path_in_space() const {
