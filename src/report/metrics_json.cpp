@@ -87,7 +87,7 @@ std::string to_text(const Json& json) {
 }
 
 Expected<Json> read_json_object(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
+  const Expected<std::string> text = read_text_file(file, /*max_MB=*/1);
   if (!text) {
     return text.error();
   }
