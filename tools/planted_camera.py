@@ -7,7 +7,7 @@
 Renders as tools/long_drives.py does (CACHE and POSES_DIR are the same), runs the program with the true calibration and
 with one whose principal point is DX, DY pixels off, with either scale, and prints a table: t_rel in percent and r_rel
 in degrees per 100 m of the whole drive and from frame N on, no alignment; and how far the camera of frames.csv is from
-the true one at the end, and at most (x and y; from frame N on). docs/accuracy.md shows the table.
+the true one in the runs with the camera's height, at the end and at most (x and y; from frame N on). docs/accuracy.md shows the table.
 """
 
 import _environment  # noqa: F401  starts this tool again in the environment of `make build`
@@ -83,7 +83,7 @@ def measure(arguments, drive, off_px, scratch):
                 "--set", f"scale.source={source}"])
         cells += [errors(arguments.program, folder / "poses/00.txt", out / "trajectory_kitti.txt", first)
                   for first in (0, arguments.from_frame)]
-    end, most = pixels_off(out / "frames.csv", principal_point(calibration), arguments.from_frame)
+    end, most = pixels_off(scratch / "camera_height/frames.csv", principal_point(calibration), arguments.from_frame)
     name = "{:g}, {:g} px off".format(*off_px) if any(off_px) else "true"
     return (drive.name, name, *cells, *("{:.2f}, {:.2f}".format(*off) for off in (end, most)))
 

@@ -25,7 +25,8 @@ constexpr double kMaxSigmaOfFocal = 0.01;
 /// .. where it leaves the given value by more than so many sigmas, ..
 constexpr double kMinSigmas = 2.0;
 /// .. to which this is added in squares, px: however many runs there are, tracks bend alike in
-/// turns to one side, and a true principal point is missed by 0.6 px until the road turns back.
+/// turns to one side, and a true principal point is missed by 0.6 to 0.7 px until the road turns
+/// back.
 constexpr double kBias_px = 0.3;
 /// The camera moves by this at a keyframe: the window can follow.
 constexpr double kMaxStep_px = 0.25;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -37,13 +38,15 @@ void measure(RoadFilter& filter, int num, double log_scale) {
   }
 }
 
-TEST(RoadFilter, OneWildMeasurementMovesLittleSeveralWin) {
-  RoadFilter filter{RoadOptions{}};
-  measure(filter, 10, 0.0);
-  EXPECT_FALSE(filter.update(1.0, 0.01));
-  EXPECT_LT(std::abs(filter.log_scale()), 0.02);
-  measure(filter, 10, 1.0);
-  EXPECT_NEAR(filter.log_scale(), 1.0, 0.02);
+TEST(RoadFilter, OneWildMeasurementMovesLittleAsManyAsBeforeWin) {
+  for (const int num_before : {2, 8, 50}) {
+    RoadFilter filter{RoadOptions{}};
+    measure(filter, num_before, 0.0);
+    EXPECT_FALSE(filter.update(1.0, 0.01));
+    EXPECT_LT(std::abs(filter.log_scale()), num_before < 50 ? 0.1 : 0.02) << num_before;
+    measure(filter, std::min(num_before + 10, 40), 1.0);
+    EXPECT_NEAR(filter.log_scale(), 1.0, 0.02) << num_before;
+  }
 }
 
 /// In a tight turn the strip ahead lies off the road: whole rendered 00, frames 3394 to 3408.
