@@ -141,12 +141,13 @@ std::string sealed(const std::string& text, const std::string& first_line) {
 /// What is in it. Error, without file and line: no search wrote it.
 Expected<std::string> unsealed(const std::string& line, const std::string& first_line) {
   static const std::size_t kBefore = sealed("", "").size() - 1;
-  const std::string text =
-      line.size() > kBefore ? line.substr(kBefore, line.size() - kBefore - 1) : std::string();
-  if (line != sealed(text, first_line)) {
-    return fail("expected a line as this version of stemvo wrote it, found another one");
+  if (line.size() > kBefore) {  // a shorter one is not worth a hash
+    std::string text = line.substr(kBefore, line.size() - kBefore - 1);
+    if (line == sealed(text, first_line)) {
+      return text;
+    }
   }
-  return text;
+  return fail("expected a line as this version of stemvo wrote it, found another one");
 }
 
 /// Of the lines' members. A cast of a number that is none may be undefined, or give another one.
