@@ -23,6 +23,9 @@ OPSET = 13
 INPUT = "image"
 OUTPUT = "channels"
 
+# Rows of one filter that are computed as that many filters: a block of ONNX Runtime's convolutions with AVX-512, two with AVX2.
+ROWS = 16
+
 
 class _Graph:
     """Nodes in a chain, and their constants. prefix: of all names but the input's."""
@@ -96,6 +99,29 @@ def _add_folded(graph, stem):
     graph.add("Add", "shifted", graph.constant("shift", np.full((1, 1, 1, 1), stem.shift)))
 
 
+def _add_rows(graph, stem):
+    """One filter, ROWS rows of its channel at a time. ONNX Runtime copies each pixel's patch to multiply one filter with it,
+    which takes longer than the product. Filters that see the rows of all ROWS, each its own shifted down, need no copy, and
+    make the same numbers: for 8x8 at stride 2, 38 rows instead of 8, in a third of the time."""
+    _, planes, height, width = stem.weights.shape
+    top, left, bottom, right = stem.padding
+    below = stem.stride * (ROWS - 1)
+    weights = np.zeros((ROWS, planes, height + below, width))
+    for row in range(ROWS):
+        weights[row, :, stem.stride * row:stem.stride * row + height] = stem.weights[0]
+    image = graph.last
+    graph.add("Conv", "blocks", graph.constant("weights", weights), graph.constant("bias", np.repeat(stem.bias, ROWS)),
+              kernel_shape=[height + below, width], strides=[stem.stride * ROWS, stem.stride], pads=[top, left, bottom + below, right])
+    graph.add("Transpose", "rows", perm=[0, 2, 1, 3])  # 1 x blocks x ROWS x w
+    graph.add("Reshape", "all_rows", graph.integers("one_plane", [1, 1, -1, 0]))
+    graph.last = image
+    graph.add("Shape", "size")
+    graph.add("Gather", "height", graph.integers("of_rows", [2]))
+    graph.add("Add", "room", graph.integers("beside_the_kernel", [top + bottom - height + stem.stride]))
+    graph.add("Div", "count", graph.integers("stride", [stem.stride]))
+    graph.add("Slice", "filtered", graph.integers("axis", [2]), inputs=["all_rows", graph.integers("first", [0]), "count"])
+
+
 def _add_stem(graph, stem, pick):
     if stem.layer_norm is not None:
         stem = stem_module.fold_layer_norm_mean(stem)
@@ -103,6 +129,9 @@ def _add_stem(graph, stem, pick):
         stem = stem_module.fold_mean(stem)
     if np.any(stem.mean != 0.0):
         graph.add("Sub", "centred_image", graph.constant("mean", stem.mean.reshape(1, 3, 1, 1)))
+    if stem.filters == 1 and stem.layer_norm is None:
+        _add_rows(graph, stem)
+        return
     graph.add("Conv", "convolution", graph.constant("weights", stem.weights), graph.constant("bias", stem.bias),
               kernel_shape=list(stem.kernel), strides=[stem.stride, stem.stride], pads=list(stem.padding))
     if stem.layer_norm is not None:
