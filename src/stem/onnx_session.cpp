@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <onnxruntime_c_api.h>
+#include <sys/mman.h>
 
 #include "stem/foreign_model.hpp"
 #include "stemvo/camera.hpp"
@@ -59,6 +60,15 @@ namespace {
 constexpr std::uint32_t kApiVersion = 1;
 constexpr const char* kInputName = "image";
 constexpr const char* kOnlyOutput = "channels";
+
+// What ONNX Runtime takes to start is a fifth of it. Where memory ends meanwhile, it may crash.
+constexpr std::size_t kRoomToStart = std::size_t{32} << 20;
+
+bool has_room_to_start() {
+  void* const room =
+      mmap(nullptr, kRoomToStart, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  return room != MAP_FAILED && munmap(room, kRoomToStart) == 0;
+}
 
 /// Calls `end` once the time is over, from a thread of its own, unless it is destroyed before.
 class Alarm {
@@ -119,6 +129,10 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label,
 }
 
 Status OnnxSession::load(std::string_view model) {
+  if (!has_room_to_start()) {
+    return fail(fmt::format("{}: out of memory: expected {} MB for ONNX Runtime to start", label_,
+                            kRoomToStart >> 20));
+  }
   const OrtApiBase* base = OrtGetApiBase();
   api_ = base->GetApi(kApiVersion);
   if (api_ == nullptr) {
