@@ -2,7 +2,6 @@
 #include "calibration/calibrate.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -26,8 +25,6 @@ namespace fs = std::filesystem;
 /// A number less certain than this is not determined: px, and a share of the focal length.
 constexpr double kMaxSigma_px = 2.0;
 constexpr double kMaxSigmaOfFocal = 0.01;
-/// .. but for a change by so many sigmas.
-constexpr double kInsists = 3.0;
 
 fs::path calibration_file(const CalibrationRequest& request) {
   return request.calibration.value_or(request.sequence_dir / "calib.txt");
@@ -75,7 +72,7 @@ void read_estimate(const Camera& given, const CameraEstimate& estimate, Calibrat
   const auto parameter = [&](const char* name, double value, int i, double unit, double max_sigma) {
     const double sigma = unit * estimate.sigma[i];
     const double change = unit * estimate.change[i];
-    const bool is_determined = sigma <= max_sigma || std::abs(change) > kInsists * sigma;
+    const bool is_determined = sigma <= max_sigma;
     return CalibratedParameter{name,  value,     is_determined ? value + change : value,
                                sigma, max_sigma, is_determined};
   };

@@ -32,7 +32,7 @@ struct CalibratedParameter {
   double given = 0.0;
   double refined = 0.0;    ///< as given where it is not determined
   double sigma = 0.0;      ///< standard deviation
-  double max_sigma = 0.0;  ///< more: not determined, unless the change is far beyond it
+  double max_sigma = 0.0;  ///< more: not determined
   bool is_determined = false;
 };
 
