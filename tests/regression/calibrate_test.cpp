@@ -109,6 +109,19 @@ TEST_F(Calibrate, ARunUsesTheFileItIsGivenAndNoOther) {
   EXPECT_THAT(read_file(folder_ / "given/config.yaml"), HasSubstr("# calibration " + wrong));
 }
 
+// Many sigmas from the given one, but on a straight road a sigma is worth little.
+TEST_F(Calibrate, AStraightRoadTellsNothing) {
+  const auto data = test::shared_data();
+  if (!data) {
+    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+  }
+  sequence_ = *data / "kitti/sequences/06";
+  const ProgramResult result = calibrate({});
+  EXPECT_EQ(result.exit_code, 1) << result.out;
+  EXPECT_THAT(result.err, HasSubstr("determines neither"));
+  EXPECT_FALSE(fs::exists(out_));
+}
+
 void expect_error(const ProgramResult& result, const std::vector<std::string>& words) {
   EXPECT_EQ(result.exit_code, 1) << result.out;
   EXPECT_THAT(result.err, HasSubstr("error: "));
