@@ -94,13 +94,13 @@ TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
   };
   for (const char* option : {"--config", "--calib"}) {
     const std::string file = large(std::string(option).substr(2), 5);
-    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5 MB"});
+    expect_error(run({option, file}), 1, {file + ": expected at most 1 MB, found 5 MB"});
   }
   const std::string camera = large("camera.yaml", 5);
   expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
-               {camera + ": expected at most 4 MB, found 5 MB"});
-  fs::resize_file(camera, 4000001);
-  expect_error(run({"--config", camera}), 1, {"expected at most 4 MB, found 4.000001 MB"});
+               {camera + ": expected at most 1 MB, found 5 MB"});
+  fs::resize_file(camera, 1000001);
+  expect_error(run({"--config", camera}), 1, {"expected at most 1 MB, found 1.000001 MB"});
   const std::string poses = large("poses.txt", 70);
   expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70 MB"});
 }
