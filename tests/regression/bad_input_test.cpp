@@ -168,6 +168,16 @@ TEST_F(BadInput, ImagesOfAbsurdSizeAreOneWarningEach) {
                     HasSubstr("000008.png: expected a PNG image, found another kind of file")));
 }
 
+/// The first five say what size the others have.
+TEST_F(BadInput, ALargeImageAmongTheFirstIsNotDecoded) {
+  cv::imwrite(sequence_ / "image_2/000001.png", cv::Mat(11000, 11000, CV_8UC1, cv::Scalar(0)));
+  const ProgramResult result = run({"--quiet", "--frames", "0:3"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err,
+              HasSubstr("000001.png: expected an image of 620x188 pixels, found 11000x11000"));
+  EXPECT_LT(result.peak_mib, 250.0);  // 375 where it is
+}
+
 TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {
   const fs::path images = folder_ / "jpeg";
   fs::create_directories(images);
