@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "search/search.hpp"
@@ -41,14 +42,16 @@ struct SearchArguments {
   ConfigArguments config;
   std::vector<std::filesystem::path> merge;
   bool is_quiet = false;
+  bool was_stopped = false;  ///< while records were read
 };
 
 Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
   search::SearchRequest& request = arguments.request;
   request.models_dir = data_folder("models");
+  request.is_stopped = [&arguments] { return arguments.was_stopped = is_interrupted(); };
   if (!arguments.merge.empty()) {
     return search::merge_searches(arguments.merge, request.out_dir, request.models_dir,
-                                  command_line());
+                                  command_line(), request.is_stopped);
   }
   const Expected<Config> config = read_config(arguments.config, search::search_defaults());
   if (!config) {
@@ -76,6 +79,10 @@ Expected<int> run(SearchArguments& arguments) {
     return kExitUsage;
   }
   const Expected<search::SearchReport> report = find_filters(arguments);
+  if (!report && arguments.was_stopped) {
+    print_warning(report.error().message);
+    return kExitInterrupted;
+  }
   if (!report) {
     return report.error();
   }

@@ -13,6 +13,7 @@
 
 #include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
+#include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
@@ -381,15 +382,14 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
   if (!names) {
     return names.error();
   }
-  const Expected<std::string> published = read_text_file(request.published);
+  const Expected<Json> published = read_json_object(request.published, /*has_comments=*/true);
   if (!published) {
     return published.error();
   }
   Benchmark benchmark(request);
   try {
-    const Json json = Json::parse(*published, nullptr, true, /*ignore_comments=*/true);
     for (const std::string& name : *names) {
-      benchmark.plan(name, json);
+      benchmark.plan(name, *published);
     }
   } catch (const Json::exception& error) {
     return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",

@@ -70,13 +70,14 @@ const Format kMessage = {.width = "width",
 
 /// A matrix {rows, cols, data: [..]}, or Kalibr's list of rows, becomes the list of its numbers.
 void flatten(YAML::Node map, const char* key) {
+  constexpr std::size_t kMaxRows = 4;                // aliases of one may be many
   const YAML::Node value = std::as_const(map)[key];  // the other [] makes what is not there
   if (!value) {
     return;
   }
   if (value.IsMap() && value["data"]) {
     map[key] = value["data"];
-  } else if (value.IsSequence() && value.size() > 0 &&
+  } else if (value.IsSequence() && value.size() > 0 && value.size() <= kMaxRows &&
              std::all_of(value.begin(), value.end(),
                          [](const YAML::Node& row) { return row.IsSequence(); })) {
     std::vector<YAML::Node> others;  // first of all: a row may be an alias of the first
@@ -93,17 +94,16 @@ void flatten(YAML::Node map, const char* key) {
   }
 }
 
-void keep_only(YAML::Node map, const std::vector<std::string_view>& known) {
-  std::vector<std::string> others;
+/// What is left of a map; a key that is there twice stays so.
+YAML::Node only(const YAML::Node& map, const std::vector<std::string_view>& known) {
+  YAML::Node kept(YAML::NodeType::Map);
   for (const auto& entry : map) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-    if (std::find(known.begin(), known.end(), key) == known.end()) {
-      others.push_back(key);
+    if (std::find(known.begin(), known.end(), key) != known.end()) {
+      kept.force_insert(entry.first, entry.second);
     }
   }
-  for (const std::string& key : others) {
-    map.remove(key);
-  }
+  return kept;
 }
 
 /// Our name for a model of distortion; a name that is not known stays.
@@ -186,7 +186,7 @@ class Reader {
       flatten(root_, key);
     }
     if (!format_.known.empty()) {
-      keep_only(root_, format_.known);
+      root_.reset(only(root_, format_.known));
     } else {
       root_.remove("sensor_type");  // EuRoC's
       root_.remove("comment");

@@ -137,14 +137,33 @@ Status add_view(FrameList& frames,
   return {};
 }
 
+namespace {
+
+/// The first of equals; there is one.
+template <typename Vote>
+Vote most_frequent(const std::vector<Vote>& votes) {
+  return *std::max_element(votes.begin(), votes.end(), [&](const Vote& a, const Vote& b) {
+    return std::count(votes.begin(), votes.end(), a) < std::count(votes.begin(), votes.end(), b);
+  });
+}
+
+}  // namespace
+
 Expected<io::ImageKind> vote_on_images(
     const std::vector<fs::path>& files,
-    const std::function<Expected<io::ImageKind>(const fs::path&)>& kind_of) {
+    const std::function<Expected<io::ImageKind>(const fs::path&, const io::WantedSize&)>& kind_of) {
   constexpr std::size_t kNumVotes = 5;
+  std::vector<io::WantedSize> sizes;
+  for (std::size_t i = 0; i < std::min(files.size(), kNumVotes); ++i) {
+    if (const auto size = io::declared_size(files[i])) {
+      sizes.push_back(size);
+    }
+  }
+  const io::WantedSize wanted = sizes.empty() ? std::nullopt : most_frequent(sizes);
   std::string first_message;
   std::vector<io::ImageKind> votes;
   for (auto file = files.begin(); file != files.end() && votes.size() < kNumVotes; ++file) {
-    const auto kind = kind_of(*file);
+    const auto kind = kind_of(*file, wanted);
     if (kind) {
       votes.push_back(*kind);
     } else if (first_message.empty()) {
@@ -155,9 +174,7 @@ Expected<io::ImageKind> vote_on_images(
     return fail(
         fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
   }
-  return *std::max_element(votes.begin(), votes.end(), [&](const auto& a, const auto& b) {
-    return std::count(votes.begin(), votes.end(), a) < std::count(votes.begin(), votes.end(), b);
-  });
+  return most_frequent(votes);
 }
 
 }  // namespace stemvo::dataset

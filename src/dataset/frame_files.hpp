@@ -77,10 +77,12 @@ namespace stemvo::dataset {
                               const std::vector<std::string>& masks,
                               std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
-/// What most of the first readable images are; of equals the one seen first. One odd frame must
-/// not throw the rest away. `kind_of`: of a file. Error: none can be read.
+/// What most of the first readable images are, of the size that most of the first say they have; of
+/// equals the one seen first. One odd frame must not throw the rest away. `kind_of`: of a file,
+/// where it is of that size. Error: none can be read.
 [[nodiscard]] Expected<io::ImageKind> vote_on_images(
     const std::vector<std::filesystem::path>& files,
-    const std::function<Expected<io::ImageKind>(const std::filesystem::path&)>& kind_of);
+    const std::function<Expected<io::ImageKind>(const std::filesystem::path&,
+                                                const io::WantedSize&)>& kind_of);
 
 }  // namespace stemvo::dataset

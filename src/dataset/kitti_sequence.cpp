@@ -111,11 +111,12 @@ Status add_truth(const fs::path& absolute,
 
 /// The size that most images have.
 Status set_size(bool is_color, FrameList& frames) {
-  const auto kind = dataset::vote_on_images(frames.files, [is_color](const fs::path& file) {
-    return io::read_png(file, is_color).map([is_color](const cv::Mat& image) {
-      return io::ImageKind{image.size(), is_color};
-    });
-  });
+  const auto kind = dataset::vote_on_images(
+      frames.files, [is_color](const fs::path& file, const io::WantedSize& wanted) {
+        return io::read_png(file, is_color, wanted).map([is_color](const cv::Mat& image) {
+          return io::ImageKind{image.size(), is_color};
+        });
+      });
   if (!kind) {
     return kind.error();
   }

@@ -112,7 +112,7 @@ Expected<TimedPose> parse_row(Format format, const std::string& line) {
       .and_then(pose_from_quaternion_row);
 }
 
-Expected<PoseFile> read_rows(const fs::path& file, std::string_view text, Format format) {
+Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Format format) {
   const double unit_s = format == Format::kEuroc ? 1e-9 : 1.0;
   std::vector<std::string_view> lines = split_lines(text);
   // Empty lines at the end of a file are no poses; within KITTI's they would shift the frames.
@@ -170,16 +170,14 @@ std::size_t nearest(std::span<const double> times_s, double time_s) {
 }  // namespace
 
 Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
-  return read_text_file(file, kMaxRows_MB)
-      .and_then([&](const std::string& text) { return read_rows(file, text, Format::kKitti); })
+  return read_rows(file)
+      .and_then([&](const std::string& text) { return parse_rows(file, text, Format::kKitti); })
       .map([](const PoseFile& read) { return read.poses; });
 }
 
 Expected<PoseFile> read_pose_file(const fs::path& file) {
-  Expected<PoseFile> result =
-      read_text_file(file, kMaxRows_MB).and_then([&](const std::string& text) {
-        return read_rows(file, text, format_of(text));
-      });
+  Expected<PoseFile> result = read_rows(file).and_then(
+      [&](const std::string& text) { return parse_rows(file, text, format_of(text)); });
   if (result) {
     sort_by_time(*result);
   }

@@ -194,10 +194,23 @@ Expected<cv::Mat> decode_image(Bytes bytes,
                           bytes.empty() ? "an empty file" : "another kind of file"));
 }
 
-Expected<ImageKind> read_image_kind(const fs::path& file) {
-  return read_and_decode(file, true, {}, [&](Bytes bytes) {
+WantedSize declared_size(const fs::path& file) {
+  WantedSize found;
+  (void)read_text_file(file, [&](std::string_view text) -> Expected<int> {
+    const Bytes start = bytes_of(text);
+    const auto size = is_png(start) ? png_size(start) : jpeg_size(start);
+    if (size && check_size(file.string(), *size, {})) {
+      found = cv::Size(static_cast<int>(size->width), static_cast<int>(size->height));
+    }
+    return fail("not read on");
+  });
+  return found;
+}
+
+Expected<ImageKind> read_image_kind(const fs::path& file, const WantedSize& wanted) {
+  return read_and_decode(file, true, wanted, [&](Bytes bytes) {
     const bool is_color = is_png(bytes) ? is_color_png(bytes) : is_color_jpeg(bytes);
-    return decode_image(bytes, file.string(), is_color).map([&](const cv::Mat& image) {
+    return decode_image(bytes, file.string(), is_color, wanted).map([&](const cv::Mat& image) {
       return ImageKind{image.size(), is_color};
     });
   });

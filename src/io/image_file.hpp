@@ -22,7 +22,10 @@ struct ImageKind {
 /// A PNG or a JPEG, told by its first bytes and decoded whole. Error (file named): neither, or
 /// cut off, or damaged. Of a JPEG the sensor's rows and columns: a wish to be shown turned (EXIF)
 /// is ignored, since the calibration knows nothing of it.
-[[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
+[[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file,
+                                                  const WantedSize& wanted = {});
+/// What it says its size is, by its first 64 kB. None: it cannot be told, or no image has it.
+[[nodiscard]] WantedSize declared_size(const std::filesystem::path& file);
 /// The same as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. A file that is too
 /// large for the size it declares, or declares another than is wanted, is not read to its end.
 [[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file,

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/json_file.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -38,7 +38,7 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
                             file.string()));
   }
   const auto fail_at = [&](const YAML::Node& node, const std::string& problem) {
-    return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, problem));
+    return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, one_line(problem)));
   };
   std::vector<ThresholdResult> bounds;
   std::set<std::pair<std::string, std::string>> seen;

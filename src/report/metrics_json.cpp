@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "report/metrics_json.hpp"
 
-#include <algorithm>
-
 #include <fmt/format.h>
 
 #include "report/evaluate_report.hpp"
@@ -84,25 +82,6 @@ void add_metrics(Json& json, const std::optional<Metrics>& metrics) {
 
 std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
-}
-
-Expected<Json> read_json_object(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file, /*max_MB=*/1);
-  if (!text) {
-    return text.error();
-  }
-  try {
-    Json json = Json::parse(*text);
-    if (!json.is_object()) {
-      return fail(
-          fmt::format("{}: expected a JSON object, found {}", file.string(), json.type_name()));
-    }
-    return json;
-  } catch (const Json::exception& error) {
-    const std::string what = error.what();  // "[json.exception.parse_error.101] parse error at .."
-    return fail(fmt::format("{}: not JSON: {}", file.string(),
-                            what.substr(std::min(what.find("] ") + 2, what.size()))));
-  }
 }
 
 Json metrics_document(const MetricsReport& report) {

@@ -35,9 +35,6 @@ struct MetricsReport;
 /// Adds the keys of metrics.json that need ground truth; all null without metrics.
 void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& metrics);
 
-/// A file that somebody else may have written. Errors: it cannot be read, or holds no JSON object.
-[[nodiscard]] Expected<nlohmann::ordered_json> read_json_object(const std::filesystem::path& file);
-
 /// Indented, ends with a newline. A number that is not finite becomes null, bytes that are not
 /// UTF-8 the replacement character.
 [[nodiscard]] std::string to_text(const nlohmann::ordered_json& json);

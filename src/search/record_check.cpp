@@ -17,6 +17,10 @@ namespace stemvo::search {
 namespace {
 
 constexpr int kMaxFilter = 1000000;
+// Of a search. Lines of more sequences would be longer than kMaxRecordBytes.
+constexpr std::size_t kMaxRungs = 20;
+constexpr std::size_t kMaxLayers = 300;
+constexpr std::size_t kMaxSequences = 300;
 constexpr std::size_t kMaxFrames = 100000000;
 /// Of every number of a score: far above what a drive on Earth has.
 constexpr double kMaxNumber = 1e9;
@@ -113,6 +117,14 @@ Status check_identity(const SearchIdentity& identity) {
   if (identity.rungs.empty() || identity.layers.empty() || identity.sequences.empty()) {
     return fail("expected rungs, layers and sequences, found none");
   }
+  for (const auto& [name, size, max] :
+       {std::tuple("rungs", identity.rungs.size(), kMaxRungs),
+        std::tuple("layers", identity.layers.size(), kMaxLayers),
+        std::tuple("sequences", identity.sequences.size(), kMaxSequences)}) {
+    if (size > max) {
+      return fail(fmt::format("{}: expected at most {}, found {}", name, max, size));
+    }
+  }
   for (const Rung& rung : identity.rungs) {
     if (!(rung.frame_share > 0.0) || !(rung.frame_share <= 1.0)) {
       return fail(fmt::format("frame_share: expected 0 to 1, found {}", rung.frame_share));
@@ -153,8 +165,8 @@ Status check_identity(const SearchIdentity& identity) {
 
 Status check_record(const FilterRecord& record, const SearchIdentity& identity) {
   const auto layer = std::ranges::find_if(identity.layers, [&](const LayerIdentity& one) {
-    return one.is_layer_of(record.key) && one.first <= record.key.filter &&
-           record.key.filter < one.last;
+    return one.first <= record.key.filter && record.key.filter < one.last &&
+           one.is_layer_of(record.key);
   });
   if (layer == identity.layers.end()) {
     return fail(fmt::format("expected a filter of the search, found {}", to_string(record.key)));

@@ -22,14 +22,15 @@
 #include "text/text_file.hpp"
 
 using Json = nlohmann::ordered_json;
+using ReadJson = nlohmann::json;  // does not look at each key of an object for one
 
 /// The library's NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE, for objects whose keys keep their order.
-#define STEMVO_JSON_MEMBERS(Type, ...)                                         \
-  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {           \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, __VA_ARGS__))   \
-  }                                                                            \
-  static void from_json(const Json& nlohmann_json_j, Type& nlohmann_json_t) {  \
-    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, __VA_ARGS__)) \
+#define STEMVO_JSON_MEMBERS(Type, ...)                                            \
+  void to_json(Json& nlohmann_json_j, const Type& nlohmann_json_t) {              \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_TO, __VA_ARGS__))      \
+  }                                                                               \
+  static void from_json(const ReadJson& nlohmann_json_j, Type& nlohmann_json_t) { \
+    NLOHMANN_JSON_EXPAND(NLOHMANN_JSON_PASTE(NLOHMANN_JSON_FROM, __VA_ARGS__))    \
   }
 
 namespace stemvo::search {
@@ -133,47 +134,82 @@ std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// A line of the file; `first_line`: what is in the first one, for the others.
-std::string sealed(const std::string& text, const std::string& first_line) {
-  return fmt::format(R"({{"sha256":"{}","of":{}}})", internal::sha256_hex(first_line + text), text);
+// A line of the file, around its hash and what is in it.
+constexpr std::string_view kBeforeHash = R"({"sha256":")";
+constexpr std::string_view kBeforeText = R"(","of":)";
+constexpr std::string_view kBehind = "}";
+
+/// `seal`: begun with what is in the first line, for the others.
+std::string sealed(const std::string& text, const internal::Sha256& seal) {
+  return fmt::format("{}{}{}{}{}", kBeforeHash, seal.hex(text), kBeforeText, text, kBehind);
 }
 
 /// What is in it. Error, without file and line: no search wrote it.
-Expected<std::string> unsealed(const std::string& line, const std::string& first_line) {
-  static const std::size_t kBefore = sealed("", "").size() - 1;
-  if (line.size() > kBefore) {  // a shorter one is not worth a hash
-    std::string text = line.substr(kBefore, line.size() - kBefore - 1);
-    if (line == sealed(text, first_line)) {
-      return text;
+Expected<std::string> unsealed(std::string_view line, const internal::Sha256& seal) {
+  constexpr std::size_t kHashSize = 64;
+  constexpr std::size_t kTextAt = kBeforeHash.size() + kHashSize + kBeforeText.size();
+  if (line.size() > kMaxRecordBytes) {
+    return fail(fmt::format("expected a line of at most {} bytes, found one of {}", kMaxRecordBytes,
+                            line.size()));
+  }
+  const bool is_formed = line.size() > kTextAt && line.starts_with(kBeforeHash) &&
+                         line.substr(0, kTextAt).ends_with(kBeforeText) && line.ends_with(kBehind);
+  if (is_formed) {
+    const std::string_view text = line.substr(kTextAt, line.size() - kTextAt - kBehind.size());
+    if (line.substr(kBeforeHash.size(), kHashSize) == seal.hex(text)) {
+      return std::string(text);
     }
   }
   return fail("expected a line as this version of stemvo wrote it, found another one");
 }
 
+/// How many lists and objects stand in each other at most, if it is JSON.
+int depth_of(std::string_view text) {
+  int depth = 0;
+  int deepest = 0;
+  bool is_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (is_string && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      is_string = !is_string;
+    } else if (!is_string && (c == '[' || c == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!is_string && (c == ']' || c == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
 /// Of the lines' members. A cast of a number that is none may be undefined, or give another one.
-bool has_whole_numbers(const Json& json, int depth = 0) {
+bool has_whole_numbers(const ReadJson& json) {
   static constexpr std::array kWhole = {
       "rung",         "filter",      "filter_frames", "held_out_filter_frames",
       "frames",       "block",       "last",          "filters",
       "sampling_px",  "first_frame", "num_frames",    "first",
       "only_sequence"};
   constexpr std::uint64_t kMax = 1000000000;
-  constexpr int kMaxDepth = 8;  // of the deepest, path_xz_m, 5
   const auto is_sound = [&](const auto& member) {
-    const Json& value = member.value();
+    const ReadJson& value = member.value();
     const bool is_whole =
         !json.is_object() || !value.is_number() ||
         std::ranges::find(kWhole, member.key()) == kWhole.end() ||
         (value.is_number_unsigned() && value.template get<std::uint64_t>() <= kMax);
-    return is_whole && (!value.is_structured() || has_whole_numbers(value, depth + 1));
+    return is_whole && (!value.is_structured() || has_whole_numbers(value));
   };
   const auto members = json.items();
-  return depth <= kMaxDepth && std::all_of(members.begin(), members.end(), is_sound);
+  return std::all_of(members.begin(), members.end(), is_sound);
 }
 
 /// Error, without file and line: sealed or not, it is input, and no search wrote it.
 Status add_line(const std::string& text, SearchRecords& records) try {
-  const Json json = Json::parse(text);
+  constexpr int kMaxDepth = 8;  // of the deepest, path_xz_m, 5
+  if (depth_of(text) > kMaxDepth) {
+    return fail("expected a line of a search, found lists in lists");
+  }
+  const ReadJson json = ReadJson::parse(text);
   if (!has_whole_numbers(json)) {
     return fail("expected whole numbers of up to 1e9 where a search counts, found others");
   }
@@ -191,7 +227,7 @@ Status add_line(const std::string& text, SearchRecords& records) try {
              ? Status()
              : Status(fail(fmt::format("expected {} once on rung {}, found it again",
                                        to_string(record.key), record.rung)));
-} catch (const Json::exception& problem) {
+} catch (const ReadJson::exception& problem) {
   return fail(fmt::format("expected a line of a search, found another one ({})", problem.what()));
 }
 
@@ -253,29 +289,41 @@ std::string SearchIdentity::change_to(const SearchIdentity& now, bool as_parts) 
   return changed.empty() ? std::string() : fmt::format("{} changed", fmt::join(changed, " and "));
 }
 
-Expected<SearchRecords> read_records(const std::filesystem::path& file) {
-  const Expected<std::string> text = read_text_file(file);
+Expected<SearchRecords> read_records(const std::filesystem::path& file,
+                                     const IsStopped& is_stopped) {
+  const Expected<std::string> text = read_text_file(file, kMaxRecords_MB);
   if (!text) {
     return text.error();
   }
   constexpr std::size_t kMaxWarnings = 5;
+  constexpr std::size_t kMaxLeftOut = 1000;
   std::size_t num_left_out = 0;
   SearchRecords records;
   std::size_t& begin = records.num_good_bytes;
   std::size_t line_number = 0;
+  internal::Sha256 seal({});
   for (std::size_t end = 0; (end = text->find('\n', begin)) != text->npos; begin = end + 1) {
-    ++line_number;
-    const auto line = unsealed(text->substr(begin, end - begin), records.first_line);
+    if (is_stopped && is_stopped()) {
+      return fail(fmt::format("{}: interrupted while it was read", file.string()));
+    }
+    const auto line = unsealed(std::string_view(*text).substr(begin, end - begin), seal);
     const Status status = line ? add_line(*line, records) : Status(line.error());
+    if (++line_number == 1) {
+      seal = internal::Sha256(records.first_line);
+    }
     if (status) {
       continue;
     }
     const std::string problem =
-        fmt::format("{}: {}", at_line(file, line_number), status.error().message);
+        fmt::format("{}: {}", at_line(file, line_number), one_line(status.error().message));
     if (line_number == 1) {
       return fail(problem);
     }
-    if (++num_left_out <= kMaxWarnings) {
+    if (++num_left_out > kMaxLeftOut) {
+      return fail(
+          fmt::format("{}; expected at most {} such lines, found more", problem, kMaxLeftOut));
+    }
+    if (num_left_out <= kMaxWarnings) {
       records.warnings.push_back(problem + "; left out");
     }
   }
@@ -288,7 +336,8 @@ Expected<SearchRecords> read_records(const std::filesystem::path& file) {
 
 Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
                                       const SearchIdentity& identity,
-                                      bool resume) {
+                                      bool resume,
+                                      const IsStopped& is_stopped) {
   std::FILE* stream = std::fopen(file.c_str(), resume ? "ae" : "axe");
   if (stream == nullptr) {
     const bool is_there = errno == EEXIST;
@@ -303,7 +352,7 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
   if (::flock(::fileno(stream), LOCK_EX | LOCK_NB) != 0) {  // as long as it is open
     return fail(fmt::format("{}: another search is writing it", file.string()));
   }
-  auto before = read_records(file);
+  auto before = read_records(file, is_stopped);
   if (!before) {
     return before.error();
   }
@@ -320,18 +369,19 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
                             std::generic_category().message(errno)));
   }
   opened.first_line_ = is_new ? text_of(identity) : before->first_line;
-  const Status written =
-      opened.write(is_new ? sealed(opened.first_line_, "") + '\n' : std::string());
+  const Status written = opened.write(
+      is_new ? sealed(opened.first_line_, internal::Sha256({})) + '\n' : std::string());
   return written ? Expected<RecordFile>(opened) : written.error();
 }
 
 Status RecordFile::append(const std::vector<FilterRecord>& records) {
   records_.insert(records.begin(), records.end());
   std::string text;
+  const internal::Sha256 seal(first_line_);
   for (const FilterRecord& record : records) {
     Json json = record.key;
     to_json(json, record);
-    text += sealed(text_of(json), first_line_) + '\n';
+    text += sealed(text_of(json), seal) + '\n';
   }
   return write(text);
 }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -28,6 +29,11 @@
 namespace stemvo::search {
 
 inline constexpr const char* kRecordsFile = "records.jsonl";
+/// What it holds at most (6,000 drives of a KITTI sequence and more), and one line of it.
+inline constexpr int kMaxRecords_MB = 128;
+inline constexpr std::size_t kMaxRecordBytes = 8000000;
+/// True: what takes long is to be left.
+using IsStopped = std::function<bool()>;
 
 /// A filter of a layer of a model, and what finds matches on its channel. Ordered as rows are where
 /// numbers do not decide.
@@ -106,7 +112,9 @@ struct LayerIdentity {
 
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(last - first); }
   [[nodiscard]] FilterKey key(int filter) const { return {model, layer, features, filter}; }
-  [[nodiscard]] bool is_layer_of(const FilterKey& one) const { return one == key(one.filter); }
+  [[nodiscard]] bool is_layer_of(const FilterKey& one) const {
+    return one.model == model && one.layer == layer && one.features == features;
+  }
 };
 
 struct SequenceIdentity {
@@ -156,8 +164,10 @@ struct SearchRecords {
   std::vector<std::string> warnings;  ///< lines that are no record of the search, and left out
 };
 
-/// Reads all whole lines. Errors: not there, the first line is no identity of this version.
-[[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file);
+/// Reads all whole lines. Errors: not there, the first line is no identity of this version, more
+/// than a thousand others are no records, stopped.
+[[nodiscard]] Expected<SearchRecords> read_records(const std::filesystem::path& file,
+                                                   const IsStopped& is_stopped = {});
 
 /// Records that grow, on the disk when append() returns. A second writer of a file is an error.
 class RecordFile {
@@ -167,7 +177,8 @@ class RecordFile {
   /// read_records.
   [[nodiscard]] static Expected<RecordFile> open(const std::filesystem::path& file,
                                                  const SearchIdentity& identity,
-                                                 bool resume);
+                                                 bool resume,
+                                                 const IsStopped& is_stopped = {});
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
   [[nodiscard]] const FilterRecords& records() const { return records_; }
   /// Of what it held when it was opened.

@@ -12,15 +12,16 @@
 #include "pipeline/out_folder.hpp"
 #include "pipeline/thread_scope.hpp"
 #include "search/race.hpp"
+#include "search/record_check.hpp"
 
 namespace stemvo::search {
 namespace {
 
 namespace fs = std::filesystem;
 
-Expected<SearchRecords> read_part(const fs::path& folder) {
+Expected<SearchRecords> read_part(const fs::path& folder, const IsStopped& is_stopped) {
   const std::string file = (folder / kRecordsFile).string();
-  auto part = read_records(file);
+  auto part = read_records(file, is_stopped);
   if (!part) {
     return part;
   }
@@ -133,8 +134,9 @@ std::vector<fs::path> inputs_of(const SearchRequest& request, const SearchPlan& 
 Status write_joined(const fs::path& file,
                     const SearchIdentity& identity,
                     const FilterRecords& records,
-                    Scores scores) {
-  auto joined = RecordFile::open(file, identity, /*resume=*/true);
+                    Scores scores,
+                    const IsStopped& is_stopped) {
+  auto joined = RecordFile::open(file, identity, /*resume=*/true, is_stopped);
   if (!joined) {
     return joined.error();
   }
@@ -175,7 +177,11 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!lock) {
     return lock.error();
   }
-  auto records = RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume);
+  if (const Status status = check_identity(plan->identity); !status) {
+    return status.error();  // its records could not be read again
+  }
+  auto records = RecordFile::open(request.out_dir / kRecordsFile, plan->identity, request.resume,
+                                  request.is_stopped);
   if (!records) {
     return records.error();
   }
@@ -196,14 +202,15 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
 Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                       const std::filesystem::path& out_dir,
                                       const std::filesystem::path& models_dir,
-                                      const std::string& command) {
+                                      const std::string& command,
+                                      const IsStopped& is_stopped) {
   SearchIdentity identity;
   Scores scores;
   std::vector<std::string> warnings;
   std::vector<fs::path> inputs;
   for (const std::filesystem::path& folder : parts) {
     inputs.push_back(folder / kRecordsFile);
-    const auto part = read_part(folder);
+    const auto part = read_part(folder, is_stopped);
     if (!part) {
       return part.error();
     }
@@ -229,7 +236,8 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   if (!lock) {
     return lock.error();
   }
-  const Status written = write_joined(out_dir / kRecordsFile, identity, *records, scores);
+  const Status written =
+      write_joined(out_dir / kRecordsFile, identity, *records, scores, is_stopped);
   if (!written) {
     return written.error();
   }

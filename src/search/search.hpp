@@ -37,7 +37,9 @@ struct SearchRequest {
   /// Index of a sequence: as they are, then under each of `kinds`, the held-out one last. Runs it
   /// alone, as a part for merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
   std::optional<std::size_t> only_sequence;
-  bool resume = false;       ///< go on from what out_dir holds
+  bool resume = false;  ///< go on from what out_dir holds
+  /// Asked while records of before are read, which may take long; true: an interrupt.
+  std::function<bool()> is_stopped = {};
   int num_threads = 0;       ///< 0: all cores
   std::string command = {};  ///< that repeats the search, for report.html; may be empty
   /// Filters in flight, which a kill may lose; 0: a layer's, as far as 1 GB of odometries allows.
@@ -66,10 +68,11 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Joins parts of an exhaustive search (other filters, layers or models, or one sequence only; the
 /// same sequences and configuration) into out_dir, whose filters.csv is that of one search over all
 /// of them. Errors: a folder without records, parts that differ in more than filters, a filter with
-/// two different results or none on a sequence.
+/// two different results or none on a sequence. `is_stopped`: as SearchRequest has it.
 [[nodiscard]] Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                                     const std::filesystem::path& out_dir,
                                                     const std::filesystem::path& models_dir,
-                                                    const std::string& command = {});
+                                                    const std::string& command = {},
+                                                    const std::function<bool()>& is_stopped = {});
 
 }  // namespace stemvo::search

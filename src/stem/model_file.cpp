@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -239,12 +240,24 @@ Expected<OnnxSession> load_model(const StemNetwork& network, std::string_view by
 
 }  // namespace
 
-std::string sha256_hex(std::string_view bytes) {
+std::string sha256_hex(std::string_view bytes) { return Sha256({}).hex(bytes); }
+
+Sha256::Sha256(std::string_view beginning) : state_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  STEMVO_CHECK(EVP_DigestInit_ex(state_.get(), EVP_sha256(), nullptr) == 1 &&
+                   EVP_DigestUpdate(state_.get(), beginning.data(), beginning.size()) == 1,
+               "libcrypto begins a SHA-256");
+}
+
+std::string Sha256::hex(std::string_view rest) const {
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> state(EVP_MD_CTX_new(),
+                                                                      &EVP_MD_CTX_free);
   std::array<unsigned char, 32> digest{};
   unsigned int size = 0;
-  const int done =
-      EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  STEMVO_CHECK(done == 1 && size == digest.size(), "libcrypto computes a SHA-256");
+  STEMVO_CHECK(EVP_MD_CTX_copy_ex(state.get(), state_.get()) == 1 &&
+                   EVP_DigestUpdate(state.get(), rest.data(), rest.size()) == 1 &&
+                   EVP_DigestFinal_ex(state.get(), digest.data(), &size) == 1 &&
+                   size == digest.size(),
+               "libcrypto computes a SHA-256");
   return fmt::format("{:02x}", fmt::join(digest, ""));
 }
 

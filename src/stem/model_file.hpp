@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -8,10 +9,22 @@
 #include "stemvo/error.hpp"
 #include "stemvo/options.hpp"
 
+using EVP_MD_CTX = struct evp_md_ctx_st;  // libcrypto's
+
 namespace stemvo::internal {
 
 /// SHA-256 as 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string sha256_hex(std::string_view bytes);
+
+/// The same of many texts with one beginning, which is hashed once.
+class Sha256 {
+ public:
+  explicit Sha256(std::string_view beginning);
+  [[nodiscard]] std::string hex(std::string_view rest) const;
+
+ private:
+  std::shared_ptr<EVP_MD_CTX> state_;
+};
 
 /// The default network, which is part of the library: its files are names for messages.
 [[nodiscard]] StemNetwork built_in_network();

@@ -19,6 +19,7 @@
 
 #include "stem/foreign_model.hpp"
 #include "stemvo/camera.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::internal {
 
@@ -91,6 +92,16 @@ class Alarm {
   std::jthread thread_;  ///< stopped and joined first
 };
 
+/// Without the paths of ONNX Runtime's sources ("/onnxruntime_src/.../mod.cc:48 Status Run() ..").
+std::string without_sources(std::string message) {
+  constexpr std::string_view kSources = "/onnxruntime_src/";
+  for (std::size_t at = message.find(kSources); at != message.npos;
+       at = message.find(kSources, at)) {
+    message.erase(at, std::min(message.find(' ', at), message.size() - 1) + 1 - at);
+  }
+  return message;
+}
+
 }  // namespace
 
 // Returns from the calling member function with the Error, if there is one.
@@ -107,12 +118,11 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
     return {};
   }
   const OnnxHandle<OrtStatus> status(raw, api_->ReleaseStatus);
-  std::string message = api_->GetErrorMessage(raw);
-  std::replace(message.begin(), message.end(), '\n', ' ');
+  const std::string message = api_->GetErrorMessage(raw);
   const bool is_memory = message.find("bad_alloc") != std::string::npos ||
                          message.find("Failed to allocate memory") != std::string::npos;
-  return fail(
-      fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "", message));
+  return fail(fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "",
+                          one_line(without_sources(message))));
 }
 
 Expected<OnnxSession> OnnxSession::create(const std::string& label,

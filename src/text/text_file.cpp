@@ -184,6 +184,10 @@ Status check_can_write(const fs::path& file) {
     return status;
   }
   std::error_code ignored;
+  if (fs::is_fifo(file, ignored) || fs::is_socket(file, ignored)) {  // nobody reads it yet
+    return fail(
+        fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
+  }
   const Status status = write_beside(file, unfinished(file), "can be written");
   fs::remove(unfinished(file), ignored);
   return status;
@@ -198,8 +202,26 @@ Status remove_file(const fs::path& file) {
               : Status();
 }
 
+Expected<std::string> read_rows(const fs::path& file, int max_MB) {
+  auto text = read_text_file(file, max_MB);
+  std::size_t index = 0;
+  for (std::size_t begin = 0, end = 0; text && begin < text->size(); begin = end + 1, ++index) {
+    end = std::min(text->find('\n', begin), text->size());
+    if (index == kMaxLines) {
+      return fail(
+          fmt::format("{}: expected at most {} lines, found more", file.string(), kMaxLines));
+    }
+    if (end - begin > kMaxLineBytes) {
+      return fail_at(file, index,
+                     fail(fmt::format("expected a line of at most {} bytes, found one of {}",
+                                      kMaxLineBytes, end - begin)));
+    }
+  }
+  return text;
+}
+
 Expected<std::vector<std::string>> read_lines(const fs::path& file, int max_MB) {
-  return read_text_file(file, max_MB).map([](const std::string& text) {
+  return read_rows(file, max_MB).map([](const std::string& text) {
     const std::vector<std::string_view> lines = split_lines(text);
     return std::vector<std::string>(lines.begin(), lines.end());
   });
@@ -233,6 +255,13 @@ std::vector<std::string_view> split_words(std::string_view line) {
     words.push_back(word);
   }
   return words;
+}
+
+std::string one_line(std::string_view text) {
+  constexpr std::size_t kMaxBytes = 300;
+  std::string line(text.substr(0, kMaxBytes));
+  std::ranges::replace_if(line, [](unsigned char c) { return c < 0x20; }, ' ');
+  return text.size() > kMaxBytes ? line + ".." : line;
 }
 
 std::string at_line(const fs::path& file, std::size_t line) {

@@ -15,9 +15,12 @@ namespace stemvo {
 
 /// What files hold at most, MB: calibrations, configurations and other settings; poses, times and
 /// lists; any.
-inline constexpr int kMaxSettings_MB = 4;
+inline constexpr int kMaxSettings_MB = 1;
 inline constexpr int kMaxRows_MB = 64;
 inline constexpr int kMaxFile_MB = 1024;
+/// Lines of a file of rows, and bytes of one.
+inline constexpr std::size_t kMaxLines = 1000000;
+inline constexpr std::size_t kMaxLineBytes = 65536;
 
 /// What lies there, for messages: "a file", "a folder", "a pipe", "a device", "a socket", "nothing
 /// of that name".
@@ -43,7 +46,10 @@ using SizeLimit = std::function<Expected<int>(std::string_view start)>;
 /// The file, if there is one, and what a killed write_text_file left of it. Error: it stays.
 [[nodiscard]] Status remove_file(const std::filesystem::path& file);
 
-/// All lines of a file without their ends. Errors: those of read_text_file.
+/// A file of rows. Errors: those of read_text_file, too many lines, one that is too long.
+[[nodiscard]] Expected<std::string> read_rows(const std::filesystem::path& file,
+                                              int max_MB = kMaxRows_MB);
+/// The same as lines without their ends.
 [[nodiscard]] Expected<std::vector<std::string>> read_lines(const std::filesystem::path& file,
                                                             int max_MB = kMaxRows_MB);
 /// Lines without their end (`\n` or `\r\n`); no empty line is added for the last newline.
@@ -53,6 +59,8 @@ using SizeLimit = std::function<Expected<int>(std::string_view start)>;
 /// All of them.
 [[nodiscard]] std::vector<std::string_view> split_words(std::string_view line);
 
+/// Of a text from elsewhere what a message may hold: one line of at most 300 bytes.
+[[nodiscard]] std::string one_line(std::string_view text);
 /// "file:line", line counted from 1, for messages.
 [[nodiscard]] std::string at_line(const std::filesystem::path& file, std::size_t line);
 /// The error with file and line in front; `index` counts lines from 0.

@@ -150,6 +150,12 @@ def hostile():
              helper.make_node("Add", ["zero", "least"], ["a"]), helper.make_node("Add", ["zero", "minus"], ["b"])]
     write("hostile_divide_later", [*later, helper.make_node("Div", ["a", "b"], ["divided"]), *use], [image], [channels],
           [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus"), numpy_helper.from_array(np.array([0]), "nothing")])
+    # What ONNX Runtime says of these is long, or names its own sources.
+    einsum = [helper.make_node("Reshape", ["image", "deep"], ["values"]),
+              helper.make_node("Einsum", ["values"], ["sum"], equation="a" * 2400 + "->"), helper.make_node("Add", ["image", "sum"], ["channels"])]
+    write("hostile_einsum", einsum, [image], [channels], [numpy_helper.from_array(np.array([1] * 2399 + [-1]), "deep")])
+    mod = [helper.make_node("Cast", ["image"], ["whole"], to=TensorProto.INT64), helper.make_node("Mod", ["whole", "nothing"], ["divided"])]
+    write("hostile_mod", [*mod, *use], [image], [channels], [numpy_helper.from_array(np.array([0]), "nothing")])
     # Some 10^10 multiplications per operator: slower than any first layer.
     box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
     slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],

@@ -94,13 +94,13 @@ TEST_F(BadInput, FilesHaveSizesOfTheirKind) {
   };
   for (const char* option : {"--config", "--calib"}) {
     const std::string file = large(std::string(option).substr(2), 5);
-    expect_error(run({option, file}), 1, {file + ": expected at most 4 MB, found 5 MB"});
+    expect_error(run({option, file}), 1, {file + ": expected at most 1 MB, found 5 MB"});
   }
   const std::string camera = large("camera.yaml", 5);
   expect_error(run_stemvo({"run", (sequence_ / "image_2").string(), "--camera", camera}), 1,
-               {camera + ": expected at most 4 MB, found 5 MB"});
-  fs::resize_file(camera, 4000001);
-  expect_error(run({"--config", camera}), 1, {"expected at most 4 MB, found 4.000001 MB"});
+               {camera + ": expected at most 1 MB, found 5 MB"});
+  fs::resize_file(camera, 1000001);
+  expect_error(run({"--config", camera}), 1, {"expected at most 1 MB, found 1.000001 MB"});
   const std::string poses = large("poses.txt", 70);
   expect_error(run({"--gt", poses}), 1, {poses + ": expected at most 64 MB, found 70 MB"});
 }
@@ -166,6 +166,16 @@ TEST_F(BadInput, ImagesOfAbsurdSizeAreOneWarningEach) {
               AllOf(HasSubstr("000006.png: expected at most 17 MB, found 900 MB"),
                     HasSubstr("000007.png: expected an image of 620x188 pixels, found 10240x188"),
                     HasSubstr("000008.png: expected a PNG image, found another kind of file")));
+}
+
+/// The first five say what size the others have.
+TEST_F(BadInput, ALargeImageAmongTheFirstIsNotDecoded) {
+  cv::imwrite(sequence_ / "image_2/000001.png", cv::Mat(11000, 11000, CV_8UC1, cv::Scalar(0)));
+  const ProgramResult result = run({"--quiet", "--frames", "0:3"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err,
+              HasSubstr("000001.png: expected an image of 620x188 pixels, found 11000x11000"));
+  EXPECT_LT(result.peak_mib, 250.0);  // 375 where it is
 }
 
 TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {

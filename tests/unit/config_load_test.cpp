@@ -148,6 +148,12 @@ TEST_F(ConfigLoad, NotYamlNamesTheLine) {
   EXPECT_THAT(error_of("seed: 1\nstem: [1,\n"), StartsWith(":3: not YAML: "));
   EXPECT_THAT(error_of("seed: 1\n---\nseed: 2\n"),
               HasSubstr(":2: not YAML: expected one document, found more behind it"));
+  std::string many;
+  for (int i = 0; i < 5000; ++i) {
+    many += "seed: 1\n";
+  }
+  EXPECT_THAT(error_of(many + "seed: 1\n"),
+              StartsWith(":5000: not YAML: expected at most 10000 keys and values, found more"));
   EXPECT_THAT(error_of(std::string("\x89PNG\r\n\x1a\n\0\0", 10)), HasSubstr(": not YAML: "));
 }
 

@@ -134,6 +134,13 @@ TEST(Check, NamesMetricsThatCannotBeRead) {
               HasSubstr("t_rel_percent: expected a number, found string"));
   EXPECT_THAT(message(R"({"t_rel_percent": true})"), HasSubstr("expected a number, found boolean"));
   EXPECT_THAT(message(R"({"t_rel_percent": 1e999})"), HasSubstr("not JSON"));
+  EXPECT_THAT(message(R"({"t_rel_percent": 1, "a": {"frames": 2}, "t_rel_percent": 2})"),
+              HasSubstr("metrics.json: expected the key 't_rel_percent' once, found it twice"));
+  EXPECT_THAT(message(R"({"a": {"frames": 1}, "b": {"frames": 2}, "t_rel_percent": "low"})"),
+              HasSubstr("expected a number"));
+  EXPECT_THAT(message("{\"a\": " + std::string(100, '[') + std::string(100, ']') + "}"),
+              HasSubstr("expected at most 64 levels, found more"));
+  EXPECT_LT(message("{\"" + std::string(10000, 'x')).size(), 1000U);
 
   const TempFolder folder;
   const auto file = folder.file("t.yaml", thresholds);

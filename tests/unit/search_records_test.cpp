@@ -185,6 +185,38 @@ TEST_F(Records, ManyLinesThatAreNoRecordsAreCounted) {
   EXPECT_EQ(content->warnings.back(), file("a").string() + ": 995 more lines left out");
 }
 
+TEST_F(Records, MoreLinesThatAreNoRecordsThanADamagedFileHasAreAnError) {
+  write("a", identity(0, 3), {record(0)});
+  std::ofstream out(file("a"), std::ios::app);
+  for (int i = 0; i < 1001; ++i) {
+    out << "{\"model\": 1}\n";
+  }
+  out.close();
+  const auto content = read_records(file("a"));
+  ASSERT_FALSE(content);
+  EXPECT_THAT(content.error().message,
+              AllOf(HasSubstr("records.jsonl:1003: expected a line as"),
+                    HasSubstr("expected at most 1000 such lines, found more")));
+}
+
+TEST_F(Records, ALineLongerThanASearchWritesIsLeftOut) {
+  write("a", identity(0, 3), {record(0)});
+  std::ofstream(file("a"), std::ios::app) << std::string(kMaxRecordBytes + 1, ' ') << '\n';
+  const auto content = read_records(file("a"));
+  ASSERT_TRUE(content) << content.error().message;
+  ASSERT_EQ(content->warnings.size(), 1U);
+  EXPECT_THAT(content->warnings.front(), HasSubstr("records.jsonl:3: expected a line of at most"));
+}
+
+TEST_F(Records, WhoeverAsksStopsTheReading) {
+  write("a", identity(0, 3), {record(0), record(1)});
+  int num_asked = 0;
+  const auto content = read_records(file("a"), [&] { return ++num_asked == 2; });
+  ASSERT_FALSE(content);
+  EXPECT_THAT(content.error().message, HasSubstr("records.jsonl: interrupted while it was read"));
+  EXPECT_EQ(num_asked, 2);
+}
+
 TEST_F(Records, ALineOfAnotherSearchIsLeftOut) {
   write("a", identity(0, 3), {record(0)});
   write("b", identity(0, 4), {record(1)});
@@ -257,6 +289,11 @@ TEST_F(Records, WhatNoSearchWritesIsNamedAndLeftOut) {
   write("sequences", twice, {});
   EXPECT_THAT(read_records(file("sequences")).error().message,
               HasSubstr("00: expected a sequence"));
+  SearchIdentity many = identity(0, 3);
+  many.sequences.resize(301, many.sequences[0]);
+  write("many", many, {});
+  EXPECT_THAT(read_records(file("many")).error().message,
+              HasSubstr("sequences: expected at most 300, found 301"));
   SearchIdentity no_sequences = identity(0, 3);
   no_sequences.sequences.clear();
   std::filesystem::remove_all(folder_ / "a");

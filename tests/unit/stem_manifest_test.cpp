@@ -183,6 +183,9 @@ TEST(Sha256, StandardVectors) {  // FIPS 180-4, examples of NIST
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(internal::sha256_hex(""),
             "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  const internal::Sha256 beginning("a");
+  EXPECT_EQ(beginning.hex("bc"), internal::sha256_hex("abc"));
+  EXPECT_EQ(beginning.hex("b"), internal::sha256_hex("ab"));
 }
 
 TEST(CheckModel, FindsTheFirstThingThatIsWrong) {

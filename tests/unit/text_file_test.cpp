@@ -51,6 +51,33 @@ TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
   EXPECT_EQ(num_files(folder), 1);
 }
 
+TEST(ReadRows, RefusesTooManyLinesAndOneThatIsTooLong) {
+  const TempFolder folder;
+  const auto read = [&](const std::string& text) { return read_rows(folder.file("a", text)); };
+  const std::string longest(kMaxLineBytes, 'x');
+  EXPECT_TRUE(read(longest + "\n" + longest));
+  EXPECT_THAT(read("1\n" + longest + "x\n").error().message,
+              HasSubstr("a:2: expected a line of at most 65536 bytes, found one of 65537"));
+  EXPECT_THAT(read("1\n" + longest + "x").error().message, HasSubstr("a:2: "));
+  const std::string most(kMaxLines, '\n');
+  EXPECT_TRUE(read(most));
+  EXPECT_THAT(read(most + "1").error().message,
+              HasSubstr("a: expected at most 1000000 lines, found more"));
+}
+
+TEST(CheckCanWrite, APipeIsAnError) {
+  const TempFolder folder;
+  const fs::path pipe = folder / "calib.txt";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(check_can_write(pipe).error().message,
+              HasSubstr(pipe.string() + ": expected a file to write, found a pipe"));
+}
+
+TEST(OneLine, IsOneAndNotLong) {
+  EXPECT_EQ(one_line("a\nb"), "a b");
+  EXPECT_EQ(one_line(std::string(1000, 'x')), std::string(300, 'x') + "..");
+}
+
 TEST(WriteTextFile, AFullDiskLeavesTheOldFile) {
   const TempFolder folder;
   const fs::path file = folder.file("poses.txt", "old");
