@@ -41,7 +41,7 @@ Expected<int> check(CheckArguments& arguments) {
   const Expected<std::vector<ThresholdResult>> results =
       check_metrics(arguments.metrics, arguments.thresholds);
   if (!results) {
-    return fail(results.error().message + " (see 'stemvo check --help')");
+    return results.error();
   }
   print(format_check_table(*results));
   print_json(document(*results));

@@ -32,7 +32,7 @@ Expected<int> evaluate(EvaluateArguments& arguments) {
   arguments.request.alignment = parse_alignment(arguments.alignment).value();
   const Expected<EvaluationReport> report = evaluate_files(arguments.request);
   if (!report) {
-    return fail(report.error().message + " (see 'stemvo evaluate --help')");
+    return report.error();
   }
   print(format_evaluation_table(*report));
   print_json(evaluation_document(*report));

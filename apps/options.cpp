@@ -3,6 +3,7 @@
 
 #include <map>
 #include <system_error>
+#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -41,16 +42,21 @@ std::filesystem::path data_folder(const char* name) {
   return std::filesystem::path(STEMVO_SOURCE_DIR) / name;
 }
 
-CLI::Validator in_range(double min, double max) {
+template <typename Number>
+CLI::Validator in_range(Number min, Number max) {
   const auto check = [min, max](const std::string& text) {
-    double value = 0.0;
+    Number value = {};
     const bool is_inside =
         CLI::detail::lexical_cast(text, value) && value >= min && value <= max;  // nan is not
     return is_inside ? std::string()
-                     : fmt::format("expected a number from {} to {}, found {}", min, max, text);
+                     : fmt::format("expected a {} from {} to {}, found {}",
+                                   std::is_integral_v<Number> ? "whole number" : "number", min, max,
+                                   text);
   };
   return {check, ""};
 }
+template CLI::Validator in_range(int, int);
+template CLI::Validator in_range(double, double);
 
 void add_config_options(CLI::App& command, ConfigArguments& arguments) {
   command

@@ -37,8 +37,9 @@ CLI::Option* add_file_option(CLI::App& command,
                              std::optional<std::filesystem::path>& file,
                              const std::string& help);
 
-/// Numbers from min to max, so finite ones; leaves the help's line short.
-[[nodiscard]] CLI::Validator in_range(double min, double max);
+/// Numbers from min to max, so finite ones, or int: whole ones; leaves the help's line short.
+template <typename Number>
+[[nodiscard]] CLI::Validator in_range(Number min, Number max);
 
 /// --out DIR, which must be given.
 CLI::Option* add_out_folder(CLI::App& command,

@@ -3,7 +3,7 @@
 """Makes the README's moving picture of a run: frame with tracks, its channel, the path growing.
 
     stemvo synth drive --frames 150 --width 930 --height 282
-    stemvo run drive/sequences/00 --out result --pictures 4
+    stemvo run drive/sequences/00 --out result --pictures 8
     tools/moving_picture.py result drive/poses/00.txt docs/images/demo.gif
 """
 
@@ -19,7 +19,7 @@ import PIL.Image
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-WIDTH, PATH_WIDTH, COLOURS, MS_PER_IMAGE = 380, 180, 48, 150
+WIDTH, PATH_WIDTH, COLOURS, MS_PER_IMAGE = 380, 180, 64, 250
 
 
 def positions(file):
@@ -55,7 +55,7 @@ def main():
         both = PIL.Image.new("RGB", (WIDTH + PATH_WIDTH, left.height), "white")
         both.paste(left, (0, 0))
         both.paste(draw_path(estimate, truth, int(file.stem), (PATH_WIDTH, left.height)), (WIDTH, 0))
-        images.append(both.quantize(COLOURS, dither=PIL.Image.Dither.NONE))
+        images.append(both.quantize(COLOURS, PIL.Image.Quantize.MAXCOVERAGE, kmeans=1, dither=PIL.Image.Dither.NONE))
     images[0].save(options.gif, save_all=True, append_images=images[1:], duration=MS_PER_IMAGE, loop=0, optimize=True)
     print(f"{options.gif}: {len(images)} images, {options.gif.stat().st_size} bytes")
 

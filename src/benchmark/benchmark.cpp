@@ -56,7 +56,7 @@ Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& reques
   }
   if (names.empty()) {
     return fail(
-        fmt::format("{}: expected a folder per sequence, found: {} (see 'stemvo benchmark --help')",
+        fmt::format("{}: expected a folder per sequence, found: {}; give the folder above it",
                     folder.string(), code ? code.message() : "none"));
   }
   std::sort(names.begin(), names.end());

@@ -33,7 +33,10 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
         fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
   }
   // Commands that read other recordings too open none of them as KITTI's.
-  const char* why = looks_like_kitti(directory) ? "" : " (this command reads KITTI folders only)";
+  const char* why = looks_like_kitti(directory)
+                        ? ""
+                        : "; this command reads KITTI's layout only (image_2/000000.png, .., "
+                          "calib.txt, times.txt), 'stemvo run' others too";
   return fail(option == "auto"
                   ? fmt::format("{}: expected a folder image_2 or image_0, found neither{}",
                                 directory.string(), why)

@@ -94,6 +94,7 @@ Json metrics_document(const MetricsReport& report) {
                {"fps", report.fps},
                {"scale_source", report.scale_source},
                {"tracked_fraction", report.tracked_fraction},
+               {"in_place_fraction", report.in_place_fraction},
                {"camera", report.camera},
                {"road_measured_fraction", report.road_measured_fraction},
                {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};

@@ -41,11 +41,11 @@ struct MetricsReport {
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// camera{fx_px,fy_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px} (as it was known in the end; sigmas are
-/// null where it is not refined) road_measured_fraction (of all frames; null where the road is not
-/// asked) alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg;
-/// sim3 where the trajectory is up to scale, else none) path_length_m average_offset_m
-/// null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m segments
+/// in_place_fraction camera{fx_px,fy_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px} (as it was known in
+/// the end; sigmas are null where it is not refined) road_measured_fraction (of all frames; null
+/// where the road is not asked) alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m
+/// and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none) path_length_m
+/// average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m segments
 /// ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
 /// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
 /// refined trajectory is written) and, only where it was asked for, timing{threads fps loop_fps

@@ -12,7 +12,11 @@ namespace {
 
 constexpr double kInPlace = 0.95;  ///< a larger share of such frames is told
 
-std::string scale_explained(const std::string& source) {
+std::string scale_explained(const MetricsReport& report) {
+  const std::string& source = report.scale_source;
+  if (source == "none" && report.metrics) {
+    return source + " (files: up to scale; here: fitted to the true metres)";
+  }
   return source == "ground_truth" ? source + " (each step rescaled to its true length)"
          : source == "constant"   ? source + " (every step the same length: not metric)"
          : source == "none"       ? source + " (up to scale: units, not metres)"
@@ -25,14 +29,15 @@ std::string head(const MetricsReport& report) {
   table.add({"sequence", fmt::format("{}, {} frames ({}:{})", report.sequence, report.num_frames,
                                      report.first_frame, end)});
   table.add({"model", fmt::format("{}, filter {}", report.model, report.filter)});
-  table.add({"scale", scale_explained(report.scale_source)});
+  table.add({"scale", scale_explained(report)});
   table.add({"speed", fmt::format("{:.1f} frames/s", report.fps)});
   table.add({"tracked", fmt::format("{:.1f} % of the frames have a measured pose",
                                     100.0 * report.tracked_fraction)});
   if (report.in_place_fraction > kInPlace) {
-    table.add({"motion", fmt::format("the camera hardly left its place (no translation on {:.1f} % "
-                                     "of the frames): lengths and percentages mean little",
-                                     100.0 * report.in_place_fraction)});
+    table.add(
+        {"motion",
+         fmt::format("hardly any ({:.1f} % of the frames in place): lengths and % mean little",
+                     100.0 * report.in_place_fraction)});
   }
   if (const auto& sigma = report.camera.sigma_px) {
     table.add(

@@ -41,6 +41,33 @@ json coordinates(const Trajectory& trajectory, int axis, double sign = 1.0) {
               [&](const Rigid3& pose) { return rounded(sign * pose.translation[axis]); });
 }
 
+/// What a scene of these trajectories shows, in each axis a little more than they take, and how
+/// long the axes are: true to scale, but none so short that its ticks run into each other.
+json scene_around(const std::vector<const Trajectory*>& trajectories) {
+  constexpr double kMargin = 0.1;
+  constexpr double kShortest = 0.45;                 // of the longest
+  Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());  // where they start
+  for (const Trajectory* trajectory : trajectories) {
+    for (const Rigid3& pose : *trajectory) {
+      const Eigen::Vector3d& p = pose.translation;
+      if (p.allFinite()) {
+        box.extend(Eigen::Vector3d(p.x(), p.z(), -p.y()));
+      }
+    }
+  }
+  const Eigen::Vector3d sizes = box.sizes().cwiseMax(1e-3 + 1e-3 * box.sizes().maxCoeff());
+  const Eigen::Vector3d lengths = (sizes / sizes.maxCoeff()).cwiseMax(kShortest);
+  json scene = {{"camera", {{"eye", {{"x", -2.0}, {"y", -2.0}, {"z", 1.8}}}}}};
+  for (const auto& [i, letter] : {std::pair(0, "x"), std::pair(1, "y"), std::pair(2, "z")}) {
+    const double half = (0.5 + kMargin) * sizes[i];
+    scene["aspectratio"][letter] = rounded(lengths[i]);
+    scene[letter + std::string("axis")]["nticks"] = 5;
+    scene[letter + std::string("axis")]["range"] = {rounded(box.center()[i] - half),
+                                                    rounded(box.center()[i] + half)};
+  }
+  return scene;
+}
+
 /// Whether a homography was scored against a fundamental matrix.
 bool is_scored(const FrameResult& r) { return r.homography_score + r.fundamental_score > 0.0; }
 
@@ -106,16 +133,17 @@ class RunFigures {
       traces.back()["line"]["color"] = "#999999";
     }
     traces.push_back(path("estimate", run_.estimate));
-    json up = html::titled("up, " + run_.unit, 3);
-    up["nticks"] = 3;  // a drive is flat
-    const json layout = {{"large", true},
-                         {"scene",
-                          {{"aspectmode", "data"},
-                           {"camera", {{"eye", {{"x", -1.35}, {"y", -2.7}, {"z", 1.6}}}}},
-                           {"xaxis", html::titled("right, " + run_.unit, 3)},
-                           {"yaxis", html::titled("forward, " + run_.unit, 3)},
-                           {"zaxis", up}}}};
-    add({"Path in space", "", traces, layout, static_cast<int>(traces.size()) - 1});
+    std::vector<const Trajectory*> shown = {&run_.estimate};
+    if (run_.ground_truth) {
+      shown.push_back(&run_.ground_truth->poses);
+    }
+    json scene = scene_around(shown);
+    scene["xaxis"].update(html::titled("right, " + run_.unit, 3));
+    scene["yaxis"].update(html::titled("forward, " + run_.unit, 3));
+    scene["zaxis"].update(html::titled("up, " + run_.unit, 3));
+    const json layout = {{"large", true}, {"scene", scene}};
+    add({"Path in space", "Short axes are stretched: heights are what the ticks say.", traces,
+         layout, static_cast<int>(traces.size()) - 1});
   }
 
   void add_errors_over_distance() const {
@@ -176,7 +204,7 @@ class RunFigures {
                    {"xaxis", html::titled("segment, m")},
                    {"xaxis2", html::titled("segment, m")},
                    {"yaxis", html::titled("t_rel, %", 2)},
-                   {"yaxis2", html::titled("r_rel, degrees per 100 m", 3)}};
+                   {"yaxis2", html::titled("r_rel, deg/100 m", 3)}};
     add({"Error by segment length", "KITTI's segments, from every tenth frame.", each, layout});
   }
 
@@ -195,7 +223,7 @@ class RunFigures {
     json layout = stacked(3);
     layout["yaxis3"].update(html::titled("tracks"));
     layout["yaxis2"].update(html::titled("R_H", 3));
-    layout["yaxis2"]["range"] = {0, 1};  // often one frame only
+    layout["yaxis2"]["range"] = ratio_range();
     layout["yaxis"]["type"] = "category";
     add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
          traces, layout, 0});
@@ -219,7 +247,8 @@ class RunFigures {
       traces.push_back(over_frames("sigma of the scale", "y3", [](const FrameResult& r) {
         return r.scale_sigma ? rounded(100.0 * *r.scale_sigma) : json();
       }));
-      layout["yaxis3"].update(html::titled("sigma, %", 2));
+      layout["yaxis3"].update(html::logarithmic("sigma, %"));  // it begins with 100
+      layout["yaxis3"]["hoverformat"] = ".2f";
     }
     layout["yaxis2"].update(html::titled("step, " + run_.unit, 3));
     layout["yaxis"].update(html::titled("moved by, px", 2));
@@ -238,9 +267,7 @@ class RunFigures {
     add({"Time per stage",
          "Stages of different frames overlap: they do not add up to a frame's time.",
          traces,
-         {{"xaxis", html::titled("frame")},
-          {"yaxis", html::titled("ms", 1)},
-          {"hovermode", "x unified"}},
+         {{"xaxis", frames_axis()}, {"yaxis", html::titled("ms", 1)}, {"hovermode", "x unified"}},
          0});
   }
 
@@ -295,9 +322,30 @@ class RunFigures {
             {"yaxis", y_axis}};
   }
 
+  /// Around what there is, often one frame only, and where both models are level.
+  [[nodiscard]] json ratio_range() const {
+    double low = 0.4;
+    double high = 0.5;
+    for (const FrameResult& r : run_.frames) {
+      low = is_scored(r) ? std::min(low, r.homography_ratio) : low;
+      high = is_scored(r) ? std::max(high, r.homography_ratio) : high;
+    }
+    return {low - 0.05, high + 0.05};
+  }
+
+  /// The same in each figure.
+  [[nodiscard]] json frames_axis() const {
+    const auto first = static_cast<double>(run_.numbers.front());
+    const auto last = static_cast<double>(run_.numbers.back());
+    const double margin = 0.02 * (last - first) + 0.5;
+    json axis = html::titled("frame");
+    axis["range"] = {first - margin, last + margin};
+    return axis;
+  }
+
   /// y (the lowest), y2, .. above one x axis of frames.
-  static json stacked(int rows) {
-    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", html::titled("frame")}};
+  [[nodiscard]] json stacked(int rows) const {
+    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", frames_axis()}};
     layout["xaxis"]["anchor"] = "y";
     constexpr double kGap = 0.06;
     for (int i = 0; i < rows; ++i) {

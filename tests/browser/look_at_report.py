@@ -40,6 +40,28 @@ def middle_of_path(page):
     }})()""")
 
 
+def titles_in_the_way(page):
+    """Those of axes that stand over another text or in a plot."""
+    return page.evaluate("""figures.flatMap(({ div }) => {
+        const elements = [...div.querySelectorAll("text, .nsewdrag")].map((element) => ({ element, box: element.getBoundingClientRect() }));
+        const meet = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
+        return elements.filter(({ element, box }) => /^[xy][0-9]*title$/.test(element.getAttribute("class")) &&
+            elements.some((other) => other.element !== element && meet(box, other.box))).map(({ element }) => element.textContent); })""")
+
+
+def pixels_at_edges_of_spaces(page):
+    """Of each view in 3D, how many have not the ground's colour: 0 where nothing is cut."""
+    return page.evaluate("""Promise.all(figures.filter(({ section }) => is_space(section)).map(async ({ div }) => {
+        const image = new Image();
+        image.src = await Plotly.toImage(div, { width: null, height: null });
+        await image.decode();
+        const { width, height } = image, context = new OffscreenCanvas(width, height).getContext("2d");
+        context.drawImage(image, 0, 0);
+        const edges = [[0, 0, 3, height], [width - 3, 0, 3, height], [0, 0, width, 3], [0, height - 3, width, 3]];
+        const colours = edges.flatMap((edge) => [...new Uint32Array(context.getImageData(...edge).data.buffer)]);
+        return colours.filter((colour) => colour !== colours[0]).length; }))""")
+
+
 def swipe(page):
     """How far the page is scrolled by a finger that goes up over each figure, down at the page's end."""
     client = page.context.new_cdp_session(page)
@@ -109,12 +131,14 @@ def look(browser, report, screenshot):
         page.screenshot(path=screenshot, full_page=True)
     page.close()
 
-    page = open_page(browser, report, found, viewport={"width": 380, "height": 800}, color_scheme="dark", has_touch=True, is_mobile=True)
+    page = open_page(browser, report, found, viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True)
     found["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     found["phone_width"] = page.evaluate("document.documentElement.scrollWidth")
     found["buttons_over_legend"] = page.evaluate("""figures.filter(({ div }) => {
         const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
         return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
+    found["titles_in_the_way"] = titles_in_the_way(page)
+    found["at_edges_of_spaces"] = pixels_at_edges_of_spaces(page)
     found["swiped"] = swipe(page)
     page.close()
     return found

@@ -91,6 +91,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"run", "x", "--out", "o", "--frames", "7:3"}, "A < B"},
       {{"run", "x", "--out", "o", "--set", "stem.filter"}, "expected KEY=VALUE"},
       {{"run", "x", "--out", "o", "--threads", "-1"}, "--threads"},
+      {{"run", "x", "--out", "o", "--threads", "1.5"}, "a whole number from 0 to 1024, found 1.5"},
       {{"run", "x", "--out", "o", "--pictures", "0"}, "--pictures"},
       {{"evaluate", "--gt", "a"}, "ESTIMATE"},
       {{"evaluate", "--gt", "a", "b", "--align", "icp"}, "--align"},

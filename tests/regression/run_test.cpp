@@ -92,7 +92,8 @@ TEST_F(Run, MetricsHaveEveryKeyOfTheContract) {
   for (const char* key :
        {"frames", "fps", "path_length_m", "scale_source", "average_offset_m", "null_offset_m",
         "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments", "ate_rmse_m",
-        "rpe_rotation_deg", "tracked_fraction", "alignment", "road_measured_fraction"}) {
+        "rpe_rotation_deg", "tracked_fraction", "in_place_fraction", "alignment",
+        "road_measured_fraction"}) {
     EXPECT_TRUE(metrics.contains(key)) << key;
   }
   for (const char* key : {"none", "scale", "se3", "sim3"}) {

@@ -133,9 +133,9 @@ TEST_F(KittiSequenceTest, FolderProblems) {
   fs::remove_all(folder_);
   fs::create_directories(folder_);
   write(folder_ / "times.txt", "0\n");  // as other recordings have
-  EXPECT_THAT(
-      open_error(),
-      EndsWith("image_2 or image_0, found neither (this command reads KITTI folders only)"));
+  EXPECT_THAT(open_error(),
+              EndsWith("image_2 or image_0, found neither; this command reads KITTI's layout only "
+                       "(image_2/000000.png, .., calib.txt, times.txt), 'stemvo run' others too"));
   fs::remove_all(folder_);
   EXPECT_THAT(open_error(), HasSubstr("expected a sequence folder"));
 }

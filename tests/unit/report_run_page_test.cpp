@@ -113,6 +113,38 @@ TEST_F(RunPageTest, ShowsPathsErrorsAndFrames) {
   EXPECT_EQ(hover("Error over distance", "yaxis"), ".3f");
 }
 
+TEST_F(RunPageTest, FiguresOverFramesShowTheSameFrames) {
+  const json page = content();
+  const auto axis = [&](const char* heading, const char* name) {
+    return section(page, heading)["layout"][name];
+  };
+  const json range = axis("Time per stage", "xaxis")["range"];
+  EXPECT_LT(range[0], 100);
+  EXPECT_GT(range[1], 500);
+  EXPECT_EQ(axis("Tracks, model and state", "xaxis")["range"], range);
+  EXPECT_EQ(axis("Scale and camera", "xaxis")["range"], range);
+}
+
+TEST_F(RunPageTest, SmallAndLargeValuesAreSeen) {
+  frames_[1].homography_ratio = 0.97;  // the only one that is scored
+  frames_[1].homography_score = 97.0;
+  frames_[1].fundamental_score = 3.0;
+  frames_[1].scale_sigma = 1.0;
+  const json page = content();
+  EXPECT_GT(section(page, "Tracks, model and state")["layout"]["yaxis2"]["range"][1], 1.0);
+  EXPECT_EQ(section(page, "Scale and camera")["layout"]["yaxis3"]["type"], "log");
+}
+
+// 0.2 m up on 202 m: true to scale, nothing of it would be seen.
+TEST_F(RunPageTest, EachAxisOfTheSpaceIsLongEnoughForItsTicks) {
+  const json scene = section(content(), "Path in space")["layout"]["scene"];
+  EXPECT_EQ(scene["aspectratio"]["y"], 1.0);
+  EXPECT_GT(scene["aspectratio"]["z"], 0.4);
+  EXPECT_LT(scene["zaxis"]["range"][0], 0.0);
+  EXPECT_GT(scene["zaxis"]["range"][1], 0.2);
+  EXPECT_LT(scene["zaxis"]["range"][1], 0.3);
+}
+
 TEST_F(RunPageTest, FramesWithoutATruePoseAreShownWithoutTheirErrors) {
   truth_->frames = {40, 100, 190};
   truth_->poses = take_poses(truth_->poses, truth_->frames);
