@@ -44,7 +44,7 @@ json coordinates(const Trajectory& trajectory, int axis, double sign = 1.0) {
 /// What a scene of these trajectories shows, in each axis a little more than they take, and how
 /// long the axes are: true to scale, but none so short that its ticks run into each other.
 json scene_around(const std::vector<const Trajectory*>& trajectories) {
-  constexpr double kMargin = 0.1;
+  constexpr double kMargin = 0.15;
   constexpr double kShortest = 0.45;                 // of the longest
   Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());  // where they start
   for (const Trajectory* trajectory : trajectories) {
