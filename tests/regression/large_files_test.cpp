@@ -264,7 +264,7 @@ TEST_F(LargeRecords, AnInterruptIsHeard) {
              })(search::kMaxRecords_MB * 1000000U));
   test::RunningProgram program(STEMVO_PROGRAM,
                                {"search", "--merge", part_, "--out", folder_ / "merged"});
-  std::this_thread::sleep_for(std::chrono::milliseconds(800));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
   program.send(SIGTERM);
   const ProgramResult result = program.wait();
   EXPECT_EQ(result.exit_code, 130) << result.err;
