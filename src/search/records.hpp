@@ -29,8 +29,8 @@
 namespace stemvo::search {
 
 inline constexpr const char* kRecordsFile = "records.jsonl";
-/// What it holds at most (6,000 drives of a KITTI sequence and more), and one line of it.
-inline constexpr int kMaxRecords_MB = 128;
+/// What it holds at most (24,000 drives of a KITTI sequence and more), and one line of it.
+inline constexpr int kMaxRecords_MB = 512;
 inline constexpr std::size_t kMaxRecordBytes = 8000000;
 /// True: what takes long is to be left.
 using IsStopped = std::function<bool()>;
