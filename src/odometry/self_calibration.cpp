@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <opencv2/core/utility.hpp>
+
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -15,7 +19,7 @@ constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
 /// Of one whose focal length is asked for as well: it may be another camera's.
 constexpr double kWeakPriorSigma[] = {30.0, 30.0, 0.03, 0.02, 0.01};
 /// Errors of a track's points are alike: a run tells less than as many independent ones would.
-constexpr double kSigmaFactor = 2.0;
+constexpr double kSigmaFactorSq = 2.0 * 2.0;
 /// Who drives forward bends all tracks alike: without this factor focal lengths that are known were
 /// missed by 3.3 sigmas on drives (03, a rendered one), by 0.8 with the camera in the hand.
 constexpr double kFocalSigmaFactor = 3.0;
@@ -52,14 +56,20 @@ std::optional<CameraEstimate> SelfCalibration::estimate() const {
   if (refinement_ == CameraRefinement::kOff) {
     return std::nullopt;
   }
-  CameraChange sigma = information_.inverse().diagonal().cwiseSqrt();
-  sigma[2] *= kFocalSigmaFactor;
-  return CameraEstimate{mean_, sigma, num_runs_};
+  SelfCalibration after = *this;
+  after.take_in();
+  return CameraEstimate{after.mean_, after.sigma(), after.num_runs_};
 }
 
 std::optional<Eigen::Vector2d> SelfCalibration::principal_point_sigma_px() const {
-  const std::optional<CameraEstimate> known = estimate();
-  return known ? std::optional<Eigen::Vector2d>(known->sigma.head<2>()) : std::nullopt;
+  return refinement_ == CameraRefinement::kOff ? std::nullopt
+                                               : std::optional<Eigen::Vector2d>(sigma().head<2>());
+}
+
+CameraChange SelfCalibration::sigma() const {
+  CameraChange sigma = information_.inverse().diagonal().cwiseSqrt();
+  sigma[2] *= kFocalSigmaFactor;
+  return sigma;
 }
 
 CameraChange SelfCalibration::applied() const {
@@ -74,30 +84,45 @@ void SelfCalibration::observe(const Keyframe& keyframe, const BundleAdjustmentOp
   if (refinement_ == CameraRefinement::kOff) {
     return;
   }
+  take_in();
   approach_believed();
   const WindowOptions window_options{.num_keyframes = kNumKeyframes};
   add_keyframe(run_, keyframe, window_options);
   triangulate_landmarks(run_, camera_, window_options);
   if (static_cast<int>(run_.keyframes.size()) == kNumKeyframes) {
-    measure(options);
-    run_ = {};
+    begin_measuring(options);
   }
 }
 
-void SelfCalibration::measure(const BundleAdjustmentOptions& options) {
-  constexpr double factor_sq = kSigmaFactor * kSigmaFactor;
-  const CameraChange before = applied();
-  const auto found =
-      measure_camera(run_, camera_, {rest_of(mean_, before), factor_sq * information_}, options);
+void SelfCalibration::begin_measuring(const BundleAdjustmentOptions& options) {
+  const CameraPrior prior{rest_of(mean_, applied()), kSigmaFactorSq * information_};
+  auto task = [run = std::move(run_), camera = camera_, prior, options] {
+    return timed(Stage::kCamera, [&] { return measure_camera(run, camera, prior, options); });
+  };
+  const auto where =
+      cv::getNumThreads() > 1 ? std::launch::async | std::launch::deferred : std::launch::deferred;
+  measured_ = std::async(where, std::move(task)).share();
+  run_ = {};
+}
+
+SelfCalibration::Measured SelfCalibration::known(const std::optional<CameraMeasurement>& found) {
+  std::promise<std::optional<CameraMeasurement>> promise;
+  promise.set_value(found);
+  return promise.get_future().share();
+}
+
+void SelfCalibration::take_in() {
+  const Measured measured = std::exchange(measured_, {});
+  const auto found = measured.valid() ? measured.get() : std::nullopt;
   if (!found.has_value() || !is_plausible(*found)) {
     return;
   }
-  mean_ = composed(before, found->change);
-  information_ += found->information / factor_sq;
+  mean_ = composed(applied(), found->change);
+  information_ += found->information / kSigmaFactorSq;
   ++num_runs_;
-  const CameraChange sigma = estimate()->sigma;
+  const CameraChange sigmas = sigma();
   const auto insists = [&](int i, double max, double bias) {
-    return sigma[i] < max && std::abs(mean_[i]) > kMinSigmas * std::hypot(sigma[i], bias);
+    return sigmas[i] < max && std::abs(mean_[i]) > kMinSigmas * std::hypot(sigmas[i], bias);
   };
   believed_.setZero();
   believed_[0] = insists(0, kMaxSigma_px, kBias_px) ? mean_[0] : 0.0;

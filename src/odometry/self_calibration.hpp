@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <future>
 #include <iterator>
 #include <optional>
 
@@ -25,8 +26,9 @@ class SelfCalibration {
 
   SelfCalibration(const Camera& given, CameraRefinement refinement);
 
-  /// The next keyframe, its pose refined. A run that is long enough is measured, and the next one
-  /// begun.
+  /// The next keyframe, its pose refined. A run that is long enough is measured until the next
+  /// call, in another thread where there may be one beside this (cv::setNumThreads), and taken in
+  /// then: the same on any number of threads.
   void observe(const Keyframe& keyframe, const BundleAdjustmentOptions& options);
   /// As of a window.
   void rescale(double factor, const Eigen::Vector3d& center) {
@@ -37,15 +39,19 @@ class SelfCalibration {
 
   /// The given one, or on its way to what the data insist on.
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// What all runs say, whether the data insist on it or not; nullopt: nothing is refined.
+  /// What all runs say, whether the data insist on it or not, after one that is still measured;
+  /// nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraEstimate> estimate() const;
-  /// Of the estimate; nullopt: nothing is refined.
+  /// Of the runs that were taken in; nullopt: nothing is refined.
   [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
 
   /// Its state, for state_archive.hpp.
   template <typename Archive>
   void serialize(Archive& archive) {
-    archive(camera_, believed_, mean_, information_, num_runs_, run_);
+    bool is_measuring = measured_.valid();
+    std::optional<CameraMeasurement> found = is_measuring ? measured_.get() : std::nullopt;
+    archive(camera_, believed_, mean_, information_, num_runs_, run_, is_measuring, found);
+    measured_ = is_measuring ? known(found) : Measured();
   }
   /// When it was read.
   [[nodiscard]] bool is_sound() const {
@@ -55,9 +61,16 @@ class SelfCalibration {
   }
 
  private:
-  void measure(const BundleAdjustmentOptions& options);
+  using Measured = std::shared_future<std::optional<CameraMeasurement>>;
+  static Measured known(const std::optional<CameraMeasurement>& found);
+
+  void begin_measuring(const BundleAdjustmentOptions& options);
+  /// The run that is measured, if there is one; waits for it.
+  void take_in();
   void approach_believed();
   [[nodiscard]] CameraChange applied() const;
+  /// Standard deviations of mean_.
+  [[nodiscard]] CameraChange sigma() const;
 
   Camera given_;
   Camera camera_;
@@ -65,8 +78,9 @@ class SelfCalibration {
   CameraChange believed_ = CameraChange::Zero();  ///< what the data insist on; camera_ goes there
   CameraChange mean_ = CameraChange::Zero();      ///< less the given camera
   CameraInformation information_;
-  int num_runs_ = 0;  ///< measured
-  Window run_;        ///< the keyframes since the last measurement
+  int num_runs_ = 0;   ///< measured
+  Window run_;         ///< the keyframes since the last one that was measured
+  Measured measured_;  ///< that run; not valid once it was taken in
 };
 
 }  // namespace stemvo

@@ -16,6 +16,7 @@
 #include <cereal/types/string.hpp>
 
 #include "features/state_archive.hpp"
+#include "odometry/bundle_adjustment.hpp"
 #include "odometry/initializer.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/window_history.hpp"
@@ -57,6 +58,10 @@ void serialize(Archive& archive, Camera& camera) {
                                   std::abs(camera.cx_px) < kLargest_px &&
                                   std::abs(camera.cy_px) < kLargest_px &&
                                   is_size(camera.width_px) && is_size(camera.height_px));
+}
+template <typename Archive>
+void serialize(Archive& archive, CameraMeasurement& measured) {
+  archive(measured.change, measured.information);
 }
 template <typename Archive>
 void serialize(Archive& archive, RoadImage::Level& level) {

@@ -18,8 +18,8 @@ namespace {
 constexpr std::array<std::string_view, kNumStages> kNames = {
     "read and decode",     "stem",         "stretch",           "pyramid",    "description",
     "road image",          "detection",    "tracking",          "homography", "epipolar geometry",
-    "two-view refinement", "localization", "window refinement", "road scale", "frame files",
-    "result files"};
+    "two-view refinement", "localization", "window refinement", "camera",     "road scale",
+    "frame files",         "result files"};
 
 constexpr std::array<std::string_view, kNumFates> kFates = {
     "looked for",         "out of view", "not found", "merged", "off the epipolar line",

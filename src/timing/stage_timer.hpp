@@ -28,6 +28,7 @@ enum class Stage {
   kTwoViewRefinement,
   kLocalization,      ///< among the landmarks
   kWindowRefinement,  ///< triangulation and bundle adjustment
+  kCamera,            ///< what a run of keyframes tells of it, beside the frames
   kRoadScale,
   kFrameFiles,   ///< frames.csv, images of frames
   kResultFiles,  ///< everything that is written at the end
