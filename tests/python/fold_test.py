@@ -20,6 +20,7 @@ import numpy as np  # noqa: E402
 import export_stem  # noqa: E402
 import fold_bench  # noqa: E402
 from stems import fold, fold_report, frames, onnx_writer  # noqa: E402
+from stems import stem as stem_module  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", "")
 DATA = os.environ.get("STEMVO_SHARED_DATA")
@@ -79,6 +80,23 @@ class Fold(unittest.TestCase):
                 time.sleep(0.1)
 
         self.assertLess(fold_bench.seconds(Waiting(), None), 0.05)
+
+
+class OneFilterInRows(unittest.TestCase):
+    """onnx_writer computes many rows of one filter at a time: the same channel, of the same size."""
+
+    def test_as_among_others(self):
+        rng = np.random.default_rng(4)
+        for kernel, stride, padding in (((8, 8), 2, (3, 3, 3, 3)), ((4, 4), 4, (0, 0, 0, 0)), ((7, 5), 2, (3, 2, 2, 1)), ((3, 3), 1, (1, 1, 1, 1))):
+            for planes in (1, 3):
+                two = stem_module.Stem(rng.normal(size=(2, planes, *kernel)), rng.normal(size=2), stride, mean=np.full(planes, 90.0) if planes == 3 else np.zeros(1),
+                                       padding=padding)
+                both, one = (fold_report.session(onnx_writer.build(stem)) for stem in (two, fold.one_filter(two, 1)))
+                for size in ((8, 9), (31, 40), (33, 33), (64, 50), (131, 20)):
+                    feed = {onnx_writer.INPUT: rng.uniform(0, 255, (1, planes, *size)).astype(np.float32)}
+                    expected, found = both.run(None, feed)[0][:, 1:], one.run(None, feed)[0]
+                    self.assertEqual(found.shape, expected.shape, (kernel, stride, padding, size))
+                    self.assertLess(np.abs(found - expected).max(), 0.01)
 
 
 def npz_of(stem, path):
