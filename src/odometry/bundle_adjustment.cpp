@@ -116,8 +116,8 @@ std::optional<CameraMeasurement> measure_camera(const Window& window,
   const double sigma_px = error_px / 1.1774;  // Rayleigh
   BundleOptions solver;
   solver.num_fixed_poses = 1;
-  solver.max_iterations = 30;  // nearly to the end: what is left of the way is left of the error
-  solver.min_relative_decrease = 5e-4;
+  solver.max_iterations = 30;  // to the end: what is left of the way there is left of the error
+  solver.min_relative_decrease = 1e-4;
   solver.camera = CameraPrior{prior.mean, prior.information * (sigma_px * sigma_px)};
   solver.loss_scale_px = std::max(options.loss_scale_px, options.loss_share * error_px);
   const BundleResult result = adjust_bundle(read.bundle, solver);
