@@ -59,6 +59,15 @@ std::string in_python(std::string message) {
   if (message.starts_with(kKey)) {
     message.erase(0, kKey.size());
   }
+  for (const auto& [words, ours] :
+       {std::pair("a folder, a video file, a quoted pattern of images or camera:N",
+                  "a folder or a pattern of images (docs/python.md: FrameView for videos)"),
+        std::pair(" ('stemvo run --help' lists what is read)", ""),
+        std::pair("'stemvo --dump-config' explains each", "print(stemvo.Options()) lists all")}) {
+    if (const std::size_t at = message.find(words); at != std::string::npos) {
+      message.replace(at, std::string_view(words).size(), ours);
+    }
+  }
   for (const auto& [option, argument] :
        {std::pair("--camera FILE", "camera_file"), std::pair("--camera", "camera_file"),
         std::pair("--times FILE", "times"), std::pair("--times", "times"),

@@ -201,7 +201,7 @@ def main(arguments=None):
         else:
             show_result(rr, given.result, open_recording)
     except (OSError, ValueError, KeyError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit("error: " + str(error).replace("camera_file", "--camera FILE"))
 
 
 if __name__ == "__main__":

@@ -57,8 +57,7 @@ Expected<Pairs> pair_poses(const PoseFile& estimate,
 void add_row(TextTable& table, const EvaluationRow& row, Alignment alignment) {
   const Metrics& m = row.metrics;
   table.add({row.name, number_or_dash(m.t_rel_percent, 2), number_or_dash(m.r_rel_deg_per_100m, 3),
-             fmt::format("{:.2f}", m.average_offset_m),
-             fmt::format("{:.2f}", m.ate_rmse.after_m(alignment)),
+             format_length(m.average_offset_m, 2), format_length(m.ate_rmse.after_m(alignment), 2),
              fmt::format("{:.4f}", m.rpe_translation_m),
              fmt::format("{:.4f}", m.rpe_rotation_deg)});
 }
