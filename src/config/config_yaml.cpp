@@ -302,8 +302,7 @@ std::string unknown_key(std::string_view section,
     }
   }
   const std::string of = section.empty() ? "" : fmt::format(" of {}", section);
-  return fmt::format("unknown key; known keys{}: {} ('stemvo --dump-config' explains each)", of,
-                     fmt::join(known, ", "));
+  return fmt::format("unknown key; known keys{}: {}", of, fmt::join(known, ", "));
 }
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {

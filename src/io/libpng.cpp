@@ -26,6 +26,9 @@ class LibpngReader {
       throw std::bad_alloc();
     }
     png_set_read_fn(png_, this, &give);
+    // Texts and profiles are skipped: it would unpack each to several MB.
+    constexpr png_byte kSkipped[] = "tEXt\0zTXt\0iTXt\0iCCP\0eXIf";
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, kSkipped, sizeof(kSkipped) / 5);
   }
   ~LibpngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
   LibpngReader(const LibpngReader&) = delete;

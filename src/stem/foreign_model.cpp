@@ -246,6 +246,23 @@ Status check_attribute(std::string_view message) {
 /// An upper bound, by the bytes it takes: the smallest kinds have two values in one.
 std::size_t max_values(std::string_view tensor) { return 2 * tensor.size(); }
 
+/// What ONNX Runtime connects one by one: the time it takes to load them grows by their square.
+struct Links {
+  std::size_t num_operators = 0;
+  std::size_t num_ends = 0;  ///< inputs and outputs of operators, and weights
+
+  [[nodiscard]] Status check() const {
+    if (num_operators > kMaxNodes) {
+      return fail(fmt::format("expected at most {} operators, found more", kMaxNodes));
+    }
+    return num_ends > kMaxLinks
+               ? Status(fail(fmt::format("expected at most {} inputs and outputs of operators and "
+                                         "weights in all, found more",
+                                         kMaxLinks)))
+               : Status();
+  }
+};
+
 Status check_node(std::string_view message, ConstantSizes& constants) {
   std::string_view type;
   std::string_view domain;
@@ -302,15 +319,34 @@ ConstantSizes constants_of(std::string_view graph) {
   return constants;
 }
 
+/// Before anything is kept of it.
+Status check_links(std::string_view graph) {
+  Links links;
+  return for_each_field(graph, [&](const Field& field) -> Status {
+    if (field.number == kGraphNode) {
+      ++links.num_operators;
+      const Status read = for_each_field(field.bytes, [&](const Field& of_node) -> Status {
+        links.num_ends += of_node.number == kNodeInput || of_node.number == kNodeOutput ? 1 : 0;
+        return {};
+      });
+      if (!read) {
+        return read;
+      }
+    }
+    links.num_ends += field.number == kGraphInitializer || field.number == kGraphInput ? 1 : 0;
+    return links.check();
+  });
+}
+
 Status check_graph(std::string_view message) {
-  std::size_t num_nodes = 0;
+  if (Status status = check_links(message); !status) {
+    return status;
+  }
   ConstantSizes constants = constants_of(message);
   return for_each_field(message, [&](const Field& field) -> Status {
     switch (field.number) {
       case kGraphNode:
-        return ++num_nodes > kMaxNodes
-                   ? fail(fmt::format("expected at most {} operators, found more", kMaxNodes))
-                   : check_node(field.bytes, constants);
+        return check_node(field.bytes, constants);
       case kGraphInitializer:
         return check_tensor(field.bytes, /*is_weight=*/true);
       case kGraphSparse:
@@ -329,7 +365,7 @@ bool is_runtime_format(std::string_view model) {
 }  // namespace
 
 Status check_foreign_model(const std::string& label, std::string_view model) {
-  bool has_graph = false;
+  int num_graphs = 0;
   Status status;
   if (model.size() > kMaxModelBytes) {
     status = fail(fmt::format("expected at most {} bytes, found {}", kMaxModelBytes, model.size()));
@@ -337,12 +373,13 @@ Status check_foreign_model(const std::string& label, std::string_view model) {
     status = fail("expected an ONNX model, found one in ONNX Runtime's own format");
   } else {
     status = for_each_field(model, [&](const Field& field) -> Status {
-      has_graph = has_graph || field.number == kModelGraph;
-      return field.number == kModelGraph       ? check_graph(field.bytes)
+      num_graphs += field.number == kModelGraph ? 1 : 0;
+      return num_graphs > 1                    ? fail("expected one graph, found several")
+             : field.number == kModelGraph     ? check_graph(field.bytes)
              : field.number == kModelFunctions ? fail("expected no functions, found one")
                                                : Status();
     });
-    if (status && !has_graph) {
+    if (status && num_graphs == 0) {
       status = fail("expected an ONNX model, found a file without a graph");
     }
   }

@@ -32,13 +32,12 @@ Error cannot(const char* what, const fs::path& path, const std::error_code& code
   return fail(fmt::format("{}: cannot {}: {}", path.string(), what, code.message()));
 }
 
-/// All that is in the folder, if it is there, has such a name.
+/// All that is in the folder, if it is there, is such an entry.
 template <typename Predicate>
 bool holds_only(const fs::path& folder, const Predicate& is_ours) {
   std::error_code code;
-  const bool is_only =
-      std::all_of(fs::directory_iterator(folder, code), fs::directory_iterator(),
-                  [&](const auto& entry) { return is_ours(entry.path().filename()); });
+  const bool is_only = std::all_of(fs::directory_iterator(folder, code), fs::directory_iterator(),
+                                   [&](const auto& entry) { return is_ours(entry); });
   return is_only && (!code || code == std::errc::no_such_file_or_directory);
 }
 
@@ -47,15 +46,18 @@ bool holds_only_a_drive(const fs::path& folder) {
   const auto final_name = [](const fs::path& name) {  // a kill may have left one unfinished
     return name.extension() == ".unfinished" ? name.stem() : name;
   };
-  const auto is_frame = [&](const fs::path& name) {
-    const fs::path frame = final_name(name);
+  const auto is_frame = [&](const fs::directory_entry& entry) {
+    const fs::path frame = final_name(entry.path().filename());
     const std::string number = frame.stem().string();
-    return (frame.extension() == ".png" || frame.extension() == ".npy") && number.size() == 6 &&
+    return entry.is_regular_file() &&
+           (frame.extension() == ".png" || frame.extension() == ".npy") && number.size() == 6 &&
            number.find_first_not_of("0123456789") == number.npos;
   };
-  const auto is_content = [&](const fs::path& name) {
-    const std::string content = final_name(name).string();
-    return content == kMark || std::ranges::find(kContents, content) != kContents.end();
+  const auto is_content = [&](const fs::directory_entry& entry) {
+    const std::string content = final_name(entry.path().filename()).string();
+    const bool is_known =
+        content == kMark || std::ranges::find(kContents, content) != kContents.end();
+    return is_known && entry.is_directory() == (content == "image_2" || content == "depth");
   };
   return holds_only(folder, is_content) && holds_only(folder / "image_2", is_frame) &&
          holds_only(folder / "depth", is_frame);

@@ -48,9 +48,11 @@ class ResourceLimits : public ::testing::Test {
 };
 
 TEST_F(ResourceLimits, TooFewOpenFiles) {
+  int num_refused = 0;
   for (const int limit : {4, 7, 9, 10, 12}) {
-    expect_said("ulimit -n " + std::to_string(limit), "open files");
+    num_refused += expect_said("ulimit -n " + std::to_string(limit), "open files");
   }
+  EXPECT_GE(num_refused, 2);
 }
 
 TEST_F(ResourceLimits, TooFewOpenFilesToRender) {
@@ -84,6 +86,29 @@ TEST_F(ResourceLimits, TooFewProcesses) {
 }
 
 /// From where the program's libraries are loaded on: the dynamic loader says what it lacks.
+/// Of a filter it says nothing: it must not stand among those that detect nothing.
+TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
+  const fs::path large = test::rendered_drive({.frames = 12}) / "sequences/00";
+  int num_refused = 0;
+  for (int kib = 110000; kib < 230000; kib += 10000) {
+    const std::string out = folder_ / ("search" + std::to_string(kib));
+    const ProgramResult result = under(
+        "ulimit -v " + std::to_string(kib),
+        "search " + large.string() +
+            " --exhaustive --filters 0:2 --no-baselines --set 'evaluation.segment_lengths_m=[3]'"
+            " --quiet --out " +
+            out);
+    if (result.exit_code == 0) {
+      EXPECT_THAT(read_file(out + "/filters.csv"), Not(HasSubstr("out of memory"))) << kib;
+      continue;
+    }
+    ++num_refused;
+    EXPECT_EQ(result.exit_code, 1) << kib << result.err;
+    EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+  }
+  EXPECT_GE(num_refused, 3);
+}
+
 TEST_F(ResourceLimits, TooLittleMemory) {
   const ProgramResult probe = test::run_program(
       "/bin/bash",

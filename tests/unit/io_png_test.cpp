@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -288,6 +289,20 @@ TEST(PngFile, MorePixelsThanTheHeaderSays) {
     const auto image = decode_png(encoded(png), "a.png", false);
     ASSERT_FALSE(image) << depth;
     EXPECT_THAT(image.error().message, HasSubstr("found damaged data")) << depth;
+  }
+}
+
+/// A text of 8 kB unpacks to 8 MB; a hundred of them took 16 s.
+TEST(PngFile, TextsAreNotUnpacked) {
+  Bytes text = {'k', 0, 0};
+  const Bytes zeros = packed(Bytes(std::size_t{8} << 20U));
+  text.insert(text.end(), zeros.begin(), zeros.end());
+  for (const int depth : {8, 16}) {
+    Png png{depth, 0, 10, 10, Bytes(static_cast<std::size_t>(10 * (1 + 10 * depth / 8))), {}};
+    png.extra.assign(100, {"zTXt", text});
+    const std::clock_t start = std::clock();
+    EXPECT_TRUE(decode_png(encoded(png), "a.png", false)) << depth;
+    EXPECT_LT(std::clock() - start, 2 * CLOCKS_PER_SEC) << depth;
   }
 }
 

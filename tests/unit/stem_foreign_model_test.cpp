@@ -97,6 +97,43 @@ TEST(ForeignModel, AGraphOfTooManyOperatorsIsRefused) {
   EXPECT_THAT(with_nodes(kMaxNodes + 1).error().message, HasSubstr("at most 2000 operators"));
 }
 
+/// The parts would be merged to one that is checked nowhere.
+TEST(ForeignModel, AGraphInPartsIsRefused) {
+  const std::string part(
+      "\x3a\x0c\x0a\x0a\x22\x08"
+      "Constant");
+  EXPECT_TRUE(check_foreign_model("one", part));
+  EXPECT_EQ(check_foreign_model("two", part + part).error().message,
+            "two: expected one graph, found several");
+}
+
+TEST(ForeignModel, TooManyInputsOrWeightsAreRefused) {
+  const auto message = [](const char* key, const std::string& content) {
+    std::string result = key;  // the field, its length
+    for (std::size_t rest = content.size(); rest > 0; rest >>= 7U) {
+      result += static_cast<char>((rest & 0x7fU) | (rest > 0x7fU ? 0x80U : 0U));
+    }
+    return result + content;
+  };
+  const auto repeated = [](const std::string& text, std::size_t count) {
+    std::string result;
+    for (std::size_t i = 0; i < count; ++i) {
+      result += text;
+    }
+    return result;
+  };
+  const std::string weight = message("\x2a", message("\x42", "a"));
+  const std::string input = message("\x0a", "a");
+  const std::string image = message("\x5a", input);
+  for (const std::size_t count : {kMaxLinks, kMaxLinks + 1}) {
+    const std::string node = message("\x0a", repeated(input, count - 1) + message("\x22", "Max"));
+    for (const std::string& graph : {repeated(weight, count), image + node}) {
+      EXPECT_EQ(check_foreign_model("many", message("\x3a", graph)).has_value(),
+                count == kMaxLinks);
+    }
+  }
+}
+
 TEST(ForeignModel, ARunEndsAtItsTimeLimit) {
   const auto session = OnnxSession::create("slow", bytes_of("hostile_slow"), "stem");
   ASSERT_TRUE(session) << session.error().message;
