@@ -6,7 +6,7 @@ WORKDIR /stemvo
 COPY . .
 RUN make build && cd build/release && cpack -G DEB
 
-FROM debian:12-slim
+FROM debian:12
 COPY --from=build /stemvo/build/release/stemvo_*.deb /tmp/
 RUN apt-get update && apt-get install -y --no-install-recommends /tmp/stemvo_*.deb && rm -rf /tmp/*.deb /var/lib/apt/lists/*
 RUN useradd --create-home stemvo
