@@ -49,6 +49,28 @@ def titles_in_the_way(page):
             elements.some((other) => other.element !== element && meet(box, other.box))).map(({ element }) => element.textContent); })""")
 
 
+def hard_to_read(page):
+    """Texts that a figure's edge cuts, ticks upright or over each other, rows without a label."""
+    return page.evaluate("""figures.flatMap(({ div }) => {
+        const found = [], edge = div.getBoundingClientRect();
+        const text_of = (element) => ({ text: element.textContent, element, box: element.getBoundingClientRect() });
+        for (const { text, box } of [...div.querySelectorAll("text")].map(text_of))
+            if (box.width > 0 && (box.left < edge.left - 1 || box.right > edge.right + 1 || box.top < edge.top - 1 || box.bottom > edge.bottom + 1))
+                found.push("cut: " + text);
+        for (const axis of ["x", "y"]) {
+            const ticks = [...div.querySelectorAll("." + axis + "tick text")].map(text_of);
+            ticks.forEach(({ text, element, box }, i) => {
+                if (/rotate\\((?!0)/.test(element.getAttribute("transform"))) found.push("upright: " + text);
+                if (ticks.slice(i + 1).some(({ box: other }) => Math.min(box.right, other.right) - Math.max(box.left, other.left) > 0 &&
+                                                                  Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top) > 3)) found.push("covered: " + text);
+            });
+            const shown = div._fullLayout[axis + "axis"];
+            if (axis === "y" && shown?._categories?.length > ticks.length && Object.keys(div._fullLayout).filter((key) => /^yaxis/.test(key)).length === 1)
+                found.push(shown._categories.length - ticks.length + " rows without a label");
+        }
+        return found; })""")
+
+
 def pixels_at_edges_of_spaces(page):
     """Of each view in 3D, how many have not the ground's colour: 0 where nothing is cut."""
     return page.evaluate("""Promise.all(figures.filter(({ section }) => is_space(section)).map(async ({ div }) => {
@@ -138,8 +160,14 @@ def look(browser, report, screenshot):
         const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
         return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
     found["titles_in_the_way"] = titles_in_the_way(page)
+    found["hard_to_read"] = hard_to_read(page)
     found["at_edges_of_spaces"] = pixels_at_edges_of_spaces(page)
     found["swiped"] = swipe(page)
+    page.close()
+
+    page = open_page(browser, report, found, viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)  # held sideways
+    found["titles_in_the_way"] += titles_in_the_way(page)
+    found["hard_to_read"] += hard_to_read(page)
     page.close()
     return found
 
