@@ -15,6 +15,7 @@ from playwright.sync_api import TimeoutError as Late, sync_playwright
 
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SLIDER, TOP_VIEW = "#frame", ".figure"
+DRAWN = "figures.every(({ div }) => Math.hypot(div._fullLayout.width - div.clientWidth, div._fullLayout.height - div.clientHeight) < 2)"
 
 
 def open_page(browser, report, found, **options):
@@ -24,6 +25,7 @@ def open_page(browser, report, found, **options):
     page.on("request", lambda request: found["requests"].append(request.url[:100]))
     page.goto(report.as_uri())
     page.wait_for_selector("body[data-shown=yes]", timeout=120000)
+    page.wait_for_function(DRAWN, timeout=20000)
     return page
 
 
@@ -137,6 +139,7 @@ def look(browser, report, screenshot):
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
     found["categories"] = page.locator(".xtick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    found["captions"] = page.locator("figcaption").all_text_contents()
     found["log_ticks"] = page.evaluate("""figures.flatMap(({ div }) => Object.keys(div._fullLayout)
         .filter((key) => /^[xy]axis/.test(key) && div._fullLayout[key].type === "log")
         .map((key) => div.querySelectorAll("." + key[0] + "tick text").length))""")
@@ -166,8 +169,11 @@ def look(browser, report, screenshot):
     page.close()
 
     page = open_page(browser, report, found, viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)  # held sideways
-    found["titles_in_the_way"] += titles_in_the_way(page)
-    found["hard_to_read"] += hard_to_read(page)
+    for size in ({"width": 844, "height": 390}, {"width": 390, "height": 844}):
+        page.set_viewport_size(size)
+        page.wait_for_function(DRAWN, timeout=20000)
+        found["titles_in_the_way"] += titles_in_the_way(page)
+        found["hard_to_read"] += hard_to_read(page)
     page.close()
     return found
 
