@@ -59,7 +59,8 @@ class ReportPage(unittest.TestCase):
         self.assertIn("Best filter: ", found["title"])
         self.assertEqual(found["headings"], ["Filters by rank", "Error and matches", "Paths from above", "Channels", "All filters", "Command",
                                              "Configuration of all rows"])
-        self.assertEqual(len(found["images"]), 1)
+        self.assertEqual(found["captions"][0], "00, frame 15")
+        self.assertEqual([caption.split(": ")[0] for caption in found["captions"][1:]], ["best filter", "median", "worst"] + 4 * ["baseline"])
 
     def test_a_recording_without_ground_truth(self):
         images = self.folder / "plain"
@@ -96,6 +97,8 @@ class ReportPage(unittest.TestCase):
         self.assertEqual(self.found["figures"], 7)
         self.assertEqual(len(self.found["images"]), 6)
         self.assertTrue(all(width > 100 for width in self.found["images"]))
+        for caption in self.found["captions"]:
+            self.assertRegex(caption, r"^frame \d+: \w+, \d+ of \d+ matches; flow 0 \(blue\) to \d+ px \(yellow\), outliers red$")
         for heading in ("Path from above", "Numbers", "Error by segment length", "Scale and camera", "Command", "Configuration"):
             self.assertIn(heading, self.found["headings"])
 
