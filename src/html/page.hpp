@@ -20,7 +20,8 @@ struct CaptionedImage {
 
 /// A figure of plotly.js: the lists `traces` and the object `layout` are those of its reference
 /// (without colours and fonts, which are the page's, for light and dark), and of the page: `large`,
-/// or `small`, several of which stand beside each other.
+/// or `small`, several of which stand beside each other, or a `plot_height`: pixels without what
+/// the legend and the texts take.
 struct Figure {
   std::string heading;
   std::string note;  ///< a sentence under the heading; may be empty

@@ -97,18 +97,20 @@ class DriveLoop {
     }
     const std::size_t number = run_.sequence.range().begin + i;
     const ChannelOdometry& seen = run_.odometry.frames();
-    const cv::Mat image = draw_frame_image(
-        frame.value_or(cv::Mat()), seen.image(), seen.matches(), seen.inlier_mask(),
+    const cv::Mat image = draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(),
+                                           seen.inlier_mask());
+    const std::string caption =
         fmt::format("frame {}: {}, {} of {} matches", number, to_string(pose.state),
-                    pose.num_inliers, pose.num_matches));
+                    pose.num_inliers, pose.num_matches);
+    const std::string colors = describe_flow(seen.matches(), seen.inlier_mask());
     if (is_asked_for) {
       const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
-      keep_first(drive_.written, write_image(file, image));
+      keep_first(drive_.written, write_image(file, draw_under_caption(image, caption, colors)));
     }
     if (is_reported) {
       constexpr int kReportWidth_px = 720;
       drive_.images.push_back(
-          {fmt::format("frame {}", number), encode_jpeg(image, kReportWidth_px)});
+          {caption + (colors.empty() ? "" : "; " + colors), encode_jpeg(image, kReportWidth_px)});
     }
   }
 

@@ -136,17 +136,6 @@ void draw_matches(cv::Mat& rgb,
   }
 }
 
-/// The caption, and what the colours of the flow mean.
-void draw_band(cv::Mat& rgb, const std::string& caption, double longest_px, bool has_matches) {
-  cv::Mat band = rgb.rowRange(0, kBand_px);
-  band.setTo(kBandColor);
-  const std::string legend =
-      has_matches ? fmt::format("flow 0 (blue) to {:g} px (yellow), outliers red", longest_px) : "";
-  put_caption(band, {12, 0, rgb.cols * 3 / 5, kBand_px}, caption, kBandText);
-  put_caption(band, {rgb.cols * 3 / 5 + 24, 0, rgb.cols * 2 / 5 - 36, kBand_px}, legend, kBandText,
-              1.0);
-}
-
 int height_at_width(const cv::Mat& image, int width_px) {
   return image.empty()
              ? 0
@@ -172,8 +161,7 @@ cv::Mat fit(const cv::Mat& image, const cv::Size& size) {
 cv::Mat draw_frame_image(const cv::Mat& frame,
                          const ChannelImage& channel,
                          const Matches& matches,
-                         const std::vector<char>& inlier_mask,
-                         const std::string& caption) {
+                         const std::vector<char>& inlier_mask) {
   STEMVO_CHECK(matches.prev_uv.size() == matches.cur_uv.size(), "matches come in pairs");
   STEMVO_CHECK(inlier_mask.empty() || inlier_mask.size() == matches.cur_uv.size(),
                "one entry per match");
@@ -182,10 +170,11 @@ cv::Mat draw_frame_image(const cv::Mat& frame,
                                                  : kDefaultWidth_px;
   const int channel_height_px = height_at_width(channel.pixels, width_px);
   const int gap_px = frame.empty() || channel.pixels.empty() ? 0 : kGap_px;
-  cv::Mat image(kBand_px + frame.rows + gap_px + channel_height_px, width_px, CV_8UC3, kBandColor);
+  const int height_px = std::max(1, frame.rows + gap_px + channel_height_px);
+  cv::Mat image(height_px, width_px, CV_8UC3, kBandColor);
   const double longest_px = longest_flow_px(matches, inlier_mask);
   if (!frame.empty()) {
-    cv::Mat part = image.rowRange(kBand_px, kBand_px + frame.rows);
+    cv::Mat part = image.rowRange(0, frame.rows);
     to_rgb(frame).copyTo(part);
     draw_matches(part, matches, inlier_mask, longest_px,
                  [](const Eigen::Vector2d& uv) { return uv; });
@@ -201,8 +190,39 @@ cv::Mat draw_frame_image(const cv::Mat& frame,
           ((channel.map.from_input(uv).array() + 0.5) * zoom.array() - 0.5).matrix());
     });
   }
-  draw_band(image, caption, longest_px, !matches.cur_uv.empty());
   return image;
+}
+
+std::string describe_flow(const Matches& matches, const std::vector<char>& inlier_mask) {
+  return matches.cur_uv.empty() ? ""
+                                : fmt::format("flow 0 (blue) to {:g} px (yellow), outliers red",
+                                              longest_flow_px(matches, inlier_mask));
+}
+
+cv::Mat draw_under_caption(const cv::Mat& image,
+                           const std::string& left,
+                           const std::string& right) {
+  cv::Mat result(kBand_px + image.rows, image.cols, CV_8UC3, kBandColor);
+  image.copyTo(result.rowRange(kBand_px, result.rows));
+  put_caption(result, {12, 0, image.cols * 3 / 5, kBand_px}, left, kBandText);
+  put_caption(result, {image.cols * 3 / 5 + 24, 0, image.cols * 2 / 5 - 36, kBand_px}, right,
+              kBandText, 1.0);
+  return result;
+}
+
+std::vector<cv::Mat> draw_channels(const cv::Mat& frame,
+                                   const std::vector<cv::Mat>& channels,
+                                   int width) {
+  STEMVO_CHECK(!frame.empty(), "a frame to show");
+  const int width_px = std::max(1, std::min(frame.cols, width));
+  const cv::Size size(width_px, height_at_width(frame, width_px));
+  std::vector<cv::Mat> images = {fit(to_rgb(frame), size)};
+  for (const cv::Mat& channel : channels) {
+    STEMVO_CHECK(!channel.empty(), "a channel to show");
+    images.push_back(
+        fit(to_rgb(channel.type() == CV_32FC1 ? stretch_for_the_eye(channel) : channel), size));
+  }
+  return images;
 }
 
 cv::Mat draw_channel_sheet(const cv::Mat& frame,
@@ -213,10 +233,9 @@ cv::Mat draw_channel_sheet(const cv::Mat& frame,
   const double frame_aspect = static_cast<double>(frame.cols) / frame.rows;
   const int columns = count_columns(captions.size(), frame_aspect);
   const int rows = (static_cast<int>(captions.size()) + columns - 1) / columns;
-  const int cell_width_px =
-      std::min(frame.cols, (kSheetWidth_px - kSheetGap_px * (columns + 1)) / columns);
-  const cv::Size cell(std::max(1, cell_width_px),
-                      std::max(1, cvRound(cell_width_px / frame_aspect)));
+  const std::vector<cv::Mat> images =
+      draw_channels(frame, channels, (kSheetWidth_px - kSheetGap_px * (columns + 1)) / columns);
+  const cv::Size cell = images.front().size();
 
   cv::Mat sheet(kSheetGap_px + rows * (cell.height + kLabel_px + kSheetGap_px / 2),
                 kSheetGap_px + columns * (cell.width + kSheetGap_px), CV_8UC3, kPaper);
@@ -224,10 +243,7 @@ cv::Mat draw_channel_sheet(const cv::Mat& frame,
     const int x = kSheetGap_px + (static_cast<int>(i) % columns) * (cell.width + kSheetGap_px);
     const int y = kSheetGap_px +
                   (static_cast<int>(i) / columns) * (cell.height + kLabel_px + kSheetGap_px / 2);
-    const cv::Mat& source = i == 0 ? frame : channels[i - 1];
-    STEMVO_CHECK(!source.empty(), "a channel to show");
-    fit(to_rgb(source.type() == CV_32FC1 ? stretch_for_the_eye(source) : source), cell)
-        .copyTo(sheet(cv::Rect({x, y}, cell)));
+    images[i].copyTo(sheet(cv::Rect({x, y}, cell)));
     put_caption(sheet, {x, y + cell.height, cell.width, kLabel_px}, captions[i], kInk);
   }
   return sheet;

@@ -17,16 +17,27 @@ namespace stemvo {
 /// matches as lines from the previous to the current position. Inliers are coloured by the length
 /// of their flow, outliers thin and red. Frame: CV_8UC1 or CV_8UC3 (RGB); may be empty (an
 /// unreadable frame: the channel alone), as may the channel. `inlier_mask` has one entry per match,
-/// or is empty (all count as outliers). The caption may be empty. Returns CV_8UC3, RGB.
+/// or is empty (all count as outliers). Returns CV_8UC3, RGB.
 [[nodiscard]] cv::Mat draw_frame_image(const cv::Mat& frame,
                                        const ChannelImage& channel,
                                        const Matches& matches,
-                                       const std::vector<char>& inlier_mask,
-                                       const std::string& caption);
+                                       const std::vector<char>& inlier_mask);
+/// What its colours mean; empty where there are no matches.
+[[nodiscard]] std::string describe_flow(const Matches& matches,
+                                        const std::vector<char>& inlier_mask);
+/// It below a band with these texts, which may be empty.
+[[nodiscard]] cv::Mat draw_under_caption(const cv::Mat& image,
+                                         const std::string& left,
+                                         const std::string& right);
 
-/// The paper's Figure 1: the input and the channels as a grid of labelled images. Channels are
-/// CV_8UC1 (as they are) or CV_32FC1 (stretched between their 0.5 and 99.5 percentiles, for the eye
-/// only). `captions` has one entry for the frame, then one per channel (checked). CV_8UC3, RGB.
+/// The frame, then the channels, as images of one size, at most `width` wide: CV_8UC3, RGB.
+/// Channels are CV_8UC1 (as they are) or CV_32FC1 (stretched between their 0.5 and 99.5
+/// percentiles, for the eye only).
+[[nodiscard]] std::vector<cv::Mat> draw_channels(const cv::Mat& frame,
+                                                 const std::vector<cv::Mat>& channels,
+                                                 int width);
+
+/// The paper's Figure 1: those images in a grid, each over its caption (checked).
 [[nodiscard]] cv::Mat draw_channel_sheet(const cv::Mat& frame,
                                          const std::vector<cv::Mat>& channels,
                                          const std::vector<std::string>& captions);

@@ -225,7 +225,8 @@ class RunFigures {
     layout["yaxis2"].update(html::titled("R_H", 3));
     layout["yaxis2"]["range"] = ratio_range();
     layout["yaxis"]["type"] = "category";
-    add({"Tracks, model and state", "R_H: score of the homography over that of both models.",
+    add({"Tracks, model and state",
+         "R_H: score of the homography over that of both models; a map has it until it starts.",
          traces, layout, 0});
   }
 
@@ -345,7 +346,8 @@ class RunFigures {
 
   /// y (the lowest), y2, .. above one x axis of frames.
   [[nodiscard]] json stacked(int rows) const {
-    json layout = {{"large", true}, {"hovermode", "x unified"}, {"xaxis", frames_axis()}};
+    json layout = {
+        {"plot_height", 150 * rows}, {"hovermode", "x unified"}, {"xaxis", frames_axis()}};
     layout["xaxis"]["anchor"] = "y";
     constexpr double kGap = 0.06;
     for (int i = 0; i < rows; ++i) {

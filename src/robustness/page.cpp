@@ -51,10 +51,10 @@ void add_ratios(const RobustnessReport& report, html::Page& page) {
       traces.back()["visible"] = "legendonly";
     }
   }
-  json layout = {{"height", 130 + 19 * report.rows.size()},
+  json layout = {{"plot_height", 19 * report.rows.size()},
                  {"dragmode", "pan"},
-                 {"xaxis", html::logarithmic("rotation error, times the control's")},
-                 {"yaxis", {{"autorange", "reversed"}}}};
+                 {"xaxis", html::logarithmic("error, times the control's")},
+                 {"yaxis", {{"autorange", "reversed"}, {"dtick", 1}}}};
   layout["shapes"] = json::array({{{"type", "line"},
                                    {"yref", "paper"},
                                    {"x0", 1},

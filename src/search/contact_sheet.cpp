@@ -20,13 +20,14 @@ std::string outcome_of(const FilterRow& row) {
              : fmt::format("t_rel {:.2f} %", row.mean.t_rel_percent.value_or(0.0));
 }
 
-Expected<cv::Mat> draw_channels(const Results& results,
+Expected<Pictures> draw_filters(const Results& results,
                                 const KittiSequence& sequence,
                                 const ShownFilters& shown) {
+  constexpr int kPageWidth_px = 720;
   const std::size_t middle = sequence.size() / 2;
   const Expected<cv::Mat> frame = sequence.read(middle);
   if (!frame) {
-    return frame;
+    return frame.error();
   }
   std::vector<cv::Mat> channels;
   std::vector<std::string> captions = {
@@ -44,7 +45,12 @@ Expected<cv::Mat> draw_channels(const Results& results,
     channels.push_back(channel->values);
     captions.push_back(fmt::format("{}: {}, {}", rank, to_string(row->key), outcome_of(*row)));
   }
-  return draw_channel_sheet(*frame, channels, captions);
+  Pictures pictures = {draw_channel_sheet(*frame, channels, captions), {}, sequence.ground_truth()};
+  for (const cv::Mat& image : draw_channels(*frame, channels, kPageWidth_px)) {
+    pictures.channels.push_back(
+        {captions[pictures.channels.size()], encode_jpeg(image, kPageWidth_px)});
+  }
+  return pictures;
 }
 
 }  // namespace
@@ -87,11 +93,7 @@ Expected<Pictures> draw_pictures(const Results& results) {
   if (!sequence) {
     return sequence.error();
   }
-  const Expected<cv::Mat> channels = draw_channels(results, *sequence, shown);
-  if (!channels) {
-    return channels.error();
-  }
-  return Pictures{*channels, sequence->ground_truth()};
+  return draw_filters(results, *sequence, shown);
 }
 
 }  // namespace stemvo::search

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "html/figures.hpp"
-#include "io/image_file.hpp"
 #include "search/records.hpp"
 
 namespace stemvo::search {
@@ -32,13 +31,13 @@ std::string described(const FilterRow& row) {
 
 /// Points of the rows that have both numbers, a trace for each thing that became of them.
 template <typename X, typename Y>
-json traces_of(const Results& results, const X& x_of, const Y& y_of, bool has_intervals = false) {
+json traces_of(const Results& results, const X& x_of, const Y& y_of, bool has_bars = false) {
   json groups = json::array();
-  for (const char* name :
-       {"equal to the best", "worse than the best", "baseline", "stopped early"}) {
+  for (const char* name : {has_intervals(results.rows) ? "equal to the best" : "filter",
+                           "worse than the best", "baseline", "stopped early"}) {
     groups.push_back(
         {{"name", name}, {"mode", "markers"}, {"marker", {{"size", 8}}}, {"hoverinfo", "text"}});
-    if (has_intervals) {
+    if (has_bars) {
       groups.back()["error_y"] = {{"type", "data"}, {"symmetric", false}, {"thickness", 1}};
     }
   }
@@ -55,7 +54,7 @@ json traces_of(const Results& results, const X& x_of, const Y& y_of, bool has_in
     group["x"].push_back(*x);
     group["y"].push_back(*y);
     group["text"].push_back(described(row));
-    if (has_intervals) {
+    if (has_bars) {
       const ErrorRatio& over = row.over_best;
       const bool is_known = std::isfinite(over.high);
       group["error_y"]["array"].push_back(is_known ? over.high - over.ratio : 0.0);
@@ -70,18 +69,21 @@ json traces_of(const Results& results, const X& x_of, const Y& y_of, bool has_in
 
 void add_ranking(const Results& results, html::Page& page) {
   int rank = 0;
+  const bool has_bars = has_intervals(results.rows);
   const json traces = traces_of(
       results,
       [&](const FilterRow& row) {
         return row.status == FilterStatus::kRanked ? Number(++rank) : std::nullopt;
       },
-      [](const FilterRow& row) { return Number(row.over_best.ratio); }, true);
+      [](const FilterRow& row) { return Number(row.over_best.ratio); }, has_bars);
   const json layout = {{"xaxis", html::titled("rank")},
                        {"yaxis", html::logarithmic("error, times the best's")}};
   page.add_figure(
       {"Filters by rank",
-       "Bars are 95 % intervals; filters whose bar holds 1 cannot be told from the best.", traces,
-       layout});
+       has_bars
+           ? "Bars are 95 % intervals; filters whose bar holds 1 cannot be told from the best."
+           : "The path is too short for 95 % intervals, which say what is worse than the best.",
+       traces, layout});
 }
 
 void add_scatter(const Results& results, html::Page& page) {
@@ -143,10 +145,8 @@ Status write_page(const Results& results, const Pictures& pictures, const std::s
   if (pictures.ground_truth) {
     add_paths(results, *pictures.ground_truth, page);
   }
-  if (!pictures.sheet.empty()) {
-    constexpr int kQuality = 90;
-    page.add_images("Channels", {{"the input, and the filters above on its middle frame",
-                                  io::encode_jpeg(pictures.sheet, kQuality)}});
+  if (!pictures.channels.empty()) {
+    page.add_images("Channels", pictures.channels);
   }
   page.add_text("All filters", table);
   html::add_how_to_repeat(page, results.target.command, "Configuration of all rows",

@@ -126,4 +126,10 @@ std::vector<FilterRow> rank_filters(const SearchIdentity& identity, const Filter
   return rows;
 }
 
+bool has_intervals(const std::vector<FilterRow>& rows) {
+  return std::ranges::any_of(rows, [](const FilterRow& row) {
+    return row.status == FilterStatus::kRanked && std::isfinite(row.over_best.high);
+  });
+}
+
 }  // namespace stemvo::search

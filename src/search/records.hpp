@@ -21,6 +21,7 @@
 
 #include "evaluation/paired_ratio.hpp"
 #include "evaluation/trajectory.hpp"
+#include "html/page.hpp"
 #include "search/search.hpp"
 
 /// records.jsonl: the identity of a search in the first line, then a FilterRecord a line, each
@@ -221,6 +222,9 @@ struct FilterRow : FilterRecord {
 [[nodiscard]] std::vector<FilterRow> rank_filters(const SearchIdentity& identity,
                                                   const FilterRecords& records);
 
+/// False: the path is too short for any.
+[[nodiscard]] bool has_intervals(const std::vector<FilterRow>& rows);
+
 /// filters.csv: a header, then the rows by rank; `model,layer,filter` first, no times. Columns per
 /// sequence where there are several, and of the held-out one.
 [[nodiscard]] std::string format_csv(const SearchIdentity& identity,
@@ -257,6 +261,7 @@ struct Results {
 /// What a search's results show of its first sequence.
 struct Pictures {
   cv::Mat sheet;  ///< RGB; empty: nothing was found. The input and the channels of choose_rows
+  std::vector<html::CaptionedImage> channels;  ///< those of the sheet
   std::optional<Trajectory> ground_truth;
 };
 /// Error: the sequence or a model is not where it was.

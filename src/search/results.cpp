@@ -210,11 +210,17 @@ std::string format_summary(const Results& results, const Json& work) {
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<double>();
   const auto num_equal = std::ranges::count(results.rows, true, &FilterRow::is_equal);
   const fs::path& folder = results.target.out_dir;
-  return (num_equal > 1
-              ? fmt::format("filters 1 to {} cannot be told from the best (over best: errors over "
-                            "its errors, 95 % interval)\n",
-                            num_equal)
-              : "") +
+  std::string equals;
+  if (num_equal > 1) {
+    equals = has_intervals(results.rows)
+                 ? fmt::format(
+                       "filters 1 to {} cannot be told from the best (over best: errors "
+                       "over its errors, 95 % interval)\n",
+                       num_equal)
+                 : "the path is too short for 95 % intervals, which say what is worse than the "
+                   "best (over best: errors over its errors)\n";
+  }
+  return equals +
          fmt::format(
              "work: {} filter-frames, {:.1f} % of an exhaustive search; baselines: {}\ntable: "
              "{}\nreport: {}\n",

@@ -15,6 +15,7 @@ from playwright.sync_api import TimeoutError as Late, sync_playwright
 
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 SLIDER, TOP_VIEW = "#frame", ".figure"
+DRAWN = "figures.every(({ div }) => Math.hypot(div._fullLayout.width - div.clientWidth, div._fullLayout.height - div.clientHeight) < 2)"
 
 
 def open_page(browser, report, found, **options):
@@ -24,6 +25,7 @@ def open_page(browser, report, found, **options):
     page.on("request", lambda request: found["requests"].append(request.url[:100]))
     page.goto(report.as_uri())
     page.wait_for_selector("body[data-shown=yes]", timeout=120000)
+    page.wait_for_function(DRAWN, timeout=20000)
     return page
 
 
@@ -47,6 +49,28 @@ def titles_in_the_way(page):
         const meet = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2 && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
         return elements.filter(({ element, box }) => /^[xy][0-9]*title$/.test(element.getAttribute("class")) &&
             elements.some((other) => other.element !== element && meet(box, other.box))).map(({ element }) => element.textContent); })""")
+
+
+def hard_to_read(page):
+    """Texts that a figure's edge cuts, ticks upright or over each other, rows without a label."""
+    return page.evaluate("""figures.flatMap(({ div }) => {
+        const found = [], edge = div.getBoundingClientRect();
+        const text_of = (element) => ({ text: element.textContent, element, box: element.getBoundingClientRect() });
+        for (const { text, box } of [...div.querySelectorAll("text")].map(text_of))
+            if (box.width > 0 && (box.left < edge.left - 1 || box.right > edge.right + 1 || box.top < edge.top - 1 || box.bottom > edge.bottom + 1))
+                found.push("cut: " + text);
+        for (const axis of ["x", "y"]) {
+            const ticks = [...div.querySelectorAll("." + axis + "tick text")].map(text_of);
+            ticks.forEach(({ text, element, box }, i) => {
+                if (/rotate\\((?!0)/.test(element.getAttribute("transform"))) found.push("upright: " + text);
+                if (ticks.slice(i + 1).some(({ box: other }) => Math.min(box.right, other.right) - Math.max(box.left, other.left) > 0 &&
+                                                                  Math.min(box.bottom, other.bottom) - Math.max(box.top, other.top) > 3)) found.push("covered: " + text);
+            });
+            const shown = div._fullLayout[axis + "axis"];
+            if (axis === "y" && shown?._categories?.length > ticks.length && Object.keys(div._fullLayout).filter((key) => /^yaxis/.test(key)).length === 1)
+                found.push(shown._categories.length - ticks.length + " rows without a label");
+        }
+        return found; })""")
 
 
 def pixels_at_edges_of_spaces(page):
@@ -115,6 +139,7 @@ def look(browser, report, screenshot):
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
     found["categories"] = page.locator(".xtick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+    found["captions"] = page.locator("figcaption").all_text_contents()
     found["log_ticks"] = page.evaluate("""figures.flatMap(({ div }) => Object.keys(div._fullLayout)
         .filter((key) => /^[xy]axis/.test(key) && div._fullLayout[key].type === "log")
         .map((key) => div.querySelectorAll("." + key[0] + "tick text").length))""")
@@ -138,8 +163,17 @@ def look(browser, report, screenshot):
         const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
         return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
     found["titles_in_the_way"] = titles_in_the_way(page)
+    found["hard_to_read"] = hard_to_read(page)
     found["at_edges_of_spaces"] = pixels_at_edges_of_spaces(page)
     found["swiped"] = swipe(page)
+    page.close()
+
+    page = open_page(browser, report, found, viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)  # held sideways
+    for size in ({"width": 844, "height": 390}, {"width": 390, "height": 844}):
+        page.set_viewport_size(size)
+        page.wait_for_function(DRAWN, timeout=20000)
+        found["titles_in_the_way"] += titles_in_the_way(page)
+        found["hard_to_read"] += hard_to_read(page)
     page.close()
     return found
 

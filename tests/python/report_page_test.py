@@ -44,6 +44,7 @@ class ReportPage(unittest.TestCase):
         self.assertNotEqual(found["light"], found["dark"])
         self.assertLessEqual(found["phone_width"], 360)
         self.assertEqual(found["titles_in_the_way"], [])
+        self.assertEqual(found["hard_to_read"], [])
         self.assertEqual(set(found["at_edges_of_spaces"]) - {0}, set())
         self.assertEqual(found["buttons_over_legend"], 0)
         self.assertTrue(all(count > 1 for count in found["log_ticks"]), found["log_ticks"])
@@ -58,7 +59,8 @@ class ReportPage(unittest.TestCase):
         self.assertIn("Best filter: ", found["title"])
         self.assertEqual(found["headings"], ["Filters by rank", "Error and matches", "Paths from above", "Channels", "All filters", "Command",
                                              "Configuration of all rows"])
-        self.assertEqual(len(found["images"]), 1)
+        self.assertEqual(found["captions"][0], "00, frame 15")
+        self.assertEqual([caption.split(": ")[0] for caption in found["captions"][1:]], ["best filter", "median", "worst"] + 4 * ["baseline"])
 
     def test_a_recording_without_ground_truth(self):
         images = self.folder / "plain"
@@ -84,7 +86,7 @@ class ReportPage(unittest.TestCase):
 
     def test_robustness(self):
         out = self.folder / "robustness"
-        call("robustness", self.folder / "drive/sequences/00", "--out", out, "--kinds", "none,jpeg", "--controls", "gray")
+        call("robustness", self.folder / "drive/sequences/00", "--out", out, "--frames", "0:15", "--kinds", "none,exposure_steps,gaussian_blur")
         found = look_at(out / "report.html")
         self.expect_a_sound_page(found)
         self.assertEqual(found["headings"][-3:], ["All numbers", "Command", "Configuration of the judged channel"])
@@ -95,6 +97,8 @@ class ReportPage(unittest.TestCase):
         self.assertEqual(self.found["figures"], 7)
         self.assertEqual(len(self.found["images"]), 6)
         self.assertTrue(all(width > 100 for width in self.found["images"]))
+        for caption in self.found["captions"]:
+            self.assertRegex(caption, r"^frame \d+: \w+, \d+ of \d+ matches; flow 0 \(blue\) to \d+ px \(yellow\), outliers red$")
         for heading in ("Path from above", "Numbers", "Error by segment length", "Scale and camera", "Command", "Configuration"):
             self.assertIn(heading, self.found["headings"])
 

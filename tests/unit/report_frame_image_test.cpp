@@ -60,18 +60,18 @@ TEST(FrameImage, WritingLeavesTheImageAloneAndKeepsItsColours) {
 }
 
 TEST(FrameImage, ShowsInputAboveChannelAtTheSameWidth) {
-  const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), {}, {}, "frame 7");
+  const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), {}, {});
   ASSERT_EQ(image.type(), CV_8UC3);
-  EXPECT_EQ(image.size(), cv::Size(400, kBand_px + 100 + kGap_px + 100));
-  EXPECT_EQ(image.at<cv::Vec3b>(kBand_px + 50, 200), cv::Vec3b(90, 90, 90));
-  EXPECT_EQ(image.at<cv::Vec3b>(kBand_px + 100 + kGap_px + 50, 200), cv::Vec3b(120, 120, 120));
+  EXPECT_EQ(image.size(), cv::Size(400, 100 + kGap_px + 100));
+  EXPECT_EQ(image.at<cv::Vec3b>(50, 200), cv::Vec3b(90, 90, 90));
+  EXPECT_EQ(image.at<cv::Vec3b>(100 + kGap_px + 50, 200), cv::Vec3b(120, 120, 120));
 }
 
 TEST(FrameImage, DrawsMatchesAtTheSamePositionOnBoth) {
   const cv::Mat image =
-      draw_frame_image(gray_frame(), coarse_channel(), one_match({200, 30}, {230, 60}), {1}, "");
-  const cv::Rect above = colored_box(image.rowRange(kBand_px, kBand_px + 100));
-  const cv::Rect below = colored_box(image.rowRange(kBand_px + 100 + kGap_px, image.rows));
+      draw_frame_image(gray_frame(), coarse_channel(), one_match({200, 30}, {230, 60}), {1});
+  const cv::Rect above = colored_box(image.rowRange(0, 100));
+  const cv::Rect below = colored_box(image.rowRange(100 + kGap_px, image.rows));
   for (const cv::Rect& box : {above, below}) {
     EXPECT_NEAR(box.x, 200, 3);
     EXPECT_NEAR(box.y, 30, 3);
@@ -83,8 +83,8 @@ TEST(FrameImage, DrawsMatchesAtTheSamePositionOnBoth) {
 TEST(FrameImage, ColoursInliersByFlowAndOutliersRed) {
   const Matches match = one_match({50, 50}, {90, 50});
   const auto pixel = [&](const std::vector<char>& mask) {
-    const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), match, mask, "");
-    return image.at<cv::Vec3b>(kBand_px + 50, 70);
+    const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), match, mask);
+    return image.at<cv::Vec3b>(50, 70);
   };
   EXPECT_TRUE(is_red(pixel({0})));
   EXPECT_TRUE(is_red(pixel({})));
@@ -93,29 +93,39 @@ TEST(FrameImage, ColoursInliersByFlowAndOutliersRed) {
   // A short flow has another colour than the longest.
   const Matches three{
       {{50, 20}, {50, 50}, {50, 80}}, {{51, 20}, {90, 50}, {90, 80}}, {-1, -1, -1}, 3};
-  const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), three, {1, 1, 1}, "");
-  const cv::Vec3d slow = image.at<cv::Vec3b>(kBand_px + 20, 51);
-  const cv::Vec3d fast = image.at<cv::Vec3b>(kBand_px + 50, 70);
+  const cv::Mat image = draw_frame_image(gray_frame(), coarse_channel(), three, {1, 1, 1});
+  const cv::Vec3d slow = image.at<cv::Vec3b>(20, 51);
+  const cv::Vec3d fast = image.at<cv::Vec3b>(50, 70);
   EXPECT_GT(cv::norm(slow - fast), 100.0);
 }
 
 TEST(FrameImage, TakesColourFramesAsRgb) {
   const cv::Mat blue(100, 400, CV_8UC3, cv::Scalar(10, 20, 200));
-  const cv::Mat image = draw_frame_image(blue, coarse_channel(), {}, {}, "");
-  EXPECT_EQ(image.at<cv::Vec3b>(kBand_px + 5, 5), cv::Vec3b(10, 20, 200));
+  const cv::Mat image = draw_frame_image(blue, coarse_channel(), {}, {});
+  EXPECT_EQ(image.at<cv::Vec3b>(5, 5), cv::Vec3b(10, 20, 200));
   const TempFolder folder;
   ASSERT_TRUE(write_image(folder / "a.png", image));
   const cv::Mat bgr = cv::imread((folder / "a.png").string());
-  EXPECT_EQ(bgr.at<cv::Vec3b>(kBand_px + 5, 5), cv::Vec3b(200, 20, 10));
+  EXPECT_EQ(bgr.at<cv::Vec3b>(5, 5), cv::Vec3b(200, 20, 10));
 }
 
 TEST(FrameImage, SurvivesWhatAnUnreadableFrameGives) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Matches wild{{{0, 0}, {kNan, 3}, {-1e300, 5}}, {{1e300, 5}, {5, 5}, {1e12, 5}}, {}, 3};
-  EXPECT_FALSE(draw_frame_image({}, coarse_channel(), wild, {1, 1, 0}, "x").empty());
-  EXPECT_FALSE(draw_frame_image(gray_frame(), {}, wild, {}, "\u00fc\xff").empty());
-  EXPECT_FALSE(draw_frame_image({}, {}, {}, {}, "").empty());
-  EXPECT_THROW((void)draw_frame_image(gray_frame(), {}, wild, {1}, ""), std::logic_error);
+  EXPECT_FALSE(draw_frame_image({}, coarse_channel(), wild, {1, 1, 0}).empty());
+  EXPECT_FALSE(draw_frame_image(gray_frame(), {}, wild, {}).empty());
+  EXPECT_FALSE(draw_frame_image({}, {}, {}, {}).empty());
+  EXPECT_THROW((void)draw_frame_image(gray_frame(), {}, wild, {1}), std::logic_error);
+}
+
+TEST(FrameImage, StandsUnderItsCaption) {
+  const cv::Mat image = draw_under_caption(cv::Mat(100, 400, CV_8UC3, cv::Scalar(10, 20, 200)),
+                                           "\u00fc\xff", "right");
+  ASSERT_EQ(image.size(), cv::Size(400, kBand_px + 100));
+  EXPECT_EQ(image.at<cv::Vec3b>(kBand_px + 5, 5), cv::Vec3b(10, 20, 200));
+  EXPECT_EQ(describe_flow(one_match({50, 50}, {90, 50}), {1}),
+            "flow 0 (blue) to 40 px (yellow), outliers red");
+  EXPECT_EQ(describe_flow({}, {}), "");
 }
 
 TEST(FrameImage, SaysThatItCannotBeWritten) {

@@ -15,6 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::read_all;
 
 class SearchRun : public testing::SmallDrive {
@@ -46,7 +47,8 @@ TEST_F(SearchRun, RanksEveryFilterWhateverTheThreads) {
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_FALSE(report->interrupted);
   EXPECT_TRUE(report->warnings.empty());
-  EXPECT_THAT(report->text, AllOf(HasSubstr("default"), HasSubstr("t_rel")));
+  EXPECT_THAT(report->text, AllOf(HasSubstr("default"), HasSubstr("t_rel"),
+                                  HasSubstr("cannot be told from the best")));
   const auto json = nlohmann::json::parse(report->json);
   EXPECT_TRUE(json["complete"].get<bool>());
   EXPECT_EQ(json["filters"].size(), 8U);  // and ORB, R, G, B
@@ -59,6 +61,15 @@ TEST_F(SearchRun, RanksEveryFilterWhateverTheThreads) {
   blocks.block = 3;
   ASSERT_TRUE(run_search(blocks));
   EXPECT_EQ(table("blocks"), table("one"));
+}
+
+TEST_F(SearchRun, SaysThatAPathIsTooShortForIntervals) {
+  SearchRequest brief = request("brief");
+  brief.frames = FrameRangeRequest{0, 5};
+  const auto report = run_search(brief);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(report->text, AllOf(HasSubstr("too short for 95 % intervals"),
+                                  Not(HasSubstr("cannot be told from the best"))));
 }
 
 TEST_F(SearchRun, HalvingStoppedAndGoneOnGivesTheSameTable) {
