@@ -71,8 +71,7 @@ Status apply_override(Config& config, const std::string& assignment) {
                                         [&](const auto& f) { return f.section == section; });
     return fail(
         source + ": " +
-        config::unknown_key(is_section ? section : "", name.substr(name.find('.') + 1), fields) +
-        " ('stemvo --dump-config' explains each)");
+        config::unknown_key(is_section ? section : "", name.substr(name.find('.') + 1), fields));
   }
   const std::string problem = config::read_assigned(assignment.substr(equals + 1), *field);
   if (!problem.empty()) {

@@ -302,7 +302,9 @@ std::string unknown_key(std::string_view section,
     }
   }
   const std::string of = section.empty() ? "" : fmt::format(" of {}", section);
-  return fmt::format("unknown key; known keys{}: {}", of, fmt::join(known, ", "));
+  const bool is_dumped = std::ranges::find(fields, "odometry", &Field::section) != fields.end();
+  return fmt::format("unknown key; known keys{}: {}{}", of, fmt::join(known, ", "),
+                     is_dumped ? " ('stemvo --dump-config' explains each)" : "");
 }
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
