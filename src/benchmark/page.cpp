@@ -19,16 +19,22 @@ std::string string_of(const Json& value) { return value.get<std::string>(); }
 void add_bars(const Json& report, const char* key, const std::string& title, html::Page& page) {
   std::vector<std::string> order;
   json bars = json::object();
+  std::size_t num_bars = 0;
   const auto add = [&](const std::string& name, const Json& sequence, const Json& value) {
     if (!value.is_number()) {
       return;
     }
     if (!bars.contains(name)) {
       order.push_back(name);
-      bars[name] = {{"name", name}, {"type", "bar"}, {"x", json::array()}, {"y", json::array()}};
+      bars[name] = {{"name", name},
+                    {"type", "bar"},
+                    {"orientation", "h"},
+                    {"x", json::array()},
+                    {"y", json::array()}};
     }
-    bars[name]["x"].push_back(string_of(sequence["name"]) + ", " + describe_frames(sequence));
-    bars[name]["y"].push_back(value.get<double>());
+    bars[name]["y"].push_back(string_of(sequence["name"]) + ", " + describe_frames(sequence));
+    bars[name]["x"].push_back(value.get<double>());
+    ++num_bars;
   };
   for (const Json& sequence : report["sequences"]) {
     for (const Json& run : sequence["runs"]) {
@@ -43,7 +49,9 @@ void add_bars(const Json& report, const char* key, const std::string& title, htm
     traces.push_back(bars[name]);
   }
   if (!traces.empty()) {
-    const json layout = {{"yaxis", html::logarithmic(title)}, {"xaxis", {{"type", "category"}}}};
+    const json layout = {{"plot_height", 60 + 22 * num_bars},
+                         {"xaxis", html::logarithmic(title)},
+                         {"yaxis", {{"type", "category"}, {"autorange", "reversed"}}}};
     page.add_figure({title, "", traces, layout});
   }
 }
@@ -57,7 +65,7 @@ Status write_page(const std::filesystem::path& file,
   html::Page page("Benchmark", fmt::format("stemvo {}{}", string_of(report["stemvo_version"]),
                                            report["interrupted"] == true ? ", interrupted" : ""));
   add_bars(report, "t_rel_percent", "t_rel, %", page);
-  add_bars(report, "r_rel_deg_per_100m", "r_rel, degrees per 100 m", page);
+  add_bars(report, "r_rel_deg_per_100m", "r_rel, deg/100 m", page);
   for (const Json& sequence : report["sequences"]) {
     if (const auto found = paths.find(string_of(sequence["name"])); found != paths.end()) {
       html::add_paths_from_above(page,

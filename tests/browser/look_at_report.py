@@ -137,7 +137,7 @@ def look(browser, report, screenshot):
     found["headings"] = page.locator("h2, summary").all_text_contents()
     found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
-    found["categories"] = page.locator(".xtick text").all_text_contents()
+    found["categories"] = page.locator(".xtick text, .ytick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
     found["captions"] = page.locator("figcaption").all_text_contents()
     found["log_ticks"] = page.evaluate("""figures.flatMap(({ div }) => Object.keys(div._fullLayout)
