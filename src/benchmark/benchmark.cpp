@@ -9,13 +9,11 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include "pipeline/input_hashes.hpp"
+#include "benchmark/kept_run.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
-#include "stem/model_file.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 
@@ -26,10 +24,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
-constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
-constexpr const char* kMetricsFile = "metrics.json";
-constexpr const char* kPosesFile = "trajectory_kitti.txt";
-constexpr const char* kResultFiles[] = {kMetricsFile, kPosesFile};  // that are read here
 constexpr double kLengthTolerance_m = 1.5;
 
 /// Those asked for, where one that is not there is a row, or all.
@@ -91,55 +85,6 @@ Json published_rows(const Json& publications, const std::string& sequence) {
     }
   }
   return rows;
-}
-
-/// Hashes of everything a result depends on.
-Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
-  const auto program = pipeline::hash_program();
-  const auto model = pipeline::hash_model(run.config, run.models_dir);
-  const auto files =
-      pipeline::hash_sequence(sequence, run.sequence_dir, pipeline::FrameIdentity::kNamesAndSizes);
-  if (!program || !model || !files) {
-    return !program ? program.error() : !model ? model.error() : files.error();
-  }
-  return Json{{"configuration", internal::sha256_hex(dump_config(run.config))},
-              {"program", *program},
-              {"model", *model},
-              {"frames", files->frames},
-              {"calibration", files->calibration},
-              {"ground_truth", files->ground_truth}};
-}
-
-/// As kInputsFile has it beside the inputs: a result that was touched does not count.
-Json hash_result(const fs::path& file) {
-  const Expected<std::string> text = read_text_file(file);
-  return text ? Json(internal::sha256_hex(*text)) : Json("cannot be read");
-}
-
-/// Why the run of this folder is to be done (again), for its title; nothing where its result
-/// counts.
-std::optional<std::string> reason_to_run(const fs::path& folder, const Json& inputs) {
-  std::error_code ignored;
-  if (!fs::exists(folder / kInputsFile, ignored)) {
-    return "";  // never completed
-  }
-  const Expected<Json> before = read_json_object(folder / kInputsFile);
-  if (!before) {
-    return fmt::format(" (again: {})", before.error().message);
-  }
-  Json now = inputs;
-  for (const char* name : kResultFiles) {
-    now[name] = hash_result(folder / name);
-  }
-  std::vector<std::string> changed;
-  for (const auto& [part, hash] : now.items()) {
-    if (before->value(part, Json()) != hash) {
-      changed.push_back(part);
-    }
-  }
-  return changed.empty()
-             ? std::nullopt
-             : std::optional(fmt::format(" (again: {} changed)", fmt::join(changed, ", ")));
 }
 
 const std::string& text_of(const Json& json) { return json.get_ref<const std::string&>(); }
@@ -208,10 +153,10 @@ class Benchmark {
     for (const Json& sequence : report_["sequences"]) {
       for (const Json& run : sequence["runs"]) {
         const fs::path folder = run_dir(sequence, run).lexically_relative(request_.out_dir);
-        for (const char* name : kResultFiles) {
+        for (const char* name : benchmark::kResultFiles) {
           names.push_back(folder / name);
         }
-        names.push_back(folder / kInputsFile);
+        names.push_back(folder / benchmark::kInputsFile);
       }
     }
     return names;
@@ -298,11 +243,12 @@ class Benchmark {
   Expected<Json> result_of(RunRequest& one, const std::string& title) {
     const Expected<Json> inputs =
         KittiSequence::open(one.sequence_dir, {.camera = one.config.input.camera})
-            .and_then([&](const KittiSequence& opened) { return hash_inputs(one, opened); });
+            .and_then(
+                [&](const KittiSequence& opened) { return benchmark::hash_inputs(one, opened); });
     if (!inputs) {
       return inputs;
     }
-    if (const std::optional<std::string> reason = reason_to_run(one.out_dir, *inputs)) {
+    if (const std::optional<std::string> reason = benchmark::reason_to_run(one.out_dir, *inputs)) {
       summary_.interrupted =
           request_.on_run &&
           !request_.on_run(fmt::format("{}/{} {}{}", num_begun_, num_runs_, title, *reason));
@@ -311,12 +257,13 @@ class Benchmark {
         return done ? Expected<Json>(Json()) : done.error();
       }
     }
-    return read_json_object(one.out_dir / kMetricsFile);
+    return read_json_object(one.out_dir / benchmark::kMetricsFile);
   }
 
-  Status run_now(RunRequest& one, Json inputs, const std::string& title) {
+  Status run_now(RunRequest& one, const Json& inputs, const std::string& title) {
     std::error_code ignored;
-    fs::remove(one.out_dir / kInputsFile, ignored);  // an interrupted run must not pass for done
+    fs::remove(one.out_dir / benchmark::kInputsFile,
+               ignored);  // an interrupted run must not pass for done
     one.started = std::chrono::steady_clock::now();
     const Expected<RunSummary> done = run_sequence(one, request_.on_frame);
     if (!done || !done->written) {
@@ -329,10 +276,7 @@ class Benchmark {
     for (const std::string& warning : done->warnings) {
       summary_.warnings.push_back(fmt::format("{}: {}", title, warning));
     }
-    for (const char* name : kResultFiles) {
-      inputs[name] = hash_result(one.out_dir / name);
-    }
-    return write_text_file(one.out_dir / kInputsFile, to_text(inputs));
+    return benchmark::keep_run(one.out_dir, inputs);
   }
 
   [[nodiscard]] Status write_files() const {
@@ -351,7 +295,7 @@ class Benchmark {
     std::vector<html::PathFromAbove> paths;
     for (const Json& run : sequence["runs"]) {
       if (run["state"] == "done") {
-        const auto poses = read_kitti_trajectory(run_dir(sequence, run) / kPosesFile);
+        const auto poses = read_kitti_trajectory(run_dir(sequence, run) / benchmark::kPosesFile);
         if (!poses) {
           return poses.error();
         }

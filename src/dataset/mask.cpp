@@ -47,8 +47,7 @@ Status add_part(const std::string& part, cv::Mat& mask) {
   if (part.find_first_not_of("0123456789.,- ") == std::string::npos) {
     return fail(
         fmt::format("--mask {}: expected X,Y,WIDTH,HEIGHT in whole pixels of the frames, as "
-                    "0,300,1241,76, or an "
-                    "image",
+                    "0,300,1241,76, or an image",
                     part));
   }
   const auto image = io::read_image(part, false);

@@ -2,7 +2,9 @@
 #include "html/figures.hpp"
 
 #include <cmath>
+#include <utility>
 
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 namespace stemvo::html {
@@ -33,6 +35,31 @@ std::vector<std::array<double, 2>> seen_from_above(std::span<const Rigid3> poses
     xz.push_back({pose.translation.x(), pose.translation.z()});
   }
   return xz;
+}
+
+json scene_around(const std::vector<std::span<const Rigid3>>& trajectories) {
+  constexpr double kMargin = 0.15;
+  constexpr double kShortest = 0.45;                 // of the longest
+  Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());  // where they start
+  for (const std::span<const Rigid3> trajectory : trajectories) {
+    for (const Rigid3& pose : trajectory) {
+      const Eigen::Vector3d& p = pose.translation;
+      if (p.allFinite()) {
+        box.extend(Eigen::Vector3d(p.x(), p.z(), -p.y()));
+      }
+    }
+  }
+  const Eigen::Vector3d sizes = box.sizes().cwiseMax(1e-3 + 1e-3 * box.sizes().maxCoeff());
+  const Eigen::Vector3d lengths = (sizes / sizes.maxCoeff()).cwiseMax(kShortest);
+  json scene = {{"camera", {{"eye", {{"x", -2.0}, {"y", -2.0}, {"z", 1.8}}}}}};
+  for (const auto& [i, letter] : {std::pair(0, "x"), std::pair(1, "y"), std::pair(2, "z")}) {
+    const double half = (0.5 + kMargin) * sizes[i];
+    scene["aspectratio"][letter] = rounded(lengths[i]);
+    scene[letter + std::string("axis")]["nticks"] = 5;
+    scene[letter + std::string("axis")]["range"] = {rounded(box.center()[i] - half),
+                                                    rounded(box.center()[i] + half)};
+  }
+  return scene;
 }
 
 void add_paths_from_above(Page& page,

@@ -39,6 +39,10 @@ void add_paths_from_above(Page& page,
                           const std::vector<PathFromAbove>& paths,
                           const std::string& unit = "m");
 
+/// What a scene of these trajectories shows, in each axis a little more than they take, and how
+/// long the axes are: true to scale, but none so short that its ticks run into each other.
+[[nodiscard]] nlohmann::json scene_around(const std::vector<std::span<const Rigid3>>& trajectories);
+
 /// At the end of a page: the command (where there is one), and the configuration folded away.
 void add_how_to_repeat(Page& page,
                        const std::string& command,

@@ -26,9 +26,6 @@ class LibpngReader {
       throw std::bad_alloc();
     }
     png_set_read_fn(png_, this, &give);
-    // Texts and profiles are skipped: it would unpack each to several MB.
-    constexpr png_byte kSkipped[] = "tEXt\0zTXt\0iTXt\0iCCP\0eXIf";
-    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, kSkipped, sizeof(kSkipped) / 5);
   }
   ~LibpngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
   LibpngReader(const LibpngReader&) = delete;
@@ -39,6 +36,8 @@ class LibpngReader {
     if (setjmp(png_jmpbuf(png_)) != 0) {
       return false;
     }
+    constexpr png_byte kTexts[] = "zTXt\0iTXt";  // skipped: each would be unpacked to several MB
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, kTexts, 2);
     png_read_info(png_, info_);
     const bool is_color = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0;
     png_set_expand(png_);

@@ -41,33 +41,6 @@ json coordinates(const Trajectory& trajectory, int axis, double sign = 1.0) {
               [&](const Rigid3& pose) { return rounded(sign * pose.translation[axis]); });
 }
 
-/// What a scene of these trajectories shows, in each axis a little more than they take, and how
-/// long the axes are: true to scale, but none so short that its ticks run into each other.
-json scene_around(const std::vector<const Trajectory*>& trajectories) {
-  constexpr double kMargin = 0.15;
-  constexpr double kShortest = 0.45;                 // of the longest
-  Eigen::AlignedBox3d box(Eigen::Vector3d::Zero());  // where they start
-  for (const Trajectory* trajectory : trajectories) {
-    for (const Rigid3& pose : *trajectory) {
-      const Eigen::Vector3d& p = pose.translation;
-      if (p.allFinite()) {
-        box.extend(Eigen::Vector3d(p.x(), p.z(), -p.y()));
-      }
-    }
-  }
-  const Eigen::Vector3d sizes = box.sizes().cwiseMax(1e-3 + 1e-3 * box.sizes().maxCoeff());
-  const Eigen::Vector3d lengths = (sizes / sizes.maxCoeff()).cwiseMax(kShortest);
-  json scene = {{"camera", {{"eye", {{"x", -2.0}, {"y", -2.0}, {"z", 1.8}}}}}};
-  for (const auto& [i, letter] : {std::pair(0, "x"), std::pair(1, "y"), std::pair(2, "z")}) {
-    const double half = (0.5 + kMargin) * sizes[i];
-    scene["aspectratio"][letter] = rounded(lengths[i]);
-    scene[letter + std::string("axis")]["nticks"] = 5;
-    scene[letter + std::string("axis")]["range"] = {rounded(box.center()[i] - half),
-                                                    rounded(box.center()[i] + half)};
-  }
-  return scene;
-}
-
 /// Whether a homography was scored against a fundamental matrix.
 bool is_scored(const FrameResult& r) { return r.homography_score + r.fundamental_score > 0.0; }
 
@@ -133,11 +106,11 @@ class RunFigures {
       traces.back()["line"]["color"] = "#999999";
     }
     traces.push_back(path("estimate", run_.estimate));
-    std::vector<const Trajectory*> shown = {&run_.estimate};
+    std::vector<std::span<const Rigid3>> shown = {run_.estimate};
     if (run_.ground_truth) {
-      shown.push_back(&run_.ground_truth->poses);
+      shown.emplace_back(run_.ground_truth->poses);
     }
-    json scene = scene_around(shown);
+    json scene = html::scene_around(shown);
     scene["xaxis"].update(html::titled("right, " + run_.unit, 3));
     scene["yaxis"].update(html::titled("forward, " + run_.unit, 3));
     scene["zaxis"].update(html::titled("up, " + run_.unit, 3));

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -33,8 +32,6 @@ inline constexpr const char* kRecordsFile = "records.jsonl";
 /// What it holds at most (24,000 drives of a KITTI sequence and more), and one line of it.
 inline constexpr int kMaxRecords_MB = 512;
 inline constexpr std::size_t kMaxRecordBytes = 8000000;
-/// True: what takes long is to be left.
-using IsStopped = std::function<bool()>;
 
 /// A filter of a layer of a model, and what finds matches on its channel. Ordered as rows are where
 /// numbers do not decide.

@@ -18,6 +18,9 @@ namespace stemvo::search {
 /// points), steps of the true length. Ranks filters as the defaults of a run do (docs/search.md).
 [[nodiscard]] Config search_defaults();
 
+/// True: what takes long is to be left.
+using IsStopped = std::function<bool()>;
+
 /// Everything `stemvo search` was asked for.
 struct SearchRequest {
   std::vector<std::filesystem::path> sequence_dirs;   ///< all of them rank the filters
@@ -39,7 +42,7 @@ struct SearchRequest {
   std::optional<std::size_t> only_sequence;
   bool resume = false;  ///< go on from what out_dir holds
   /// Asked while records of before are read, which may take long; true: an interrupt.
-  std::function<bool()> is_stopped = {};
+  IsStopped is_stopped = {};
   int num_threads = 0;       ///< 0: all cores
   std::string command = {};  ///< that repeats the search, for report.html; may be empty
   /// Filters in flight, which a kill may lose; 0: a layer's, as far as 1 GB of odometries allows.
@@ -73,6 +76,6 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
                                                     const std::filesystem::path& out_dir,
                                                     const std::filesystem::path& models_dir,
                                                     const std::string& command = {},
-                                                    const std::function<bool()>& is_stopped = {});
+                                                    const IsStopped& is_stopped = {});
 
 }  // namespace stemvo::search

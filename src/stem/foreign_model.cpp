@@ -246,23 +246,6 @@ Status check_attribute(std::string_view message) {
 /// An upper bound, by the bytes it takes: the smallest kinds have two values in one.
 std::size_t max_values(std::string_view tensor) { return 2 * tensor.size(); }
 
-/// What ONNX Runtime connects one by one: the time it takes to load them grows by their square.
-struct Links {
-  std::size_t num_operators = 0;
-  std::size_t num_ends = 0;  ///< inputs and outputs of operators, and weights
-
-  [[nodiscard]] Status check() const {
-    if (num_operators > kMaxNodes) {
-      return fail(fmt::format("expected at most {} operators, found more", kMaxNodes));
-    }
-    return num_ends > kMaxLinks
-               ? Status(fail(fmt::format("expected at most {} inputs and outputs of operators and "
-                                         "weights in all, found more",
-                                         kMaxLinks)))
-               : Status();
-  }
-};
-
 Status check_node(std::string_view message, ConstantSizes& constants) {
   std::string_view type;
   std::string_view domain;
@@ -319,27 +302,35 @@ ConstantSizes constants_of(std::string_view graph) {
   return constants;
 }
 
-/// Before anything is kept of it.
-Status check_links(std::string_view graph) {
-  Links links;
+/// Operators, and their inputs and outputs and the weights, which ONNX Runtime connects one by one.
+/// Before anything is kept of them.
+Status check_counts(std::string_view graph) {
+  std::size_t num_nodes = 0;
+  std::size_t num_links = 0;
   return for_each_field(graph, [&](const Field& field) -> Status {
+    num_links += field.number == kGraphInitializer || field.number == kGraphInput ? 1 : 0;
     if (field.number == kGraphNode) {
-      ++links.num_operators;
       const Status read = for_each_field(field.bytes, [&](const Field& of_node) -> Status {
-        links.num_ends += of_node.number == kNodeInput || of_node.number == kNodeOutput ? 1 : 0;
+        num_links += of_node.number == kNodeInput || of_node.number == kNodeOutput ? 1 : 0;
         return {};
       });
       if (!read) {
         return read;
       }
+      if (++num_nodes > kMaxNodes) {
+        return fail(fmt::format("expected at most {} operators, found more", kMaxNodes));
+      }
     }
-    links.num_ends += field.number == kGraphInitializer || field.number == kGraphInput ? 1 : 0;
-    return links.check();
+    return num_links <= kMaxLinks
+               ? Status()
+               : Status(fail(fmt::format("expected at most {} inputs and outputs of operators and "
+                                         "weights in all, found more",
+                                         kMaxLinks)));
   });
 }
 
 Status check_graph(std::string_view message) {
-  if (Status status = check_links(message); !status) {
+  if (Status status = check_counts(message); !status) {
     return status;
   }
   ConstantSizes constants = constants_of(message);

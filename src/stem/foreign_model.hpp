@@ -12,7 +12,7 @@ namespace stemvo::internal {
 inline constexpr std::size_t kMaxModelBytes = std::size_t{512} << 20U;
 /// Whole networks have hundreds. The time ONNX Runtime takes to load them grows by their square.
 inline constexpr std::size_t kMaxNodes = 2000;
-inline constexpr std::size_t kMaxLinks = 10000;
+inline constexpr std::size_t kMaxLinks = 10000;  ///< inputs and outputs of nodes, weights
 inline constexpr int kMaxKernel_px = 4096;
 inline constexpr int kMaxStride_px = 256;
 inline constexpr int kMaxFilters = 4096;
