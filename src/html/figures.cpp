@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <Eigen/Geometry>
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace stemvo::html {
@@ -17,7 +18,7 @@ json rounded(double value) {
 json titled(const std::string& title, std::optional<int> hover_digits) {
   json axis = {{"title", {{"text", title}}}};
   if (hover_digits) {
-    axis["hoverformat"] = "." + std::to_string(*hover_digits) + "f";
+    axis["hoverformat"] = fmt::format(".{}f", *hover_digits);
   }
   return axis;
 }

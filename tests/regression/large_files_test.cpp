@@ -80,7 +80,8 @@ class LargeFiles : public ::testing::Test {
     EXPECT_LT(result.err.size(), 700U) << what;
     EXPECT_THAT(result.err, Not(HasSubstr("internal"))) << what;
     if (result.exit_code == 1) {
-      EXPECT_THAT(what, AllOf(HasSubstr(": error: "), HasSubstr("/" + file.filename().string())));
+      EXPECT_THAT(what, AllOf(HasSubstr(": error: "),
+                              HasSubstr(fmt::format("/{}", file.filename().string()))));
       EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << what;
     }
   }
@@ -280,7 +281,7 @@ TEST_F(LargeRecords, WhatIsNone) {
   expect_merged("wrong seals", again(head(), sealed(std::string(300, ' '), internal::Sha256({}))));
   expect_merged("lists", inside(again("[", "[],")(kInside - kInside % 3) + "[]]"));
   expect_merged("lists in lists", inside(std::string(kInside, '[')));
-  expect_merged("a text", inside("\"" + std::string(kInside, 'x') + "\""));
+  expect_merged("a text", inside(fmt::format("\"{}\"", std::string(kInside, 'x'))));
 }
 
 }  // namespace
