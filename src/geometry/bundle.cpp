@@ -11,75 +11,20 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "geometry/bundle_sums.hpp"
 #include "geometry/cauchy_loss.hpp"
 #include "internal_check.hpp"
 
 namespace stemvo {
 namespace {
 
-using Matrix32 = Eigen::Matrix<double, 3, 2>;
-using Matrix63 = Eigen::Matrix<double, 6, 3>;
-using Matrix62 = Eigen::Matrix<double, 6, 2>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kMinBundleDepth = 1e-6;
 /// More keeps the first steps from where the data hardly pull: where the window bends, and the
 /// camera. With 1e-4 ten steps end half-way there.
 constexpr double kFirstDamping = 1e-7;
-constexpr int kCamera = 5;  ///< unknowns of the camera
-using Matrix52 = Eigen::Matrix<double, kCamera, 2>;
-
-/// Where a pose sees a point, and how far from its observation.
-struct Reprojection {
-  Reprojection(const Bundle& bundle,
-               const Bundle::Observation& observation,
-               const Eigen::Matrix3d& rotation) {
-    x = rotation * bundle.points[static_cast<std::size_t>(observation.point)] +
-        bundle.camera_from_world[static_cast<std::size_t>(observation.pose)].translation;
-    inverse_z = 1.0 / x.z();
-    u = x.x() * inverse_z;
-    v = x.y() * inverse_z;
-    r_sq = u * u + v * v;
-    stretch = 1.0 + r_sq * (bundle.radial[0] + bundle.radial[1] * r_sq);
-    error = Eigen::Vector2d(bundle.camera.fx_px * u * stretch + bundle.camera.cx_px,
-                            bundle.camera.fy_px * v * stretch + bundle.camera.cy_px) -
-            observation.uv;
-  }
-  /// Transposed Jacobians.
-  [[nodiscard]] Matrix32 by_x(const Bundle& bundle) const;
-  [[nodiscard]] Matrix52 by_camera(const Camera& camera) const;
-
-  Eigen::Vector3d x;  ///< the point in the camera
-  double inverse_z = 0.0;
-  double u = 0.0;  ///< its ray
-  double v = 0.0;
-  double r_sq = 0.0;
-  double stretch = 1.0;   ///< of the ray, by the radial distortion
-  Eigen::Vector2d error;  ///< px
-  double weight = 1.0;    ///< of the robust loss
-};
-
-Matrix32 Reprojection::by_x(const Bundle& bundle) const {
-  const Eigen::Vector2d& radial = bundle.radial;
-  const double bend = 2.0 * (radial[0] + 2.0 * radial[1] * r_sq);
-  const double fx = bundle.camera.fx_px * inverse_z;
-  const double fy = bundle.camera.fy_px * inverse_z;
-  const double uu = stretch + bend * u * u;
-  const double uv = bend * u * v;
-  const double vv = stretch + bend * v * v;
-  Matrix32 result;
-  result << fx * uu, fy * uv, fx * uv, fy * vv, -fx * (uu * u + uv * v), -fy * (uv * u + vv * v);
-  return result;
-}
-
-Matrix52 Reprojection::by_camera(const Camera& camera) const {
-  const double fu = camera.fx_px * u;
-  const double fv = camera.fy_px * v;
-  Matrix52 result;
-  result << 1.0, 0.0, 0.0, 1.0, fu * stretch, fv * stretch, fu * r_sq, fv * r_sq, fu * r_sq * r_sq,
-      fv * r_sq * r_sq;
-  return result;
-}
+constexpr int kCamera = BundleSums::kCamera;
 
 std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
   std::vector<Eigen::Matrix3d> rotations;
@@ -89,18 +34,17 @@ std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
   return rotations;
 }
 
-/// The normal equations in blocks. A point's part is damped and eliminated at once.
+/// The normal equations without the points: the camera first, then the free poses.
 class BundleEquations {
  public:
   BundleEquations(const Bundle& bundle, const BundleOptions& options)
       : options_(options),
         num_camera_(options.camera ? kCamera : 0),
-        size_(6 * (static_cast<int>(bundle.camera_from_world.size()) - options.num_fixed_poses) +
-              num_camera_),
+        sums_(bundle, options.num_fixed_poses, options.camera.has_value()),
+        size_(num_camera_ + 6 * sums_.num_free_poses()),
         reduced_(size_, size_),
         gradient_(size_),
-        points_(bundle.points.size()),
-        by_pose_(bundle.observations.size()) {}
+        diagonal_(size_) {}
 
   /// Around the bundle, with the points' blocks damped.
   void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
@@ -112,32 +56,26 @@ class BundleEquations {
   [[nodiscard]] CameraInformation camera_information() const;
 
  private:
-  struct PointBlock {
-    Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    Eigen::Matrix<double, kCamera, 3> by_camera = Eigen::Matrix<double, kCamera, 3>::Zero();
-  };
-  /// An observation of a pose with this rotation.
-  void add(const Bundle& bundle,
-           std::size_t i,
-           const Reprojection& at,
-           const Eigen::Matrix3d& rotation,
-           PointBlock& point);
-  void eliminate(
-      const Bundle& bundle, std::size_t begin, std::size_t end, double damping, PointBlock& point);
-  [[nodiscard]] int row_of(const Bundle::Observation& observation) const {
-    return num_camera_ + 6 * (observation.pose - options_.num_fixed_poses);
-  }
+  void move_points(const Eigen::VectorXd& change, Bundle& bundle) const;
+  [[nodiscard]] int row_of(int free_pose) const { return num_camera_ + 6 * free_pose; }
 
   BundleOptions options_;
   int num_camera_;
+  BundleSums sums_;
   int size_;
-  Eigen::MatrixXd reduced_;  ///< camera first, then the free poses; upper triangle
+  Eigen::MatrixXd reduced_;  ///< upper triangle
   Eigen::VectorXd gradient_;
   Eigen::VectorXd diagonal_;  ///< before the elimination
-  std::vector<PointBlock> points_;
-  std::vector<Matrix63> by_pose_;  ///< of each observation
 };
+
+template <std::size_t kColumns>
+void copy(const BundleSums::Block<kColumns>& from, int num_rows, Eigen::Ref<Eigen::MatrixXd> to) {
+  for (std::size_t c = 0; c < kColumns; ++c) {
+    for (int r = 0; r < num_rows; ++r) {
+      to(r, static_cast<int>(c)) = from[c][r];
+    }
+  }
+}
 
 void move_camera(const CameraChange& change, Bundle& bundle) {
   bundle.camera.cx_px += change[0];
@@ -147,100 +85,24 @@ void move_camera(const CameraChange& change, Bundle& bundle) {
   bundle.radial += change.tail<2>();
 }
 
-/// The observations of a point, [begin, end).
-template <typename Use>
-void for_each_point(const Bundle& bundle, const Use& use) {
-  const auto& all = bundle.observations;
-  for (std::size_t begin = 0; begin < all.size();) {
-    std::size_t end = begin + 1;
-    while (end < all.size() && all[end].point == all[begin].point) {
-      ++end;
-    }
-    use(begin, end);
-    begin = end;
-  }
-}
-
 void BundleEquations::linearize(const Bundle& bundle,
                                 const std::vector<Reprojection>& at,
                                 double damping) {
-  reduced_.setZero();
-  gradient_.setZero();
-  diagonal_.setZero(size_);
-  const std::vector<Eigen::Matrix3d> rotations = rotations_of(bundle);
-  for_each_point(bundle, [&](std::size_t begin, std::size_t end) {
-    PointBlock& point = points_[static_cast<std::size_t>(bundle.observations[begin].point)];
-    point = PointBlock();
-    for (std::size_t i = begin; i < end; ++i) {
-      add(bundle, i, at[i], rotations[static_cast<std::size_t>(bundle.observations[i].pose)],
-          point);
-    }
-    eliminate(bundle, begin, end, damping, point);
-  });
-}
-
-void BundleEquations::add(const Bundle& bundle,
-                          std::size_t i,
-                          const Reprojection& at,
-                          const Eigen::Matrix3d& rotation,
-                          PointBlock& point) {
-  const Bundle::Observation& observation = bundle.observations[i];
-  const double weight = at.weight;
-  const Matrix32 by_x = at.by_x(bundle);
-  const Matrix32 by_point = rotation.transpose() * by_x;
-  const Matrix32 weighted = weight * by_point;
-  point.inverse.noalias() += weighted * by_point.transpose();
-  point.gradient.noalias() += weighted * at.error;
-  const bool is_free = observation.pose >= options_.num_fixed_poses;
-  Matrix62 by_pose;  // x' = exp(w) x + t
-  if (is_free) {
-    by_pose << at.x.cross(by_x.col(0)), at.x.cross(by_x.col(1)), by_x;
-    const int row = row_of(observation);
-    by_pose_[i].noalias() = by_pose * weighted.transpose();
-    const Matrix62 weighted_pose = weight * by_pose;
-    reduced_.block<6, 6>(row, row).noalias() += weighted_pose * by_pose.transpose();
-    diagonal_.segment<6>(row) += weighted_pose.cwiseProduct(by_pose).rowwise().sum();
-    gradient_.segment<6>(row).noalias() += weighted_pose * at.error;
-  }
-  if (num_camera_ > 0) {
-    const Matrix52 by_camera = at.by_camera(bundle.camera);
-    const Matrix52 weighted_camera = weight * by_camera;
-    point.by_camera.noalias() += weighted_camera * by_point.transpose();
-    reduced_.topLeftCorner<kCamera, kCamera>().noalias() += weighted_camera * by_camera.transpose();
-    diagonal_.head<kCamera>() += weighted_camera.cwiseProduct(by_camera).rowwise().sum();
-    gradient_.head<kCamera>().noalias() += weighted_camera * at.error;
-    if (is_free) {
-      reduced_.block<kCamera, 6>(0, row_of(observation)).noalias() +=
-          weighted_camera * by_pose.transpose();
+  sums_.add_up(bundle, at, damping);
+  const BundleSums::Block<2> of_camera = {sums_.camera.gradient, sums_.camera.diagonal};
+  Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
+  copy(of_camera, num_camera_, columns.topRows(num_camera_));
+  copy(sums_.camera.with_camera, num_camera_, reduced_.topLeftCorner(num_camera_, num_camera_));
+  for (int j = 0; j < sums_.num_free_poses(); ++j) {
+    const BundleSums::Pose& pose = sums_.poses[static_cast<std::size_t>(j)];
+    copy(BundleSums::Block<2>{pose.gradient, pose.diagonal}, 6, columns.middleRows<6>(row_of(j)));
+    copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
+    for (int i = 0; i <= j; ++i) {
+      copy(sums_.of_poses[sums_.index_of(i, j)], 6, reduced_.block<6, 6>(row_of(i), row_of(j)));
     }
   }
-}
-
-void BundleEquations::eliminate(
-    const Bundle& bundle, std::size_t begin, std::size_t end, double damping, PointBlock& point) {
-  point.inverse.diagonal() *= 1.0 + damping;
-  point.inverse = point.inverse.inverse().eval();
-  if (num_camera_ > 0) {
-    const Eigen::Matrix<double, kCamera, 3> scaled = point.by_camera * point.inverse;
-    reduced_.topLeftCorner<kCamera, kCamera>().noalias() -= scaled * point.by_camera.transpose();
-    gradient_.head<kCamera>().noalias() -= scaled * point.gradient;
-  }
-  for (std::size_t i = begin; i < end; ++i) {
-    if (bundle.observations[i].pose < options_.num_fixed_poses) {
-      continue;
-    }
-    const int row = row_of(bundle.observations[i]);
-    Matrix63 scaled;
-    scaled.noalias() = by_pose_[i] * point.inverse;
-    gradient_.segment<6>(row).noalias() -= scaled * point.gradient;
-    if (num_camera_ > 0) {
-      reduced_.block<kCamera, 6>(0, row).noalias() -= point.by_camera * scaled.transpose();
-    }
-    for (std::size_t j = i; j < end; ++j) {
-      reduced_.block<6, 6>(row, row_of(bundle.observations[j])).noalias() -=
-          scaled * by_pose_[j].transpose();
-    }
-  }
+  gradient_ = columns.col(0);
+  diagonal_ = columns.col(1);
 }
 
 bool BundleEquations::step(double damping,
@@ -259,20 +121,7 @@ bool BundleEquations::step(double damping,
   if (solver.info() != Eigen::Success || !change.allFinite()) {
     return false;
   }
-  for_each_point(bundle, [&](std::size_t begin, std::size_t end) {
-    const auto index = static_cast<std::size_t>(bundle.observations[begin].point);
-    const PointBlock& point = points_[index];
-    Eigen::Vector3d rest = point.gradient;
-    if (num_camera_ > 0) {
-      rest += point.by_camera.transpose() * change.head<kCamera>();
-    }
-    for (std::size_t i = begin; i < end; ++i) {
-      if (bundle.observations[i].pose >= options_.num_fixed_poses) {
-        rest += by_pose_[i].transpose() * change.segment<6>(row_of(bundle.observations[i]));
-      }
-    }
-    bundle.points[index] -= point.inverse * rest;
-  });
+  move_points(change, bundle);
   for (std::size_t i = static_cast<std::size_t>(options_.num_fixed_poses);
        i < bundle.camera_from_world.size(); ++i) {
     const Vector6 of_pose =
@@ -286,6 +135,40 @@ bool BundleEquations::step(double damping,
     move_camera(camera_change, bundle);
   }
   return true;
+}
+
+void BundleEquations::move_points(const Eigen::VectorXd& change, Bundle& bundle) const {
+  const auto times = [](const BundleSums::Block<3>& block, const auto& by) {
+    Eigen::Vector3d result;
+    for (std::size_t c = 0; c < block.size(); ++c) {
+      double sum = 0.0;
+      for (int r = 0; r < by.size(); ++r) {
+        sum += block[c][r] * by[r];
+      }
+      result[static_cast<int>(c)] = sum;
+    }
+    return result;
+  };
+  const auto& all = bundle.observations;
+  for (std::size_t i = 0; i < all.size();) {
+    const auto index = static_cast<std::size_t>(all[i].point);
+    const BundleSums::Point& point = sums_.points[index];
+    Eigen::Vector3d rest(point.gradient[0], point.gradient[1], point.gradient[2]);
+    if (num_camera_ > 0) {
+      rest += times(point.with_camera, change.head<kCamera>());
+    }
+    for (; i < all.size() && all[i].point == static_cast<int>(index); ++i) {
+      if (const int free = all[i].pose - options_.num_fixed_poses; free >= 0) {
+        rest += times(sums_.pose_with_point[i], change.segment<6>(row_of(free)));
+      }
+    }
+    Eigen::Matrix3d inverse;
+    for (int c = 0; c < 3; ++c) {
+      const BundleSums::Lanes4& column = point.inverse[c];
+      inverse.col(c) << column[0], column[1], column[2];
+    }
+    bundle.points[index] -= inverse * rest;
+  }
 }
 
 CameraInformation BundleEquations::camera_information() const {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/bundle.hpp"
+#include "geometry/bundle_sums.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -39,7 +40,7 @@ Bundle bundle_of(const DriveTracks& drive, double push) {
   return bundle;
 }
 
-struct Reprojection {
+struct ReprojectionError {
   const Camera& camera;
   Eigen::Vector2d uv;
 
@@ -66,8 +67,8 @@ double solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
   auto* loss = new ceres::CauchyLoss(options.loss_scale_px);
   for (const Bundle::Observation& seen : bundle.observations) {
     double* pose = poses[static_cast<std::size_t>(seen.pose)].data();
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reprojection, 2, 3, 3, 3>(
-                                 new Reprojection{bundle.camera, seen.uv}),
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ReprojectionError, 2, 3, 3, 3>(
+                                 new ReprojectionError{bundle.camera, seen.uv}),
                              loss, pose, pose + 3,
                              bundle.points[static_cast<std::size_t>(seen.point)].data());
   }
@@ -104,6 +105,47 @@ TEST(Bundle, EndsWhereCeresDoes) {
     const Rigid3& b = judge.camera_from_world[i];
     EXPECT_LE((a.translation - b.translation).norm(), 1e-5) << i;
     EXPECT_LE(a.rotation.angularDistance(b.rotation), 1e-6) << i;
+  }
+}
+
+void expect_alike(const BundleSums::Column& a, const BundleSums::Column& b, int num_rows) {
+  for (int r = 0; r < num_rows; ++r) {
+    EXPECT_NEAR(a[r], b[r], 1e-9 * (1.0 + std::abs(b[r])));
+  }
+}
+
+/// By the widest instructions of this processor, and by those that every one has.
+TEST(BundleSums, DifferInTheLastDigitsFromThePortableOnes) {
+  Bundle bundle = bundle_of(DriveTracks(6, 0.3, 8), 1.0);
+  bundle.radial = Eigen::Vector2d(0.01, -0.003);
+  std::vector<Reprojection> at;
+  for (const Bundle::Observation& seen : bundle.observations) {
+    const Rigid3& pose = bundle.camera_from_world[static_cast<std::size_t>(seen.pose)];
+    at.emplace_back(bundle, seen, pose.rotation_matrix()).weight = 0.5;
+  }
+  BundleSums sums(bundle, 2, true);
+  BundleSums portable = sums;
+  sums.add_up(bundle, at, 1e-7);
+  portable.add_up(bundle, at, 1e-7, false);
+  expect_alike(sums.camera.gradient, portable.camera.gradient, BundleSums::kCamera);
+  expect_alike(sums.camera.diagonal, portable.camera.diagonal, BundleSums::kCamera);
+  for (std::size_t c = 0; c < 5; ++c) {
+    expect_alike(sums.camera.with_camera[c], portable.camera.with_camera[c], BundleSums::kCamera);
+  }
+  ASSERT_EQ(sums.poses.size(), 4U);
+  for (std::size_t i = 0; i < sums.poses.size(); ++i) {
+    expect_alike(sums.poses[i].gradient, portable.poses[i].gradient, 6);
+    expect_alike(sums.poses[i].diagonal, portable.poses[i].diagonal, 6);
+    for (std::size_t c = 0; c < 6; ++c) {
+      expect_alike(sums.poses[i].with_camera[c], portable.poses[i].with_camera[c], 5);
+    }
+  }
+  ASSERT_EQ(sums.of_poses.size(), 10U);
+  for (std::size_t i = 0; i < sums.of_poses.size(); ++i) {
+    EXPECT_NE(sums.of_poses[i][0][0], 0.0);
+    for (std::size_t c = 0; c < 6; ++c) {
+      expect_alike(sums.of_poses[i][c], portable.of_poses[i][c], 6);
+    }
   }
 }
 
