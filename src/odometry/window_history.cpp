@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "internal_check.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
 
 /// A kept landmark: seen from so many keyframes, under so large an angle between two of them.
-constexpr int kMinKeyframes = 3;
+constexpr int kMinKeyframes = 4;
 constexpr double kMinParallax_rad = 1.5 * std::numbers::pi / 180.0;
 /// Lengths are the mean of so many frames' before and after.
 constexpr int kScaleFrames = 5;
@@ -40,17 +41,20 @@ std::array<std::uint8_t, 3> color_at(const cv::Mat& image, const Eigen::Vector2d
 void WindowHistory::observe(const Window& window, const cv::Mat& image) {
   const Keyframe& newest = window.keyframes.back();
   for (const TrackPoint& observation : newest.points) {
-    Track& track = tracks_[observation.track_id];
-    ++track.num_keyframes;
+    const auto sees = [&](const Keyframe& keyframe) {
+      return find_point(keyframe.points, observation.track_id) != nullptr;
+    };
+    const auto [found, is_new] = tracks_.try_emplace(observation.track_id);
+    Track& track = found->second;
+    // A new corner came to its first keyframe with the frame behind it.
+    track.num_keyframes +=
+        is_new ? static_cast<int>(std::ranges::count_if(window.keyframes, sees)) : 1;
     track.rgb = color_at(image, observation.uv);  // the last view is the nearest
     const auto landmark = window.landmarks.find(observation.track_id);
     if (landmark == window.landmarks.end()) {
       continue;
     }
-    const auto oldest = std::find_if(
-        window.keyframes.begin(), window.keyframes.end(), [&](const Keyframe& keyframe) {
-          return find_point(keyframe.points, observation.track_id) != nullptr;
-        });
+    const auto oldest = std::ranges::find_if(window.keyframes, sees);
     track.max_parallax_rad =
         std::max(track.max_parallax_rad, parallax_rad(landmark->second, *oldest, newest));
   }
@@ -106,6 +110,9 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
     keep_motions(keyframe, window.keyframes.size() > 1 ? window.keyframes[1] : coming);
   }
   for (const int track_id : lost_tracks(window, leaving, coming)) {
+    if (window.landmarks.contains(track_id)) {
+      count_landmark(tracks_[track_id].num_keyframes);
+    }
     keep(window, keyframe, track_id);
   }
 }

@@ -53,6 +53,7 @@ void to_json(Json& json, const TimingReport& report) {
   for (const TrackCount& track : report.tracks) {
     json["tracks"][track.name] = track.count;
   }
+  json["landmark_life_keyframes"] = report.landmark_life_keyframes;
   json["stages"] = Json::object();
   for (const StageTiming& stage : report.stages) {
     json["stages"][stage.name] = {{"calls", stage.calls},

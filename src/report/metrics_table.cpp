@@ -109,7 +109,9 @@ std::string format_tracks(const TimingReport& report) {
         {track.name, fmt::format("{:.1f}", count / static_cast<double>(report.num_frames)),
          fmt::format("{:.1f}", 100.0 * count / static_cast<double>(report.tracks.front().count))});
   }
-  return '\n' + table.str();
+  return '\n' + table.str() +
+         fmt::format("\nlandmarks: half are seen from {} keyframes or more\n",
+                     report.landmark_life_keyframes);
 }
 
 }  // namespace

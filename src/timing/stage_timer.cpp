@@ -106,6 +106,17 @@ void count_tracks(TrackFate fate, std::size_t count) {
   }
 }
 
+void StageRecorder::add_landmark(int num_keyframes) {
+  const std::lock_guard lock(mutex_);
+  landmarks_.push_back(num_keyframes);
+}
+
+void count_landmark(int num_keyframes) {
+  if (StageRecorder* recorder = StageRecorder::active()) {
+    recorder->add_landmark(num_keyframes);
+  }
+}
+
 double StageRecorder::cpu_ms(Stage stage) const {
   const std::lock_guard lock(mutex_);
   return stages_[static_cast<std::size_t>(stage)].cpu_ms;
@@ -136,6 +147,11 @@ TimingReport StageRecorder::report() const {
   report.peak_memory_mib = peak_memory_mib();
   for (std::size_t i = 0; tracks_.front() > 0 && i < tracks_.size(); ++i) {
     report.tracks.push_back({std::string(kFates[i]), tracks_[i]});
+  }
+  if (std::vector<int> lives = landmarks_; !lives.empty()) {
+    const auto middle = lives.begin() + std::ssize(lives) / 2;
+    std::ranges::nth_element(lives, middle);
+    report.landmark_life_keyframes = *middle;
   }
   return report;
 }

@@ -63,6 +63,7 @@ class StageRecorder {
   /// A frame's result is there; `started`: when it was asked for.
   void add_frame(std::chrono::steady_clock::time_point started);
   void add_tracks(TrackFate fate, std::size_t count);
+  void add_landmark(int num_keyframes);
   /// Processor time of all calls of a stage so far.
   [[nodiscard]] double cpu_ms(Stage stage) const;
   /// Of everything so far.
@@ -84,10 +85,14 @@ class StageRecorder {
   std::vector<double> intervals_ms_;
   std::vector<double> latencies_ms_;
   std::array<std::size_t, kNumFates> tracks_{};
+  std::vector<int> landmarks_;
 };
 
 /// Counts tracks; without a StageRecorder it does nothing.
 void count_tracks(TrackFate fate, std::size_t count);
+
+/// A landmark that so many keyframes saw has left the window; the same.
+void count_landmark(int num_keyframes);
 
 /// Measures a stage from here to the end of the block; without a StageRecorder it does nothing. It
 /// sees the calling thread only, not what OpenCV hands to other threads.

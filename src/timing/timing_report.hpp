@@ -45,7 +45,10 @@ struct TimingReport {
   double fps = 0.0;      ///< frames over wall time, process start to trajectory written
   int num_threads = 0;
   std::vector<TrackCount> tracks;  ///< looked for, and why some were lost; empty: none were
-  double peak_memory_mib = 0.0;    ///< most the program has held at once; NaN: not told
+  /// Median, over landmarks that no keyframe of the window sees any more, of the keyframes that
+  /// did; 0: there are none.
+  int landmark_life_keyframes = 0;
+  double peak_memory_mib = 0.0;  ///< most the program has held at once; NaN: not told
 };
 
 }  // namespace stemvo

@@ -120,6 +120,11 @@ TEST(Timing, TracksAreCountedByWhatBecameOfThem) {
   count_tracks(TrackFate::kLookedFor, 5);  // nobody listens
   const StageRecorder recorder;
   EXPECT_TRUE(recorder.report().tracks.empty());
+  EXPECT_EQ(recorder.report().landmark_life_keyframes, 0);
+  for (const int life : {9, 2, 3}) {
+    count_landmark(life);
+  }
+  EXPECT_EQ(recorder.report().landmark_life_keyframes, 3);
   count_tracks(TrackFate::kLookedFor, 200);
   count_tracks(TrackFate::kLookedFor, 180);
   count_tracks(TrackFate::kNotFound, 30);
@@ -161,6 +166,7 @@ TimingReport example() {
   report.fps = 180.0;
   report.num_threads = 2;
   report.tracks = {{"looked for", 160000}, {"not found", 40000}};
+  report.landmark_life_keyframes = 5;
   report.peak_memory_mib = 222.4;
   return report;
 }
@@ -175,6 +181,7 @@ TEST(Timing, TableHasARowPerStageAndTheWhole) {
   EXPECT_THAT(table, ContainsRegex("peak memory +222 MiB"));
   EXPECT_THAT(table, ContainsRegex("looked for +400\\.0 +100\\.0\n"));
   EXPECT_THAT(table, ContainsRegex("not found +100\\.0 +25\\.0\n"));
+  EXPECT_THAT(table, HasSubstr("half are seen from 5 keyframes or more\n"));
   EXPECT_THAT(table, Not(HasSubstr(" \n"))) << "blanks at the end of a line";
 }
 
@@ -199,6 +206,7 @@ TEST(Timing, JsonHasTheSameNumbers) {
   EXPECT_EQ(json["other_cpu_s"], 0.3);
   EXPECT_EQ(json["cpu_s"], 4.0);
   EXPECT_EQ(json["tracks"]["not found"], 40000);
+  EXPECT_EQ(json["landmark_life_keyframes"], 5);
 }
 
 }  // namespace
