@@ -174,6 +174,8 @@ TEST_F(LargeFiles, Poses) {
   for (const Content& content : contents) {
     expect_bounded(poses, kMaxRows_MB, content, {"evaluate", "--gt", folder_ / "truth.txt", poses});
   }
+  expect_bounded(poses, kMaxRows_MB, contents[0],
+                 {"evaluate", "--gt", poses, poses, "--align", "sim3"});
 }
 
 TEST_F(LargeFiles, TimesAndLists) {
