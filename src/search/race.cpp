@@ -33,7 +33,7 @@ struct Race {
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
   bool is_stopped = false;
-  std::string problem_of_memory = {};  ///< then it is stopped: of the filters it says nothing
+  Status memory = {};  ///< lacked: then it is stopped, of the filters it says nothing
 
   Status run() {
     for (const FilterRecord& record : file.records()) {
@@ -56,7 +56,7 @@ struct Race {
         return status;
       }
     }
-    return problem_of_memory.empty() ? Status() : fail(problem_of_memory);
+    return memory;
   }
 
   bool is_last(std::size_t rung) const { return rung + 1 == plan.identity.rungs.size(); }
@@ -217,8 +217,7 @@ struct Race {
       };
       cv::parallel_for_({0, num_tasks}, run_tasks, num_tasks);
       frames_done += running.size();
-      is_stopped =
-          !problem_of_memory.empty() || (progress && !progress(frames_done, frames_planned()));
+      is_stopped = !memory || (progress && !progress(frames_done, frames_planned()));
       if (is_stopped) {
         return false;
       }
@@ -230,7 +229,7 @@ struct Race {
     const FrameSource& sequence = plan.sequences[index].sequence;
     const Expected<cv::Mat> frame = sequence.read(frame_index);
     if (!frame) {
-      warn(frame.error().message);
+      warn(frame.error());
       return {};
     }
     const PlanLayer& layer = plan.layers[plan.candidates[running.front()].layer];
@@ -238,19 +237,20 @@ struct Race {
         layer.stem.apply_range(*frame, filter_of(running.front()), filter_of(running.back()) + 1,
                                frame_zoom(layer, sequence.camera()));
     if (!channels) {
-      warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
-                       channels.error().message));
+      warn(fail(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
+                            channels.error().message),
+                channels.error().lacks_memory));
       return {*frame, {}};
     }
     return {*frame, *std::move(channels)};
   }
 
-  void warn(const std::string& text) {
-    if (lacks_memory(text)) {
-      problem_of_memory = text;
+  void warn(const Error& problem) {
+    if (problem.lacks_memory) {
+      memory = problem;
     }
-    if (std::ranges::find(warnings, text) == warnings.end()) {
-      warnings.push_back(text);
+    if (std::ranges::find(warnings, problem.message) == warnings.end()) {
+      warnings.push_back(problem.message);
     }
   }
 };

@@ -92,16 +92,19 @@ TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
   const fs::path large =
       test::rendered_drive({.frames = 5, .width_px = 2480, .height_px = 752}) / "sequences/00";
   int num_refused = 0;
-  for (int kib = 110000; kib < 230000; kib += 10000) {
-    const std::string out = folder_ / ("search" + std::to_string(kib));
+  for (int i = 0; i < 24; ++i) {
+    const int kib = 110000 + i / 2 * 10000;
+    const fs::path sequence = i % 2 == 0 ? large : drive_;  // for this one it ends at the sheet too
+    const fs::path out = folder_ / ("search" + std::to_string(i));
     const ProgramResult result = under(
         "ulimit -v " + std::to_string(kib),
-        "search " + large.string() +
+        "search " + sequence.string() +
             " --exhaustive --filters 0:2 --no-baselines --set 'evaluation.segment_lengths_m=[1]'"
             " --quiet --out " +
-            out);
+            out.string());
     if (result.exit_code == 0) {
-      EXPECT_THAT(read_file(out + "/filters.csv"), Not(HasSubstr("out of memory"))) << kib;
+      EXPECT_THAT(read_file(out / "filters.csv"), Not(HasSubstr("out of memory"))) << kib;
+      EXPECT_TRUE(fs::exists(out / "sheet.png")) << kib << result.err;
       continue;
     }
     ++num_refused;
