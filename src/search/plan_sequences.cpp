@@ -92,16 +92,15 @@ Expected<OpenedSequence> open_sequence(const SearchRequest& request,
 
 /// Why the layer's filters cannot be run on frames of this camera, empty where they can; lowers how
 /// many are in flight.
-Expected<std::string> fit_layer(const SearchRequest& request,
-                                const LayerIdentity& identity,
-                                const Camera& camera,
-                                PlanLayer& layer) {
+std::string fit_layer(const SearchRequest& request,
+                      const LayerIdentity& identity,
+                      const Camera& camera,
+                      PlanLayer& layer) {
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
   const int zoom = frame_zoom(layer, camera);
   const auto channels = layer.stem.apply_range(blank, identity.first, identity.first + 1, zoom);
   if (!channels) {
-    return channels.error().lacks_memory ? Expected<std::string>(channels.error())
-                                         : channels.error().message;
+    return channels.error().message;
   }
   const cv::Size size = channels->front().values.size();
   const Upsample upsample =
@@ -159,12 +158,8 @@ Status add_sequence(const SearchRequest& request,
   }
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-    const auto problem =
-        fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]);
-    if (!problem) {
-      return problem.error();
-    }
-    problems.push_back(*problem);
+    problems.push_back(
+        fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]));
   }
   plan.sequences.push_back({source, opened.is_held_out, std::move(problems)});
   return {};

@@ -33,7 +33,6 @@ struct Race {
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
   bool is_stopped = false;
-  Status memory = {};  ///< lacked: then it is stopped, of the filters it says nothing
 
   Status run() {
     for (const FilterRecord& record : file.records()) {
@@ -56,7 +55,7 @@ struct Race {
         return status;
       }
     }
-    return memory;
+    return {};
   }
 
   bool is_last(std::size_t rung) const { return rung + 1 == plan.identity.rungs.size(); }
@@ -217,7 +216,7 @@ struct Race {
       };
       cv::parallel_for_({0, num_tasks}, run_tasks, num_tasks);
       frames_done += running.size();
-      is_stopped = !memory || (progress && !progress(frames_done, frames_planned()));
+      is_stopped = progress && !progress(frames_done, frames_planned());
       if (is_stopped) {
         return false;
       }
@@ -229,7 +228,7 @@ struct Race {
     const FrameSource& sequence = plan.sequences[index].sequence;
     const Expected<cv::Mat> frame = sequence.read(frame_index);
     if (!frame) {
-      warn(frame.error());
+      warn(frame.error().message);
       return {};
     }
     const PlanLayer& layer = plan.layers[plan.candidates[running.front()].layer];
@@ -237,20 +236,16 @@ struct Race {
         layer.stem.apply_range(*frame, filter_of(running.front()), filter_of(running.back()) + 1,
                                frame_zoom(layer, sequence.camera()));
     if (!channels) {
-      warn(fail(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
-                            channels.error().message),
-                channels.error().lacks_memory));
+      warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
+                       channels.error().message));
       return {*frame, {}};
     }
     return {*frame, *std::move(channels)};
   }
 
-  void warn(const Error& problem) {
-    if (problem.lacks_memory) {
-      memory = problem;
-    }
-    if (std::ranges::find(warnings, problem.message) == warnings.end()) {
-      warnings.push_back(problem.message);
+  void warn(const std::string& text) {
+    if (std::ranges::find(warnings, text) == warnings.end()) {
+      warnings.push_back(text);
     }
   }
 };

@@ -149,8 +149,7 @@ Expected<std::vector<Channel>> apply_enlarged(
   auto channels = bank(enlarged, first, last);
   if (!channels) {
     return fail(fmt::format("{} (a frame of {}x{} enlarged {} times)", channels.error().message,
-                            frame.cols, frame.rows, zoom),
-                channels.error().lacks_memory);
+                            frame.cols, frame.rows, zoom));
   }
   for (Channel& channel : *channels) {
     channel.map.scale /= zoom;

@@ -114,6 +114,24 @@ TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
   EXPECT_GE(num_refused, 3);
 }
 
+/// Of a contender it says nothing.
+TEST_F(ResourceLimits, TooLittleMemoryToCompare) {
+  const std::string words = "robustness --kinds none --controls gray --frames 0:6 --quiet " +
+                            drive_.string() + " --out " + (folder_ / "out").string();
+  int num_refused = 0;
+  for (int kib = 110000; kib < 170000; kib += 4000) {
+    const ProgramResult result = under("ulimit -v " + std::to_string(kib), words);
+    if (result.exit_code == 0) {
+      EXPECT_THAT(result.err, IsEmpty()) << kib;
+      continue;
+    }
+    ++num_refused;
+    EXPECT_EQ(result.exit_code, 1) << kib << result.err;
+    EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+  }
+  EXPECT_GE(num_refused, 2);
+}
+
 TEST_F(ResourceLimits, TooLittleMemory) {
   const ProgramResult probe = test::run_program(
       "/bin/bash",
