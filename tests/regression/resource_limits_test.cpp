@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -130,6 +131,27 @@ TEST_F(ResourceLimits, TooLittleMemoryToCompare) {
     EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
   }
   EXPECT_GE(num_refused, 2);
+}
+
+/// Of room for the stack of one thread more, where what was kept in the first second is on the
+/// heap: the files so far were written empty, to where the program was called.
+TEST_F(ResourceLimits, NoThreadForTheFilesSoFar) {
+  const fs::path drive = test::rendered_drive({.frames = 200, .width_px = 310, .height_px = 94});
+  const fs::path here = folder_ / "here";
+  fs::create_directories(here);
+  write_file(here / "frames.csv", "mine");
+  int num_done = 0;
+  for (int kib = 160000; kib < 300000 && num_done < 3; kib += 5000) {
+    const ProgramResult result =
+        under(fmt::format("cd {}; ulimit -s 65536; ulimit -v {}", here.string(), kib),
+              fmt::format("run {} --threads 1 --quiet --out {} --set features.max_features=5000 "
+                          "--set features.min_distance_px=2",
+                          (drive / "sequences/00").string(), (folder_ / "out").string()));
+    num_done += result.exit_code == 0;
+    EXPECT_EQ(read_file(here / "frames.csv"), "mine") << kib;
+    EXPECT_FALSE(fs::exists(here / "trajectory_kitti.txt")) << kib;
+  }
+  EXPECT_EQ(num_done, 3);
 }
 
 TEST_F(ResourceLimits, TooLittleMemory) {
