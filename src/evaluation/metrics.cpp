@@ -55,12 +55,31 @@ Trajectory align(std::span<const Rigid3> estimate,
                    estimate);
 }
 
-double position_rmse_m(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
+/// Root mean square distance of positions.
+double rmse_m(std::span<const Eigen::Vector3d> estimate, std::span<const Eigen::Vector3d> truth) {
   double sum = 0.0;
   for (std::size_t i = 0; i < estimate.size(); ++i) {
-    sum += (estimate[i].translation - ground_truth[i].translation).squaredNorm();
+    sum += (estimate[i] - truth[i]).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(estimate.size()));
+}
+
+/// Under each alignment.
+AbsoluteTrajectoryError ate_rmse(std::span<const Rigid3> estimate,
+                                 std::span<const Rigid3> ground_truth) {
+  const std::vector<Eigen::Vector3d> from = positions(estimate);
+  const std::vector<Eigen::Vector3d> to = positions(ground_truth);
+  std::vector<Eigen::Vector3d> moved(from.size());
+  const auto after_m = [&](Alignment alignment) {
+    const Similarity3 by = align_positions(from, to, alignment);
+    const Eigen::Quaterniond rotation(by.rotation);
+    std::ranges::transform(from, moved.begin(), [&](const Eigen::Vector3d& position) {
+      return Eigen::Vector3d(by.scale * (rotation * position) + by.translation);
+    });
+    return rmse_m(moved, to);
+  };
+  return {rmse_m(from, to), after_m(Alignment::kScale), after_m(Alignment::kSe3),
+          after_m(Alignment::kSim3)};
 }
 
 /// What is left of the true motion first -> last after undoing the estimated one (devkit).
@@ -176,10 +195,7 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   metrics.null_offset_m = average_offset_m(Trajectory(truth.size()), truth);
   metrics.segment_lengths_m = segment_lengths(options, metrics.path_length_m);
   add_segment_errors(est, truth, kFirstFrameStep, metrics);
-  metrics.ate_rmse.none_m = position_rmse_m(est, truth);
-  metrics.ate_rmse.scale_m = position_rmse_m(align(est, truth, Alignment::kScale), truth);
-  metrics.ate_rmse.se3_m = position_rmse_m(align(est, truth, Alignment::kSe3), truth);
-  metrics.ate_rmse.sim3_m = position_rmse_m(align(est, truth, Alignment::kSim3), truth);
+  metrics.ate_rmse = ate_rmse(est, truth);
   add_step_errors(est, truth, metrics);
   return metrics;
 }

@@ -103,12 +103,14 @@ Expected<std::string> to_tum_row(std::string line) {
                      words[6], words[7], words[4]);
 }
 
-Expected<TimedPose> parse_row(Format format, const std::string& line) {
+Expected<TimedPose> parse_row(Format format, std::string_view line) {
   if (format == Format::kKitti) {
     return parse_numbers(line, 12).and_then(pose_from_matrix_row);
   }
-  return (format == Format::kEuroc ? to_tum_row(line) : Expected<std::string>(line))
-      .and_then([](const std::string& row) { return parse_numbers(row, 8); })
+  return (format == Format::kEuroc ? to_tum_row(std::string(line)).and_then([](const auto& row) {
+           return parse_numbers(row, 8);
+         })
+                                   : parse_numbers(line, 8))
       .and_then(pose_from_quaternion_row);
 }
 
@@ -122,8 +124,8 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   PoseFile result;
   result.is_of_body = format == Format::kEuroc;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::string line(format == Format::kKitti ? lines[i]
-                                                    : lines[i].substr(0, lines[i].find('#')));
+    const std::string_view line =
+        format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));
     if (format != Format::kKitti && count_words(line, 1) == 0) {
       continue;
     }

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <future>
 #include <new>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -150,18 +151,22 @@ class DriveLoop {
       return;
     }
     last_files_ = Clock::now();
-    // What cannot be written now is written, or reported, at the end; so is all where no thread is
-    // to be had. The future keeps what its thread does not let go.
-    writing_ = std::async([out = run_.request.out_dir, csv = drive_.csv,
-                           trajectory = drive_.trajectory(run_),
-                           checkpoint = std::exchange(checkpoint_, {})]() mutable {
+    auto write = [out = run_.request.out_dir, csv = drive_.csv,
+                  trajectory = drive_.trajectory(run_),
+                  checkpoint = std::exchange(checkpoint_, {})]() mutable {
       static_cast<void>(write_text_file(out / "frames.csv", std::exchange(csv, {})));
       static_cast<void>(
           write_kitti_trajectory(out / "trajectory_kitti.txt", std::exchange(trajectory, {})));
       if (!checkpoint.empty()) {
         static_cast<void>(write_text_file(checkpoint_file(out), std::exchange(checkpoint, {})));
       }
-    });
+    };
+    // What cannot be written now is written, or reported, at the end. The future keeps what its
+    // thread does not let go; one that was put off would write what it has been moved from.
+    try {
+      writing_ = std::async(std::launch::async, std::move(write));
+    } catch (const std::system_error&) {  // NOLINT: no thread is to be had
+    }
   }
 
   /// The trajectories are the caller's.

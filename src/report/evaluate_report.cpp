@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -23,25 +24,19 @@ struct Pairs {
   Trajectory truth;
 };
 
-Expected<Pairs> pair_by_line(const PoseFile& estimate,
-                             const PoseFile& truth,
-                             const std::string& file,
-                             const std::string& truth_file) {
-  if (estimate.poses.size() != truth.poses.size()) {
-    return fail(
-        fmt::format("{}: expected {} poses as in {}, found {} (poses are compared line by line "
-                    "unless both files have times, as TUM's and EuRoC's)",
-                    file, truth.poses.size(), truth_file, estimate.poses.size()));
-  }
-  return Pairs{estimate.poses, truth.poses};
-}
-
-Expected<Pairs> pair_poses(const PoseFile& estimate,
-                           const PoseFile& truth,
-                           const std::filesystem::path& file,
-                           const EvaluationRequest& request) {
+/// Nullopt: all of both, line by line.
+Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
+                                          const PoseFile& truth,
+                                          const std::filesystem::path& file,
+                                          const EvaluationRequest& request) {
   if (estimate.timestamps_s.empty() || truth.timestamps_s.empty()) {
-    return pair_by_line(estimate, truth, file.string(), request.ground_truth.string());
+    if (estimate.poses.size() == truth.poses.size()) {
+      return std::nullopt;
+    }
+    return fail(fmt::format(
+        "{}: expected {} poses as in {}, found {} (poses are compared line by line "
+        "unless both files have times, as TUM's and EuRoC's)",
+        file.string(), truth.poses.size(), request.ground_truth.string(), estimate.poses.size()));
   }
   const TimePairs pairs =
       pair_by_time(estimate.timestamps_s, truth.timestamps_s, request.tolerance_s);
@@ -90,9 +85,10 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
     if (!pairs) {
       return pairs.error();
     }
-    report.rows.push_back({file.string(),
-                           evaluate_aligned(pairs->estimate, pairs->truth, request.alignment),
-                           estimate->poses.size(), pairs->estimate.size()});
+    const Trajectory& compared = *pairs ? (*pairs)->estimate : estimate->poses;
+    const Trajectory& with = *pairs ? (*pairs)->truth : truth->poses;
+    report.rows.push_back({file.string(), evaluate_aligned(compared, with, request.alignment),
+                           estimate->poses.size(), compared.size()});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
   report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth->poses.size()), truth->poses),

@@ -2,6 +2,7 @@
 #include "robustness/robustness.hpp"
 
 #include <algorithm>
+#include <new>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -209,6 +210,9 @@ class Robustness {
                Outcome& outcome) {
     auto odometry = pipeline::create_odometry(config, source.camera(), request_.models_dir);
     if (!odometry) {
+      if (odometry.error().lacks_memory) {
+        throw std::bad_alloc();  // of the contender it says nothing
+      }
       warn(fmt::format("{}: {}", what, odometry.error().message));
       outcome.is_refused = true;
       ++num_done_;

@@ -160,9 +160,6 @@ Status add_sequence(const SearchRequest& request,
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
     problems.push_back(
         fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]));
-    if (lacks_memory(problems.back())) {
-      return fail(problems.back());
-    }
   }
   plan.sequences.push_back({source, opened.is_held_out, std::move(problems)});
   return {};

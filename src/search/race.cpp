@@ -33,7 +33,6 @@ struct Race {
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
   bool is_stopped = false;
-  std::string problem_of_memory = {};  ///< then it is stopped: of the filters it says nothing
 
   Status run() {
     for (const FilterRecord& record : file.records()) {
@@ -56,7 +55,7 @@ struct Race {
         return status;
       }
     }
-    return problem_of_memory.empty() ? Status() : fail(problem_of_memory);
+    return {};
   }
 
   bool is_last(std::size_t rung) const { return rung + 1 == plan.identity.rungs.size(); }
@@ -217,8 +216,7 @@ struct Race {
       };
       cv::parallel_for_({0, num_tasks}, run_tasks, num_tasks);
       frames_done += running.size();
-      is_stopped =
-          !problem_of_memory.empty() || (progress && !progress(frames_done, frames_planned()));
+      is_stopped = progress && !progress(frames_done, frames_planned());
       if (is_stopped) {
         return false;
       }
@@ -246,9 +244,6 @@ struct Race {
   }
 
   void warn(const std::string& text) {
-    if (lacks_memory(text)) {
-      problem_of_memory = text;
-    }
     if (std::ranges::find(warnings, text) == warnings.end()) {
       warnings.push_back(text);
     }

@@ -26,11 +26,6 @@ struct PlanLayer {
       choose_upsample(config.stem.upsample, config.features.method, camera));
 }
 
-/// Whether that is what an error says of a model that cannot be run.
-[[nodiscard]] inline bool lacks_memory(const std::string& error) {
-  return error.find("out of memory: ") != std::string::npos;
-}
-
 /// A path that holds in any folder.
 [[nodiscard]] std::string from_anywhere(const std::filesystem::path& path);
 

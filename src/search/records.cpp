@@ -375,7 +375,6 @@ Expected<RecordFile> RecordFile::open(const std::filesystem::path& file,
 }
 
 Status RecordFile::append(const std::vector<FilterRecord>& records) {
-  records_.insert(records.begin(), records.end());
   std::string text;
   const internal::Sha256 seal(first_line_);
   for (const FilterRecord& record : records) {
@@ -383,7 +382,19 @@ Status RecordFile::append(const std::vector<FilterRecord>& records) {
     to_json(json, record);
     text += sealed(text_of(json), seal) + '\n';
   }
-  return write(text);
+  std::error_code ignored;
+  if (std::filesystem::file_size(file_, ignored) + text.size() >
+      std::uintmax_t{kMaxRecords_MB} * 1000000) {
+    return fail(fmt::format(
+        "{}: expected at most {} MB of records, which can be read again, found more to write; "
+        "give the other filters (--filters), sequences or frames an --out of their own",
+        file_.string(), kMaxRecords_MB));
+  }
+  Status written = write(text);
+  if (written) {
+    records_.insert(records.begin(), records.end());
+  }
+  return written;
 }
 
 Status RecordFile::write(const std::string& text) {

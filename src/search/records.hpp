@@ -177,6 +177,7 @@ class RecordFile {
                                                  const SearchIdentity& identity,
                                                  bool resume,
                                                  const IsStopped& is_stopped = {});
+  /// Error: they cannot be written, or would make it larger than what is read again.
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
   [[nodiscard]] const FilterRecords& records() const { return records_; }
   /// Of what it held when it was opened.

@@ -266,7 +266,10 @@ Status write_files(const Results& results, SearchReport& report) {
       return status;
     }
   }
-  return write_page(results, pictures ? *pictures : Pictures(), report.text);
+  const Status page = write_page(results, pictures ? *pictures : Pictures(), report.text);
+  return page && !pictures && pictures.error().lacks_memory
+             ? fail(report.warnings.back() + "; all else is written")
+             : page;
 }
 
 }  // namespace

@@ -186,11 +186,11 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
     return records.error();
   }
   const auto warnings = run_race(*plan, progress, *records);
-  if (!warnings) {
-    return warnings.error();
-  }
   auto report = write_results(plan->identity, records->records(),
                               {request.out_dir, request.models_dir, request.command});
+  if (!warnings) {
+    return warnings.error();  // the tables hold what was done before
+  }
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings->begin(), warnings->end());
     report->warnings.insert(report->warnings.begin(), records->warnings().begin(),

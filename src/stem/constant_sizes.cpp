@@ -2,11 +2,11 @@
 #include "stem/constant_sizes.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include <fmt/format.h>
 
 #include "stem/foreign_model.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::internal {
 namespace {
@@ -14,17 +14,28 @@ namespace {
 constexpr std::size_t kMaxRank = 64;
 
 /// Of each value at most one.
-constexpr std::array<std::string_view, 22> kCopying = {
-    "Identity", "Cast",    "Reshape",    "Transpose", "Squeeze",    "Unsqueeze", "Flatten", "Slice",
-    "Concat",   "Neg",     "Abs",        "Sqrt",      "Exp",        "Log",       "Floor",   "Ceil",
-    "Relu",     "Sigmoid", "Reciprocal", "ReduceSum", "ReduceMean", "ReduceProd"};
+constexpr std::string_view kCopying =
+    "Identity Cast Reshape Transpose Squeeze Unsqueeze Flatten Slice Concat Neg Abs Sqrt Exp Log "
+    "Floor Ceil Relu Sigmoid Reciprocal ReduceSum ReduceMean ReduceProd";
 /// Of each pair of values at most one.
-constexpr std::array<std::string_view, 8> kPairing = {"Add", "Sub", "Mul", "Div",
-                                                      "Pow", "Min", "Max", "Gather"};
+constexpr std::string_view kPairing = "Add Sub Mul Div Pow Min Max Gather";
+/// Whatever else layers of image networks consist of. None takes a count or a place from an
+/// attribute or a pixel; sizes of windows have their limit (kMaxWindow_px).
+constexpr std::string_view kOfImages =
+    "Conv ConvTranspose MaxPool AveragePool GlobalAveragePool GlobalMaxPool BatchNormalization "
+    "InstanceNormalization GroupNormalization LayerNormalization RMSNormalization LpNormalization "
+    "LRN PRelu LeakyRelu ThresholdedRelu Elu Celu Selu Gelu Mish Swish HardSigmoid HardSwish "
+    "Softplus Softsign Softmax LogSoftmax Tanh Erf Sign Round Clip Dropout Sum Mean Where Equal "
+    "Greater Less And Or Not MatMul Gemm ReduceMax ReduceMin ReduceL1 ReduceL2 ReduceSumSquare "
+    "Split Pad Resize DepthToSpace SpaceToDepth";
 
-template <std::size_t kSize>
-bool is_among(std::string_view type, const std::array<std::string_view, kSize>& types) {
-  return std::find(types.begin(), types.end(), type) != types.end();
+bool is_among(std::string_view type, std::string_view types) {
+  for (auto word = take_word(types); !word.empty(); word = take_word(types)) {
+    if (word == type) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -56,11 +67,16 @@ Status ConstantSizes::add_node(std::string_view type,
     product = std::min(product * std::max<std::size_t>(size, 1), std::size_t{kMaxProbeValues} + 1);
   }
   std::size_t size = kVariable;
+  const bool is_pairing = is_among(type, kPairing);
+  const bool is_copying = is_among(type, kCopying);
   if (type == "Shape" || type == "Size") {
     size = kMaxRank;
+  } else if (!is_pairing && !is_copying && !is_among(type, kOfImages)) {
+    return fail(
+        "expected an operator that layers of image networks consist of, found another one; cut the "
+        "model before it (tools/export_stem.py --layers)");
   } else if (is_constant) {
-    const bool is_pairing = is_among(type, kPairing);
-    if (!is_pairing && !is_among(type, kCopying)) {
+    if (!is_pairing && !is_copying) {
       return fail(
           "expected it to depend on the image, found that ONNX Runtime would compute it, of any "
           "size, while it loads; compute it before the export");

@@ -16,9 +16,9 @@ class ConstantSizes {
  public:
   /// A weight, or what a node holds as one.
   void add(std::string_view name, std::size_t num_values);
-  /// The next node. Error: one that depends on constants alone (the shape of an image counts as
-  /// one), and makes more of them than can be told beforehand, or too many; what it takes comes
-  /// from no node before it.
+  /// The next node. Error: of a kind that layers of images have none of; one that depends on
+  /// constants alone (the shape of an image counts as one), and makes more of them than can be told
+  /// beforehand, or too many; what it takes comes from no node before it.
   [[nodiscard]] Status add_node(std::string_view type,
                                 const std::vector<std::string_view>& inputs,
                                 const std::vector<std::string_view>& outputs);

@@ -119,6 +119,7 @@ enum NodeField : std::uint64_t {
 };
 enum AttributeField : std::uint64_t {
   kAttributeName = 1,
+  kAttributeInt = 3,
   kAttributeTensor = 5,
   kAttributeGraph = 6,
   kAttributeInts = 8,
@@ -191,17 +192,17 @@ Status check_tensor(std::string_view message, bool is_weight) {
 }
 
 bool is_size(std::string_view attribute) {
-  constexpr std::array<std::string_view, 6> kSizes = {
-      "kernel_shape", "strides", "pads", "dilations", "output_padding", "output_shape"};
+  constexpr std::array<std::string_view, 7> kSizes = {
+      "kernel_shape", "strides", "pads", "dilations", "output_padding", "output_shape", "size"};
   return std::find(kSizes.begin(), kSizes.end(), attribute) != kSizes.end();
 }
 
 Status check_size(std::string_view name, std::uint64_t bits) {
   const auto size = static_cast<std::int64_t>(bits);
-  return size >= -kMaxKernel_px && size <= kMaxKernel_px
+  return size >= -kMaxWindow_px && size <= kMaxWindow_px
              ? Status()
              : Status(fail(
-                   fmt::format("expected {} of at most {}, found {}", name, kMaxKernel_px, size)));
+                   fmt::format("expected {} of at most {}, found {}", name, kMaxWindow_px, size)));
 }
 
 /// One number, or a packed list.
@@ -235,6 +236,7 @@ Status check_attribute(std::string_view message) {
       case kAttributeTensor:
       case kAttributeTensors:
         return check_tensor(field.bytes, /*is_weight=*/false);
+      case kAttributeInt:
       case kAttributeInts:
         return is_size(name) ? check_sizes(name, field) : Status();
       default:

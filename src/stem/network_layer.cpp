@@ -5,6 +5,7 @@
 #include <array>
 #include <memory>
 #include <mutex>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,6 +36,9 @@ class NetworkLayer {
       channel.map = plan_.map();
     }
     if (Status status = run_passes(first, channels); !status) {
+      if (status.error().lacks_memory) {
+        throw std::bad_alloc();  // neither the model nor the frame is to blame
+      }
       return status.error();
     }
     return channels;

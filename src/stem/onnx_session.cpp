@@ -122,7 +122,8 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
   const bool is_memory = message.find("bad_alloc") != std::string::npos ||
                          message.find("Failed to allocate memory") != std::string::npos;
   return fail(fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "",
-                          one_line(without_sources(message))));
+                          one_line(without_sources(message))),
+              is_memory);
 }
 
 Expected<OnnxSession> OnnxSession::create(const std::string& label,
@@ -141,7 +142,8 @@ Expected<OnnxSession> OnnxSession::create(const std::string& label,
 Status OnnxSession::load(std::string_view model) {
   if (!has_room_to_start()) {
     return fail(fmt::format("{}: out of memory: expected {} MB for ONNX Runtime to start", label_,
-                            kRoomToStart >> 20));
+                            kRoomToStart >> 20),
+                /*lacks_memory=*/true);
   }
   const OrtApiBase* base = OrtGetApiBase();
   api_ = base->GetApi(kApiVersion);

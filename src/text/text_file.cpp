@@ -242,10 +242,10 @@ std::vector<std::string_view> split_lines(std::string_view text) {
 }
 
 std::string_view take_word(std::string_view& line) {
-  constexpr std::string_view kBlanks = " \t";
-  line.remove_prefix(std::min(line.find_first_not_of(kBlanks), line.size()));
-  const std::string_view word = line.substr(0, line.find_first_of(kBlanks));
-  line.remove_prefix(word.size());
+  const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+  const auto* const begin = std::find_if_not(line.begin(), line.end(), is_blank);
+  const std::string_view word(begin, std::find_if(begin, line.end(), is_blank));
+  line = {word.end(), line.end()};
   return word;
 }
 

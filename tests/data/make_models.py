@@ -133,6 +133,8 @@ def hostile():
     write("hostile_tile", [*tile, helper.make_node("Resize", ["image", "", "scales"], ["like"]),
                            helper.make_node("Add", ["like", "t8"], ["channels"])], [image], [channels],
           [*one, numpy_helper.from_array(np.ones(4, np.float32), "scales")])
+    write("hostile_constant", [helper.make_node("Conv", ["one", "weights"], ["padded"], pads=[200] * 4),
+                               helper.make_node("Add", ["image", "padded"], ["channels"])], [image], [channels], [one[0], kernel])
     # A weight added to itself, transposed, again and again: each time as many values as pairs.
     add = [node for i in range(6) for node in (
         helper.make_node("Reshape", [f"a{i}", "column"], [f"c{i}"]), helper.make_node("Reshape", [f"a{i}", "row"], [f"r{i}"]),
@@ -150,12 +152,19 @@ def hostile():
              helper.make_node("Add", ["zero", "least"], ["a"]), helper.make_node("Add", ["zero", "minus"], ["b"])]
     write("hostile_divide_later", [*later, helper.make_node("Div", ["a", "b"], ["divided"]), *use], [image], [channels],
           [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus"), numpy_helper.from_array(np.array([0]), "nothing")])
-    # What ONNX Runtime says of these is long, or names its own sources.
-    einsum = [helper.make_node("Reshape", ["image", "deep"], ["values"]),
-              helper.make_node("Einsum", ["values"], ["sum"], equation="a" * 2400 + "->"), helper.make_node("Add", ["image", "sum"], ["channels"])]
-    write("hostile_einsum", einsum, [image], [channels], [numpy_helper.from_array(np.array([1] * 2399 + [-1]), "deep")])
-    mod = [helper.make_node("Cast", ["image"], ["whole"], to=TensorProto.INT64), helper.make_node("Mod", ["whole", "nothing"], ["divided"])]
-    write("hostile_mod", [*mod, *use], [image], [channels], [numpy_helper.from_array(np.array([0]), "nothing")])
+    # What ONNX Runtime says of it is long, and names its own sources.
+    write("hostile_shape", [helper.make_node("Reshape", ["image", "deep"], ["values"]), helper.make_node("Reshape", ["values", "flat"], ["channels"])],
+          [image], [channels], [numpy_helper.from_array(np.array([1] * 2398 + [3, 7]), "deep"), numpy_helper.from_array(np.array([1, 3, -1, 1]), "flat")])
+    # A number of an attribute says how much is computed and kept.
+    flat = [helper.make_node("Reshape", ["image", "row"], ["values"])]
+    row = [numpy_helper.from_array(np.array([1, -1]), "row")]
+    used = [helper.make_node("Cast", ["made"], ["float"], to=TensorProto.FLOAT), *use[1:]]
+    write("hostile_samples", [*flat, helper.make_node("Multinomial", ["values"], ["made"], sample_size=2**30), *used], [image], [channels], row)
+    words = helper.make_node("TfIdfVectorizer", ["whole"], ["made"], max_gram_length=2, max_skip_count=2**40, min_gram_length=1, mode="TF",
+                             ngram_counts=[0, 1], ngram_indexes=[0, 1], pool_int64s=[0, 1, 2])
+    write("hostile_words", [*flat, helper.make_node("Cast", ["values"], ["whole"], to=TensorProto.INT64), words, *used], [image], [channels], row)
+    write("hostile_pads", [helper.make_node("Conv", ["image", "weights"], ["channels"], pads=[4096] * 4)], [image], [channels], [kernel])
+    write("hostile_across", [helper.make_node("LRN", ["image"], ["channels"], size=2**16 + 1)], [image], [channels])
     # Some 10^10 multiplications per operator: slower than any first layer.
     box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
     slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],
@@ -182,9 +191,12 @@ def main():
     identity("wrong_rank", [value("image", [3, *picture])], [value("channels", [3, *picture])])
     identity("wrong_planes", [value("image", [1, 2, *picture])], [value("channels", [1, 2, *picture])])
     identity("wrong_type", [value("image", shape, TensorProto.UINT8)], [value("channels", shape, TensorProto.UINT8)])
-    write("wrong_free_filters", [helper.make_node("Compress", ["image", "which"], ["channels"], axis=1)],
+    write("wrong_free_filters", [helper.make_node("ReduceMax", ["image"], ["brightest"]),
+                                 helper.make_node("Cast", ["brightest"], ["number"], to=TensorProto.INT64),
+                                 helper.make_node("Reshape", ["number", "one"], ["to"]),
+                                 helper.make_node("Slice", ["image", "from", "to", "axis"], ["channels"])],
           [value("image", shape)], [value("channels", [1, "C", *picture])],
-          [numpy_helper.from_array(np.array([True, False, True]), "which")])
+          [numpy_helper.from_array(np.array([number]), key) for key, number in (("one", 1), ("from", 0), ("axis", 1))])
     write("wrong_two_inputs", [helper.make_node("Add", ["image", "more"], ["channels"])],
           [value("image", shape), value("more", shape)], [value("channels", shape)])
     write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],

@@ -129,8 +129,9 @@ TEST_F(BadInputTable, ManifestAndModel) {
 }
 
 TEST_F(BadInputTable, HostileModels) {
-  for (const char* name : {"kernel", "stride", "size", "domain", "loop", "external", "nan",
-                           "infinite", "rank", "tile", "pairs", "einsum", "mod"}) {
+  for (const char* name :
+       {"kernel", "stride", "size", "domain", "loop", "external", "nan", "infinite", "rank", "tile",
+        "pairs", "shape", "samples", "words", "pads", "across"}) {
     const TempFolder folder;
     const testing::TinyStem stem{.name = std::string("hostile_") + name, .kernel = 1, .stride = 1};
     testing::write_models(folder, stem);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -92,16 +93,19 @@ TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
   const fs::path large =
       test::rendered_drive({.frames = 5, .width_px = 2480, .height_px = 752}) / "sequences/00";
   int num_refused = 0;
-  for (int kib = 110000; kib < 230000; kib += 10000) {
-    const std::string out = folder_ / ("search" + std::to_string(kib));
+  for (int i = 0; i < 24; ++i) {
+    const int kib = 110000 + i / 2 * 10000;
+    const fs::path sequence = i % 2 == 0 ? large : drive_;  // for this one it ends at the sheet too
+    const fs::path out = folder_ / ("search" + std::to_string(i));
     const ProgramResult result = under(
         "ulimit -v " + std::to_string(kib),
-        "search " + large.string() +
+        "search " + sequence.string() +
             " --exhaustive --filters 0:2 --no-baselines --set 'evaluation.segment_lengths_m=[1]'"
             " --quiet --out " +
-            out);
+            out.string());
     if (result.exit_code == 0) {
-      EXPECT_THAT(read_file(out + "/filters.csv"), Not(HasSubstr("out of memory"))) << kib;
+      EXPECT_THAT(read_file(out / "filters.csv"), Not(HasSubstr("out of memory"))) << kib;
+      EXPECT_TRUE(fs::exists(out / "sheet.png")) << kib << result.err;
       continue;
     }
     ++num_refused;
@@ -109,6 +113,45 @@ TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
     EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
   }
   EXPECT_GE(num_refused, 3);
+}
+
+/// Of a contender it says nothing.
+TEST_F(ResourceLimits, TooLittleMemoryToCompare) {
+  const std::string words = "robustness --kinds none --controls gray --frames 0:6 --quiet " +
+                            drive_.string() + " --out " + (folder_ / "out").string();
+  int num_refused = 0;
+  for (int kib = 110000; kib < 170000; kib += 4000) {
+    const ProgramResult result = under("ulimit -v " + std::to_string(kib), words);
+    if (result.exit_code == 0) {
+      EXPECT_THAT(result.err, IsEmpty()) << kib;
+      continue;
+    }
+    ++num_refused;
+    EXPECT_EQ(result.exit_code, 1) << kib << result.err;
+    EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+  }
+  EXPECT_GE(num_refused, 2);
+}
+
+/// Of room for the stack of one thread more, where what was kept in the first second is on the
+/// heap: the files so far were written empty, to where the program was called.
+TEST_F(ResourceLimits, NoThreadForTheFilesSoFar) {
+  const fs::path drive = test::rendered_drive({.frames = 200, .width_px = 310, .height_px = 94});
+  const fs::path here = folder_ / "here";
+  fs::create_directories(here);
+  write_file(here / "frames.csv", "mine");
+  int num_done = 0;
+  for (int kib = 160000; kib < 300000 && num_done < 3; kib += 5000) {
+    const ProgramResult result =
+        under(fmt::format("cd {}; ulimit -s 65536; ulimit -v {}", here.string(), kib),
+              fmt::format("run {} --threads 1 --quiet --out {} --set features.max_features=5000 "
+                          "--set features.min_distance_px=2",
+                          (drive / "sequences/00").string(), (folder_ / "out").string()));
+    num_done += result.exit_code == 0;
+    EXPECT_EQ(read_file(here / "frames.csv"), "mine") << kib;
+    EXPECT_FALSE(fs::exists(here / "trajectory_kitti.txt")) << kib;
+  }
+  EXPECT_EQ(num_done, 3);
 }
 
 TEST_F(ResourceLimits, TooLittleMemory) {

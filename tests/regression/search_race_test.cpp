@@ -57,6 +57,22 @@ class SearchRace : public Search {
   SearchRequest request_;
 };
 
+TEST_F(SearchRace, RecordsThatCannotBeWrittenEndItWithTablesOfThoseThatWere) {
+  request_.exhaustive = true;
+  request_.block = 5;
+  request_.out_dir = folder_ / "full";
+  const auto report = run_search(request_, [&](std::size_t done, std::size_t) {
+    if (done > 5 * 30) {  // in the second block: as large as it may be
+      fs::resize_file(request_.out_dir / kRecordsFile, std::uintmax_t{kMaxRecords_MB} * 1000000);
+    }
+    return true;
+  });
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message, HasSubstr("records.jsonl: expected at most 512 MB"));
+  EXPECT_THAT(table("full"), HasSubstr("default,stem,4"));
+  EXPECT_THAT(table("full"), Not(HasSubstr("default,stem,5")));
+}
+
 /// A frame that is done is one call of the progress, and one pass of the stem.
 TEST_F(SearchRace, OnePassServesAllFiltersUnlessABlockIsAskedFor) {
   request_.exhaustive = true;

@@ -319,6 +319,20 @@ TEST_F(Records, OneWriterAtATime) {
   EXPECT_THAT(second.error().message, HasSubstr("another search is writing it"));
 }
 
+TEST_F(Records, AreNotWrittenBeyondWhatIsReadAgain) {
+  const auto file = folder_ / "records.jsonl";
+  auto writer = RecordFile::open(file, identity(0, 3), false);
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->append({record(0)}));
+  std::filesystem::resize_file(file, std::uintmax_t{kMaxRecords_MB} * 1000000 - 100);
+  const Status status = writer->append({record(1)});
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, AllOf(HasSubstr("records.jsonl: expected at most 512 MB"),
+                                            HasSubstr("an --out of their own")));
+  EXPECT_EQ(std::filesystem::file_size(file), std::uintmax_t{kMaxRecords_MB} * 1000000 - 100);
+  EXPECT_EQ(writer->records().size(), 1U);
+}
+
 TEST_F(Records, ChangesAreNamed) {
   const SearchIdentity before = identity(0, 3);
   SearchIdentity now = before;

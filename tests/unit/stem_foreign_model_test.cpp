@@ -37,8 +37,8 @@ std::string error_of(const std::string& name) {
 TEST(ForeignModel, IsRefusedForTheRightReason) {
   for (const auto& [name, reason] : {
            std::pair("kernel",
-                     "operator MaxPool: expected kernel_shape of at most 4096, found 40000"),
-           std::pair("stride", "operator MaxPool: expected strides of at most 4096, found 8000"),
+                     "operator MaxPool: expected kernel_shape of at most 256, found 40000"),
+           std::pair("stride", "operator MaxPool: expected strides of at most 256, found 8000"),
            std::pair(
                "size",
                "expected an input of at most 16777216 pixels, found 'image float 1x3x46341x46341'"),
@@ -47,7 +47,12 @@ TEST(ForeignModel, IsRefusedForTheRightReason) {
            std::pair("external", "expected all weights in the file, found 'weights' in another"),
            std::pair("nan", "expected finite weights, found NaN or infinity in 'weights'"),
            std::pair("infinite", "expected finite channels"),
-           std::pair("tile", "operator Tile: expected it to depend on the image"),
+           std::pair("pads", "operator Conv: expected pads of at most 256, found 4096"),
+           std::pair("across", "operator LRN: expected size of at most 256, found 65537"),
+           std::pair("samples", "operator Multinomial: expected an operator that layers of"),
+           std::pair("words", "operator TfIdfVectorizer: expected an operator that layers of"),
+           std::pair("tile", "operator Tile: expected an operator that layers of"),
+           std::pair("constant", "operator Conv: expected it to depend on the image"),
            std::pair("pairs", "operator Add: expected at most 134217728 values that depend on no"),
            std::pair("rank", "expected output 'channels float 1x3xhxw', found 'channels float 3x"),
        }) {
