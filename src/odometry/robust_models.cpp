@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/robust_models.hpp"
 
+#include <new>
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
@@ -61,7 +62,14 @@ std::optional<Eigen::Matrix3d> to_model(const cv::Mat& matrix) {
   return model;
 }
 
-/// Runs one of OpenCV's estimators; its exceptions mean degenerate input here.
+/// What OpenCV throws of degenerate input is no news here; of memory it is.
+void throw_if_memory_ended(const cv::Exception& exception) {
+  if (exception.code == cv::Error::StsNoMem) {
+    throw std::bad_alloc();
+  }
+}
+
+/// Runs one of OpenCV's estimators.
 template <typename Estimator>
 std::optional<Eigen::Matrix3d> run_guarded(const PixelPairs& pairs, const Estimator& estimator) {
   if (pairs.size() < kMinMatches) {
@@ -69,7 +77,8 @@ std::optional<Eigen::Matrix3d> run_guarded(const PixelPairs& pairs, const Estima
   }
   try {
     return to_model(estimator(to_points(pairs.prev_uv), to_points(pairs.cur_uv)));
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& exception) {
+    throw_if_memory_ended(exception);
     return std::nullopt;
   }
 }
@@ -139,7 +148,8 @@ std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> po
                             inliers, params)) {
       return std::nullopt;
     }
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& exception) {
+    throw_if_memory_ended(exception);
     return std::nullopt;
   }
   if (rotation.total() != 3 || translation.total() != 3) {

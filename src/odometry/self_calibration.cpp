@@ -96,12 +96,12 @@ void SelfCalibration::observe(const Keyframe& keyframe, const BundleAdjustmentOp
 
 void SelfCalibration::begin_measuring(const BundleAdjustmentOptions& options) {
   const CameraPrior prior{rest_of(mean_, applied()), kSigmaFactorSq * information_};
-  auto task = [run = std::move(run_), camera = camera_, prior, options] {
+  const auto task = [run = std::move(run_), camera = camera_, prior, options] {
     return timed(Stage::kCamera, [&] { return measure_camera(run, camera, prior, options); });
   };
   const auto where =
       cv::getNumThreads() > 1 ? std::launch::async | std::launch::deferred : std::launch::deferred;
-  measured_ = std::async(where, std::move(task)).share();
+  measured_ = std::async(where, task).share();  // moved, it is gone where no thread could begin
   run_ = {};
 }
 

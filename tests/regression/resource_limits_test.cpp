@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -69,21 +70,46 @@ TEST_F(ResourceLimits, TooSmallAStack) {
   EXPECT_EQ(run_under("ulimit -s 1024").exit_code, 0);
 }
 
-/// The limit does not bind root, and counts all that a user has: asked as nobody, who has nothing.
+/// The limit does not bind root, and counts all that a user has: asked as somebody who has nothing.
+ProgramResult run_as(int user, int max_processes, const fs::path& drive, const fs::path& out) {
+  fs::create_directories(out);
+  fs::permissions(out.parent_path(), fs::perms::all);
+  fs::permissions(out, fs::perms::all);
+  return test::run_program(
+      "/bin/bash",
+      {"-c", fmt::format("exec setpriv --reuid {} --clear-groups /bin/bash -c 'ulimit -c 0; "
+                         "ulimit -u {}; exec {} run {} --threads 2 --quiet --out {}'",
+                         user, max_processes, STEMVO_PROGRAM, drive.string(), out.string())});
+}
+
 TEST_F(ResourceLimits, TooFewProcesses) {
   if (::geteuid() != 0) {
     GTEST_SKIP() << "expected root, who can be nobody";
   }
-  const fs::path out = folder_ / "out";
-  fs::create_directories(out);
-  fs::permissions(folder_.path(), fs::perms::all);
-  fs::permissions(out, fs::perms::all);
-  const ProgramResult result = test::run_program(
-      "/bin/bash", {"-c", std::string("exec setpriv --reuid 65534 --clear-groups /bin/bash -c "
-                                      "'ulimit -c 0; ulimit -u 1; exec ") +
-                              STEMVO_PROGRAM + " run " + drive_.string() + " --quiet --out " +
-                              out.string() + "'"});
-  expect_error(result, 1, {"out of threads: expected more than 'ulimit -u' allows"});
+  expect_error(run_as(65534, 1, drive_, folder_ / "out"), 1,
+               {"out of threads: expected more than 'ulimit -u' allows"});
+}
+
+/// Where no thread is left for the camera, which is measured beside the frames.
+TEST_F(ResourceLimits, WithoutAThreadForTheCameraItIsMeasuredAllTheSame) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "expected root, who can be somebody else";
+  }
+  const auto camera_at = [&](int max_processes) {
+    const fs::path out = folder_ / std::to_string(max_processes);
+    return run_as(65533, max_processes, drive_, out).exit_code == 0
+               ? nlohmann::json::parse(read_file(out / "metrics.json")).at("camera")
+               : nlohmann::json();
+  };
+  const nlohmann::json expected = camera_at(100);
+  ASSERT_LT(expected.at("cx_sigma_px"), 9.0) << "of 10 px that are assumed";
+  int num_run = 0;
+  for (int max_processes = 2; max_processes <= 8; ++max_processes) {
+    const nlohmann::json camera = camera_at(max_processes);
+    EXPECT_TRUE(camera.is_null() || camera == expected) << max_processes << ": " << camera;
+    num_run += camera.is_null() ? 0 : 1;
+  }
+  EXPECT_GE(num_run, 3);
 }
 
 /// From where the program's libraries are loaded on: the dynamic loader says what it lacks.
