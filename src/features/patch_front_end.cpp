@@ -35,6 +35,7 @@ constexpr double kFewFound = 0.3;
 /// Motions of points between two images.
 class Motions {
  public:
+  explicit Motions(std::size_t max_size) { known_.reserve(max_size); }
   [[nodiscard]] bool empty() const { return known_.empty(); }
   void add(const cv::Point2f& from, const cv::Point2f& motion) { known_.push_back({from, motion}); }
   /// Median of the nearest; none: 0.
@@ -116,8 +117,17 @@ bool PatchFrontEnd::begin_track(const TrackingImage& image, const Point& point) 
   Track track;
   track.warp = {point.uv.x, point.uv.y};
   const Pyramid pyramid = static_cast<const PatchImage&>(image).pyramid;
-  return cut_patch(pyramid, point.uv.x, point.uv.y, track.patch) &&
-         tracks_.emplace(point.id, track).second;
+  if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
+    return false;
+  }
+  if (ended_.empty()) {
+    return tracks_.emplace(point.id, track).second;
+  }
+  auto node = std::move(ended_.back());
+  ended_.pop_back();
+  node.key() = point.id;
+  node.mapped() = track;
+  return tracks_.insert(std::move(node)).inserted;
 }
 
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
@@ -127,7 +137,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   const int coarsest = static_cast<int>(pyramid.size()) - 1;
   const int top = coarsest - 1;
   const int predicted = std::min(kPredictedLevel, top);
-  Motions motions;
+  Motions motions(from.points.size());
   const auto align = [&](const Point& point, const cv::Point2f& motion, int first_level) {
     const Track& track = tracks_.at(point.id);
     const cv::Point2f start = point.uv + motion;
@@ -209,7 +219,7 @@ std::optional<cv::Point2f> PatchFrontEnd::find_again(const TrackingImage& image,
   const cv::Point2f uv(found.warp.x, found.warp.y);
   const cv::Point2f off = uv - point.uv;
   if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
-    tracks_.erase(known);
+    ended_.push_back(tracks_.extract(known));
     return std::nullopt;
   }
   track.warp = found.warp;
@@ -223,10 +233,15 @@ void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
     const auto found = std::ranges::lower_bound(points, id, {}, id_of);
     return found != points.end() && std::invoke(id_of, *found) == id;
   };
-  std::erase_if(tracks_, [&](const auto& track) {
-    return !has(last, &Point::id, track.first) && !has(good, &Point::id, track.first) &&
-           !has(expected, &TrackPoint::track_id, track.first);
-  });
+  for (auto track = tracks_.begin(); track != tracks_.end();) {
+    const int id = track->first;
+    const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
+                         has(expected, &TrackPoint::track_id, id);
+    const auto current = track++;
+    if (!goes_on) {
+      ended_.push_back(tracks_.extract(current));
+    }
+  }
 }
 
 void PatchFrontEnd::write_tracks(StateWriter& writer) const { writer(tracks_); }

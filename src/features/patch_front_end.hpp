@@ -49,7 +49,8 @@ class PatchFrontEnd final : public PointFrontEnd {
   [[nodiscard]] static bool accept(
       const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track);
 
-  std::map<int, Track> tracks_;  ///< by id
+  std::map<int, Track> tracks_;                         ///< by id
+  std::vector<std::map<int, Track>::node_type> ended_;  ///< their memory is that of new ones
 };
 
 }  // namespace stemvo
