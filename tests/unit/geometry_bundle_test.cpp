@@ -108,43 +108,128 @@ TEST(Bundle, EndsWhereCeresDoes) {
   }
 }
 
-void expect_alike(const BundleSums::Column& a, const BundleSums::Column& b, int num_rows) {
-  for (int r = 0; r < num_rows; ++r) {
-    EXPECT_NEAR(a[r], b[r], 1e-9 * (1.0 + std::abs(b[r])));
-  }
-}
+constexpr int kCamera = BundleSums::kCamera;
 
-/// By the widest instructions of this processor, and by those that every one has.
-TEST(BundleSums, DifferInTheLastDigitsFromThePortableOnes) {
-  Bundle bundle = bundle_of(DriveTracks(6, 0.3, 8), 1.0);
-  bundle.radial = Eigen::Vector2d(0.01, -0.003);
+std::vector<Reprojection> reprojections_of(const Bundle& bundle) {
   std::vector<Reprojection> at;
   for (const Bundle::Observation& seen : bundle.observations) {
     const Rigid3& pose = bundle.camera_from_world[static_cast<std::size_t>(seen.pose)];
-    at.emplace_back(bundle, seen, pose.rotation_matrix()).weight = 0.5;
+    at.emplace_back(bundle, seen, pose.rotation_matrix());
   }
-  BundleSums sums(bundle, 2, true);
-  BundleSums portable = sums;
-  sums.add_up(bundle, at, 1e-7);
-  portable.add_up(bundle, at, 1e-7, false);
-  expect_alike(sums.camera.gradient, portable.camera.gradient, BundleSums::kCamera);
-  expect_alike(sums.camera.diagonal, portable.camera.diagonal, BundleSums::kCamera);
-  for (std::size_t c = 0; c < 5; ++c) {
-    expect_alike(sums.camera.with_camera[c], portable.camera.with_camera[c], BundleSums::kCamera);
+  return at;
+}
+
+/// Errors where the unknowns move: the camera's five, the free poses' six, the points' three.
+Eigen::VectorXd errors_at(Bundle bundle, const Eigen::VectorXd& x, int num_fixed) {
+  bundle.camera.cx_px += x[0];
+  bundle.camera.cy_px += x[1];
+  bundle.camera.fx_px *= 1.0 + x[2];
+  bundle.camera.fy_px *= 1.0 + x[2];
+  bundle.radial += x.segment<2>(3);
+  int row = kCamera;
+  for (std::size_t i = static_cast<std::size_t>(num_fixed); i < bundle.camera_from_world.size();
+       ++i, row += 6) {
+    Rigid3& pose = bundle.camera_from_world[i];
+    const Eigen::Quaterniond turn = so3_exp(x.segment<3>(row));
+    pose = Rigid3(turn * pose.rotation, turn * pose.translation + x.segment<3>(row + 3));
   }
-  ASSERT_EQ(sums.poses.size(), 4U);
-  for (std::size_t i = 0; i < sums.poses.size(); ++i) {
-    expect_alike(sums.poses[i].gradient, portable.poses[i].gradient, 6);
-    expect_alike(sums.poses[i].diagonal, portable.poses[i].diagonal, 6);
+  for (Eigen::Vector3d& point : bundle.points) {
+    point += x.segment<3>(row);
+    row += 3;
+  }
+  Eigen::VectorXd errors(2 * std::ssize(bundle.observations));
+  row = 0;
+  for (const Reprojection& at : reprojections_of(bundle)) {
+    errors.segment<2>(row) = at.error;
+    row += 2;
+  }
+  return errors;
+}
+
+/// The normal equations of all unknowns, by differences; the gradient is the last column.
+Eigen::MatrixXd normal_equations(const Bundle& bundle, double weight, int num_fixed) {
+  const int num_poses = static_cast<int>(bundle.camera_from_world.size()) - num_fixed;
+  const Eigen::Index size = kCamera + 6 * num_poses + 3 * std::ssize(bundle.points);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size);
+  Eigen::MatrixXd jacobian(2 * std::ssize(bundle.observations), size + 1);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    constexpr double kStep = 1e-6;
+    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(size, i);
+    jacobian.col(i) =
+        (errors_at(bundle, step, num_fixed) - errors_at(bundle, -step, num_fixed)) / (2.0 * kStep);
+  }
+  jacobian.col(size) = errors_at(bundle, zero, num_fixed);
+  return weight * jacobian.transpose() * jacobian;
+}
+
+/// With the points eliminated.
+Eigen::MatrixXd reduced(const Eigen::MatrixXd& all, Eigen::Index size, double damping) {
+  const Eigen::Index num_points = all.rows() - 1 - size;
+  Eigen::MatrixXd points = all.block(size, size, num_points, num_points);
+  points.diagonal() *= 1.0 + damping;
+  const Eigen::MatrixXd mixed = all.block(0, size, size, num_points);
+  Eigen::MatrixXd result(size, size + 1);
+  result.leftCols(size) =
+      all.topLeftCorner(size, size) - mixed * points.ldlt().solve(mixed.transpose());
+  result.col(size) = all.col(all.cols() - 1).head(size) -
+                     mixed * points.ldlt().solve(all.col(all.cols() - 1).segment(size, num_points));
+  return result;
+}
+
+/// As above, of the sums: rows and columns up to the diagonal, then the gradient.
+Eigen::MatrixXd reduced(const BundleSums& sums) {
+  const int size = kCamera + 6 * sums.num_free_poses();
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size + 1);
+  const auto put = [&](const BundleSums::Column& column, int num_rows, int row, int col) {
+    for (int r = 0; r < num_rows; ++r) {
+      result(row + r, col) = column[r];
+    }
+  };
+  put(sums.camera.gradient, kCamera, 0, size);
+  for (int c = 0; c < kCamera; ++c) {
+    put(sums.camera.with_camera[static_cast<std::size_t>(c)], kCamera, 0, c);
+  }
+  for (int j = 0; j < sums.num_free_poses(); ++j) {
+    const BundleSums::Pose& pose = sums.poses[static_cast<std::size_t>(j)];
+    put(pose.gradient, 6, kCamera + 6 * j, size);
     for (std::size_t c = 0; c < 6; ++c) {
-      expect_alike(sums.poses[i].with_camera[c], portable.poses[i].with_camera[c], 5);
+      const int col = kCamera + 6 * j + static_cast<int>(c);
+      put(pose.with_camera[c], kCamera, 0, col);
+      for (int i = 0; i <= j; ++i) {
+        put(sums.of_poses[sums.index_of(i, j)][c], 6, kCamera + 6 * i, col);
+      }
     }
   }
-  ASSERT_EQ(sums.of_poses.size(), 10U);
-  for (std::size_t i = 0; i < sums.of_poses.size(); ++i) {
-    EXPECT_NE(sums.of_poses[i][0][0], 0.0);
-    for (std::size_t c = 0; c < 6; ++c) {
-      expect_alike(sums.of_poses[i][c], portable.of_poses[i][c], 6);
+  return result;
+}
+
+/// By the widest instructions of this processor, and by those that every one has.
+TEST(BundleSums, AreTheNormalEquationsWithoutThePoints) {
+  constexpr double kDamping = 1e-3;
+  constexpr double kWeight = 0.5;
+  constexpr int kFixed = 2;
+  Bundle bundle = bundle_of(DriveTracks(6, 0.3, 8), 1.0);
+  bundle.radial = Eigen::Vector2d(0.01, -0.003);
+  bundle.points.resize(40);
+  std::erase_if(bundle.observations, [](const auto& seen) { return seen.point >= 40; });
+  const Eigen::MatrixXd all = normal_equations(bundle, kWeight, kFixed);
+  std::vector<Reprojection> at = reprojections_of(bundle);
+  for (Reprojection& one : at) {
+    one.weight = kWeight;
+  }
+  BundleSums sums(bundle, kFixed, /*has_camera=*/true);
+  ASSERT_EQ(sums.num_free_poses(), 4);
+  for (const bool is_vectorized : {false, true}) {
+    sums.add_up(bundle, at, kDamping, is_vectorized);
+    const Eigen::MatrixXd found = reduced(sums);
+    const Eigen::MatrixXd expected = reduced(all, found.rows(), kDamping);
+    for (Eigen::Index col = 0; col < found.cols(); ++col) {
+      const Eigen::Index last = std::min(col, found.rows() - 1);
+      const double squares = all.diagonal()[col < found.rows() ? col : all.rows() - 1];
+      for (Eigen::Index row = 0; row <= last; ++row) {
+        EXPECT_NEAR(found(row, col), expected(row, col), 1e-7 * std::sqrt(all(row, row) * squares))
+            << row << ", " << col << ", " << is_vectorized;
+      }
     }
   }
 }
