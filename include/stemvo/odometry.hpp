@@ -40,7 +40,7 @@ class Odometry {
   /// world_from_camera of every frame so far, as the window of keyframes last knew it: with its
   /// look-ahead. Mode two_frame refines nothing: the poses as they came.
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
-  /// Landmarks seen from at least 3 keyframes under at least 1.5 degrees of parallax, as they were
+  /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
   /// when they left the window, or are now.
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
