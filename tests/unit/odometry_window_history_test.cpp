@@ -74,7 +74,7 @@ TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
   Window window;
   WindowHistory history;
   const cv::Mat image(200, 200, CV_8UC1, cv::Scalar(7));
-  for (int i = 0; i < 3; ++i) {  // 1 m apart; the last two see a landmark 4 m from the first
+  for (int i = 0; i < 4; ++i) {  // 1 m apart; all see a landmark 4 m from the first
     Keyframe keyframe{i, Rigid3(Eigen::Quaterniond::Identity(), {1.0 * i, 0.0, 0.0}), {}, {}};
     keyframe.points.push_back({7, {100.0, 100.0}});
     window.keyframes.push_back(keyframe);
@@ -83,7 +83,8 @@ TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
   }
   window.keyframes[0].points.clear();
   window.keyframes[2].points.clear();
-  const Keyframe coming{3, Rigid3(Eigen::Quaterniond::Identity(), {3.0, 0.0, 0.0}), {}, {}};
+  window.keyframes[3].points.clear();
+  const Keyframe coming{4, Rigid3(Eigen::Quaterniond::Identity(), {4.0, 0.0, 0.0}), {}, {}};
   history.leave(window, 1, coming);
   ASSERT_EQ(history.landmarks().size(), 1U);
   rescale(window, 2.0, Eigen::Vector3d::Zero());
