@@ -63,11 +63,26 @@ bool holds_only_a_drive(const fs::path& folder) {
          holds_only(folder / "depth", is_frame);
 }
 
+/// The mark last: a kill leaves what the next drive may remove.
+std::error_code remove_drive(const fs::path& folder) {
+  std::error_code code;
+  for (const std::string_view name : kContents) {
+    if (!code) {
+      fs::remove_all(folder / name, code);
+    }
+  }
+  if (!code) {
+    fs::remove_all(folder, code);
+  }
+  return code;
+}
+
 }  // namespace
 
 DriveFolder::DriveFolder(const fs::path& out_dir, const std::string& name)
     : sequence_dir_(out_dir / "sequences" / (name + ".unfinished")),
       final_dir_(out_dir / "sequences" / name),
+      replaced_dir_(out_dir / "sequences" / (name + ".replaced")),
       final_poses_(out_dir / "poses" / (name + ".txt")) {}
 
 Expected<pipeline::FolderLock> DriveFolder::prepare(bool with_depth) const {
@@ -98,6 +113,11 @@ Status DriveFolder::check_final_names() const {
                       "or none, found something else (--name gives another name)",
                       path.string()));
     }
+  }
+  if (fs::exists(replaced_dir_, code) && !fs::exists(replaced_dir_ / kMark, code) &&
+      !fs::is_empty(replaced_dir_, code)) {
+    return fail(fmt::format("{}: expected a drive that was replaced or none, found something else",
+                            replaced_dir_.string()));
   }
   return check_texts();
 }
@@ -131,14 +151,15 @@ Status DriveFolder::mark_texts() const {
 
 Status DriveFolder::make_folders(bool with_depth) const {
   std::error_code code;
-  const bool is_empty = fs::is_empty(sequence_dir_, code);
-  if (code) {
-    return cannot("list the folder", sequence_dir_, code);
-  }
+  const bool is_new =
+      holds_only(sequence_dir_, [](const auto& entry) { return entry.path().stem() == kMark; });
   const bool is_ours = fs::exists(sequence_dir_ / kMark, code) && holds_only_a_drive(sequence_dir_);
-  if (!is_ours && !is_empty) {
+  if (!is_ours && !is_new) {
     return fail(fmt::format("{}: expected an unfinished drive or none, found something else",
                             sequence_dir_.string()));
+  }
+  if (Status marked = write_text_file(sequence_dir_ / kMark, ""); !marked) {
+    return marked;
   }
   for (const std::string_view name : kContents) {
     fs::remove_all(sequence_dir_ / name, code);
@@ -154,7 +175,7 @@ Status DriveFolder::make_folders(bool with_depth) const {
       }
     }
   }
-  return write_text_file(sequence_dir_ / kMark, "");
+  return {};
 }
 
 bool DriveFolder::has_earlier() const {
@@ -163,8 +184,7 @@ bool DriveFolder::has_earlier() const {
 }
 
 Status DriveFolder::abandon() const {
-  std::error_code code;
-  fs::remove_all(sequence_dir_, code);
+  const std::error_code code = remove_drive(sequence_dir_);
   return code ? Status(cannot("remove the unfinished drive", sequence_dir_, code)) : Status();
 }
 
@@ -172,13 +192,19 @@ Status DriveFolder::finish() const {
   if (Status status = mark_texts(); !status) {
     return status;
   }
-  std::error_code code;
-  fs::remove_all(final_dir_, code);
+  std::error_code code = remove_drive(replaced_dir_);
+  std::error_code absent;
+  if (!code && fs::exists(final_dir_, absent)) {
+    fs::rename(final_dir_, replaced_dir_, code);
+  }
   if (!code) {
     fs::rename(sequence_dir_ / kPoses, final_poses_, code);
   }
   if (!code) {
     fs::rename(sequence_dir_, final_dir_, code);
+  }
+  if (!code) {
+    code = remove_drive(replaced_dir_);
   }
   return code ? Status(cannot("replace the drive", final_dir_, code)) : Status();
 }

@@ -50,6 +50,7 @@ class DriveFolder {
 
   std::filesystem::path sequence_dir_;  ///< while it is made, with the poses in it: NAME.unfinished
   std::filesystem::path final_dir_;
+  std::filesystem::path replaced_dir_;  ///< the drive before, while it goes
   std::filesystem::path final_poses_;
 };
 

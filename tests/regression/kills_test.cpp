@@ -146,6 +146,64 @@ TEST_P(Kills, LeaveWholeFilesAndTheSameResults) {
   }
 }
 
+/// Killed while a drive takes the place of another, which begins with its mark.
+TEST(KillsOfSynth, LeaveAWholeDriveOrNone) {
+  const TempFolder folder;
+  const fs::path sequences = folder / "drive/sequences";
+  const auto arguments = [&](int seed) {
+    return std::vector<std::string>{
+        "synth", folder / "drive", "--frames", "100",    "--width",
+        "64",    "--height",       "32",       "--seed", std::to_string(seed)};
+  };
+  const auto num_frames = [](const fs::path& drive) {
+    return std::distance(fs::directory_iterator(drive / "image_2"), fs::directory_iterator());
+  };
+  ASSERT_EQ(run_stemvo(arguments(1)).exit_code, 0);
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> delay_us(0, 1500);
+  int num_killed = 0;
+  for (int i = 0; i < 10; ++i) {
+    test::RunningProgram program(STEMVO_PROGRAM, arguments(2 + i));
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    std::error_code code;
+    const fs::path mark = sequences / "00.unfinished/rendered_by_stemvo";
+    while (std::chrono::steady_clock::now() < give_up) {
+      if (const auto size = fs::file_size(mark, code); !code && size > 0) {
+        break;
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(delay_us(random)));
+    program.send(SIGKILL);
+    const ProgramResult result = program.wait();
+    EXPECT_THAT(result.exit_code, AnyOf(0, 128 + SIGKILL)) << result.err;
+    num_killed += result.exit_code != 0;
+    if (fs::exists(sequences / "00")) {
+      EXPECT_EQ(num_frames(sequences / "00"), 100) << i;
+    }
+  }
+  EXPECT_GT(num_killed, 0);
+  const ProgramResult last = run_stemvo(arguments(1));
+  ASSERT_EQ(last.exit_code, 0) << last.err;
+  EXPECT_EQ(num_frames(sequences / "00"), 100);
+  EXPECT_EQ(std::distance(fs::directory_iterator(sequences), fs::directory_iterator()), 1);
+}
+
+/// Killed before its mark had its name, or while the drive before was removed.
+TEST(KillsOfSynth, WhatTheyLeaveIsReplaced) {
+  const TempFolder folder;
+  const fs::path sequences = folder / "sequences";
+  fs::create_directories(sequences / "00.unfinished");
+  write_file(sequences / "00.unfinished/rendered_by_stemvo.unfinished", "");
+  fs::create_directories(sequences / "00.replaced/image_2");
+  const std::vector<std::string> arguments = {"synth",   folder.path(), "--frames", "2",
+                                              "--width", "64",          "--height", "32"};
+  expect_error(run_stemvo(arguments), 1, {"00.replaced", "expected a drive that was replaced"});
+  write_file(sequences / "00.replaced/rendered_by_stemvo", "");
+  const ProgramResult done = run_stemvo(arguments);
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_EQ(std::distance(fs::directory_iterator(sequences), fs::directory_iterator()), 1);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Commands,
     Kills,
