@@ -176,7 +176,7 @@ class DriveLoop {
     }
     const std::filesystem::path& out = run_.request.out_dir;
     keep_first(drive_.written, write_text_file(out / "frames.csv", drive_.csv));
-    if (!checkpoint_.empty()) {
+    if (drive_.interrupted && !checkpoint_.empty()) {
       keep_first(drive_.written, write_text_file(checkpoint_file(out), checkpoint_));
     }
   }

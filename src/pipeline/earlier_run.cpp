@@ -29,7 +29,19 @@ bool is_own_file(const fs::path& file) {
   return fs::is_regular_file(fs::symlink_status(file, code));
 }
 
-/// None through a link.
+}  // namespace
+
+bool has_earlier_run(const fs::path& out_dir) {
+  const auto frames = read_text_file(out_dir / "frames.csv");
+  return frames && frames->starts_with(frames_csv_header());
+}
+
+std::vector<std::string> run_files() {
+  std::vector<std::string> names(std::begin(kResults), std::end(kResults));
+  names.insert(names.end(), {"frames.csv", "config.yaml", "checkpoint"});
+  return names;
+}
+
 std::vector<fs::path> old_pictures(const fs::path& out_dir) {
   const fs::path folder = out_dir / "pictures";
   std::error_code code;
@@ -45,19 +57,6 @@ std::vector<fs::path> old_pictures(const fs::path& out_dir) {
     return !is_number || name.extension() != ".png" || !is_own_file(file);
   });
   return found;
-}
-
-}  // namespace
-
-bool has_earlier_run(const fs::path& out_dir) {
-  const auto frames = read_text_file(out_dir / "frames.csv");
-  return frames && frames->starts_with(frames_csv_header());
-}
-
-std::vector<std::string> run_files() {
-  std::vector<std::string> names(std::begin(kResults), std::end(kResults));
-  names.insert(names.end(), {"frames.csv", "config.yaml", "checkpoint"});
-  return names;
 }
 
 Status check_pictures(const fs::path& out_dir) {

@@ -16,6 +16,9 @@ namespace stemvo::pipeline {
 /// Its frames.csv tells it.
 [[nodiscard]] bool has_earlier_run(const std::filesystem::path& out_dir);
 
+/// OUT_DIR/pictures/NNNNNN.png; none through a link.
+[[nodiscard]] std::vector<std::filesystem::path> old_pictures(const std::filesystem::path& out_dir);
+
 /// Error: OUT_DIR/pictures is a link, or holds files of six digits and ".png" where no run has been
 /// (no frames.csv of a run in OUT_DIR): they are not for us to remove.
 [[nodiscard]] Status check_pictures(const std::filesystem::path& out_dir);

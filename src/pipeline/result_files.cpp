@@ -13,6 +13,8 @@
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
+#include "pipeline/checkpoint.hpp"
+#include "pipeline/earlier_run.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
 #include "report/map_ply.hpp"
@@ -122,17 +124,10 @@ class ResultWriter {
   /// All but metrics.json and report.html.
   [[nodiscard]] Status write(MetricsReport& report) const {
     const std::filesystem::path& folder = request_.out_dir;
-    std::vector<double> times_s;
-    for (std::size_t i = 0; i < trajectory_.size(); ++i) {
-      times_s.push_back(sequence_.time_s(i));
-    }
-    Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
-    keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
-    if (refined_) {
-      keep_first(written,
-                 write_kitti_trajectory(folder / "trajectory_refined_kitti.txt", *refined_));
-      keep_first(written,
-                 write_tum_trajectory(folder / "trajectory_refined_tum.txt", times_s, *refined_));
+    Status written = write_poses();
+    if (!written && make_room()) {  // they come before all else
+      static_cast<void>(write_poses());
+      static_cast<void>(write_text_file(folder / "frames.csv", drive_.csv));
     }
     report = make_report();
     keep_first(written, drive_.written);
@@ -159,6 +154,41 @@ class ResultWriter {
   }
 
  private:
+  [[nodiscard]] Status write_poses() const {
+    const std::filesystem::path& folder = request_.out_dir;
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < trajectory_.size(); ++i) {
+      times_s.push_back(sequence_.time_s(i));
+    }
+    Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
+    keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
+    if (refined_) {
+      keep_first(written,
+                 write_kitti_trajectory(folder / "trajectory_refined_kitti.txt", *refined_));
+      keep_first(written,
+                 write_tum_trajectory(folder / "trajectory_refined_tum.txt", times_s, *refined_));
+    }
+    return written;
+  }
+
+  /// On a disk that is full: this run's images go, and the state to go on from where it is done.
+  /// False: the disk is not to blame.
+  [[nodiscard]] bool make_room() const {
+    constexpr std::uintmax_t kFull = 16'000'000;
+    std::error_code code;
+    if (const auto space = std::filesystem::space(request_.out_dir, code);
+        code || space.available > kFull) {
+      return false;
+    }
+    if (!drive_.interrupted) {
+      std::filesystem::remove(checkpoint_file(request_.out_dir), code);
+    }
+    for (const std::filesystem::path& image : old_pictures(request_.out_dir)) {
+      std::filesystem::remove(image, code);
+    }
+    return true;
+  }
+
   [[nodiscard]] MetricsReport make_report() const {
     const std::chrono::duration<double> elapsed =
         std::chrono::steady_clock::now() - request_.started +

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 
@@ -170,6 +171,39 @@ TEST_F(Faults, AFileThatMayNotGrowIsAnErrorThatNamesIt) {
     test::expect_whole_files(out_);
   }
   EXPECT_GE(num_failed, 2);
+}
+
+/// A disk of 400 kB that goes.
+class SmallDisk {
+ public:
+  explicit SmallDisk(fs::path folder) : folder_(std::move(folder)) {
+    fs::create_directories(folder_);
+    is_there_ = ::mount("tmpfs", folder_.c_str(), "tmpfs", 0, "size=400k") == 0;
+  }
+  ~SmallDisk() {
+    if (is_there_) {
+      ::umount(folder_.c_str());
+    }
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  [[nodiscard]] bool is_there() const { return is_there_; }
+
+ private:
+  fs::path folder_;
+  bool is_there_ = false;
+};
+
+TEST_F(Faults, OnAFullDiskPosesComeBeforeImages) {
+  const SmallDisk disk(out_);
+  if (!disk.is_there()) {
+    GTEST_SKIP() << "expected root, who can mount";
+  }
+  write_file(out_ / "fill", std::string(100 << 10, ' '));
+  expect_error(run_stemvo(arguments()), 1, {out_.string(), "No space left on device"});
+  EXPECT_EQ(num_lines("trajectory_kitti.txt"), kNumFrames);
+  EXPECT_EQ(num_lines("trajectory_refined_tum.txt"), kNumFrames);
+  EXPECT_EQ(num_lines("frames.csv"), kNumFrames + 1);
 }
 
 }  // namespace
