@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "benchmark/kept_run.hpp"
+#include "pipeline/earlier_run.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
@@ -153,7 +154,7 @@ class Benchmark {
     for (const Json& sequence : report_["sequences"]) {
       for (const Json& run : sequence["runs"]) {
         const fs::path folder = run_dir(sequence, run).lexically_relative(request_.out_dir);
-        for (const char* name : benchmark::kResultFiles) {
+        for (const std::string& name : pipeline::run_files()) {
           names.push_back(folder / name);
         }
         names.push_back(folder / benchmark::kInputsFile);

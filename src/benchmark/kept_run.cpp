@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "pipeline/earlier_run.hpp"
 #include "pipeline/input_hashes.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
@@ -21,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 /// With the hashes of the results beside them: one that was touched does not count.
 Json with_results(const fs::path& folder, Json hashes) {
-  for (const char* name : kResultFiles) {
+  for (const std::string& name : pipeline::run_files()) {
     const Expected<std::string> text = read_text_file(folder / name);
     hashes[name] = text ? internal::sha256_hex(*text) : "cannot be read";
   }

@@ -17,7 +17,6 @@ namespace stemvo::benchmark {
 inline constexpr const char* kInputsFile = "benchmark_inputs.json";  // of a run that is done
 inline constexpr const char* kMetricsFile = "metrics.json";
 inline constexpr const char* kPosesFile = "trajectory_kitti.txt";
-inline constexpr const char* kResultFiles[] = {kMetricsFile, kPosesFile};  // that are read again
 
 /// Hashes of everything a result depends on.
 [[nodiscard]] Expected<nlohmann::ordered_json> hash_inputs(const RunRequest& run,

@@ -382,9 +382,13 @@ Status RecordFile::append(const std::vector<FilterRecord>& records) {
     to_json(json, record);
     text += sealed(text_of(json), seal) + '\n';
   }
-  std::error_code ignored;
-  if (std::filesystem::file_size(file_, ignored) + text.size() >
-      std::uintmax_t{kMaxRecords_MB} * 1000000) {
+  std::error_code code;
+  const std::uintmax_t size = std::filesystem::file_size(file_, code);
+  if (code) {
+    return fail(
+        fmt::format("{}: expected the records written so far: {}", file_.string(), code.message()));
+  }
+  if (size + text.size() > std::uintmax_t{kMaxRecords_MB} * 1000000) {
     return fail(fmt::format(
         "{}: expected at most {} MB of records, which can be read again, found more to write; "
         "give the other filters (--filters), sequences or frames an --out of their own",
