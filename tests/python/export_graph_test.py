@@ -14,13 +14,13 @@ import export_stem
 from stems import receptive_field
 
 
-def network(path, *, colours_last=False, free=True, same=b"SAME_UPPER"):
+def network(path, *, colours_last=False, free=True, same=b"SAME_UPPER", image="x"):
     """Convolution 5x5/2 "same", squeeze and excitation, depthwise 3x3, padded pool, a dense layer."""
     rng = np.random.default_rng(11)
     constants = [numpy_helper.from_array(rng.normal(size=shape).astype(np.float32), name) for name, shape in
                  (("w1", (6, 3, 5, 5)), ("w2", (6, 1, 3, 3)), ("squeeze", (6, 6, 1, 1)), ("dense", (6, 4)))]
-    nodes = [helper.make_node("Transpose", ["x"], ["planes"], perm=[0, 3, 1, 2])] if colours_last else []
-    nodes += [helper.make_node("Conv", ["planes" if colours_last else "x", "w1"], ["front"], name="conv_1", kernel_shape=[5, 5],
+    nodes = [helper.make_node("Transpose", [image], ["planes"], perm=[0, 3, 1, 2])] if colours_last else []
+    nodes += [helper.make_node("Conv", ["planes" if colours_last else image, "w1"], ["front"], name="conv_1", kernel_shape=[5, 5],
                                strides=[2, 2], auto_pad=same),
               helper.make_node("Relu", ["front"], ["front/relu"]),
               helper.make_node("MaxPool", ["front/relu"], ["pooled"], kernel_shape=[3, 3], strides=[2, 2], pads=[1, 1, 1, 1]),
@@ -34,11 +34,27 @@ def network(path, *, colours_last=False, free=True, same=b"SAME_UPPER"):
               helper.make_node("MatMul", ["mean", "dense"], ["y"])]
     sides = ["H", "W"] if free else [32, 48]
     shape = [1, *sides, 3] if colours_last else [1, 3, *sides]
-    graph = helper.make_graph(nodes, "network", [helper.make_tensor_value_info("x", TensorProto.FLOAT, shape)],
+    graph = helper.make_graph(nodes, "network", [helper.make_tensor_value_info(image, TensorProto.FLOAT, shape)],
                               [helper.make_tensor_value_info("y", TensorProto.FLOAT, [1, 4])], constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)])
     model.ir_version = 8
     onnx.checker.check_model(model)
+    onnx.save(model, path)
+    return model
+
+
+def with_computed_weights(path, kind, operators):
+    """Convolution 5x5/2 whose weights the nodes (operator, inputs, output, attributes) compute from `w`, up to `computed`."""
+    rng = np.random.default_rng(5)
+    weights = rng.integers(-99, 99, (6, 3, 5, 5)).astype(kind)
+    constants = [numpy_helper.from_array(values, name) for name, values in
+                 (("w", weights), ("scale", rng.uniform(0.01, 0.1, 6).astype(np.float32)), ("three", np.full(3, 2, np.float32)),
+                  ("axes", np.array([1, 2, 3]))) if any(name in inputs for _, inputs, _, _ in operators)]
+    nodes = [helper.make_node(operator, inputs, [output], **more) for operator, inputs, output, more in operators]
+    nodes.append(helper.make_node("Conv", ["x", "computed"], ["front"], kernel_shape=[5, 5], strides=[2, 2], pads=[1, 1, 2, 2]))
+    value = lambda name, shape: helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)  # noqa: E731
+    graph = helper.make_graph(nodes, "computed", [value("x", [1, 3, "H", "W"])], [value("front", [1, 6, None, None])], constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18), helper.make_opsetid("theirs", 1)], ir_version=8)
     onnx.save(model, path)
     return model
 
@@ -51,7 +67,7 @@ def uncut(model, tensor, image, colours_last):
     copy.graph.output[-1].type.tensor_type.elem_type = TensorProto.FLOAT
     feed = image.transpose(1, 2, 0) if colours_last else image
     session = onnxruntime.InferenceSession(copy.SerializeToString(), providers=["CPUExecutionProvider"])
-    return session.run([tensor], {"x": np.ascontiguousarray(feed[None], np.float32)})[0]
+    return session.run([tensor], {model.graph.input[0].name: np.ascontiguousarray(feed[None], np.float32)})[0]
 
 
 def cut(file, image):
@@ -112,6 +128,34 @@ class Cut(Files):
         self.export(self.path, *options, "--size", "48x32")
         self.assertEqual(cut(self.folder / "out" / "whole.onnx", np.zeros((3, 32, 48)))[0].shape, (1, 6, 8, 12))
         self.assertIn("needs its --size WxH", self.error_of(self.path, *options, "--size", "40x32"))
+
+    def test_weights_that_nodes_compute_are_weights(self):
+        for kind, *operators in (
+                (np.int8, ("DequantizeLinear", ["w", "scale"], "computed", {"axis": 0})),
+                (np.float32, ("ReduceMean", ["w", "axes"], "mean", {}), ("Sub", ["w", "mean"], "centred", {}),
+                 ("Mul", ["centred"] * 2, "square", {}), ("ReduceMean", ["square", "axes"], "variance", {}),
+                 ("Sqrt", ["variance"], "sigma", {}), ("Div", ["centred", "sigma"], "computed", {})),
+                (np.float32, ("ReduceL2", ["w", "axes"], "norm", {}), ("Div", ["w", "norm"], "computed", {})),
+                (np.float32, ("BatchNormalization", ["w", *["three"] * 4], "computed", {}))):
+            with self.subTest(operator=operators[0][0]):
+                model = with_computed_weights(self.path, kind, operators)
+                self.export(self.path, "--layers", "front", "--preprocessing", "none")
+                file = self.folder / "out" / "whole.onnx"
+                self.assertEqual([node.op_type for node in onnx.load(file).graph.node], ["Identity", "Conv"])
+                want = uncut(model, "front", self.image, False)
+                self.assertLess(np.abs(cut(file, self.image)[0] - want).max(), 1e-4 * want.std())
+
+    def test_weights_that_cannot_be_computed(self):
+        with_computed_weights(self.path, np.float32, [("Unpack", ["w"], "computed", {"domain": "theirs"})])
+        self.assertIn("whole.onnx: computed: expected weights that ONNX Runtime computes, found:",
+                      self.error_of(self.path, "--layers", "front", "--preprocessing", "none"))
+
+    def test_a_network_whose_input_has_the_name_of_ours(self):
+        for colours_last in (False, True):
+            model = network(self.path, colours_last=colours_last, image="image")
+            self.export(self.path, "--layers", "front", "--preprocessing", "none")
+            want = uncut(model, "front", self.image, colours_last)
+            self.assertLess(np.abs(cut(self.folder / "out" / "whole.onnx", self.image)[0] - want).max(), 1e-4 * want.std())
 
     def test_errors(self):
         network(self.path)

@@ -14,17 +14,17 @@ def _expected(layer, size):
     return ((size[1] + top + bottom - rows) // layer.stride + 1, (size[0] + left + right - columns) // layer.stride + 1)
 
 
-def _session(model):
+def session(model):
     options = onnxruntime.SessionOptions()
     options.log_severity_level = 4
     return onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
 
 
-def _problem(session, layers, size):
+def _problem(running, layers, size):
     """What is wrong on a picture of this size; None if nothing."""
     image = np.random.default_rng(1).uniform(0, 255, (1, 3, size[1], size[0])).astype(np.float32)
     try:
-        outputs = session.run([layer.name for layer in layers], {onnx_writer.INPUT: image})
+        outputs = running.run([layer.name for layer in layers], {onnx_writer.INPUT: image})
     except Exception as error:  # noqa: BLE001  the runtime's own types differ between its versions
         return " ".join(str(error).split())[:200]
     for layer, output in zip(layers, outputs):
@@ -43,11 +43,11 @@ def checked(path, model, layers, size):
     small = max(6 * stride, 96)
     problem = None
     try:
-        session = _session(model)
+        running = session(model)
     except Exception as error:  # noqa: BLE001
         problem = " ".join(str(error).split())[:200]
     for free in ((small + stride - 1, small + stride // 2), (small + stride, small)):
-        problem = problem or _problem(session, layers, free)
+        problem = problem or _problem(running, layers, free)
     if problem is None:
         return model
     if size is None:
@@ -57,7 +57,7 @@ def checked(path, model, layers, size):
     model.graph.input.append(onnx.helper.make_tensor_value_info(onnx_writer.INPUT, onnx.TensorProto.FLOAT,
                                                                 [1, 3, size[1], size[0]]))
     try:
-        problem = _problem(_session(model), layers, size)
+        problem = _problem(session(model), layers, size)
     except Exception as error:  # noqa: BLE001
         problem = " ".join(str(error).split())[:200]
     if problem is not None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Cuts a whole network (.onnx) at named tensors: image 1x3xHxW, RGB 0..255 -> the layers asked for.
 
-Preprocessing goes in front; "same" paddings, which depend on the size of the picture, become numbers; a
-network whose pictures have their colours last gets a transposition.
+Preprocessing goes in front; "same" paddings, which depend on the size of the picture, and weights that are
+computed become numbers; a network whose pictures have their colours last gets a transposition.
 """
 
 import contextlib
@@ -14,9 +14,9 @@ import numpy as np
 import onnx
 import onnxruntime
 from google.protobuf.message import DecodeError
-from onnx import TensorProto, helper, numpy_helper, shape_inference
+from onnx import TensorProto, compose, helper, numpy_helper, shape_inference
 
-from stems import onnx_writer, receptive_field
+from stems import graph_check, onnx_writer, receptive_field
 from stems.weights import WeightsError
 
 
@@ -71,12 +71,18 @@ def read(path):
     return model
 
 
+def _free_our_input(graph):
+    """Gives a tensor of the network that has our input's name another one."""
+    compose.add_prefix_graph(graph, "", *[False] * 6, inplace=True, name_map={onnx_writer.INPUT: f"network/{onnx_writer.INPUT}"})
+
+
 def _image_input(path, model):
     constants = {item.name for item in model.graph.initializer}
     inputs = [item for item in model.graph.input if item.name not in constants]
     shapes = [[size.dim_value if size.HasField("dim_value") else None for size in item.type.tensor_type.shape.dim]
               for item in inputs]
     if len(inputs) == 1 and len(shapes[0]) == 4 and 3 in (shapes[0][1], shapes[0][3]):
+        _free_our_input(model.graph)
         return inputs[0], shapes[0][1] != 3
     found = ", ".join(f"{item.name} {'x'.join(str(size or '?') for size in shape)}" for item, shape in zip(inputs, shapes))
     raise WeightsError(f"{path}: expected one input 1x3xHxW or 1xHxWx3, found {found or 'none'}")
@@ -174,17 +180,45 @@ def _find(path, model, names):
     return found
 
 
+def _reads(node):
+    """Names of the tensors it is given, and those of the nodes inside it."""
+    inside = (inner for attribute in node.attribute for inner in attribute.g.node)
+    return {name for name in node.input if name}.union(*map(_reads, inside))
+
+
 def _needed(graph, tensors):
     """Nodes that the tensors depend on, in order."""
     wanted, kept = set(tensors), []
     for node in reversed(graph.node):
         if wanted & set(node.output):
             kept.append(node)
-            wanted |= set(node.input)
-            for attribute in node.attribute:
-                for inner in attribute.g.node:
-                    wanted |= set(inner.input)
+            wanted |= _reads(node)
     return kept[::-1], wanted
+
+
+def _compute_constants(path, model, image, tensors):
+    """Weights in place of the nodes that compute them from others (quantised, standardised ones), which stemvo refuses."""
+    variable, constant, kept = {image.name}, [], []
+    for node in _needed(model.graph, tensors)[0]:
+        depends = not variable.isdisjoint(_reads(node))
+        (kept if depends else constant).append(node)
+        variable |= set(node.output) if depends else set()
+    wanted = set(tensors).union(*map(_reads, kept))
+    names = [name for node in constant for name in node.output if name in wanted]
+    if not names:
+        return
+    given = set().union(*map(_reads, constant))
+    graph = helper.make_graph(constant, "constants", [], [helper.make_empty_tensor_value_info(name) for name in names],
+                              [item for item in model.graph.initializer if item.name in given])
+    try:
+        values = graph_check.session(helper.make_model(graph, opset_imports=model.opset_import, functions=model.functions,
+                                                       ir_version=model.ir_version)).run(names, {})
+        model.graph.initializer.extend(map(numpy_helper.from_array, values, names))
+    except Exception as error:  # noqa: BLE001  the runtime's own types differ between its versions
+        raise WeightsError(f"{path}: {names[0]}: expected weights that ONNX Runtime computes, found: "
+                           f"{' '.join(str(error).split())[:200]}") from error
+    del model.graph.node[:]
+    model.graph.node.extend(kept)
 
 
 def _preprocessing_nodes(fed, target, colours_last):
@@ -248,6 +282,7 @@ def cut(path, model, names, fed, size=None, filter_index=None):
     if any(node.op_type == "Shape" for node in _needed(model.graph, tensors)[0]):
         model = _without_size_arithmetic(path, _at_size(model, image, colours_last, size or (256, 256)), tensors)
         image = next(item for item in model.graph.input if item.name == image.name)
+    _compute_constants(path, model, image, tensors)
     copy = _with_free_sizes(model, image, colours_last)
     shapes = infer(_at_size(model, image, colours_last, size or (256, 256)))
     _make_paddings_numbers(copy, shapes)
