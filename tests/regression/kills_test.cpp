@@ -171,6 +171,7 @@ TEST(KillsOfSynth, LeaveAWholeDriveOrNone) {
       if (const auto size = fs::file_size(mark, code); !code && size > 0) {
         break;
       }
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
     }
     std::this_thread::sleep_for(std::chrono::microseconds(delay_us(random)));
     program.send(SIGKILL);
