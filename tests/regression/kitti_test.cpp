@@ -73,23 +73,23 @@ class KittiSpeed : public ::testing::Test {
 
 // Found: 12 ms.
 TEST_F(KittiSpeed, ProcessorTimePerFrameIsBounded) {
-  expect_processor_ms_per_frame({}, folder_ / "result", 25.0);
+  expect_processor_ms_per_frame({}, folder_ / "result", 30.0);
 }
 
 // 7 to 8 ms.
 TEST_F(KittiSpeed, ProcessorTimePerFrameOfPairsIsBounded) {
   expect_processor_ms_per_frame(
       {"--set", "odometry.mode=two_frame", "--set", "scale.source=constant"}, folder_ / "result",
-      18.0);
+      20.0);
 }
 
 // 15 ms; t_rel of these frames at most 1.5 times the defaults'.
 TEST_F(KittiSpeed, FastYamlIsCheaperAndNearlyAsAccurate) {
   const std::string whole = folder_ / "defaults";
   const std::string fast = folder_ / "fast";
-  expect_processor_ms_per_frame({}, whole, 25.0);
+  expect_processor_ms_per_frame({}, whole, 30.0);
   expect_processor_ms_per_frame(
-      {"--threads", "1", "--config", STEMVO_SOURCE_DIR "/config/fast.yaml"}, fast, 16.0);
+      {"--threads", "1", "--config", STEMVO_SOURCE_DIR "/config/fast.yaml"}, fast, 20.0);
   EXPECT_LE(t_rel_percent(fast), 1.5 * t_rel_percent(whole));
 }
 
