@@ -10,10 +10,10 @@
 #include <immintrin.h>
 #endif
 
+#include "instruction_set.hpp"
+
 namespace stemvo {
 namespace {
-
-#define STEMVO_INLINE inline __attribute__((always_inline))
 
 /// Eight samples side by side: one AVX register, two of SSE or NEON. GCC and Clang know it without
 /// intrinsics, and make worse code of plain loops.
@@ -235,8 +235,6 @@ constexpr PatchKernels kPortable{sample_coarse_portable, coarse_sums_portable, s
                                  fine_sums_portable};
 
 #if defined(__x86_64__)
-#define STEMVO_AVX2 __attribute__((target("avx2,fma")))
-
 STEMVO_AVX2 void sample_coarse_avx2(const BorderedImage& image,
                                     float x,
                                     float y,
@@ -320,8 +318,7 @@ const PatchKernels& portable_patch_kernels() { return kPortable; }
 
 const PatchKernels& patch_kernels() {
 #if defined(__x86_64__)
-  static const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return has_avx2 ? kAvx2 : kPortable;
+  return has_avx2() ? kAvx2 : kPortable;
 #else
   return kPortable;
 #endif

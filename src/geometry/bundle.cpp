@@ -8,8 +8,6 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Geometry>
-#include <Eigen/LU>
 
 #include "geometry/bundle_sums.hpp"
 #include "geometry/cauchy_loss.hpp"

@@ -5,11 +5,10 @@
 
 #include <Eigen/LU>
 
+#include "instruction_set.hpp"
+
 namespace stemvo {
 namespace {
-
-// Compiled once for each instruction set, where it is inlined.
-#define STEMVO_INLINE inline __attribute__((always_inline))
 
 using Lanes4 = BundleSums::Lanes4;
 using Column = BundleSums::Column;
@@ -244,19 +243,18 @@ void add_up_points_portable(const Bundle& bundle,
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2,fma"))) void add_up_points_avx2(const Bundle& bundle,
-                                                            const Reprojection* at,
-                                                            const Rotation* rotations,
-                                                            double damping,
-                                                            BundleSums& sums) {
+STEMVO_AVX2 void add_up_points_avx2(const Bundle& bundle,
+                                    const Reprojection* at,
+                                    const Rotation* rotations,
+                                    double damping,
+                                    BundleSums& sums) {
   add_up_points(bundle, at, rotations, damping, sums);
 }
 #endif
 
 AddUpPoints fastest() {
 #if defined(__x86_64__)
-  static const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return has_avx2 ? add_up_points_avx2 : add_up_points_portable;
+  return has_avx2() ? add_up_points_avx2 : add_up_points_portable;
 #else
   return add_up_points_portable;
 #endif

@@ -112,6 +112,12 @@ TEST_F(ResourceLimits, WithoutAThreadForTheCameraItIsMeasuredAllTheSame) {
   EXPECT_GE(num_run, 3);
 }
 
+/// An error that says what ran out.
+void expect_out_of_memory(const ProgramResult& result, int kib) {
+  EXPECT_EQ(result.exit_code, 1) << kib << result.err;
+  EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+}
+
 /// From where the program's libraries are loaded on: the dynamic loader says what it lacks.
 /// Of a filter it says nothing: it must not stand among those that detect nothing.
 TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
@@ -135,8 +141,7 @@ TEST_F(ResourceLimits, TooLittleMemoryToSearch) {
       continue;
     }
     ++num_refused;
-    EXPECT_EQ(result.exit_code, 1) << kib << result.err;
-    EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+    expect_out_of_memory(result, kib);
   }
   EXPECT_GE(num_refused, 3);
 }
@@ -153,8 +158,7 @@ TEST_F(ResourceLimits, TooLittleMemoryToCompare) {
       continue;
     }
     ++num_refused;
-    EXPECT_EQ(result.exit_code, 1) << kib << result.err;
-    EXPECT_THAT(result.err, AnyOf(HasSubstr("out of"), HasSubstr("annot allocate"))) << kib;
+    expect_out_of_memory(result, kib);
   }
   EXPECT_GE(num_refused, 2);
 }
