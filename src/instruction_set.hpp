@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdlib>
+#include <string_view>
+
 // Code that is compiled once for every processor and once for those with AVX2 and FMA: the body is
 // STEMVO_INLINE, and called from a plain function and from one that is STEMVO_AVX2.
 
@@ -12,11 +15,19 @@
 
 namespace stemvo {
 
-/// Whether this processor has what STEMVO_AVX2 is compiled for.
-[[nodiscard]] inline bool has_avx2() {
+/// Whether the environment asks for the code that is compiled for every processor.
+[[nodiscard]] inline bool is_portable_asked_for() {
+  const char* value = std::getenv("STEMVO_PORTABLE");
+  return value != nullptr && std::string_view(value) == "1";
+}
+
+/// Whether what is STEMVO_AVX2 runs: this processor has what it is compiled for, and the portable
+/// code is not asked for. Decided once: a process keeps to one set.
+[[nodiscard]] inline bool uses_avx2() {
 #if defined(__x86_64__)
-  static const bool has = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return has;
+  static const bool uses =
+      __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && !is_portable_asked_for();
+  return uses;
 #else
   return false;
 #endif

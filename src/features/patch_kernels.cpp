@@ -314,11 +314,9 @@ constexpr PatchKernels kAvx2{sample_coarse_avx2, coarse_sums_avx2, sample_fine_a
 
 }  // namespace
 
-const PatchKernels& portable_patch_kernels() { return kPortable; }
-
 const PatchKernels& patch_kernels() {
 #if defined(__x86_64__)
-  return has_avx2() ? kAvx2 : kPortable;
+  return uses_avx2() ? kAvx2 : kPortable;
 #else
   return kPortable;
 #endif

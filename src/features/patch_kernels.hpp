@@ -54,8 +54,7 @@ struct PatchKernels {
                     float* sums);
 };
 
-/// The fastest that this processor runs.
+/// The set that this process uses.
 [[nodiscard]] const PatchKernels& patch_kernels();
-[[nodiscard]] const PatchKernels& portable_patch_kernels();
 
 }  // namespace stemvo

@@ -252,9 +252,9 @@ STEMVO_AVX2 void add_up_points_avx2(const Bundle& bundle,
 }
 #endif
 
-AddUpPoints fastest() {
+AddUpPoints of_this_process() {
 #if defined(__x86_64__)
-  return has_avx2() ? add_up_points_avx2 : add_up_points_portable;
+  return uses_avx2() ? add_up_points_avx2 : add_up_points_portable;
 #else
   return add_up_points_portable;
 #endif
@@ -284,10 +284,7 @@ BundleSums::BundleSums(const Bundle& bundle, int fixed, bool with_camera)
       points(bundle.points.size()),
       pose_with_point(bundle.observations.size()) {}
 
-void BundleSums::add_up(const Bundle& bundle,
-                        const std::vector<Reprojection>& at,
-                        double damping,
-                        bool is_vectorized) {
+void BundleSums::add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
   camera = {};
   std::ranges::fill(poses, Pose());
   std::ranges::fill(of_poses, Block<6>());
@@ -298,8 +295,7 @@ void BundleSums::add_up(const Bundle& bundle,
         Rotation{{Lanes4{r(0, 0), r(0, 1), r(0, 2), 0.0}, Lanes4{r(1, 0), r(1, 1), r(1, 2), 0.0},
                   Lanes4{r(2, 0), r(2, 1), r(2, 2), 0.0}}});
   }
-  (is_vectorized ? fastest() : add_up_points_portable)(bundle, at.data(), rotations.data(), damping,
-                                                       *this);
+  of_this_process()(bundle, at.data(), rotations.data(), damping, *this);
 }
 
 }  // namespace stemvo

@@ -62,12 +62,9 @@ struct BundleSums {
 
   BundleSums(const Bundle& bundle, int num_fixed_poses, bool has_camera);
 
-  /// Around the bundle; `at` is where it sees each observation. By the widest instructions that
-  /// this processor has if `is_vectorized`: the last digits differ.
-  void add_up(const Bundle& bundle,
-              const std::vector<Reprojection>& at,
-              double damping,
-              bool is_vectorized = true);
+  /// Around the bundle; `at` is where it sees each observation. The last digits are those of this
+  /// process's instruction set.
+  void add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
 
   /// Of free poses i <= j.
   [[nodiscard]] std::size_t index_of(int i, int j) const {

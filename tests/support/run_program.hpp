@@ -99,4 +99,11 @@ inline ProgramResult run_stemvo(const std::vector<std::string>& arguments) {
   return run_program(STEMVO_PROGRAM, arguments);
 }
 
+/// The same, as a processor without AVX2 runs it.
+inline ProgramResult run_stemvo_portable(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {"STEMVO_PORTABLE=1", STEMVO_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return run_program("/usr/bin/env", words);
+}
+
 }  // namespace stemvo::test

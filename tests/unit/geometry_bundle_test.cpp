@@ -203,7 +203,6 @@ Eigen::MatrixXd reduced(const BundleSums& sums) {
   return result;
 }
 
-/// By the widest instructions of this processor, and by those that every one has.
 TEST(BundleSums, AreTheNormalEquationsWithoutThePoints) {
   constexpr double kDamping = 1e-3;
   constexpr double kWeight = 0.5;
@@ -219,17 +218,15 @@ TEST(BundleSums, AreTheNormalEquationsWithoutThePoints) {
   }
   BundleSums sums(bundle, kFixed, /*has_camera=*/true);
   ASSERT_EQ(sums.num_free_poses(), 4);
-  for (const bool is_vectorized : {false, true}) {
-    sums.add_up(bundle, at, kDamping, is_vectorized);
-    const Eigen::MatrixXd found = reduced(sums);
-    const Eigen::MatrixXd expected = reduced(all, found.rows(), kDamping);
-    for (Eigen::Index col = 0; col < found.cols(); ++col) {
-      const Eigen::Index last = std::min(col, found.rows() - 1);
-      const double squares = all.diagonal()[col < found.rows() ? col : all.rows() - 1];
-      for (Eigen::Index row = 0; row <= last; ++row) {
-        EXPECT_NEAR(found(row, col), expected(row, col), 1e-7 * std::sqrt(all(row, row) * squares))
-            << row << ", " << col << ", " << is_vectorized;
-      }
+  sums.add_up(bundle, at, kDamping);
+  const Eigen::MatrixXd found = reduced(sums);
+  const Eigen::MatrixXd expected = reduced(all, found.rows(), kDamping);
+  for (Eigen::Index col = 0; col < found.cols(); ++col) {
+    const Eigen::Index last = std::min(col, found.rows() - 1);
+    const double squares = all.diagonal()[col < found.rows() ? col : all.rows() - 1];
+    for (Eigen::Index row = 0; row <= last; ++row) {
+      EXPECT_NEAR(found(row, col), expected(row, col), 1e-7 * std::sqrt(all(row, row) * squares))
+          << row << ", " << col;
     }
   }
 }
