@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "report/evaluate_report.hpp"
 #include "support/ply_reader.hpp"
 #include "support/program_test.hpp"
 
@@ -125,6 +126,28 @@ TEST_F(Run, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
     EXPECT_FALSE(bytes.empty());
     EXPECT_TRUE(bytes == first) << "variant " << i;
   }
+}
+
+/// The code for processors without AVX2: bytes of its own for any number of threads, and a path
+/// near the other one.
+TEST_F(Run, PortableCodeHasItsOwnBytesAndTheSamePath) {
+  const std::string path = "/trajectory_kitti.txt";
+  ASSERT_EQ(run_drive(sequence_, out_).exit_code, 0);
+  for (const std::string threads : {"1", "2"}) {
+    ASSERT_EQ(test::run_stemvo_portable(
+                  {"run", sequence_.string(), "--out", out_ + threads, "--threads", threads})
+                  .exit_code,
+              0);
+  }
+  EXPECT_TRUE(read_file(out_ + "1" + path) == read_file(out_ + "2" + path));
+#if defined(__x86_64__)
+  EXPECT_EQ(read_file(out_ + "1" + path) == read_file(out_ + path),
+            !(__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")));
+#endif
+  const auto difference = evaluate_files({out_ + path, {out_ + "1" + path}});
+  ASSERT_TRUE(difference.has_value());
+  std::cout << difference->rows.front().metrics.ate_rmse.none_m << " m apart\n";
+  EXPECT_LE(difference->rows.front().metrics.ate_rmse.none_m, 0.02);  // found: 0.002
 }
 
 TEST_F(Run, WithoutGroundTruthNoByteOfTheTrajectoryChanges) {
