@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: MIT
 """What each part of the program buys: the defaults, and the defaults with one part replaced.
 
-    tools/ablation.py KITTI_ROOT --out docs/accuracy.md [--sequences 03,00,06] [--seeds 1,2,3]
+    tools/ablation.py KITTI_ROOT --out docs/ablation.md [--sequences 03,00,06] [--seeds 1,2,3]
 
-KITTI_ROOT holds sequences/NN and poses/NN.txt. Two tables: with per-step ground-truth scale (each step takes its true
-length, so that direction and rotation are judged) and with metres from the camera's height (no ground
-truth). Nothing is aligned. "Together" pools the segments of all sequences. With more than one seed of
-the random numbers the means are shown. Where FILE has the lines `<!-- ablation -->` and
-`<!-- end of ablation -->`, what is between them is replaced; else FILE is written whole. A row is a
-heading and the options that make it (ROWS); standard library only.
+KITTI_ROOT holds sequences/NN and poses/NN.txt. A cell has t_rel and r_rel with per-step ground-truth scale
+(each step takes its true length, so that direction and rotation are judged), and t_rel with metres
+from the camera's height (no ground truth). Nothing is aligned. "Together" pools the segments of all
+sequences. With more than one seed of the random numbers the means are shown. A row is a heading and the
+options that make it (ROWS); standard library only.
 """
 
 import argparse
@@ -22,11 +21,8 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-BEGIN, END = "<!-- ablation -->", "<!-- end of ablation -->"
-PROTOCOLS = {
-    "ground_truth": "Per-step ground-truth scale (`scale.source=ground_truth`)",
-    "camera_height": "Metres from the camera's height (`scale.source=camera_height`), no ground truth",
-}
+T_REL, R_REL = "t_rel_percent", "r_rel_deg_per_100m"
+COLUMNS = {"ground_truth": (T_REL, R_REL), "camera_height": (T_REL,)}  # scale.source -> errors in a cell
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +30,7 @@ class Row:
     heading: str
     settings: tuple = ()  # of --set
     config: str = "default"  # of --config
-    protocols: tuple = tuple(PROTOCOLS)  # the road plays no part with per-step ground-truth scale
+    scales: tuple = tuple(COLUMNS)  # the road plays no part with per-step ground-truth scale
 
 
 ROAD = ("camera_height",)
@@ -53,9 +49,9 @@ ROWS = (
     Row("map without refinement", ("refine.every=0",)),
     Row("the paper's recipe, stand-in stem", config=PAPER),
     Row("the paper's recipe on the gray image", ("stem.model=gray", "stem.filter=-1", "stem.sampling_px=0"), PAPER),
-    Row("road: dense alignment only", ("scale.estimators=dense",), protocols=ROAD),
-    Row("road: tracked points only", ("scale.estimators=points",), protocols=ROAD),
-    Row("road: no temporal filter", ("scale.temporal_filter=false",), protocols=ROAD),
+    Row("road: dense alignment only", ("scale.estimators=dense",), scales=ROAD),
+    Row("road: tracked points only", ("scale.estimators=points",), scales=ROAD),
+    Row("road: no temporal filter", ("scale.temporal_filter=false",), scales=ROAD),
 )
 
 
@@ -80,12 +76,9 @@ def mean(values):
     return None if not values or any(value is None for value in values) else sum(values) / len(values)
 
 
-KEYS = ("t_rel_percent", "r_rel_deg_per_100m", "average_offset_m")
-
-
 def averaged(runs):
     """One sequence's numbers, the mean over the seeds."""
-    return {key: mean(run[key] for run in runs) for key in KEYS} | {"segments": runs[0]["segments"]}
+    return {key: mean(run[key] for run in runs) for key in (T_REL, R_REL)} | {"segments": runs[0]["segments"]}
 
 
 def pooled(sequences, key):
@@ -100,69 +93,64 @@ def number(value):
     return "-" if value is None else f"{value:.2f}"
 
 
-def cells(sequences):
-    rows = [" / ".join(number(s[key]) for key in KEYS) for s in sequences]
-    return rows + [" / ".join(number(pooled(sequences, key)) for key in KEYS[:2])]
+def cells(sequences, scale):
+    """The errors of one scale, per sequence and together."""
+    keys = COLUMNS[scale]
+    return [[number(of[key]) for key in keys] for of in sequences] + [[number(pooled(sequences, key)) for key in keys]]
 
 
 def line(words):
     return "| " + " | ".join(words) + " |"
 
 
-def start_row(pool, arguments, row, protocol):
-    """The runs of a row, per sequence and seed; they wait in the pool."""
-    def settings(seed):
-        return (*arguments.set, *row.settings, f"scale.source={protocol}", f"seed={seed}")
+def start_row(pool, arguments, row):
+    """The runs of a row: by scale, sequence and seed; they wait in the pool."""
+    def run(scale, name, seed):
+        settings = (*arguments.set, *row.settings, f"scale.source={scale}", f"seed={seed}")
+        return pool.submit(metrics_of_run, arguments.program, arguments.kitti_root / "sequences" / name, row.config, settings)
 
-    return [[pool.submit(metrics_of_run, arguments.program, arguments.kitti_root / "sequences" / name, row.config, settings(seed))
-             for seed in arguments.seeds] for name in arguments.sequences]
+    return {scale: [[run(scale, name, seed) for seed in arguments.seeds] for name in arguments.sequences]
+            for scale in row.scales}
 
 
-def finish_row(row, runs):
+def finish_row(row, runs, num_sequences):
     """The cells of a row, and what kept it from being measured."""
     try:
-        return cells([averaged([run.result() for run in seeds]) for seeds in runs]), None
+        found = {scale: cells([averaged([run.result() for run in seeds]) for seeds in of_scale], scale)
+                 for scale, of_scale in runs.items()}
     except RunError as error:
-        return ["-"] * (len(runs) + 1), f"{row.heading}: {error}"
+        return ["-"] * (num_sequences + 1), f"Not possible: {row.heading}: {error}"
+    nothing = {scale: ["-"] * len(keys) for scale, keys in COLUMNS.items()}
+    return [" / ".join(word for scale in COLUMNS for word in (found[scale][i] if scale in found else nothing[scale]))
+            for i in range(num_sequences + 1)], None
 
 
-def table(arguments, protocol, started):
-    """`started`: the rows of this protocol with their runs."""
-    lines = [f"{PROTOCOLS[protocol]}:", "", line(["", *arguments.sequences, "together"]),
-             "|" + "---|" * (len(arguments.sequences) + 2)]
+def label(row):
+    config = () if row.config == "default" else (f"--config {pathlib.Path(row.config).name}",)
+    return " ".join([row.heading, *(f"`{setting}`" for setting in (*config, *row.settings))])
+
+
+def table(arguments):
+    names = arguments.sequences
+    lines = [line(["", *names, "together"]), "|" + "---|" * (len(names) + 2)]
     problems = []
-    for row, runs in started:
-        found, problem = finish_row(row, runs)
-        print(f"{protocol}, {row.heading}: {found[-1]}", file=sys.stderr, flush=True)
-        config = () if row.config == "default" else (f"--config {pathlib.Path(row.config).name}",)
-        settings = " ".join(f"`{setting}`" for setting in (*config, *row.settings))
-        lines.append(line([f"{row.heading} {settings}".strip(), *found]))
-        if problem:
-            problems.append(f"Not possible: {problem}")
-    return lines + (["", *problems] if problems else []) + [""]
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        for row, runs in [(row, start_row(pool, arguments, row)) for row in ROWS]:
+            found, problem = finish_row(row, runs, len(names))
+            print(f"{row.heading}: {found[-1]}", file=sys.stderr, flush=True)
+            lines.append(line([label(row), *found]))
+            problems += [problem] if problem else []
+    return lines + ["", *problems] if problems else lines
 
 
 def report(arguments):
     done = subprocess.run([arguments.program, "--version"], capture_output=True, text=True, check=True)
-    version = done.stdout.strip()
     seeds = "" if arguments.seeds == ["1"] else f" --seeds {','.join(arguments.seeds)}"
-    lines = [f"t_rel % / r_rel degrees per 100 m / average offset m, no alignment; {version}.", ""]
-    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        started = {protocol: [(row, start_row(pool, arguments, row, protocol)) for row in ROWS
-                              if protocol in row.protocols] for protocol in PROTOCOLS}
-        for protocol in PROTOCOLS:
-            lines += table(arguments, protocol, started[protocol])
     base = "".join(f" --set {setting}" for setting in arguments.set)
     command = f"tools/ablation.py KITTI --sequences {','.join(arguments.sequences)}{seeds}{base} --out FILE"
-    return "\n".join(lines + ["```", command, "```"])
-
-
-def write(file, text):
-    """Between the marks of an existing file, or the whole file."""
-    old = file.read_text(encoding="utf-8") if file.exists() else ""
-    before, begin, rest = old.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    file.write_text(f"{before}{begin}\n{text}\n{end}{after}" if begin and end else text + "\n", encoding="utf-8")
+    head = ("The defaults, and the defaults with one part replaced: t_rel % / r_rel degrees per 100 m with per-step "
+            "ground-truth scale / t_rel % without ground truth, no alignment. What it says: [accuracy](accuracy.md#ablation).")
+    return "\n".join(["# Ablation", "", head, "", f"{done.stdout.strip()}, `{command}`:", "", *table(arguments), ""])
 
 
 def parse_arguments(arguments):
@@ -183,7 +171,7 @@ def parse_arguments(arguments):
 
 def main():
     arguments = parse_arguments(sys.argv[1:])
-    write(arguments.out, report(arguments))
+    arguments.out.write_text(report(arguments), encoding="utf-8")
     return 0
 
 
