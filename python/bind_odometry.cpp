@@ -153,6 +153,13 @@ void bind_options(nb::module_& module) {
 }
 
 void bind_result(nb::module_& module) {
+  nb::class_<CameraSigma>(module, "CameraSigma", "Standard deviations of a camera, in pixels")
+      .def_ro("fx", &CameraSigma::fx_px)
+      .def_ro("cx", &CameraSigma::cx_px)
+      .def_ro("cy", &CameraSigma::cy_px)
+      .def("__repr__", [](const CameraSigma& s) {
+        return fmt::format("CameraSigma(fx={}, cx={}, cy={})", s.fx_px, s.cx_px, s.cy_px);
+      });
   nb::class_<Result>(module, "Result", "A frame's pose and how it came about")
       .def_prop_ro(
           "world_from_camera", [](const Result& r) { return array_of(r.frame.world_from_camera); },
@@ -168,6 +175,9 @@ void bind_result(nb::module_& module) {
           "Of log(metres per unit)")
       .def_prop_ro(
           "camera", [](const Result& r) { return r.frame.camera; }, "With what was learnt so far")
+      .def_prop_ro(
+          "camera_sigma", [](const Result& r) { return r.frame.camera_sigma; },
+          "None: the camera is not refined")
       .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; })
       .def("__repr__", [](const Result& r) {
         const auto& at = r.frame.world_from_camera.translation;

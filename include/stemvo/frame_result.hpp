@@ -41,6 +41,14 @@ enum class RoadState {
 /// `disabled`, `none`, `held`, `measured`.
 [[nodiscard]] std::string_view to_string(RoadState state);
 
+/// Standard deviations of a camera's estimate, to which the one in use goes step by step; of the
+/// focal length, too, where only the principal point does.
+struct CameraSigma {
+  double fx_px = 0.0;  ///< that of fy is the same share of fy
+  double cx_px = 0.0;
+  double cy_px = 0.0;
+};
+
 /// Milliseconds per stage of one frame. Stages of different frames overlap: their sum is no frame's
 /// time.
 struct StageTimes {
@@ -60,9 +68,9 @@ struct FrameResult {
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
   RoadState road = RoadState::kDisabled;
-  std::string_view road_reason;  ///< why the road was not measured, else empty
-  Camera camera;                 ///< with what was learnt so far (`camera.refine`)
-  std::optional<Eigen::Vector2d> principal_point_sigma_px;  ///< nullopt: it is not refined
+  std::string_view road_reason;             ///< why the road was not measured, else empty
+  Camera camera;                            ///< with what was learnt so far (`camera.refine`)
+  std::optional<CameraSigma> camera_sigma;  ///< nullopt: it is not refined
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty

@@ -61,9 +61,12 @@ std::optional<CameraEstimate> SelfCalibration::estimate() const {
   return CameraEstimate{after.mean_, after.sigma(), after.num_runs_};
 }
 
-std::optional<Eigen::Vector2d> SelfCalibration::principal_point_sigma_px() const {
-  return refinement_ == CameraRefinement::kOff ? std::nullopt
-                                               : std::optional<Eigen::Vector2d>(sigma().head<2>());
+std::optional<CameraSigma> SelfCalibration::camera_sigma() const {
+  if (refinement_ == CameraRefinement::kOff) {
+    return std::nullopt;
+  }
+  const CameraChange sigmas = sigma();
+  return CameraSigma{sigmas[2] * given_.fx_px, sigmas[0], sigmas[1]};
 }
 
 CameraChange SelfCalibration::sigma() const {

@@ -11,6 +11,7 @@
 #include "odometry/bundle_adjustment.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
+#include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
 
 namespace stemvo {
@@ -43,7 +44,7 @@ class SelfCalibration {
   /// nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraEstimate> estimate() const;
   /// Of the runs that were taken in; nullopt: nothing is refined.
-  [[nodiscard]] std::optional<Eigen::Vector2d> principal_point_sigma_px() const;
+  [[nodiscard]] std::optional<CameraSigma> camera_sigma() const;
 
   /// Its state, for state_archive.hpp.
   template <typename Archive>

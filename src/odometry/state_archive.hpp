@@ -113,6 +113,10 @@ void serialize(Archive& archive, MapLandmark& landmark) {
   archive(landmark.frame, landmark.position, landmark.rgb);
 }
 template <typename Archive>
+void serialize(Archive& archive, CameraSigma& sigma) {
+  serialize_bytes(archive, sigma);
+}
+template <typename Archive>
 void serialize(Archive& archive, StageTimes& times) {
   serialize_bytes(archive, times);
 }
@@ -124,8 +128,8 @@ template <typename Archive>
 void serialize(Archive& archive, FrameResult& result) {
   archive(result.state, result.world_from_camera, result.num_matches, result.num_inliers,
           result.homography_score, result.fundamental_score, result.homography_ratio, result.model,
-          result.road, result.road_reason, result.camera, result.principal_point_sigma_px,
-          result.scale_sigma, result.times, result.problem);
+          result.road, result.road_reason, result.camera, result.camera_sigma, result.scale_sigma,
+          result.times, result.problem);
   StateReader::expect(result.state >= FrameState::kFirst && result.state <= FrameState::kNoImage &&
                       result.road >= RoadState::kDisabled && result.road <= RoadState::kMeasured &&
                       result.model >= TwoViewModel::kNone &&

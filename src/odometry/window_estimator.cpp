@@ -249,7 +249,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
   remember(frame, result.state);
   scale_.report(result);
   result.camera = camera_;
-  result.principal_point_sigma_px = calibration_.principal_point_sigma_px();
+  result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
 }
 

@@ -206,7 +206,7 @@ class ResultWriter {
     report.tracked_fraction =
         share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
     report.in_place_fraction = share_in_place(drive_.frames);
-    report.camera = {drive_.frames.back().camera, drive_.frames.back().principal_point_sigma_px};
+    report.camera = {drive_.frames.back().camera, drive_.frames.back().camera_sigma};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
         return frame.road == RoadState::kMeasured;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kHeader =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,road,fx_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px\n";
+    "scale_sigma,road,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
 
 constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
@@ -19,14 +19,15 @@ std::string_view frames_csv_header() { return kHeader; }
 
 std::string frames_csv_row(std::size_t frame, double timestamp_s, const FrameResult& r) {
   const std::string sigma = r.scale_sigma ? fmt::format("{:.4f}", *r.scale_sigma) : "";
-  const auto& camera_sigma = r.principal_point_sigma_px;
+  const auto& sigmas = r.camera_sigma;
   return fmt::format(
       "{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{},{:.2f},{:.2f},{:.2f},{}\n",
       frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
       r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
       r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.road),
       r.camera.fx_px, r.camera.cx_px, r.camera.cy_px,
-      camera_sigma ? fmt::format("{:.2f},{:.2f}", camera_sigma->x(), camera_sigma->y()) : ",");
+      sigmas ? fmt::format("{:.2f},{:.2f},{:.2f}", sigmas->fx_px, sigmas->cx_px, sigmas->cy_px)
+             : ",,");
 }
 
 }  // namespace stemvo

@@ -30,8 +30,10 @@ void to_json(Json& json, const CameraReport& report) {
           {"fy_px", camera.fy_px},
           {"cx_px", camera.cx_px},
           {"cy_px", camera.cy_px}};
-  json["cx_sigma_px"] = report.sigma_px ? Json(report.sigma_px->x()) : Json();
-  json["cy_sigma_px"] = report.sigma_px ? Json(report.sigma_px->y()) : Json();
+  const std::optional<CameraSigma>& sigma = report.sigma;
+  json["fx_sigma_px"] = sigma ? Json(sigma->fx_px) : Json();
+  json["cx_sigma_px"] = sigma ? Json(sigma->cx_px) : Json();
+  json["cy_sigma_px"] = sigma ? Json(sigma->cy_px) : Json();
 }
 void to_json(Json& json, const AbsoluteTrajectoryError& ate) {
   json = {{"none", ate.none_m}, {"scale", ate.scale_m}, {"se3", ate.se3_m}, {"sim3", ate.sim3_m}};

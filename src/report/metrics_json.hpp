@@ -6,11 +6,10 @@
 #include <optional>
 #include <string>
 
-#include <Eigen/Core>
-
 #include "evaluation/metrics.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
+#include "stemvo/frame_result.hpp"
 #include "timing/timing_report.hpp"
 
 namespace stemvo {
@@ -18,7 +17,7 @@ namespace stemvo {
 /// The camera as it was known in the end.
 struct CameraReport {
   Camera camera;
-  std::optional<Eigen::Vector2d> sigma_px;  ///< of its principal point; nullopt: it is not refined
+  std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
 };
 
 /// What metrics.json holds. Everything in `metrics` is null in the file without ground truth.
@@ -41,12 +40,12 @@ struct MetricsReport {
 };
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// in_place_fraction camera{fx_px,fy_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px} (as it was known in
-/// the end; sigmas are null where it is not refined) road_measured_fraction (of all frames; null
-/// where the road is not asked) alignment (of average_offset_m, t_rel_percent, r_rel_deg_per_100m
-/// and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none) path_length_m
-/// average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m segments
-/// ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
+/// in_place_fraction camera{fx_px,fy_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px} (as it was
+/// known in the end; sigmas are null where it is not refined) road_measured_fraction (of all
+/// frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent,
+/// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
+/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
+/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
 /// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
 /// refined trajectory is written) and, only where it was asked for, timing{threads fps loop_fps
 /// interval{median_ms,p95_ms} latency{median_ms,p95_ms} peak_memory_mib cpu_s start_cpu_s

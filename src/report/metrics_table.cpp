@@ -39,11 +39,13 @@ std::string head(const MetricsReport& report) {
          fmt::format("hardly any ({:.1f} % of the frames in place): lengths and % mean little",
                      100.0 * report.in_place_fraction)});
   }
-  if (const auto& sigma = report.camera.sigma_px) {
+  if (const auto& sigma = report.camera.sigma) {
+    const Camera& camera = report.camera.camera;
     table.add(
         {"camera", fmt::format("principal point {:.1f}, {:.1f} px, known to {:.1f}, {:.1f} px",
-                               report.camera.camera.cx_px, report.camera.camera.cy_px, sigma->x(),
-                               sigma->y())});
+                               camera.cx_px, camera.cy_px, sigma->cx_px, sigma->cy_px)});
+    table.add({"", fmt::format("focal length {:.1f} px, known to {:.1f} px", camera.fx_px,
+                               sigma->fx_px)});
   }
   if (report.road_measured_fraction) {
     table.add({"road", fmt::format("measured on {:.1f} % of the frames",

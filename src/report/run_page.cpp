@@ -24,8 +24,6 @@ using nlohmann::json;
 /// The devkit's.
 constexpr std::size_t kFirstFrameStep = 10;
 
-const Eigen::Vector2d kNoSigma = Eigen::Vector2d::Zero();
-
 /// One value per element.
 template <typename Range, typename Value>
 json list(const Range& range, const Value& value) {
@@ -212,8 +210,14 @@ class RunFigures {
     json traces =
         json::array({over_frames("length of a step", "y2", [](const FrameResult&) { return 0; })});
     traces[0]["y"] = steps;
-    add_principal_point(traces, 0, "principal point, x", "#009e73");
-    add_principal_point(traces, 1, "principal point, y", "#cc79a7");
+    add_learnt(traces, "principal point, x", "#009e73", &Camera::cx_px, &CameraSigma::cx_px);
+    add_learnt(traces, "principal point, y", "#cc79a7", &Camera::cy_px, &CameraSigma::cy_px);
+    const bool is_focal_learnt = std::any_of(
+        run_.frames.begin(), run_.frames.end(),
+        [&](const FrameResult& r) { return r.camera.fx_px != run_.frames.front().camera.fx_px; });
+    if (is_focal_learnt) {
+      add_learnt(traces, "focal length", "#e69f00", &Camera::fx_px, &CameraSigma::fx_px);
+    }
     const bool has_scale = std::any_of(run_.frames.begin(), run_.frames.end(),
                                        [](const FrameResult& r) { return r.scale_sigma; });
     json layout = stacked(has_scale ? 3 : 2);
@@ -226,8 +230,7 @@ class RunFigures {
     }
     layout["yaxis2"].update(html::titled("step, " + run_.unit, 3));
     layout["yaxis"].update(html::titled("moved by, px", 2));
-    add({"Scale and camera", "Shaded: one sigma, where the principal point is learnt.", traces,
-         layout, 0});
+    add({"Scale and camera", "Shaded: one sigma, where the camera is learnt.", traces, layout, 0});
   }
 
   void add_times() const {
@@ -249,14 +252,16 @@ class RunFigures {
   void add(const html::Figure& figure) const { page_.add_figure(figure); }
 
   /// How far it has moved; around it one sigma, where it has one.
-  void add_principal_point(json& traces, int axis, const char* name, const char* color) const {
-    const auto moved = [&](const FrameResult& r) {
-      return axis == 0 ? r.camera.cx_px - run_.frames.front().camera.cx_px
-                       : r.camera.cy_px - run_.frames.front().camera.cy_px;
-    };
+  void add_learnt(json& traces,
+                  const char* name,
+                  const char* color,
+                  double Camera::* value,
+                  double CameraSigma::* sigma) const {
+    const FrameResult& first = run_.frames.front();
     const auto line = [&](double sigmas) {
       json trace = over_frames(name, "y", [&](const FrameResult& r) {
-        return rounded(moved(r) + sigmas * r.principal_point_sigma_px.value_or(kNoSigma)[axis]);
+        return rounded(r.camera.*value - first.camera.*value +
+                       sigmas * r.camera_sigma.value_or(CameraSigma()).*sigma);
       });
       trace["line"] = {{"color", color}, {"width", sigmas == 0.0 ? 2 : 0}};
       if (sigmas != 0.0) {
@@ -264,7 +269,7 @@ class RunFigures {
       }
       return trace;
     };
-    if (run_.frames.front().principal_point_sigma_px) {
+    if (first.camera_sigma) {
       traces.push_back(line(-1.0));
       traces.push_back(line(1.0));
       traces.back().update({{"fill", "tonexty"}, {"fillcolor", color + std::string("40")}});

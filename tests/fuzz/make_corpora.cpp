@@ -122,7 +122,7 @@ void metrics(const fs::path& out) {
   report.metrics = stemvo::Metrics{};
   report.metrics->segment_lengths_m = {100.0, 200.0};
   report.refined = stemvo::Metrics{};
-  report.camera.sigma_px = {0.5, 0.25};
+  report.camera.sigma = {2.0, 0.5, 0.25};
   Corpus::done(stemvo::write_metrics_json(corpus / "with_truth", report));
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -9,8 +10,10 @@
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include "support/program_test.hpp"
+#include "support/state_runs.hpp"
 
 namespace stemvo {
 namespace {
@@ -73,6 +76,34 @@ TEST_F(Calibrate, FindsTheCameraThatRenderedTheWalk) {
                                 HasSubstr(out_)));
   EXPECT_THAT(result.err, HasSubstr("300/300 frames"));
   std::cout << result.out;
+}
+
+// The focal length, 17 px off, is still on its way at 0.25 px a keyframe.
+TEST_F(Calibrate, FindsTheCameraWhileDrivingWhereAllIsAskedFor) {
+  sequence_ = test::render_walk_once(300) / "sequences/00";
+  const Intrinsics truth = read_intrinsics(sequence_ / "calib.txt");
+  const std::string wrong = folder_ / "wrong.txt";
+  write_intrinsics(wrong, {1.03 * truth.f, truth.cx + 4.0, truth.cy - 3.0});
+  const std::string out = folder_ / "out";
+  const ProgramResult result =
+      run_stemvo({"run", sequence_.string(), "--out", out, "--calib", wrong, "--quiet", "--set",
+                  "camera.refine=all", "--set", "scale.source=none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string csv = read_file(out + "/frames.csv");
+  const auto json = nlohmann::json::parse(read_file(out + "/metrics.json")).at("camera");
+  for (const auto& [name, expected] :
+       {std::pair("fx", truth.f), std::pair("cx", truth.cx), std::pair("cy", truth.cy)}) {
+    const std::vector<std::string> values = test::column(csv, std::string(name) + "_px");
+    const std::vector<std::string> sigmas = test::column(csv, std::string(name) + "_sigma_px");
+    ASSERT_EQ(values.size(), 300U);
+    const double sigma = std::stod(sigmas.back());
+    const double error = std::abs(std::stod(values.back()) - expected);
+    EXPECT_LT(error, 0.5 * std::abs(std::stod(values.front()) - expected)) << name;
+    EXPECT_LT(error, 2.0 * sigma) << name;
+    EXPECT_LT(sigma, 0.2 * std::stod(sigmas.front())) << name << ": of what is assumed";
+    EXPECT_NEAR(json.at(std::string(name) + "_px"), std::stod(values.back()), 0.006);
+    EXPECT_NEAR(json.at(std::string(name) + "_sigma_px"), sigma, 0.006);
+  }
 }
 
 TEST_F(Calibrate, TwoRunsGiveTheSameBytesAndTheGivenCalibrationIsLeftAlone) {

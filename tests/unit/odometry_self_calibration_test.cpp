@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -11,25 +12,52 @@ namespace {
 
 using testing::DriveTracks;
 
+constexpr int kLength = SelfCalibration::kNumKeyframes;
+constexpr int kNumRuns = 12;
+
+/// The k-th run: of equal steps but for how they turn (prev_from_cur).
+template <typename Turn>
+void observe_run(int k,
+                 const Turn& turn,
+                 const Eigen::Vector3d& step,
+                 const std::vector<Eigen::Vector3d>& points,
+                 const Camera& true_camera,
+                 SelfCalibration& calibration) {
+  std::vector<Rigid3> path(1);
+  for (int i = 1; i < kLength; ++i) {
+    path.push_back(path.back() * Rigid3(so3_exp(turn(i)), step));
+  }
+  const DriveTracks drive(path, points, 0.1, static_cast<std::uint64_t>(k), true_camera);
+  for (int i = 0; i < kLength; ++i) {
+    Keyframe keyframe{kLength * k + i, drive.pose(i), {}, {}};
+    for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
+      keyframe.points.push_back({id, uv});
+    }
+    calibration.observe(keyframe, {});
+  }
+}
+
 /// Runs of a drive with turns, seen by the true camera.
 void drive_runs(const Camera& true_camera, SelfCalibration& calibration) {
-  constexpr int kLength = SelfCalibration::kNumKeyframes;
-  for (int k = 0; k < 12; ++k) {
-    std::vector<Rigid3> path(1);
-    for (int i = 1; i < kLength; ++i) {
-      path.push_back(
-          path.back() *
-          Rigid3(so3_exp({0.004 * (i % 3 - 1), k % 2 == 0 ? 0.05 : -0.04, 0.0}), {0.0, 0.0, 0.9}));
-    }
-    const DriveTracks drive(path, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points, 0.1,
-                            static_cast<std::uint64_t>(k), true_camera);
-    for (int i = 0; i < drive.num_frames(); ++i) {
-      Keyframe keyframe{kLength * k + i, drive.pose(i), {}, {}};
-      for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
-        keyframe.points.push_back({id, uv});
-      }
-      calibration.observe(keyframe, {});
-    }
+  for (int k = 0; k < kNumRuns; ++k) {
+    const auto turn = [k](int i) {
+      return Eigen::Vector3d(0.004 * (i % 3 - 1), k % 2 == 0 ? 0.05 : -0.04, 0.0);
+    };
+    observe_run(k, turn, {0.0, 0.0, 0.9}, DriveTracks(2, 0.0, static_cast<std::uint64_t>(k)).points,
+                true_camera, calibration);
+  }
+}
+
+/// Runs through a room, the camera in the hand: it turns and rolls much, which tells the focal
+/// length.
+void walk_runs(const Camera& true_camera, SelfCalibration& calibration) {
+  for (int k = 0; k < kNumRuns; ++k) {
+    const auto turn = [k](int i) {
+      return Eigen::Vector3d(0.06 * std::sin(i), k % 2 == 0 ? 0.08 : -0.08, 0.1 * std::cos(i));
+    };
+    observe_run(k, turn, {0.05, 0.02, 0.05},
+                testing::points_of_room(4000, 4.0, static_cast<std::uint64_t>(k)), true_camera,
+                calibration);
   }
 }
 
@@ -43,14 +71,44 @@ TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
   EXPECT_NEAR(calibration.camera().cx_px, truth.cx_px, 0.5);
   EXPECT_NEAR(calibration.camera().cy_px, truth.cy_px, 0.5);
   EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
-  EXPECT_LE(calibration.principal_point_sigma_px()->maxCoeff(), 0.5);
+  const CameraSigma sigma = *calibration.camera_sigma();
+  EXPECT_LE(std::max(sigma.cx_px, sigma.cy_px), 0.5);
+  EXPECT_LT(sigma.fx_px, 0.5 * 3.0 * 0.003 * given.fx_px) << "estimated, though not applied";
+}
+
+TEST(SelfCalibration, FindsAFocalLengthThatIsWrongWithinItsSigma) {
+  const Camera truth = testing::kitti_camera();
+  for (const double share : {0.97, 1.03}) {
+    Camera given = truth;
+    given.fx_px *= share;
+    given.fy_px *= share;
+    SelfCalibration calibration(given, CameraRefinement::kAll);
+    walk_runs(truth, calibration);
+    const double sigma_px = calibration.camera_sigma()->fx_px;
+    EXPECT_LT(sigma_px, 0.01 * truth.fx_px);
+    EXPECT_LT(std::abs(calibration.camera().fx_px - truth.fx_px), 2.0 * sigma_px);
+    EXPECT_NEAR(calibration.camera().fy_px / truth.fy_px, calibration.camera().fx_px / truth.fx_px,
+                1e-12);
+  }
+}
+
+/// Which a drive does not tell: the sigma says so.
+TEST(SelfCalibration, AFocalLengthThatIsNotToldStaysWithinItsSigma) {
+  const Camera truth = testing::kitti_camera();
+  Camera given = truth;
+  given.fx_px *= 1.03;
+  given.fy_px *= 1.03;
+  SelfCalibration calibration(given, CameraRefinement::kAll);
+  drive_runs(truth, calibration);
+  EXPECT_EQ(calibration.camera().fx_px, given.fx_px);
+  EXPECT_LT(given.fx_px - truth.fx_px, 2.0 * calibration.camera_sigma()->fx_px);
 }
 
 TEST(SelfCalibration, ARightCameraIsKept) {
   const Camera truth = testing::kitti_camera();
   SelfCalibration calibration(truth, CameraRefinement::kAll);
   drive_runs(truth, calibration);
-  EXPECT_EQ(calibration.estimate()->num_bundles, 12);
+  EXPECT_EQ(calibration.estimate()->num_bundles, kNumRuns);
   EXPECT_EQ(calibration.camera().cx_px, truth.cx_px);
   EXPECT_EQ(calibration.camera().cy_px, truth.cy_px);
   EXPECT_EQ(calibration.camera().fx_px, truth.fx_px);
@@ -73,10 +131,10 @@ TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) 
   const SelfCalibration calibration(testing::kitti_camera(), CameraRefinement::kAll);
   EXPECT_NEAR(calibration.estimate()->sigma[2], 3.0 * 0.03, 1e-12);  // of the prior
   EXPECT_NEAR(calibration.estimate()->sigma[0], 30.0, 1e-9);
+  EXPECT_NEAR(calibration.camera_sigma()->fx_px, 3.0 * 0.03 * testing::kitti_camera().fx_px, 1e-9);
 }
 
 TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
-  constexpr int kLength = SelfCalibration::kNumKeyframes;
   const DriveTracks drive(kLength, 0.1, 5);
   const auto keyframe_of = [&](int i, double unit) {
     Keyframe keyframe{i, drive.pose(i), {}, {}};
@@ -112,7 +170,7 @@ TEST(SelfCalibration, OffMeansOff) {
   SelfCalibration calibration(given, CameraRefinement::kOff);
   drive_runs(truth, calibration);
   EXPECT_EQ(calibration.camera().cx_px, given.cx_px);
-  EXPECT_FALSE(calibration.principal_point_sigma_px().has_value());
+  EXPECT_FALSE(calibration.camera_sigma().has_value());
 }
 
 }  // namespace

@@ -52,6 +52,8 @@ class OdometryState : public ::testing::TestWithParam<Variant> {
     std::string text =
         fmt::format("{} {} {} {} {} {} {}", to_string(r.state), r.num_matches, r.num_inliers,
                     to_string(r.road), r.road_reason, r.scale_sigma.value_or(-1.0), r.camera.cx_px);
+    const CameraSigma sigma = r.camera_sigma.value_or(CameraSigma());
+    text += fmt::format(" {} {} {} {}", r.camera.fx_px, sigma.fx_px, sigma.cx_px, sigma.cy_px);
     const Matrix34d pose = r.world_from_camera.matrix();
     for (const double value : pose.reshaped()) {
       text += fmt::format(" {:a}", value);

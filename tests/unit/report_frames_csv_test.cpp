@@ -15,7 +15,7 @@ using ::testing::StartsWith;
 
 constexpr char kHeader[] =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,road,fx_px,cx_px,cy_px,cx_sigma_px,cy_sigma_px\n";
+    "scale_sigma,road,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
 
 FrameResult tracked() {
   FrameResult result;
@@ -29,7 +29,7 @@ FrameResult tracked() {
   result.road = RoadState::kHeld;
   result.scale_sigma = 0.01234;
   result.camera = {700.0, 710.0, 600.5, 180.25, 1241, 376};
-  result.principal_point_sigma_px = Eigen::Vector2d(0.5, 0.75);
+  result.camera_sigma = {3.5, 0.5, 0.75};
   result.times = {1.25, 12.5, 3.0004};
   return result;
 }
@@ -38,9 +38,9 @@ TEST(FramesCsv, HoldsOneRowPerFrame) {
   EXPECT_EQ(frames_csv_header(), kHeader);
   EXPECT_EQ(frames_csv_row(100, 10.3622, FrameResult()) + frames_csv_row(101, 10.466, tracked()),
             "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,disabled,0.00,0."
-            "00,0.00,,\n"
+            "00,0.00,,,\n"
             "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
-            "1.250,12.500,3.000,0.0123,held,700.00,600.50,180.25,0.50,0.75\n");
+            "1.250,12.500,3.000,0.0123,held,700.00,600.50,180.25,3.50,0.50,0.75\n");
 }
 
 /// A number format with a decimal comma and dots between thousands.

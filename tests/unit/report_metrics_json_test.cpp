@@ -40,7 +40,7 @@ MetricsReport example() {
           .fps = 31.5,
           .scale_source = "ground_truth",
           .tracked_fraction = 0.995,
-          .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, Eigen::Vector2d(0.5, 0.75)},
+          .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, CameraSigma{3.5, 0.5, 0.75}},
           .road_measured_fraction = 0.75,
           .metrics = metrics,
           .refined = refined,
@@ -87,7 +87,8 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["refined"]["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
-      "cx_px": 600.5, "cy_px": 180.25, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
+      "cx_px": 600.5, "cy_px": 180.25,
+      "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
   EXPECT_EQ(json.size(), 24U);
 }
 
@@ -114,6 +115,10 @@ TEST(MetricsJson, IsNullWhereThereIsNoNumber) {
   EXPECT_TRUE(json["t_rel_percent"].is_null());
   EXPECT_TRUE(json["average_offset_m"].is_null());
   EXPECT_TRUE(json["fps"].is_null());
+  report.camera.sigma.reset();
+  for (const char* key : {"fx_sigma_px", "cx_sigma_px", "cy_sigma_px"}) {
+    EXPECT_TRUE(written(report)["camera"].at(key).is_null()) << key;
+  }
   report.road_measured_fraction.reset();
   EXPECT_TRUE(written(report)["road_measured_fraction"].is_null());
 }
@@ -144,6 +149,8 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   EXPECT_THAT(table, HasSubstr("each step rescaled to its true length"));
   EXPECT_THAT(table, HasSubstr("measured on 75.0 % of the frames"));
   EXPECT_THAT(table, HasSubstr("200 frames (20:220)"));
+  EXPECT_THAT(table, HasSubstr("principal point 600.5, 180.2 px, known to 0.5, 0.8 px"));
+  EXPECT_THAT(table, HasSubstr("focal length 700.0 px, known to 3.5 px"));
   EXPECT_EQ(table.find(" \n"), std::string::npos) << "blanks at the end of a line";
 }
 

@@ -175,7 +175,7 @@ TEST_F(RunPageTest, ShowsScaleAndCameraWithTheirSigma) {
 
   for (FrameResult& frame : frames_) {
     frame.scale_sigma = 0.02;
-    frame.principal_point_sigma_px = Eigen::Vector2d(0.5, 0.25);
+    frame.camera_sigma = {3.0, 0.5, 0.25};
   }
   traces = section(content(), "Scale and camera")["traces"];
   ASSERT_EQ(traces.size(), 8U);
@@ -184,6 +184,12 @@ TEST_F(RunPageTest, ShowsScaleAndCameraWithTheirSigma) {
   EXPECT_EQ(traces[2]["fill"], "tonexty");
   EXPECT_NEAR(traces[5]["y"][200].get<double>(), 0.25, 1e-4);
   EXPECT_EQ(traces[7]["y"][200], 2.0) << "percent";
+
+  frames_.back().camera.fx_px += 4.0;
+  traces = section(content(), "Scale and camera")["traces"];
+  ASSERT_EQ(traces.size(), 11U) << "the focal length where it left the given one";
+  EXPECT_NEAR(traces[7]["y"][200].get<double>(), 4.0 - 3.0, 1e-4);
+  EXPECT_NEAR(traces[9]["y"][200].get<double>(), 4.0, 1e-4);
 }
 
 TEST_F(RunPageTest, WithoutGroundTruthNoErrorsAreShown) {
