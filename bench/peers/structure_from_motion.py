@@ -4,12 +4,13 @@
 
     bench/peers/structure_from_motion.py IMAGES --gt POSES --focal F --work FOLDER [--every 4] [--poses NAME=FILE ..]
 
-All pairs of every N-th image are matched, all poses adjusted together, focal length and two radial
-coefficients free: nothing drifts. Printed are the camera that is found; for each trajectory (COLMAP's, the ground
-truth's, those of --poses; KITTI's format, one pose per image) its error after a similarity to the ground truth,
-and how well points triangulated from it fit the images: median reprojection error, px, all and by
-fifty frames. For the latter a rigid offset of the camera (the ground truth may be another's) and its
-intrinsics are fitted to each trajectory. Needs `pip install pycolmap scipy`; FOLDER keeps the matches.
+All pairs of every N-th image are matched, their poses adjusted together, focal length and two radial
+coefficients free: nothing drifts (two runs differ by 0.1 px). Printed are the camera that is found, and for each
+trajectory (COLMAP's, the ground truth's, those of --poses; KITTI's format, one pose per image) its error after
+a similarity to the ground truth and the median error, px, with which COLMAP's points, triangulated anew
+from it, reproject: of all frames, and of each hundred (with a similarity of its own). For the latter a
+rigid offset of the camera (the ground truth may be another's) and its intrinsics are fitted to each
+trajectory. Needs `pip install pycolmap==4.2.1 scipy`; FOLDER keeps the matches.
 """
 
 import argparse
