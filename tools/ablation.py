@@ -150,7 +150,7 @@ def report(arguments):
     command = f"tools/ablation.py KITTI --sequences {','.join(arguments.sequences)}{seeds}{base} --out FILE"
     head = ("The defaults, and the defaults with one part replaced: t_rel % / r_rel degrees per 100 m with per-step "
             "ground-truth scale / t_rel % without ground truth, no alignment. What it says: [accuracy](accuracy.md#ablation).")
-    return "\n".join(["# Ablation", "", head, "", f"{done.stdout.strip()}, `{command}`:", "", *table(arguments), ""])
+    return "\n".join(["# Ablation", "", head, "", "```", command, "```", "", f"{done.stdout.strip()}:", "", *table(arguments), ""])
 
 
 def parse_arguments(arguments):
