@@ -42,27 +42,23 @@ def match(arguments, size, names):
     return file
 
 
-def reconstruct(arguments, database):
-    """The largest reconstruction; its poses, 3x4 world_from_camera, by frame."""
+def reconstruct(arguments, database, frame_of):
+    """The largest reconstruction; its poses, 3x4 world_from_camera, by frame. `frame_of`: an image's name -> its frame."""
     options = pycolmap.IncrementalPipelineOptions()
     options.ba_refine_principal_point = False
     found = pycolmap.incremental_mapping(database, arguments.images, arguments.work, options=options)
     if not found:
         raise SystemExit(f"{arguments.images}: expected a reconstruction, found none")
     best = max(found.values(), key=lambda one: one.num_reg_images())
-    return best, {frame_of(image): image.cam_from_world().inverse().matrix() for image in best.images.values() if image.has_pose}
+    return best, {frame_of[image.name]: image.cam_from_world().inverse().matrix() for image in best.images.values() if image.has_pose}
 
 
-def frame_of(image):
-    return FRAMES[image.name]
-
-
-def observations_of(model):
+def observations_of(model, frame_of):
     """Points (number), frames and pixels of tracks seen often."""
     points = [p for p in model.points3D.values() if p.track.length() >= MIN_VIEWS]
     chosen = np.random.default_rng(1).permutation(len(points))[:MAX_POINTS]
-    rows = [(k, frame_of(model.images[e.image_id]), *model.images[e.image_id].points2D[e.point2D_idx].xy)
-            for k, p in enumerate(points[i] for i in chosen) for e in p.track.elements]
+    rows = [(k, frame_of[image.name], *image.points2D[e.point2D_idx].xy)
+            for k, p in enumerate(points[i] for i in chosen) for e in p.track.elements for image in [model.images[e.image_id]]]
     rows = np.array(rows)
     return rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:]
 
@@ -122,16 +118,16 @@ def main():
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     all_names = sorted(file.name for file in arguments.images.iterdir())
-    FRAMES.update({name: i for i, name in enumerate(all_names)})
+    frame_of = {name: i for i, name in enumerate(all_names)}
     bitmap = pycolmap.Bitmap.read(arguments.images / all_names[0], as_rgb=False)
     size = (bitmap.width, bitmap.height)
     database = shutil.copy(match(arguments, size, all_names[::arguments.every]), arguments.work / "mapped.db")
-    model, judged = reconstruct(arguments, database)
+    model, judged = reconstruct(arguments, database, frame_of)
     camera = next(iter(model.cameras.values())).params
     print(f"{len(judged)} images, f {camera[0]:.1f} px, k1 {camera[3]:.3f}, k2 {camera[4]:.3f}")
     files = {"ground truth": arguments.gt} | dict(word.split("=", 1) for word in arguments.poses)
     trajectories = {"COLMAP": judged} | {name: np.loadtxt(file).reshape(-1, 3, 4) for name, file in files.items()}
-    observations = observations_of(model)
+    observations = observations_of(model, frame_of)
     parts = [sorted(judged)] + [[f for f in sorted(judged) if f // 100 == part] for part in sorted({f // 100 for f in judged})]
     for name, poses in trajectories.items():
         pixels = reprojection_errors(poses, observations, camera[[0, 3, 4]], size)
@@ -140,8 +136,6 @@ def main():
         print(f"{name}:", ", ".join(f"{error:.4f} m {np.median(pixels[np.isin(observations[1], part)]):.2f} px"
                                     for error, part in zip(errors, parts)), flush=True)
 
-
-FRAMES = {}  # of an image's name
 
 if __name__ == "__main__":
     main()
