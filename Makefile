@@ -30,6 +30,7 @@ demo: build
 	@tools/demo.sh
 
 test: build
+	@tools/setup.sh tools
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running the tests"
@@ -37,32 +38,32 @@ test: build
 
 test-all: test test-long
 
+# Without one of these groups the tests that need it are skipped.
 test-long:
-	@tools/setup.sh cluster || echo "==> Without Ray: the test of the cluster is skipped"
-	@tools/setup.sh peers || echo "==> Without OpenCV's Python package: the test of what the benchmark compares with is skipped"
-	@tools/setup.sh browser || echo "==> Without Chromium: the test that looks at report.html is skipped"
-	@tools/setup.sh root || echo "==> Without debootstrap: the test that installs the package in an empty root is skipped"
-	@tools/setup.sh docs
-	@tools/setup.sh evo
+	@for group in ray peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
+	@tools/setup.sh tools docs evo
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS)
 
 SEQUENCE ?=
 BENCH ?=
 bench: build
-	@tools/setup.sh peers
+	@tools/setup.sh tools peers
 	@bench/run.py $(SEQUENCE) $(BENCH)
 
-cluster: setup
-	@tools/setup.sh cluster
+cluster:
+	@tools/setup.sh ray
 
-test-frameworks: setup
+test-frameworks:
+	@tools/setup.sh tools
 	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py tests/frameworks/table_1.py
 
-format: setup
+format:
+	@tools/setup.sh tools
 	@tools/format.sh
 
-check-format: setup
+check-format:
+	@tools/setup.sh tools
 	@tools/format.sh --check
 
 docs: setup

@@ -12,7 +12,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
-import _environment  # noqa: E402,F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: E402,F401  starts this tool again in build/venv
 
 import fold_bench  # noqa: E402
 from stems import fold, manifest, onnx_writer  # noqa: E402

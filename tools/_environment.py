@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Importing this module first puts a tool into the Python environment that `make build` made.
+"""Importing this module first puts a tool into the Python environment build/venv.
 
 Under any other Python it starts the same command again in there, so `python3 tools/x.py` works with
 whatever python3 there is. Must therefore run on old interpreters and import nothing but the standard
@@ -20,7 +20,7 @@ def _enter():
     python = os.path.join(_VENV, "bin", "python")
     # The stamp is written last: without it the environment is missing or half made.
     if already_tried or not os.path.isfile(os.path.join(_VENV, "stamp")) or not os.access(python, os.X_OK):
-        sys.exit("run `make build` first: it makes the Python environment build/venv")
+        sys.exit("run `tools/setup.sh tools` first: it makes the Python environment build/venv")
     os.environ[_TRIED] = "1"
     sys.stdout.flush()
     # orig_argv keeps the interpreter's own arguments, -m among them.

@@ -17,7 +17,7 @@ with the network. Four numbers are the pixels at the top, left, bottom and right
 docs/search.md has examples.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import pathlib

@@ -7,7 +7,7 @@ G1.3: Gaussian of sigma 1.3 px. S0.9-0.7x1.8: Gaussian of 0.9 less 0.7 of one of
 along 90 degrees (down). M0.7+3D1.2@90: Gaussian of 0.7 plus 3 of a derivative.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import pathlib

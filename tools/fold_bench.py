@@ -7,7 +7,7 @@ that a machine whose clock varies slows both alike. Times are the processor's: w
 count, which would lengthen the longer run more. The frame has the size of one of KITTI.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import pathlib

@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 readonly CLANG_FORMAT=build/venv/bin/clang-format
-[[ -x $CLANG_FORMAT ]] || { echo "format: $CLANG_FORMAT is missing: run 'make build' first" >&2; exit 1; }
+[[ -x $CLANG_FORMAT ]] || { echo "format: $CLANG_FORMAT is missing: run 'tools/setup.sh tools' first" >&2; exit 1; }
 # Tracked and new files, not ignored ones; those deleted but not yet committed are skipped.
 sources() { git ls-files --cached --others --exclude-standard -- "$@" | while read -r f; do [[ -f $f ]] && echo "$f"; done; true; }
 mapfile -t cpp < <(sources '*.cpp' '*.hpp' '*.h')

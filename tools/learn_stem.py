@@ -6,7 +6,7 @@
 DRIVE: made by `stemvo synth DRIVE --depth`, with --walk or without (pictures, exact depth and poses).
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import dataclasses

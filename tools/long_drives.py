@@ -14,7 +14,7 @@ the machine do not stretch; length is the estimated length of each quarter over 
 docs/accuracy.md shows a table.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import os

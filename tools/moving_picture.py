@@ -7,7 +7,7 @@
     tools/moving_picture.py result drive/poses/00.txt docs/images/demo.gif
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import pathlib

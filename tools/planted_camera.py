@@ -10,7 +10,7 @@ in degrees per 100 m of the whole drive and from frame N on, no alignment; and h
 the true one in the runs with the camera's height, at the end and at most (x and y; from frame N on). docs/accuracy.md shows the table.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import csv

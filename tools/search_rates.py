@@ -7,7 +7,7 @@ The layers are random filters as wide as their stride (3 at stride 2), smoothed 
 rather than noise. How many motions are measured is printed too: a filter that fails early is cheap.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import json

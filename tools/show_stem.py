@@ -6,7 +6,7 @@ The correlation is between a channel at its own stride and the gray level in the
 its patches, over all pixels of a frame, averaged over the frames.
 """
 
-import _environment  # noqa: F401  starts this tool again in the environment of `make build`
+import _environment  # noqa: F401  starts this tool again in build/venv
 
 import argparse
 import pathlib
