@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
-#include "stem/foreign_model.hpp"
 #include "stem/hand_made.hpp"
+#include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {

@@ -26,6 +26,11 @@ class Sha256 {
   std::shared_ptr<EVP_MD_CTX> state_;
 };
 
+/// What a network's numbers are at most: whole images, for typing errors.
+inline constexpr int kMaxKernel_px = 4096;
+inline constexpr int kMaxStride_px = 256;
+inline constexpr int kMaxFilters = 4096;
+
 /// The default network, which is part of the library: its files are names for messages.
 [[nodiscard]] StemNetwork built_in_network();
 

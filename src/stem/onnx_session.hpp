@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <chrono>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -44,20 +42,16 @@ class OnnxSession {
   /// The only size of image the graph takes; 0 where an axis is free.
   [[nodiscard]] cv::Size fixed_size() const { return fixed_size_; }
 
-  using Limit = std::optional<std::chrono::milliseconds>;
-
-  /// Size of each channel for an image of this size, by asking the graph. Error: it refused, took
-  /// longer than `limit`, or its output is no 1xCxhxw.
-  [[nodiscard]] Expected<cv::Size> channel_size(cv::Size image_size, Limit limit = {}) const;
+  /// Size of each channel for an image of this size, by asking the graph. Error: it refused, or
+  /// its output is no 1xCxhxw.
+  [[nodiscard]] Expected<cv::Size> channel_size(cv::Size image_size) const;
 
   /// One pass. `image`: num_planes() planes of image_size; `channels`: num_filters() planes of
-  /// channel_size. Both are used where they are, without a copy. Error: the runtime refused, or
-  /// took longer than `limit`, which it looks at between two operators.
+  /// channel_size. Both are used where they are, without a copy. Error: the runtime refused.
   [[nodiscard]] Status run(const float* image,
                            cv::Size image_size,
                            float* channels,
-                           cv::Size channel_size,
-                           Limit limit = {}) const;
+                           cv::Size channel_size) const;
 
  private:
   struct TensorInfo;
@@ -75,7 +69,7 @@ class OnnxSession {
                                                            int num_planes,
                                                            cv::Size size) const;
   /// A null output is made by the runtime.
-  [[nodiscard]] Status run_graph(const OrtValue* input, OrtValue*& output, Limit limit) const;
+  [[nodiscard]] Status run_graph(const OrtValue* input, OrtValue*& output) const;
 
   std::string label_;
   const OrtApi* api_ = nullptr;

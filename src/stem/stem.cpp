@@ -10,7 +10,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
-#include "stem/foreign_model.hpp"
 #include "stem/hand_made.hpp"
 #include "stem/model_file.hpp"
 #include "stem/network_layer.hpp"
@@ -62,9 +61,7 @@ Expected<int> choose_sampling(int asked, const StemNetwork& network) {
 
 /// What a manifest would refuse: numbers that no convolution has.
 Status check_network(const StemNetwork& network) {
-  using internal::kMaxFilters;
-  using internal::kMaxKernel_px;
-  using internal::kMaxStride_px;
+  using namespace internal;
   struct Number {
     const char* what;
     int min;

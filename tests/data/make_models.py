@@ -95,81 +95,14 @@ def identity(name, inputs, outputs):
     write(name, [helper.make_node("Identity", [inputs[0].name], [outputs[0].name])], inputs, outputs)
 
 
-def hostile():
-    """Models that ask for too much, or for what is outside their file."""
-    image, channels = value("image", [1, 3, "H", "W"]), value("channels", [1, 3, "h", "w"])
-    pool = {"kernel_shape": [40000, 40000], "pads": [39999] * 4}
-    write("hostile_kernel", [helper.make_node("MaxPool", ["image"], ["channels"], **pool)], [image], [channels])
-    pool = {"kernel_shape": [4, 4], "strides": [8000, 8000]}
-    write("hostile_stride", [helper.make_node("MaxPool", ["image"], ["channels"], **pool)], [image], [channels])
-    identity("hostile_size", [value("image", [1, 3, 46341, 46341])], [value("channels", [1, 3, 46341, 46341])])
-    write("hostile_domain", [helper.make_node("Steal", ["image"], ["channels"], domain="com.example")], [image], [channels],
-          domains=["com.example"])
-    # An output said to be of rank 4 that is of rank 3, by a shape that only a run knows.
-    shape = [helper.make_node("Shape", ["image"], ["shape"]), helper.make_node("Slice", ["shape", "from", "to"], ["some"]),
-             helper.make_node("Reshape", ["image", "some"], ["channels"])]
-    ends = [numpy_helper.from_array(np.array([number]), key) for key, number in (("from", 1), ("to", 4))]
-    write("hostile_rank", shape, [image], [channels], ends)
-    body = helper.make_graph([helper.make_node("Identity", ["go"], ["go_on"]), helper.make_node("Identity", ["x"], ["y"])], "body",
-                             [value("i", [], TensorProto.INT64), value("go", [], TensorProto.BOOL), value("x", None)],
-                             [value("go_on", [], TensorProto.BOOL), value("y", None)])
-    write("hostile_loop", [helper.make_node("Loop", ["count", "true", "image"], ["channels"], body=body)], [image], [channels],
-          [numpy_helper.from_array(np.array(2**62), "count"), numpy_helper.from_array(np.array(True), "true")], is_checked=False)
-    kernel = numpy_helper.from_array(np.zeros((3, 3, 1, 1), np.float32), "weights")
-    conv = helper.make_node("Conv", ["image", "weights"], ["channels"], kernel_shape=[1, 1])
-    outside = onnx.TensorProto()
-    outside.CopyFrom(kernel)
+def external(name):
+    """Weights that the file beside it should hold."""
+    outside = numpy_helper.from_array(np.zeros((3, 3, 1, 1), np.float32), "weights")
     outside.ClearField("raw_data")
     outside.data_location = TensorProto.EXTERNAL
-    outside.external_data.add(key="location", value="../../../../etc/hostname")
-    write("hostile_external", [conv], [image], [channels], [outside], is_checked=False)
-    broken = np.ones((3, 3, 1, 1), np.float32)
-    broken[1, 1] = np.nan
-    write("hostile_nan", [conv], [image], [channels], [numpy_helper.from_array(broken, "weights")])
-    write("hostile_infinite", [helper.make_node("Log", ["image"], ["channels"])], [image], [channels])
-    # Of 100 bytes a million million values, which nothing but the constants decide.
-    tile = [helper.make_node("Tile", ["one" if i == 0 else f"t{i}", "repeats"], [f"t{i + 1}"]) for i in range(8)]
-    one = [numpy_helper.from_array(np.ones([1, 3, 1, 1], np.float32), "one"), numpy_helper.from_array(np.array([1, 1, 8, 8]), "repeats")]
-    write("hostile_tile", [*tile, helper.make_node("Resize", ["image", "", "scales"], ["like"]),
-                           helper.make_node("Add", ["like", "t8"], ["channels"])], [image], [channels],
-          [*one, numpy_helper.from_array(np.ones(4, np.float32), "scales")])
-    write("hostile_constant", [helper.make_node("Conv", ["one", "weights"], ["padded"], pads=[200] * 4),
-                               helper.make_node("Add", ["image", "padded"], ["channels"])], [image], [channels], [one[0], kernel])
-    # A weight added to itself, transposed, again and again: each time as many values as pairs.
-    add = [node for i in range(6) for node in (
-        helper.make_node("Reshape", [f"a{i}", "column"], [f"c{i}"]), helper.make_node("Reshape", [f"a{i}", "row"], [f"r{i}"]),
-        helper.make_node("Add", [f"c{i}", f"r{i}"], [f"a{i + 1}"]))]
-    write("hostile_pairs", [*add, helper.make_node("Add", ["image", "a6"], ["channels"])], [image], [channels],
-          [numpy_helper.from_array(np.ones(4, np.float32), "a0"), numpy_helper.from_array(np.array([-1, 1]), "column"),
-           numpy_helper.from_array(np.array([1, -1]), "row")])
-    # The least whole number by -1, of constants and of what a run alone knows.
-    least, minus = np.array([-2**63]), np.array([-1])
-    use = [helper.make_node("Cast", ["divided"], ["float"], to=TensorProto.FLOAT), helper.make_node("ReduceSum", ["float"], ["sum"], keepdims=0),
-           helper.make_node("Add", ["image", "sum"], ["channels"])]
-    write("hostile_divide", [helper.make_node("Div", ["least", "minus"], ["divided"]), *use], [image], [channels],
-          [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus")])
-    later = [helper.make_node("Cast", ["image"], ["whole"], to=TensorProto.INT64), helper.make_node("Mul", ["whole", "nothing"], ["zero"]),
-             helper.make_node("Add", ["zero", "least"], ["a"]), helper.make_node("Add", ["zero", "minus"], ["b"])]
-    write("hostile_divide_later", [*later, helper.make_node("Div", ["a", "b"], ["divided"]), *use], [image], [channels],
-          [numpy_helper.from_array(least, "least"), numpy_helper.from_array(minus, "minus"), numpy_helper.from_array(np.array([0]), "nothing")])
-    # What ONNX Runtime says of it is long, and names its own sources.
-    write("hostile_shape", [helper.make_node("Reshape", ["image", "deep"], ["values"]), helper.make_node("Reshape", ["values", "flat"], ["channels"])],
-          [image], [channels], [numpy_helper.from_array(np.array([1] * 2398 + [3, 7]), "deep"), numpy_helper.from_array(np.array([1, 3, -1, 1]), "flat")])
-    # A number of an attribute says how much is computed and kept.
-    flat = [helper.make_node("Reshape", ["image", "row"], ["values"])]
-    row = [numpy_helper.from_array(np.array([1, -1]), "row")]
-    used = [helper.make_node("Cast", ["made"], ["float"], to=TensorProto.FLOAT), *use[1:]]
-    write("hostile_samples", [*flat, helper.make_node("Multinomial", ["values"], ["made"], sample_size=2**30), *used], [image], [channels], row)
-    words = helper.make_node("TfIdfVectorizer", ["whole"], ["made"], max_gram_length=2, max_skip_count=2**40, min_gram_length=1, mode="TF",
-                             ngram_counts=[0, 1], ngram_indexes=[0, 1], pool_int64s=[0, 1, 2])
-    write("hostile_words", [*flat, helper.make_node("Cast", ["values"], ["whole"], to=TensorProto.INT64), words, *used], [image], [channels], row)
-    write("hostile_pads", [helper.make_node("Conv", ["image", "weights"], ["channels"], pads=[4096] * 4)], [image], [channels], [kernel])
-    write("hostile_across", [helper.make_node("LRN", ["image"], ["channels"], size=2**16 + 1)], [image], [channels])
-    # Some 10^10 multiplications per operator: slower than any first layer.
-    box = helper.make_node("ConstantOfShape", ["size"], ["box"], value=numpy_helper.from_array(np.array([1e-4], np.float32)))
-    slow = [box] + [helper.make_node("Conv", ["image" if i == 0 else f"x{i}", "box"], ["channels" if i == 299 else f"x{i + 1}"],
-                                     kernel_shape=[65, 65], pads=[32] * 4) for i in range(300)]
-    write("hostile_slow", slow, [image], [channels], [numpy_helper.from_array(np.array([3, 3, 65, 65]), "size")])
+    outside.external_data.add(key="location", value=f"{name}.bin")
+    write(name, [helper.make_node("Conv", ["image", "weights"], ["channels"], kernel_shape=[1, 1])],
+          [value("image", [1, 3, "H", "W"])], [value("channels", [1, 3, "h", "w"])], [outside], is_checked=False)
 
 
 def main():
@@ -201,7 +134,10 @@ def main():
           [value("image", shape), value("more", shape)], [value("channels", shape)])
     write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
           [value("image", shape)], [value("channels", [1, *picture])])
-    hostile()
+    external("wrong_external")
+    write("wrong_domain", [helper.make_node("Steal", ["image"], ["channels"], domain="com.example")],
+          [value("image", shape)], [value("channels", shape)], domains=["com.example"])
+    write("wrong_infinite", [helper.make_node("Log", ["image"], ["channels"])], [value("image", shape)], [value("channels", shape)])
 
 
 if __name__ == "__main__":

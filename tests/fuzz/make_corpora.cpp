@@ -187,15 +187,6 @@ void yaml_and_models(const fs::path& source, const fs::path& out) {
                      "stem: {filter: 3, model: gray}\nevaluation:\n  segment_lengths_m: [1]\n");
   configuration.text("assignment", "evaluation.segment_lengths_m=[100, 200]");
   Corpus(out, "manifest").copy(source / "models/manifest.yaml");
-  const Corpus models(out, "model");
-  for (const fs::directory_entry& file : fs::directory_iterator(source / "tests/data/stems")) {
-    constexpr std::uintmax_t kMaxBytes = 1 << 14;
-    // A division without a result is a signal, which is the program's to answer.
-    const bool is_signal = file.path().filename().string().starts_with("hostile_divide");
-    if (file.file_size() <= kMaxBytes && !is_signal) {
-      models.copy(file.path());
-    }
-  }
 }
 
 void images(const fs::path& out) {

@@ -128,34 +128,6 @@ TEST_F(BadInputTable, ManifestAndModel) {
                              {text("empty", "")});
 }
 
-TEST_F(BadInputTable, HostileModels) {
-  for (const char* name :
-       {"kernel", "stride", "size", "domain", "loop", "external", "nan", "infinite", "rank", "tile",
-        "pairs", "shape", "samples", "words", "pads", "across"}) {
-    const TempFolder folder;
-    const testing::TinyStem stem{.name = std::string("hostile_") + name, .kernel = 1, .stride = 1};
-    testing::write_models(folder, stem);
-    const ProgramResult result = run_stemvo({"models", folder / (stem.name + ".onnx")});
-    EXPECT_EQ(result.exit_code, 1) << name;
-    EXPECT_THAT(result.err, AllOf(StartsWith("error: "), HasSubstr(stem.name),
-                                  Not(HasSubstr("internal")), Not(HasSubstr("onnxruntime_src"))))
-        << name;
-    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-  }
-}
-
-/// The least number by -1, while the graph is loaded and while it runs: a signal of the processor.
-TEST_F(BadInputTable, DivisionsWithoutAResult) {
-  for (const char* name : {"hostile_divide", "hostile_divide_later"}) {
-    const TempFolder folder;
-    testing::write_models(folder, {.name = name, .kernel = 1, .stride = 1});
-    const ProgramResult result = run_stemvo({"models", folder / (std::string(name) + ".onnx")});
-    EXPECT_EQ(result.exit_code, 1) << name;
-    EXPECT_THAT(result.err, StartsWith("error: a division of whole numbers")) << name;
-    EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << result.err;
-  }
-}
-
 TEST_F(BadInputTable, MetricsAndThresholds) {
   write_file(folder_ / "metrics.json", "{\"t_rel_percent\": 0.875, \"segments\": null}\n");
   write_file(folder_ / "limits.yaml", "t_rel_percent: {max: 1.5}\n");

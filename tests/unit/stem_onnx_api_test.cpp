@@ -80,7 +80,7 @@ class OnnxApi : public ::testing::Test {
     return shape;
   }
 
-  const OrtApi* api = OrtGetApiBase()->GetApi(1);
+  const OrtApi* api = OrtGetApiBase()->GetApi(5);
   OrtEnv* env = nullptr;
   OrtSessionOptions* options = nullptr;
   OrtAllocator* allocator = nullptr;
@@ -104,6 +104,7 @@ TEST_F(OnnxApi, SessionOptionsAreTaken) {
   ok(api->SetIntraOpNumThreads(options, 1));
   ok(api->SetInterOpNumThreads(options, 1));
   ok(api->SetSessionGraphOptimizationLevel(options, ORT_ENABLE_ALL));
+  ok(api->AddSessionConfigEntry(options, "session.use_env_allocators", "0"));
   load("plain_k4s4.onnx");
   // These two refuse nonsense, which shows that it is really them.
   OrtStatus* status =

@@ -4,7 +4,7 @@
 // The part of ONNX Runtime's C interface that stemvo calls, for systems without the official
 // header (the PyPI wheel, where the library comes from, holds none). Names, types and numbers are
 // those of the official header, so that either one can be included. The functions stand in a table
-// that only ever grows at its end: what is listed here belongs to version 1 of it, and the unused
+// that only ever grows at its end: what is listed here belongs to version 5 of it, and the unused
 // places between are padding.
 
 #include <stddef.h>
@@ -20,6 +20,7 @@ typedef struct OrtMemoryInfo OrtMemoryInfo;
 typedef struct OrtSession OrtSession;
 typedef struct OrtValue OrtValue;
 typedef struct OrtRunOptions OrtRunOptions;
+typedef struct OrtModelMetadata OrtModelMetadata;
 typedef struct OrtTypeInfo OrtTypeInfo;
 typedef struct OrtTensorTypeAndShapeInfo OrtTensorTypeAndShapeInfo;
 typedef struct OrtSessionOptions OrtSessionOptions;
@@ -121,11 +122,7 @@ typedef struct OrtApi {
                                        size_t index,
                                        OrtAllocator* allocator,
                                        char** out);
-  void* unused_38;
-  OrtStatusPtr (*CreateRunOptions)(OrtRunOptions** out);
-  void* unused_40_45[6];
-  OrtStatusPtr (*RunOptionsSetTerminate)(OrtRunOptions* options);
-  void* unused_47_48[2];
+  void* unused_38_48[11];
   OrtStatusPtr (*CreateTensorWithDataAsOrtValue)(const OrtMemoryInfo* memory,
                                                  void* data,
                                                  size_t data_bytes,
@@ -160,10 +157,23 @@ typedef struct OrtApi {
   void (*ReleaseMemoryInfo)(OrtMemoryInfo* memory);
   void (*ReleaseSession)(OrtSession* session);
   void (*ReleaseValue)(OrtValue* value);
-  void (*ReleaseRunOptions)(OrtRunOptions* options);
+  void* unused_97;
   void (*ReleaseTypeInfo)(OrtTypeInfo* info);
   void (*ReleaseTensorTypeAndShapeInfo)(OrtTensorTypeAndShapeInfo* info);
   void (*ReleaseSessionOptions)(OrtSessionOptions* options);
+  void* unused_101_110[10];
+  OrtStatusPtr (*SessionGetModelMetadata)(const OrtSession* session, OrtModelMetadata** out);
+  void* unused_112_115[4];
+  OrtStatusPtr (*ModelMetadataLookupCustomMetadataMap)(const OrtModelMetadata* metadata,
+                                                       OrtAllocator* allocator,
+                                                       const char* key,
+                                                       char** out);
+  void* unused_117;
+  void (*ReleaseModelMetadata)(OrtModelMetadata* metadata);
+  void* unused_119_129[11];
+  OrtStatusPtr (*AddSessionConfigEntry)(OrtSessionOptions* options,
+                                        const char* key,
+                                        const char* value);
 } OrtApi;
 
 typedef struct OrtApiBase {
@@ -179,7 +189,8 @@ const OrtApiBase* OrtGetApiBase(void);
 
 static_assert(offsetof(OrtApi, Run) == 9 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, SessionGetInputCount) == 30 * sizeof(void*), "place in the table");
-static_assert(offsetof(OrtApi, RunOptionsSetTerminate) == 46 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, CreateCpuMemoryInfo) == 69 * sizeof(void*), "place in the table");
 static_assert(offsetof(OrtApi, ReleaseSessionOptions) == 100 * sizeof(void*), "place in the table");
+static_assert(offsetof(OrtApi, ReleaseModelMetadata) == 118 * sizeof(void*), "place in the table");
+static_assert(offsetof(OrtApi, AddSessionConfigEntry) == 130 * sizeof(void*), "place in the table");
 #endif
