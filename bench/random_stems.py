@@ -14,10 +14,21 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
 import _environment  # noqa: E402,F401  starts this tool again in build/venv
 
-import fold_bench  # noqa: E402
-from stems import fold, manifest, onnx_writer  # noqa: E402
+import numpy as np  # noqa: E402
+
+from stems import families, fold, manifest, onnx_writer  # noqa: E402
+from stems import stem as stem_module  # noqa: E402
 
 FILTERS, FILTER = 256, 10
+
+
+def random_stem(filters, seed):
+    """The shape of a ConvNeXt stem, its layer norm trained to other than ones and zeros."""
+    rng = np.random.default_rng(seed)
+    fed = families.PREPROCESSING["imagenet"]
+    norm = stem_module.LayerNorm(rng.uniform(0.5, 1.5, filters), rng.normal(size=filters), 1e-6)
+    return stem_module.Stem(stem_module.fold_scale(rng.normal(size=(filters, 3, 4, 4)) / 7, fed.std), rng.normal(size=filters) / 10, 4,
+                            np.array(fed.mean), layer_norm=norm)
 
 
 def main():
@@ -26,7 +37,7 @@ def main():
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     (out / "manifest.yaml").unlink(missing_ok=True)
-    full = fold_bench.random_stem(FILTERS, seed=1)
+    full = random_stem(FILTERS, seed=1)
     for name, stem, chosen in (("full", full, FILTER), ("folded", fold.layer_norm_filter(full, FILTER), 0)):
         file = out / f"{name}.onnx"
         onnx_writer.write(stem, file)

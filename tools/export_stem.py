@@ -4,7 +4,7 @@
 
 WEIGHTS is one of
   .h5 .keras             Keras: ConvNeXt, EfficientNetV2, NASNet, ResNet; the stem
-  .safetensors .pth .pt  PyTorch (timm, torchvision, the authors'): the same; the stem
+  .safetensors           PyTorch (timm, torchvision, the authors'): the same; the stem
   .onnx                  any whole network, cut at the tensors named by --layers
   .npz                   arrays of a stem (tools/stems/weights.py lists the keys)
 
@@ -43,12 +43,6 @@ def parse_size(text):
     return int(match[1]), int(match[2])
 
 
-def parse_fold(text):
-    if text != "exact" and not (re.fullmatch(r"\d{1,3}", text) and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"expected exact or a number of rows, found {text!r}")
-    return text
-
-
 def parse_layers(text):
     names = text.split(",")
     if not all(names) or len(set(names)) != len(names) or "first" in names:
@@ -63,9 +57,7 @@ def parse_arguments(arguments):
     parser.add_argument("--list", action="store_true", help="print the layers, write nothing")
     parser.add_argument("--layers", type=parse_layers, metavar="A,B,..", help="to export, by name (default: the stem behind its norm)")
     parser.add_argument("--filter", type=int, metavar="K", help="export this filter only")
-    parser.add_argument("--fold", type=parse_fold, nargs="?", const="exact", metavar="ROWS",
-                        help="with --filter: a layer norm without all the other filters; exact, or cut to ROWS rows (needs --frames)")
-    parser.add_argument("--frames", type=pathlib.Path, metavar="DIR", help="PNG files to fit --fold ROWS to, and to report its error on")
+    parser.add_argument("--fold", action="store_true", help="with --filter: a layer norm without all the other filters")
     parser.add_argument("--size", type=parse_size, metavar="WxH", help="of the pictures that \"same\" padding is for")
     parser.add_argument("--preprocessing", choices=sorted(families.PREPROCESSING), help="what the network is fed (.onnx: needed)")
     parser.add_argument("--name", help="of the model (default: of the file)")
@@ -108,13 +100,12 @@ def command_line(options, name):
     """That makes the same file again: without folders, which differ from machine to machine."""
     padding = options.padding if isinstance(options.padding, str) else ",".join(map(str, options.padding))
     words = ["tools/export_stem.py", options.weights.name, "--out", ".", "--name", name, "--padding", padding]
-    for option, value in (("--layers", ",".join(options.layers or [])), ("--filter", options.filter), ("--fold", options.fold),
-                          ("--frames", options.fold not in (None, "exact") and options.frames.name),
+    for option, value in (("--layers", ",".join(options.layers or [])), ("--filter", options.filter),
                           ("--size", options.size and "x".join(map(str, options.size))),
                           ("--preprocessing", options.preprocessing)):
         if value not in (None, "", False):
             words += [option, str(value)]
-    return shlex.join(words)
+    return shlex.join(words + ["--fold"] * options.fold)
 
 
 def list_layers(options):

@@ -94,9 +94,7 @@ def write_torch(folder, pictures, cases):
         np.savez(folder / f"timm_{name}.out.npz", *torch_outputs(model, stem, config["mean"], config["std"], pictures))
         state = {key: value.contiguous() for key, value in model.state_dict().items()}
         safetensors.torch.save_file(state, folder / f"timm_{name}.safetensors")
-        torch.save(state, folder / f"timm_{name}.pth")
-        for suffix in (".safetensors", ".pth"):
-            cases.append({"file": f"timm_{name}{suffix}", "output": f"timm_{name}.out.npz", "layer": "stem"})
+        cases.append({"file": f"timm_{name}.safetensors", "output": f"timm_{name}.out.npz", "layer": "stem"})
         if name in ("convnext_atto", "tf_efficientnetv2_b0", "resnet18"):
             write_whole(folder, name, model, config, pictures, cases)
     for name, stem in (("resnet18", lambda m, x: m.bn1(m.conv1(x))), ("convnext_tiny", lambda m, x: m.features[0](x)),
@@ -104,8 +102,8 @@ def write_torch(folder, pictures, cases):
         model = shaken_state(getattr(torchvision.models, name)(weights=None), rng)
         outputs = torch_outputs(model, stem, (0.485, 0.456, 0.406), (0.229, 0.224, 0.225), pictures)
         np.savez(folder / f"torchvision_{name}.out.npz", *outputs)
-        torch.save(model.state_dict(), folder / f"torchvision_{name}.pth", _use_new_zipfile_serialization=name != "resnet18")
-        cases.append({"file": f"torchvision_{name}.pth", "output": f"torchvision_{name}.out.npz", "layer": "stem"})
+        safetensors.torch.save_file(model.state_dict(), folder / f"torchvision_{name}.safetensors")
+        cases.append({"file": f"torchvision_{name}.safetensors", "output": f"torchvision_{name}.out.npz", "layer": "stem"})
     cases[-1]["version"] = f"torch {torch.__version__}, timm {timm.__version__}, torchvision {torchvision.__version__}"
 
 

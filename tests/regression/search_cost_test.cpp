@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -13,18 +12,13 @@ namespace {
 /// of KITTI's size.
 class SearchCost : public Search {
  protected:
-  /// Random filters, the tool's own; the path of the model.
-  [[nodiscard]] std::string random_stem(int filters) const {
-    const std::string tools = std::string(STEMVO_SOURCE_DIR) + "/tools";
-    const std::string script = folder_ / "write.py";
-    std::ofstream(script) << "import pathlib, sys\nsys.path.insert(0, sys.argv[1])\n"
-                             "import search_rates\nfolder = pathlib.Path(sys.argv[2])\n"
-                             "search_rates.write_model(folder, 4, int(sys.argv[3]), 'any')\n";
-    const ProgramResult written =
-        test::run_program(std::string(STEMVO_SOURCE_DIR) + "/build/venv/bin/python",
-                          {script, tools, folder_.path().string(), std::to_string(filters)});
+  /// Random filters with a layer norm; the path of the model.
+  [[nodiscard]] std::string random_stem() const {
+    const std::string root = STEMVO_SOURCE_DIR;
+    const ProgramResult written = test::run_program(
+        root + "/build/venv/bin/python", {root + "/bench/random_stems.py", folder_.path().string()});
     EXPECT_EQ(written.exit_code, 0) << written.err;
-    return folder_ / "stride4.onnx";
+    return folder_ / "full.onnx";
   }
 };
 
@@ -32,7 +26,7 @@ TEST_F(SearchCost, Of256FiltersInOnePassIsBounded) {
   const fs::path drive =
       test::rendered_drive({.frames = 14, .width_px = 1241, .height_px = 376}) / "sequences/00";
   const ProgramResult result =
-      run_stemvo({"search", drive.string(), "--model", random_stem(256), "--exhaustive", "--quiet",
+      run_stemvo({"search", drive.string(), "--model", random_stem(), "--exhaustive", "--quiet",
                   "--no-baselines", "--out", folder_ / "out"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   ASSERT_EQ(count_lines(folder_ / "out/filters.csv"), 257U);

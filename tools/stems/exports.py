@@ -3,11 +3,8 @@
 
 import dataclasses
 
-from stems import families, fold, fold_report, frames, graph_check, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
+from stems import families, fold, graph_check, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
 from stems.weights import WeightsError
-
-# Fitted and judged on frames of their own, in turn.
-_FRAMES = 20
 
 
 @dataclasses.dataclass
@@ -56,27 +53,16 @@ def _stems_of(options):
 
 
 def _fold_one(options, name, stem):
-    """The model of one filter, folded, and what it cost in accuracy."""
+    """One filter of a stem without the others."""
     _check_filter(options.weights, name, stem.filters, options.filter)
     if stem.layer_norm is None:
         folded = fold.one_filter(stem, options.filter)
     elif any(stem.padding):
         raise WeightsError(f"{options.weights}: --fold: expected --padding none for a stem with a layer norm, found "
                            f"{list(stem.padding)}")
-    elif options.fold == "exact":
-        folded = fold.layer_norm_filter(stem, options.filter)
     else:
-        if options.frames is None:
-            raise WeightsError("--fold ROWS: expected --frames DIR, which says what patches look like, found none")
-        fit = [frames.read(file) for file in frames.find(options.frames, 2 * _FRAMES)[0::2]]
-        moment = fold.second_moment(stem.kernel, stem.stride, fit)
-        folded = fold.layer_norm_filter(stem, options.filter, int(options.fold), moment)
-    model = onnx_writer.build_layers({name: folded})
-    notes = [f"filter {options.filter}: {len(folded.weights)} rows instead of {stem.filters}"]
-    if options.frames is not None:
-        judged = (frames.read(file) for file in frames.find(options.frames, 2 * _FRAMES)[1::2])
-        notes.append(str(fold_report.difference(onnx_writer.build(stem), model, options.filter, judged)))
-    return model, folded, tuple(notes)
+        folded = fold.layer_norm_filter(stem, options.filter)
+    return folded, (f"filter {options.filter}: {len(folded.weights)} rows instead of {stem.filters}",)
 
 
 def _of_stems(options):
@@ -85,13 +71,13 @@ def _of_stems(options):
     for stem in stems.values():
         _check_padding(stem)
     single = len(stems) == 1
-    if options.fold is not None:
+    if options.fold:
         if options.filter is None or not single:
             raise WeightsError("--fold: expected --filter K and one layer, found "
                                f"{'no --filter' if options.filter is None else f'{len(stems)} layers'}")
         name, stem = next(iter(stems.items()))
-        model, folded, more = _fold_one(options, name, stem)
-        return Export(onnx_writer.to_bytes(model), {name: folded}, network, notes + more)
+        folded, more = _fold_one(options, name, stem)
+        return Export(onnx_writer.to_bytes(onnx_writer.build_layers({name: folded})), {name: folded}, network, notes + more)
     layers = stems
     if options.filter is not None:
         for name, stem in stems.items():
@@ -122,7 +108,7 @@ def _of_graph(options):
     if options.preprocessing is None:
         raise WeightsError(f"{options.weights}: expected --preprocessing, what the network is fed "
                            f"({', '.join(families.PREPROCESSING)}), found none")
-    if options.padding != "none" or options.fold is not None:
+    if options.padding != "none" or options.fold:
         raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
     with graph_cut.refusing_unsound(options.weights):
         _check_network(options, whole)
@@ -136,7 +122,4 @@ def _of_graph(options):
 
 def make(options):
     """Reads, checks, builds. Error: WeightsError, of one line."""
-    if options.weights.suffix not in (".npz", ".onnx", *weight_files.SUFFIXES):
-        raise WeightsError(f"{options.weights}: expected one of .npz, .onnx, {', '.join(weight_files.SUFFIXES)}, "
-                           f"found {options.weights.suffix or 'no suffix'}")
     return _of_graph(options) if options.weights.suffix == ".onnx" else _of_stems(options)

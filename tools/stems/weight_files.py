@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Weights files as layers: .h5 and .keras (Keras), .safetensors and .pth (PyTorch)."""
+"""Weights files as layers: .h5 and .keras (Keras), .safetensors (PyTorch)."""
 
 import dataclasses
-import json
-import pickle
-import struct
-import zipfile
-import zlib
 
 import numpy as np
 
-from stems import keras_files, torch_pickle
+from stems import keras_files
 from stems.weights import WeightsError
 
-SUFFIXES = (".h5", ".keras", ".safetensors", ".pth", ".pt")
-# What the readers raise on damaged and foreign files.
-_BROKEN_FILE = (OSError, ValueError, EOFError, TypeError, KeyError, IndexError, AttributeError, SyntaxError, MemoryError,
-                OverflowError, NotImplementedError, RecursionError, RuntimeError, pickle.UnpicklingError, struct.error,
-                zlib.error, zipfile.BadZipFile, json.JSONDecodeError, UnicodeDecodeError)
+SUFFIXES = (".h5", ".keras", ".safetensors")
+# A pickle can run anything, so it is not read here.
+_PICKLES = (".pth", ".pt")
+_CONVERT = ("expected .safetensors, found a pickle; where PyTorch is: import torch, safetensors.torch; "
+            "safetensors.torch.save_file(torch.load({0!r}, weights_only=True), {1!r})")
 
 
 @dataclasses.dataclass
@@ -93,12 +88,9 @@ def _torch_kind(shapes):
 
 def _group_torch(tensors):
     """tensors: name -> (shape, reader). Prefixes of wrapped and parallel models are taken off."""
-    for prefix in ("model.", "state_dict.", "model_ema.", "module.", "model."):
+    for prefix in ("model.", "module."):
         if tensors and all(name.startswith(prefix) for name in tensors):
             tensors = {name.removeprefix(prefix): tensor for name, tensor in tensors.items()}
-        elif prefix in ("model.", "state_dict.") and any(name.startswith(prefix) for name in tensors):
-            # Of a checkpoint with an optimiser beside the model.
-            tensors = {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
     groups = {}
     for name, tensor in tensors.items():
         owner, _, array = name.rpartition(".")
@@ -109,11 +101,6 @@ def _group_torch(tensors):
         filters = next((shape[0] for array in ("weight", *shapes) if (shape := shapes.get(array))), None)
         layers.append(Layer(name, _torch_kind(shapes), filters, shapes, lambda array, arrays=arrays: arrays[array][1]()))
     return layers
-
-
-def _read_pth(path):
-    tensors = torch_pickle.read(path)
-    return _group_torch({name: (tensor.shape, tensor.array) for name, tensor in tensors.items()})
 
 
 def _read_safetensors(path):
@@ -130,16 +117,17 @@ def _read_safetensors(path):
 
 def load(path):
     """The layers of a file, by its suffix."""
-    readers = {".h5": ("keras", _read_keras), ".keras": ("keras", _read_keras), ".pth": ("torch", _read_pth),
-               ".pt": ("torch", _read_pth), ".safetensors": ("torch", _read_safetensors)}
+    readers = {".h5": ("keras", _read_keras), ".keras": ("keras", _read_keras), ".safetensors": ("torch", _read_safetensors)}
+    if path.suffix in _PICKLES:
+        raise WeightsError(f"{path}: " + _CONVERT.format(path.name, f"{path.stem}.safetensors"))
     if path.suffix not in readers:
-        raise WeightsError(f"{path}: expected one of {', '.join(SUFFIXES)}, found {path.suffix or 'no suffix'}")
+        raise WeightsError(f"{path}: expected one of .npz, .onnx, {', '.join(SUFFIXES)}, found {path.suffix or 'no suffix'}")
     source, read = readers[path.suffix]
     if not path.is_file():
         raise WeightsError(f"{path}: expected a weights file, found {'a folder' if path.is_dir() else 'nothing'}")
     try:
         layers = read(path)
-    except _BROKEN_FILE as error:
+    except Exception as error:  # noqa: BLE001  the readers raise many kinds on damaged files
         raise WeightsError(f"{path}: expected a {path.suffix} weights file, found: {_one_line(error)}") from error
     if not any(layer.shapes for layer in layers):
         raise WeightsError(f"{path}: expected a {path.suffix} weights file, found no arrays in it")
@@ -151,7 +139,7 @@ def read_array(file, layer, name):
     try:
         with np.errstate(all="ignore"):
             values = np.asarray(layer.read(name)).astype(np.float64)
-    except _BROKEN_FILE as error:
+    except Exception as error:  # noqa: BLE001  the readers raise many kinds on damaged files
         raise WeightsError(f"{file.path}: {layer.name}.{name}: cannot read: {_one_line(error)}") from error
     if not np.all(np.isfinite(values)):
         raise WeightsError(f"{file.path}: {layer.name}.{name}: expected finite numbers, found NaN or infinity")
