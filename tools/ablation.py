@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """What each part of the program buys: the defaults, and the defaults with one part replaced.
 
-    tools/ablation.py KITTI_ROOT --out docs/ablation.md [--sequences 03,00,06] [--seeds 1,2,3]
+    tools/ablation.py KITTI_ROOT --out docs/lab/ablation.md [--sequences 03,00,06] [--seeds 1,2,3]
 
 KITTI_ROOT holds sequences/NN and poses/NN.txt. A cell has t_rel and r_rel with per-step ground-truth scale
 (each step takes its true length, so that direction and rotation are judged), and t_rel with metres
@@ -149,7 +149,7 @@ def report(arguments):
     base = "".join(f" --set {setting}" for setting in arguments.set)
     command = f"tools/ablation.py KITTI --sequences {','.join(arguments.sequences)}{seeds}{base} --out FILE"
     head = ("The defaults, and the defaults with one part replaced: t_rel % / r_rel degrees per 100 m with per-step "
-            "ground-truth scale / t_rel % without ground truth, no alignment. What it says: [accuracy](accuracy.md#ablation).")
+            "ground-truth scale / t_rel % without ground truth, no alignment. What it says: [accuracy](accuracy_notes.md#parts-replaced).")
     return "\n".join(["# Ablation", "", head, "", "```", command, "```", "", f"{done.stdout.strip()}:", "", *table(arguments), ""])
 
 

@@ -8,7 +8,7 @@ readonly PAGES=build/docs_pages
 tools/setup.sh docs
 rm -rf "$PAGES" build/docs
 mkdir -p "$PAGES"
-cp -r docs/*.md docs/images tools/docs/api.md "$PAGES"
+cp -r docs/*.md docs/images docs/lab tools/docs/api.md "$PAGES"
 cp README.md "$PAGES/index.md"
 cp CHANGELOG.md "$PAGES/changelog.md"
 cp CONTRIBUTING.md "$PAGES/contributing.md"
@@ -16,8 +16,8 @@ cp examples/README.md "$PAGES/examples.md"
 # Links as they are in the repository, to pages of the site; files that are no pages are named only.
 sed -i -E -e 's#(\]\(|<img src=")(\.\./)?docs/#\1#g' -e 's#\]\((\.\./)?CHANGELOG\.md#](changelog.md#g' -e 's#\]\((\.\./)?CONTRIBUTING\.md#](contributing.md#g' \
   -e 's#\]\((\.\./)?examples/README\.md#](examples.md#g' -e 's#\]\((\.\./)?README\.md#](index.md#g' \
-  -e 's#\[([^]]*)\]\((\.\./)?(config|examples|bench|tests|tools|src|include|models|ci)/[^)]*\)#\1#g' \
-  -e 's#\[([^]]*)\]\([a-z_]+\.(cpp|py|txt)\)#\1#g' "$PAGES"/*.md
+  -e 's#\[([^]]*)\]\((\.\./)*(config|examples|bench|tests|tools|src|include|models|ci)/[^)]*\)#\1#g' \
+  -e 's#\[([^]]*)\]\([a-z_]+\.(cpp|py|txt)\)#\1#g' "$PAGES"/*.md "$PAGES"/lab/*.md
 
 # Doxygen first: a page links to it. (mkdocs --quiet would not count warnings.)
 doxygen tools/docs/Doxyfile

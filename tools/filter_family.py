@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """A grid of made filters of 8x8 at stride 2, for a search by odometry: OUT/family.onnx and its entry in OUT/manifest.yaml;
-prints number and name of each filter. docs/evidence.md has what came of it.
+prints number and name of each filter. docs/lab/evidence.md has what came of it.
 
 G1.3: Gaussian of sigma 1.3 px. S0.9-0.7x1.8: Gaussian of 0.9 less 0.7 of one of 1.8. D1.5@90: derivative of a Gaussian of 1.5
 along 90 degrees (down). M0.7+3D1.2@90: Gaussian of 0.7 plus 3 of a derivative.

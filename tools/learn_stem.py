@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Learns a stem from rendered drives and writes OUT/NAME.onnx, with --default-filter K that filter alone
-(OUT/NAME_filter_K.onnx: the same values at less cost), and their entry in OUT/manifest.yaml. The same drives and options give the same bytes. docs/default_model.md explains it.
+(OUT/NAME_filter_K.onnx: the same values at less cost), and their entry in OUT/manifest.yaml. The same drives and options give the same bytes. docs/lab/default_model.md explains it.
 
 DRIVE: made by `stemvo synth DRIVE --depth`, with --walk or without (pictures, exact depth and poses).
 """

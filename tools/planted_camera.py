@@ -7,7 +7,7 @@
 Renders as tools/long_drives.py does (CACHE and POSES_DIR are the same), runs the program with the true calibration and
 with one whose principal point is DX, DY pixels off, with either scale, and prints a table: t_rel in percent and r_rel
 in degrees per 100 m of the whole drive and from frame N on, no alignment; and how far the camera of frames.csv is from
-the true one in the runs with the camera's height, at the end and at most (x and y; from frame N on). docs/accuracy.md shows the table.
+the true one in the runs with the camera's height, at the end and at most (x and y; from frame N on). docs/lab/accuracy_notes.md shows the table.
 """
 
 import _environment  # noqa: F401  starts this tool again in build/venv

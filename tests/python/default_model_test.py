@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""models/ holds what the commands of docs/default_model.md make."""
+"""models/ holds what the commands of docs/lab/default_model.md make."""
 
 import os
 import pathlib
@@ -21,7 +21,7 @@ def channels(file, gray):
 
 class DefaultModel(unittest.TestCase):
     def test_the_commands_of_the_page_make_it(self):
-        page = (ROOT / "docs/default_model.md").read_text()
+        page = (ROOT / "docs/lab/default_model.md").read_text()
         lines = re.findall(r"^(?:build/release/stemvo synth|tools/learn_stem\.py) .*$", page, re.MULTILINE)
         self.assertEqual(len(lines), 4)
         gray = np.random.default_rng(3).integers(0, 256, (1, 1, 64, 96)).astype(np.float32)

@@ -40,7 +40,7 @@ class Distances {
   [[nodiscard]] double found() const {
     return static_cast<double>(px_.size()) / static_cast<double>(num_asked_);
   }
-  /// As the table in docs/accuracy.md has them.
+  /// As the table in docs/lab/accuracy_notes.md has them.
   [[nodiscard]] std::string row() const {
     return fmt::format("{:.3f} / {:.3f} / {:.2f}", quantile_px(0.5), quantile_px(0.9), found());
   }

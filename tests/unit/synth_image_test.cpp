@@ -184,7 +184,7 @@ double road_contrast(const cv::Mat& gray, double from_row) {
   return deviation[0];
 }
 
-/// Gray levels, medians over clip 06 (straight, real), as docs/synthetic_drives.md says.
+/// Gray levels, medians over clip 06 (straight, real), as docs/lab/rendered_against_real.md says.
 constexpr double kRealContrast = 7.50;
 constexpr double kRealContrastNear = 5.69;  // below 80 % of the height
 
