@@ -29,6 +29,7 @@ RUN_ELSEWHERE = {
     "make bench": "tests/python/bench_run_test.py",
     "bench/run.py": "tests/python/bench_run_test.py",
     "build/release/stemvo_bench": ".ci/run",
+    "build/release/tests/stemvo_unit_tests": ".ci/run",
     "STEMVO_BENCH_": ".ci/run",
     "cmake -S examples": "tests/package/install_and_consume.cmake",
     "build/examples/": "tests/package/install_and_consume.cmake",
