@@ -3,7 +3,7 @@
 
 import dataclasses
 
-from stems import families, fold, graph_check, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
+from stems import families, fold, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
 from stems.weights import WeightsError
 
 
@@ -114,7 +114,6 @@ def _of_graph(options):
         _check_network(options, whole)
         model, layers = graph_cut.cut(options.weights, whole, options.layers,
                                       families.PREPROCESSING[options.preprocessing], options.size, options.filter)
-    model = graph_check.checked(options.weights, model, layers, options.size)
     notes = tuple(f"{layer.name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
                   f"stride {layer.stride} only" for layer in layers if layer.sampling == "native")
     return Export(onnx_writer.to_bytes(model), {layer.name: layer for layer in layers}, None, notes)
