@@ -56,7 +56,7 @@ cluster:
 
 test-frameworks:
 	@tools/setup.sh tools
-	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py tests/frameworks/table_1.py
+	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py
 
 format:
 	@tools/setup.sh tools

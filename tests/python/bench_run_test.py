@@ -21,7 +21,6 @@ import results  # noqa: E402
 import rounds  # noqa: E402
 import rows  # noqa: E402
 import run  # noqa: E402
-import sequence  # noqa: E402
 import table  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", "")
@@ -74,32 +73,6 @@ class Turns(unittest.TestCase):
         turns = ["".join(row.name for row in rounds.order(self.ROWS, number)) for number in range(4)]
         self.assertEqual(turns, ["abc", "bca", "cab", "abc"])
 
-    def test_every_frame_is_read_before_the_first_run(self):
-        with tempfile.TemporaryDirectory() as folder:
-            drive = pathlib.Path(folder).resolve() / "sequences/00"
-            (drive / "image_0").mkdir(parents=True)
-            for number in range(6):
-                (drive / f"image_0/{number:06}.png").write_bytes(b"frame")
-            options = run.parse_arguments([str(drive), "--frames", "1:5", "--rounds", "2", "--program", sys.executable])
-            contest = rounds.Contest(options, self.ROWS, drive, drive)
-            for row in self.ROWS:
-                contest.out(row).mkdir()
-                contest.trajectory(row).write_text("pose\n" * 4)
-            happened, read_bytes = [], pathlib.Path.read_bytes
-
-            def read(file):
-                happened.append(file.name)
-                return read_bytes(file)
-
-            def measured(command, *_):
-                happened.append("run")
-                return rounds.Sample(1.0, 1.0, 1.0)
-
-            with mock.patch.object(pathlib.Path, "read_bytes", read), mock.patch.object(rounds, "run_measured", measured), \
-                    contextlib.redirect_stderr(io.StringIO()):
-                contest.run()
-            self.assertEqual(happened, ["000001.png", "000002.png", "000003.png", "000004.png", *["run"] * 6])
-
 
 class BeforeTheFirstRun(unittest.TestCase):
     """What is refused at once, in one line."""
@@ -122,22 +95,11 @@ class BeforeTheFirstRun(unittest.TestCase):
         self.assertIn(f"{__file__}: expected a KITTI sequence (a folder with image_2 or image_0), found a file", self.refused(__file__))
         self.assertIn("expected a folder image_2 or image_0 in it, found neither", self.refused(self.folder / "image_0"))
 
-    def test_a_sequence_at_the_root_of_the_disk(self):
-        self.assertEqual(sequence.truth_file(pathlib.Path("/drive")), pathlib.Path("/poses/drive.txt"))
-
     def test_a_json_file_that_cannot_be_written(self):
         nowhere = self.folder / "no/such/x.json"
         self.assertIn(f"{nowhere}: expected a file that can be written, found: No such file or directory",
                       self.refused(self.folder, "--json", nowhere))
         self.assertIn("found: Is a directory", self.refused(self.folder, "--json", self.folder))
-
-    def test_the_check_leaves_files_as_they_are(self):
-        kept, new = self.folder / "kept.json", self.folder / "new.json"
-        kept.write_text("of before")
-        for file in (kept, new):
-            run.check_writable(file)
-        self.assertEqual(kept.read_text(), "of before")
-        self.assertFalse(new.exists())
 
 
 class Measuring(unittest.TestCase):
@@ -156,11 +118,6 @@ class Measuring(unittest.TestCase):
         worked = self.measure("import time\nwhile time.process_time() < 0.5: pass\nx = b'1' * 100_000_000")
         self.assertGreater(worked.cpu_s, 0.5)
         self.assertGreater(worked.peak_mib, slept.peak_mib + 80)
-
-    def test_cores(self):
-        one = {min(os.sched_getaffinity(0))}
-        rounds.run_measured([sys.executable, "-c", "import os; print(sorted(os.sched_getaffinity(0)))"], one, self.folder / "log")
-        self.assertEqual((self.folder / "log").read_text().strip(), str(sorted(one)))
 
     def test_a_failure_says_what_the_program_said(self):
         with self.assertRaisesRegex(places.BenchError, "exit code 3: no such frame"):

@@ -44,7 +44,7 @@ RUN_ELSEWHERE = {
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
     "stemvo calibrate": "tests/regression/calibrate_test.cpp",  # a short drive does not tell of the camera
     "tools/search_cluster.py": "tests/python/search_cluster_test.py",
-    "build/venv-ray/bin/ray": "tests/python/cluster_driver_test.py",
+    "build/venv-ray/bin/ray": "tests/python/search_cluster_test.py",
 }
 # What a reader puts in the place of a name, and what makes a command short.
 IN_PLACE_OF = [

@@ -65,12 +65,6 @@ class RenderedDrives(unittest.TestCase):
         self.render(self.drive)
         self.assertTrue((folder / "sequences/00/image_2/000004.png").exists())
 
-    def test_sizes_lengths_and_seeds_have_folders_of_their_own(self):
-        drives = [self.drive, rendered.Drive(self.drive.poses, 64, 48), rendered.Drive(self.drive.poses, 96, 48, 5),
-                  rendered.Drive(self.drive.poses, 96, 48, 0, 2)]
-        self.assertEqual(len({rendered.folder_of(self.folder, drive) for drive in drives}), 4)
-        self.assertEqual(drives[2].num_frames(), 5)
-
     def test_no_pose_file_is_one_line(self):
         with self.assertRaisesRegex(rendered.DriveError, "99.txt: expected a KITTI pose file"):
             self.render(rendered.Drive(self.folder / "99.txt"))
@@ -124,15 +118,6 @@ class Command(unittest.TestCase):
             self.assertTrue(all(float(value) > 0.0 for value in cells[8].split()))
             metrics = json.loads((folder / "out/31/metrics.json").read_text())
             self.assertEqual(cells[3], f"{metrics['r_rel_deg_per_100m']:.3f}")
-
-    def test_the_programs_message_is_told(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            write_poses(folder / "31.txt", 5)
-            done = long_drives(folder / "cache", "--poses", folder, "--sequences", "31", "--size", "96x48",
-                               "--set", "stem.filter=999")
-            self.assertEqual(done.returncode, 1)
-            self.assertIn("filter", done.stderr)
 
 
 class PlantedCamera(unittest.TestCase):

@@ -3,7 +3,7 @@
 
 import dataclasses
 
-from stems import families, fold, graph_cut, graph_kinds, onnx_writer, pretrained, weight_files, weights
+from stems import families, fold, graph_cut, graph_kinds, onnx_writer, pretrained, weights
 from stems.weights import WeightsError
 
 
