@@ -46,7 +46,6 @@ undistorted, and over 1.5 megapixels made smaller. Without camera_height the pat
 poses), trajectory_refined_*.txt (odometry.mode map: the same with look-ahead), report.html (all
 there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the
 numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
-Until the run is complete also checkpoint, from which --resume goes on.
 
 Examples:
   stemvo run kitti/sequences/03 --out result
@@ -108,7 +107,7 @@ Expected<int> run(RunArguments& arguments) {
     print_warning(warning);
   }
   if (summary->interrupted) {
-    print_warning(fmt::format("interrupted; the results hold the first {} frames; --resume goes on",
+    print_warning(fmt::format("interrupted; the results hold the first {} frames",
                               summary->report.num_frames));
   }
   if (!summary->written) {
@@ -157,8 +156,6 @@ void add_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
-  command.add_flag("--resume", request.resume,
-                   "Go on where an interrupted run into --out stopped, if there is one");
   command.add_flag("--map", request.write_map,
                    "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
   command.add_flag("--timing", request.measure_times,

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "features/grid_quota.hpp"
-#include "features/state_archive.hpp"
 #include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -118,32 +117,6 @@ std::vector<cv::DMatch> DescriptorFrontEnd::match(const Described& prev,
     }
   }
   return pairs;
-}
-
-void DescriptorFrontEnd::write_state(StateWriter& writer) const {
-  const bool has_image = last_ != nullptr;
-  writer(has_image, last_frame_, track_ids_, matched_, num_tracks_);
-  if (has_image) {
-    writer(last_->channel);
-  }
-}
-
-void DescriptorFrontEnd::read_state(StateReader& reader, int num_frames) {
-  bool has_image = false;
-  reader(has_image, last_frame_, track_ids_, matched_, num_tracks_);
-  if (has_image) {
-    ChannelImage channel;
-    reader(channel);
-    StateReader::expect(!channel.pixels.empty());
-    last_ = std::dynamic_pointer_cast<const Described>(prepare(channel));
-  }
-  constexpr int kMaxTracks = 1 << 30;
-  const std::size_t num_keypoints = has_image ? last_->uv.size() : 0;
-  StateReader::expect(last_frame_ >= (has_image ? 0 : -1) && last_frame_ < num_frames &&
-                      num_tracks_ >= 0 && num_tracks_ <= kMaxTracks &&
-                      track_ids_.size() == num_keypoints);
-  StateReader::expect(
-      std::ranges::all_of(matched_, [&](std::size_t i) { return i < num_keypoints; }));
 }
 
 }  // namespace stemvo

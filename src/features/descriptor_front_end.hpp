@@ -21,8 +21,6 @@ class DescriptorFrontEnd : public FrontEnd {
       const ChannelImage& channel) const override;
   [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
-  void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader, int num_frames) override;
 
  private:
   struct Described : PreparedImage {

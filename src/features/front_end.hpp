@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 
-#include "features/state_fwd.hpp"
 #include "stem/channel.hpp"
 #include "stemvo/options.hpp"
 
@@ -63,11 +62,6 @@ class FrontEnd {
   /// outside of it); process() looks for them there before it looks for new corners. Called after
   /// keep(); a track that is not named is forgotten.
   virtual void look_for(TrackPoints /*expected*/) {}  // NOLINT: an override keeps it
-
-  /// What it knows between process() and keep(); one of the same options goes on from there.
-  /// `num_frames`: so many were processed.
-  virtual void write_state(StateWriter& writer) const = 0;
-  virtual void read_state(StateReader& reader, int num_frames) = 0;
 
  protected:
   /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.

@@ -10,7 +10,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "features/state_archive.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -243,9 +242,5 @@ void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
     }
   }
 }
-
-void PatchFrontEnd::write_tracks(StateWriter& writer) const { writer(tracks_); }
-
-void PatchFrontEnd::read_tracks(StateReader& reader) { reader(tracks_); }
 
 }  // namespace stemvo

@@ -29,18 +29,11 @@ class PatchFrontEnd final : public PointFrontEnd {
     Similarity warp;     ///< from the patch to the last image it was found in
     cv::Point2f motion;  ///< to there, from the image before
     int frame = -1;      ///< the number of that image; -1: it is new
-    template <typename Archive>
-    void serialize(Archive& archive) {
-      archive(patch, warp, motion, frame);
-    }
   };
 
   [[nodiscard]] bool begin_track(const TrackingImage& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
-  void write_tracks(StateWriter& writer) const override;
-  void read_tracks(StateReader& reader) override;
-  [[nodiscard]] bool has_track(int id) const override { return tracks_.contains(id); }
   [[nodiscard]] std::optional<cv::Point2f> find_again(const TrackingImage& image,
                                                       const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,

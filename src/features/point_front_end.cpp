@@ -10,7 +10,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/grid_quota.hpp"
-#include "features/state_archive.hpp"
 #include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -209,60 +208,6 @@ void PointFrontEnd::replenish(View& view) {
       view.points.push_back(point);
       ++next_id_;
     }
-  }
-}
-
-void PointFrontEnd::write_state(StateWriter& writer) const {
-  for (const View* view : {&last_, &last_good_}) {
-    const bool has_image = view->image != nullptr;
-    writer(has_image, view->points, view->frame);
-    if (has_image) {
-      writer(view->image->channel);
-    }
-  }
-  writer(next_id_, expected_);
-  write_tracks(writer);
-}
-
-void PointFrontEnd::read_state(StateReader& reader, int num_frames) {
-  for (View* view : {&last_, &last_good_}) {
-    bool has_image = false;
-    reader(has_image, view->points, view->frame);
-    StateReader::expect(has_image ? view->frame >= 0 && view->frame < num_frames
-                                  : view->points.empty());
-    if (has_image) {
-      ChannelImage channel;
-      reader(channel);
-      StateReader::expect(!channel.pixels.empty());
-      view->image = std::dynamic_pointer_cast<const TrackingImage>(prepare(channel));
-    }
-  }
-  reader(next_id_, expected_);
-  read_tracks(reader);
-  expect_sound();
-}
-
-/// What is read is input: what tracking takes for granted.
-void PointFrontEnd::expect_sound() const {
-  constexpr int kMaxId = 1 << 30;
-  const auto is_id = [&](int id) { return id >= 0 && id < next_id_; };
-  StateReader::expect(next_id_ <= kMaxId);
-  StateReader::expect(
-      last_good_.image == nullptr ||
-      (last_.image != nullptr && last_good_.frame < last_.frame &&
-       last_good_.image->channel.pixels.size() == last_.image->channel.pixels.size()));
-  for (const View* view : {&last_, &last_good_}) {
-    expect_ordered<StateReader>(view->points, &Point::id);
-    for (const Point& point : view->points) {
-      const cv::Size size = view->image->channel.pixels.size();
-      StateReader::expect(is_id(point.id) && has_track(point.id) && point.uv.x >= 0.0F &&
-                          point.uv.y >= 0.0F && point.uv.x <= static_cast<float>(size.width) &&
-                          point.uv.y <= static_cast<float>(size.height));
-    }
-  }
-  expect_ordered<StateReader>(expected_, &TrackPoint::track_id);
-  for (const TrackPoint& point : expected_) {
-    StateReader::expect(is_id(point.track_id));
   }
 }
 

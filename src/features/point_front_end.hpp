@@ -20,8 +20,6 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
   void look_for(TrackPoints expected) override { expected_ = std::move(expected); }
-  void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader, int num_frames) override;
 
  protected:
   /// With the pyramid that the derived class tracks on.
@@ -34,10 +32,6 @@ class PointFrontEnd : public FrontEnd {
   struct Point {
     cv::Point2f uv;
     int id = -1;
-    template <typename Archive>
-    void serialize(Archive& archive) {
-      archive(uv, id);
-    }
   };
   struct View {
     std::shared_ptr<const TrackingImage> image;
@@ -58,10 +52,6 @@ class PointFrontEnd : public FrontEnd {
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              const View& to) = 0;
-  /// What the derived class knows of the tracks.
-  virtual void write_tracks(StateWriter& /*writer*/) const {}
-  virtual void read_tracks(StateReader& /*reader*/) {}
-  [[nodiscard]] virtual bool has_track(int /*id*/) const { return true; }
   /// A track that ended, near `point` of the image; nullopt: it is not there.
   [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const TrackingImage& /*image*/,
                                                               const Point& /*point*/) {
@@ -78,7 +68,6 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
   void replenish(View& view);
   void find_expected(View& view);
-  void expect_sound() const;
 
   FeatureOptions options_;
   View last_;

@@ -6,7 +6,6 @@
 #include "internal_check.hpp"
 #include "odometry/pair_estimator.hpp"
 #include "odometry/road/image.hpp"
-#include "odometry/state_archive.hpp"
 #include "odometry/stopwatch.hpp"
 #include "odometry/window_estimator.hpp"
 #include "timing/stage_timer.hpp"
@@ -47,7 +46,6 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   Stopwatch watch;
   const ChannelImage image = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
   prepared.stem_ms = watch.lap_ms();
-  prepared.stretch = stretch_.limits();
   prepared.image = front_end_->prepare(image);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
@@ -65,7 +63,6 @@ void ChannelOdometry::track(PreparedFrame frame) {
   work.problem = std::move(frame.problem);
   if (work.image != nullptr) {
     Stopwatch watch;
-    stretch_tracked_ = frame.stretch;
     work.tracked.has_image = true;
     work.tracked.matches = front_end_->process(work.image, work.tracked.number);
     work.tracked.image = std::move(frame.pixels);
@@ -110,40 +107,6 @@ FrameResult ChannelOdometry::optimize() {
 const ChannelImage& ChannelOdometry::image() const {
   static const ChannelImage no_image;
   return optimized_.image != nullptr ? optimized_.image->channel : no_image;
-}
-
-void ChannelOdometry::write_state(StateWriter& writer) const {
-  STEMVO_CHECK(tracked_.has_value() && !localized_.has_value(), "a frame was tracked");
-  const TrackedFrame& frame = tracked_->tracked;
-  writer(num_tracked_, stretch_tracked_, frame.number, frame.has_image, frame.matches, frame.image,
-         frame.road, tracked_->times, tracked_->problem);
-  for (const PreparedImage* image : {tracked_->image.get(), optimized_.image.get()}) {
-    writer(image != nullptr ? image->channel : ChannelImage());
-  }
-  front_end_->write_state(writer);
-  estimator_->write_state(writer);
-}
-
-void ChannelOdometry::read_state(StateReader& reader) {
-  FrameInWork& work = tracked_.emplace();
-  TrackedFrame& frame = work.tracked;
-  reader(num_tracked_, stretch_tracked_, frame.number, frame.has_image, frame.matches, frame.image,
-         frame.road, work.times, work.problem);
-  constexpr int kMaxFrames = 1 << 30;
-  StateReader::expect(num_tracked_ > 0 && num_tracked_ <= kMaxFrames &&
-                      frame.number == num_tracked_ - 1 && frame.matches.prev_frame >= -1 &&
-                      frame.matches.prev_frame < frame.number);
-  const bool is_image = frame.image.size() == cv::Size(camera_.width_px, camera_.height_px) &&
-                        (frame.image.type() == CV_8UC1 || frame.image.type() == CV_8UC3);
-  StateReader::expect(frame.has_image == is_image && (!asks_road_ || !is_image || frame.road));
-  stretch_.set_limits(stretch_tracked_);
-  for (auto* image : {&work.image, &optimized_.image}) {
-    ChannelImage channel;
-    reader(channel);
-    *image = channel.pixels.empty() ? nullptr : front_end_->prepare(channel);
-  }
-  front_end_->read_state(reader, num_tracked_);
-  estimator_->read_state(reader, frame.number);
 }
 
 }  // namespace stemvo

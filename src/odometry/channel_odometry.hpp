@@ -26,7 +26,6 @@ struct PreparedFrame {
   std::shared_ptr<const RoadImage> road;       ///< null: no road is measured
   std::string problem;                         ///< why the stem gave no channel, else empty
   double stem_ms = 0.0;
-  ChannelStretch::Limits stretch;  ///< behind this image
 };
 
 /// What the odometry does with one channel after the stem: several of them can share one stem.
@@ -46,11 +45,6 @@ class ChannelOdometry {
   /// The last three for one frame; one without an image stands for a frame that could not be read:
   /// the last motion goes on.
   FrameResult process(PreparedFrame frame);
-
-  /// What is known between track() and localize(), while no other phase but prepare() runs; one of
-  /// the same options and camera goes on with localize(), and prepare() of the next frame.
-  void write_state(StateWriter& writer) const;
-  void read_state(StateReader& reader);
 
   /// Of all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
@@ -79,10 +73,9 @@ class ChannelOdometry {
   std::unique_ptr<Estimator> estimator_;
 
   int num_tracked_ = 0;
-  ChannelStretch::Limits stretch_tracked_;  ///< behind the last image tracked
-  std::optional<FrameInWork> tracked_;      ///< not localized
-  std::optional<FrameInWork> localized_;    ///< not optimized
-  FrameInWork optimized_;                   ///< the last one
+  std::optional<FrameInWork> tracked_;    ///< not localized
+  std::optional<FrameInWork> localized_;  ///< not optimized
+  FrameInWork optimized_;                 ///< the last one
 };
 
 }  // namespace stemvo

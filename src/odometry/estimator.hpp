@@ -8,7 +8,6 @@
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
-#include "features/state_fwd.hpp"
 #include "geometry/bundle.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
@@ -54,11 +53,6 @@ class Estimator {
   }
   /// See Odometry::landmarks().
   [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
-
-  /// What it knows between two frames; one of the same options goes on from there.
-  /// `num_frames`: so many are optimized.
-  virtual void write_state(StateWriter& writer) const = 0;
-  virtual void read_state(StateReader& reader, int num_frames) = 0;
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.

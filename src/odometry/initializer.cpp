@@ -178,14 +178,6 @@ std::optional<Window> Initializer::open_window(const View& now,
   return window;
 }
 
-bool Initializer::is_sound(int num_frames) const {
-  int last = reference_.frame;
-  const auto is_next = [&](const View& view) {
-    return std::exchange(last, view.frame) < view.frame;
-  };
-  return reference_.frame >= -1 && std::ranges::all_of(waiting_, is_next) && last < num_frames;
-}
-
 void Initializer::wait(View view) {
   waiting_.push_back(std::move(view));
   if (waiting_.size() > kMaxWaiting) {

@@ -48,14 +48,6 @@ class Initializer {
   /// A frame that did not decide: localized once the window is open.
   void wait(View view);
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(reference_, waiting_);
-  }
-  /// Of so many frames, when it was read.
-  [[nodiscard]] bool is_sound(int num_frames) const;
-
  private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.

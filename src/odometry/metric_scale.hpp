@@ -39,15 +39,6 @@ class MetricScale {
   /// State, reason and sigma of the last frame given.
   void report(FrameResult& result) const;
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    if (road_) {
-      archive(*road_);
-    }
-    archive(sigma_, state_, reason_);
-  }
-
  private:
   void keep(const RoadScaleEstimate& estimate);
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "odometry/state_archive.hpp"
-
 namespace stemvo {
 namespace {
 
@@ -174,14 +172,6 @@ double PairEstimator::measure_length(const TrackedFrame& frame) {
       scale_.measure(frame.road.get(),
                      Rigid3(direction.rotation, num_frames * last_step_ * direction.translation));
   return num_frames * last_step_;
-}
-
-void PairEstimator::write_state(StateWriter& writer) const { writer(*this); }
-
-void PairEstimator::read_state(StateReader& reader, int num_frames) {
-  reader(*this);
-  StateReader::expect(std::ssize(trajectory_) == num_frames && last_image_ >= -1 &&
-                      last_image_ < num_frames && chain_.is_sound(num_frames));
 }
 
 }  // namespace stemvo

@@ -35,17 +35,6 @@ class MotionChain {
   /// True until a first motion was accepted: decisive by the point test.
   [[nodiscard]] bool is_initializing() const { return is_initializing_; }
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(world_from_image_, world_from_camera_, last_prev_from_cur_, last_direction_,
-            frames_since_image_, is_initializing_);
-  }
-  /// Of so many frames, when it was read.
-  [[nodiscard]] bool is_sound(int num_frames) const {
-    return frames_since_image_ >= 0 && frames_since_image_ <= num_frames;
-  }
-
  private:
   [[nodiscard]] bool passes_gate(const Eigen::Vector3d& direction_in_prev,
                                  const MeasuredMotion& motion) const;
@@ -72,14 +61,6 @@ class PairEstimator final : public Estimator {
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override { return trajectory_; }
   [[nodiscard]] std::vector<MapLandmark> landmarks() const override { return {}; }
-  void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader, int num_frames) override;
-
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(chain_, scale_, last_step_, last_image_, trajectory_);
-  }
 
  private:
   [[nodiscard]] double measure_length(const TrackedFrame& frame);

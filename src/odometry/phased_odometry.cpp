@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/phased_odometry.hpp"
 
-#include <exception>
-#include <new>
-#include <sstream>
 #include <utility>
 
 #include "internal_check.hpp"
-#include "odometry/state_archive.hpp"
 #include "odometry/stopwatch.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -51,23 +47,6 @@ PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
   prepared = channel_odometry_.prepare(*channel, image);
   prepared.stem_ms += stem_ms;
   return prepared;
-}
-
-std::string PhasedOdometry::state() const {
-  std::ostringstream bytes;
-  StateWriter writer(bytes);
-  channel_odometry_.write_state(writer);
-  return std::move(bytes).str();
-}
-
-Status PhasedOdometry::set_state(const std::string& state) try {
-  StateReader reader(state);
-  channel_odometry_.read_state(reader);
-  return {};
-} catch (const std::bad_alloc&) {
-  throw;
-} catch (const std::exception&) {  // also OpenCV's, of images that no front end prepared
-  return fail("expected the state of an odometry, found other data");
 }
 
 }  // namespace stemvo

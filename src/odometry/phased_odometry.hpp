@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <string>
 #include <utility>
 
 #include <opencv2/core.hpp>
@@ -39,12 +38,6 @@ class PhasedOdometry {
   [[nodiscard]] FrameResult process(PreparedFrame frame) {
     return channel_odometry_.process(std::move(frame));
   }
-
-  /// Everything known between track() and localize() of a frame, while no other phase but prepare()
-  /// runs. One created alike goes on from it with localize(), and prepare() of the next frame.
-  [[nodiscard]] std::string state() const;
-  /// Error: no odometry created alike gave it; this one is of no use then.
-  [[nodiscard]] Status set_state(const std::string& state);
 
   /// Of the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }

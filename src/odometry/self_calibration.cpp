@@ -108,12 +108,6 @@ void SelfCalibration::begin_measuring(const BundleAdjustmentOptions& options) {
   run_ = {};
 }
 
-SelfCalibration::Measured SelfCalibration::known(const std::optional<CameraMeasurement>& found) {
-  std::promise<std::optional<CameraMeasurement>> promise;
-  promise.set_value(found);
-  return promise.get_future().share();
-}
-
 void SelfCalibration::take_in() {
   const Measured measured = std::exchange(measured_, {});
   const auto found = measured.valid() ? measured.get() : std::nullopt;

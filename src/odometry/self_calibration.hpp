@@ -2,7 +2,6 @@
 #pragma once
 
 #include <future>
-#include <iterator>
 #include <optional>
 
 #include <Eigen/Core>
@@ -46,24 +45,8 @@ class SelfCalibration {
   /// Of the runs that were taken in; nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraSigma> camera_sigma() const;
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    bool is_measuring = measured_.valid();
-    std::optional<CameraMeasurement> found = is_measuring ? measured_.get() : std::nullopt;
-    archive(camera_, believed_, mean_, information_, num_runs_, run_, is_measuring, found);
-    measured_ = is_measuring ? known(found) : Measured();
-  }
-  /// When it was read.
-  [[nodiscard]] bool is_sound() const {
-    constexpr int kMaxRuns = 1 << 30;
-    return camera_.width_px == given_.width_px && camera_.height_px == given_.height_px &&
-           num_runs_ >= 0 && num_runs_ <= kMaxRuns && std::ssize(run_.keyframes) < kNumKeyframes;
-  }
-
  private:
   using Measured = std::shared_future<std::optional<CameraMeasurement>>;
-  static Measured known(const std::optional<CameraMeasurement>& found);
 
   void begin_measuring(const BundleAdjustmentOptions& options);
   /// The run that is measured, if there is one; waits for it.

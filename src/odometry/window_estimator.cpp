@@ -6,7 +6,6 @@
 #include <iterator>
 #include <utility>
 
-#include "odometry/state_archive.hpp"
 #include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -352,26 +351,6 @@ WindowHistory WindowEstimator::closed_history() const {
   WindowHistory history = history_;
   history.close(window_);
   return history;
-}
-
-void WindowEstimator::write_state(StateWriter& writer) const { writer(*this); }
-
-void WindowEstimator::read_state(StateReader& reader, int num_frames) {
-  const Camera given = camera_;
-  reader(*this);
-  const auto is_earlier = [&](const View& view) {
-    return view.frame >= -1 && view.frame < num_frames;
-  };
-  const auto is_count = [&](int count) { return count >= 0 && count <= num_frames; };
-  StateReader::expect(camera_.width_px == given.width_px && camera_.height_px == given.height_px &&
-                      std::ssize(trajectory_) == num_frames && is_earlier(last_) &&
-                      is_earlier(anchor_) && initializer_.is_sound(num_frames) &&
-                      calibration_.is_sound() &&
-                      (last_.frame < 0) == (initializer_.reference().frame < 0) &&
-                      is_count(frames_still_) && is_count(keyframes_since_refinement_));
-  StateReader::expect(history_.is_sound(window_, num_frames) &&
-                      (is_initializing_ || !window_.keyframes.empty()) &&
-                      std::ssize(window_.keyframes) <= window_options_.num_keyframes);
 }
 
 }  // namespace stemvo

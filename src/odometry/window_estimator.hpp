@@ -32,22 +32,12 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
   [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override;
   [[nodiscard]] std::vector<MapLandmark> landmarks() const override;
-  void write_state(StateWriter& writer) const override;
-  void read_state(StateReader& reader, int num_frames) override;
 
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();
   }
 
   [[nodiscard]] const Window& window() const { return window_; }
-
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(camera_, initializer_, is_initializing_, window_, history_, scale_, calibration_,
-            world_from_camera_, prev_from_cur_, step_, last_, anchor_, road_pose_,
-            is_last_localized_, is_held_, frames_still_, keyframes_since_refinement_, trajectory_);
-  }
 
  private:
   // Localization: what gives the frame its pose and its state.

@@ -143,28 +143,6 @@ void WindowHistory::close(const Window& window) {
   tracks_.clear();
 }
 
-bool WindowHistory::is_sound(const Window& window, int num_frames) const {
-  int last = 0;
-  const auto is_next = [&](const WindowMotion& motion) {
-    return motion.prev >= 0 && motion.prev < motion.cur &&
-           std::exchange(last, motion.cur) < motion.cur;
-  };
-  const auto is_of_frame = [&](const MapLandmark& landmark) {
-    return landmark.frame >= 0 && landmark.frame < num_frames;
-  };
-  if (!std::ranges::all_of(motions_, is_next) || !std::ranges::all_of(landmarks_, is_of_frame) ||
-      std::ssize(scale_of_frame_) != num_frames || first_scaled_frame_ < 0 ||
-      first_scaled_frame_ > num_frames) {
-    return false;
-  }
-  if (!window.keyframes.empty()) {
-    const Keyframe& newest = window.keyframes.back();
-    const int end = newest.followers.empty() ? newest.frame : newest.followers.back().frame;
-    return last <= window.keyframes.front().frame && end < num_frames;
-  }
-  return last < std::max(num_frames, 1);
-}
-
 std::vector<Rigid3> refined_poses(std::span<const Rigid3> world_from_camera,
                                   std::span<const WindowMotion> motions) {
   std::vector<Rigid3> poses(world_from_camera.begin(), world_from_camera.end());

@@ -49,24 +49,12 @@ class WindowHistory {
   /// Well-constrained landmarks that have left.
   [[nodiscard]] const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(motions_, landmarks_, tracks_, scale_, scale_of_frame_, first_scaled_frame_);
-  }
-  /// Of this window and so many frames, when it was read: every motion leads to a later frame.
-  [[nodiscard]] bool is_sound(const Window& window, int num_frames) const;
-
  private:
   /// What is known of a track that the window sees.
   struct Track {
     int num_keyframes = 0;
     double max_parallax_rad = 0.0;
     std::array<std::uint8_t, 3> rgb{};
-    template <typename Archive>
-    void serialize(Archive& archive) {
-      archive(num_keyframes, max_parallax_rad, rgb);
-    }
   };
   /// Units when the frame came, as the mean over its neighbours, per unit now; 1 of a frame that
   /// has not ended.

@@ -5,7 +5,6 @@
 #include <bit>
 #include <chrono>
 #include <future>
-#include <new>
 #include <system_error>
 #include <utility>
 
@@ -22,8 +21,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
-
-constexpr Seconds kMaxPeriod(10.0);
 
 /// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
 /// the one before where n is not known (0).
@@ -43,24 +40,14 @@ std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
 
 class DriveLoop {
  public:
-  DriveLoop(const Run& run, const std::string& identity, const RunProgress& progress)
-      : run_(run), identity_(identity), progress_(progress) {}
+  DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {}
 
-  Drive drive(std::optional<Checkpoint> from) {
-    FrameRun frames;
+  Drive drive() {
     drive_.csv = frames_csv_header();
-    if (from) {
-      drive_ = std::move(from->drive);
-      frames.tracked = from->frame;
-    }
-    frames.may_localize = [this](std::size_t i) { return may_localize(i); };
-    frames.visit = [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-      return visit(i, frame, pose);
-    };
-    run_frames(run_.sequence, run_.odometry, frames);
-    if (can_go_on() && !is_stopped_) {
-      drive_.interrupted = false;  // it came with the last frame
-    }
+    run_frames(run_.sequence, run_.odometry,
+               [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
+                 return visit(i, frame, pose);
+               });
     if (run_.sequence.stream()) {
       end_stream(*run_.sequence.stream());
     }
@@ -85,7 +72,7 @@ class DriveLoop {
     keep_image(i, frame, pose);
     const std::size_t expected = expected_frames(run_.sequence, i + 1);
     drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < run_.sequence.size();
-    return !drive_.interrupted || can_go_on();
+    return !drive_.interrupted;
   }
 
   void keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
@@ -115,34 +102,6 @@ class DriveLoop {
     }
   }
 
-  /// False: the run ends before this frame, and can go on with it.
-  bool may_localize(std::size_t i) {
-    const auto now = Clock::now();
-    if (!drive_.written) {  // from the last checkpoint it is written again
-      is_stopped_ = drive_.interrupted;
-      return !is_stopped_;
-    }
-    if (!can_go_on() || i == 0 || (!drive_.interrupted && now - last_checkpoint_ < period_)) {
-      return true;
-    }
-    keep_checkpoint(i, now);
-    last_checkpoint_ = Clock::now();
-    // Never more than a hundredth of the time.
-    period_ =
-        std::max(std::min(2.0 * period_, kMaxPeriod), Seconds(100 * (last_checkpoint_ - now)));
-    is_stopped_ = drive_.interrupted;
-    return !is_stopped_;
-  }
-
-  void keep_checkpoint(std::size_t frame, Clock::time_point now) {
-    try {
-      const double elapsed_s =
-          drive_.elapsed_before_s + Seconds(now - run_.request.started).count();
-      checkpoint_ = pack(frame, run_.odometry.state(), drive_, elapsed_s, identity_);
-    } catch (const std::bad_alloc&) {  // NOLINT: the one before stays; the drive needs none
-    }
-  }
-
   /// The files so far, once a second, while the frames go on.
   void keep_files() {
     const bool is_busy =
@@ -152,14 +111,10 @@ class DriveLoop {
     }
     last_files_ = Clock::now();
     auto write = [out = run_.request.out_dir, csv = drive_.csv,
-                  trajectory = drive_.trajectory(run_),
-                  checkpoint = std::exchange(checkpoint_, {})]() mutable {
+                  trajectory = drive_.trajectory(run_)]() mutable {
       static_cast<void>(write_text_file(out / "frames.csv", std::exchange(csv, {})));
       static_cast<void>(
           write_kitti_trajectory(out / "trajectory_kitti.txt", std::exchange(trajectory, {})));
-      if (!checkpoint.empty()) {
-        static_cast<void>(write_text_file(checkpoint_file(out), std::exchange(checkpoint, {})));
-      }
     };
     // What cannot be written now is written, or reported, at the end. The future keeps what its
     // thread does not let go; one that was put off would write what it has been moved from.
@@ -176,9 +131,6 @@ class DriveLoop {
     }
     const std::filesystem::path& out = run_.request.out_dir;
     keep_first(drive_.written, write_text_file(out / "frames.csv", drive_.csv));
-    if (drive_.interrupted && !checkpoint_.empty()) {
-      keep_first(drive_.written, write_text_file(checkpoint_file(out), checkpoint_));
-    }
   }
 
   /// Frames in all are known now. An interrupt is the usual end of a live camera; a video that ends
@@ -203,30 +155,17 @@ class DriveLoop {
     }
   }
 
-  [[nodiscard]] bool can_go_on() const {
-    return !run_.sequence.stream() || !run_.sequence.stream()->is_live;
-  }
-
   const Run& run_;
-  const std::string& identity_;
   const RunProgress& progress_;
   Drive drive_;
-  bool is_stopped_ = false;  ///< before a frame that is there
-  /// Between two checkpoints; the first come sooner.
-  Seconds period_{0.25};
-  Clock::time_point last_checkpoint_ = Clock::now();
-  std::string checkpoint_;  ///< not written yet
   Clock::time_point last_files_ = Clock::now();
   std::future<void> writing_;
 };
 
 }  // namespace
 
-Drive run_drive(const Run& run,
-                const std::string& identity,
-                std::optional<Checkpoint> from,
-                const RunProgress& progress) {
-  return DriveLoop(run, identity, progress).drive(std::move(from));
+Drive run_drive(const Run& run, const RunProgress& progress) {
+  return DriveLoop(run, progress).drive();
 }
 
 }  // namespace stemvo::pipeline

@@ -38,7 +38,7 @@ bool has_earlier_run(const fs::path& out_dir) {
 
 std::vector<std::string> run_files() {
   std::vector<std::string> names(std::begin(kResults), std::end(kResults));
-  names.insert(names.end(), {"frames.csv", "config.yaml", "checkpoint"});
+  names.insert(names.end(), {"frames.csv", "config.yaml"});
   return names;
 }
 

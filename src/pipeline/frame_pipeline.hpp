@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <optional>
 
 #include <opencv2/core.hpp>
 
@@ -21,16 +20,6 @@ namespace stemvo::pipeline {
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
-/// What is done with the frames of a run, and from where on.
-struct FrameRun {
-  FrameVisitor visit;
-  /// Called before a frame is localized, while PhasedOdometry::state() may be asked; false ends the
-  /// run before this frame. Empty: always true.
-  std::function<bool(std::size_t index)> may_localize = nullptr;
-  /// The odometry was given the state of a run that had tracked this frame.
-  std::optional<std::size_t> tracked = std::nullopt;
-};
-
 /// An odometry for a valid configuration whose network models_dir knows; `mask`: of the frames, as
 /// FrameList's. Errors: those of with_network and PhasedOdometry::create.
 [[nodiscard]] Expected<PhasedOdometry> create_odometry(const Config& config,
@@ -43,11 +32,6 @@ struct FrameRun {
 /// thread per core), OpenCV's loops included, a few frames ahead at most; the poses do not depend
 /// on it. What a stage or the visitor throws leaves this function; frames behind the last one
 /// visited are dropped then.
-void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameRun& run);
-inline void run_frames(const FrameSource& sequence,
-                       PhasedOdometry& odometry,
-                       const FrameVisitor& visit) {
-  run_frames(sequence, odometry, FrameRun{visit});
-}
+void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

@@ -13,7 +13,6 @@
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
-#include "pipeline/checkpoint.hpp"
 #include "pipeline/earlier_run.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
@@ -171,17 +170,13 @@ class ResultWriter {
     return written;
   }
 
-  /// On a disk that is full: this run's images go, and the state to go on from where it is done.
-  /// False: the disk is not to blame.
+  /// On a disk that is full: this run's images go. False: the disk is not to blame.
   [[nodiscard]] bool make_room() const {
     constexpr std::uintmax_t kFull = 16'000'000;
     std::error_code code;
     if (const auto space = std::filesystem::space(request_.out_dir, code);
         code || space.available > kFull) {
       return false;
-    }
-    if (!drive_.interrupted) {
-      std::filesystem::remove(checkpoint_file(request_.out_dir), code);
     }
     for (const std::filesystem::path& image : old_pictures(request_.out_dir)) {
       std::filesystem::remove(image, code);
@@ -191,8 +186,7 @@ class ResultWriter {
 
   [[nodiscard]] MetricsReport make_report() const {
     const std::chrono::duration<double> elapsed =
-        std::chrono::steady_clock::now() - request_.started +
-        std::chrono::duration<double>(drive_.elapsed_before_s);
+        std::chrono::steady_clock::now() - request_.started;
     const Config& config = request_.config;
     MetricsReport report;
     report.stemvo_version = version();

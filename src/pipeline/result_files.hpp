@@ -27,7 +27,6 @@ struct Drive {
   std::string csv;                           ///< frames.csv of them
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
-  double elapsed_before_s = 0.0;  ///< in the runs that this one goes on from
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images
 

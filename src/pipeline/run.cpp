@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/run.hpp"
 
-#include <exception>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
 #include "dataset/camera_height.hpp"
-#include "pipeline/checkpoint.hpp"
 #include "pipeline/drive_loop.hpp"
 #include "pipeline/earlier_run.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "pipeline/input_hashes.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/thread_scope.hpp"
 #include "report/frames_csv.hpp"
-#include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -52,69 +47,21 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// Which file it is, and which version of it.
-std::string version_of(const std::filesystem::path& file) {
-  std::error_code code;
-  const auto size = std::filesystem::file_size(file, code);
-  const auto time = std::filesystem::last_write_time(file, code).time_since_epoch().count();
-  return code ? file.string() + " is not there"
-              : fmt::format("{} {} {}", std::filesystem::weakly_canonical(file, code).string(),
-                            size, time);
-}
-
-/// What the results depend on: a checkpoint of anything else is not gone on from.
-Expected<std::string> identity_of(const Run& run) {
-  const auto program = pipeline::hash_program();
-  if (!program) {
-    return program.error();
-  }
-  std::string files;
-  const RunRequest& request = run.request;
-  for (const std::filesystem::path& file :
-       pipeline::input_files(request, run.sequence, request.config, request.models_dir)) {
-    files += version_of(file) + '\n';
-  }
-  const Camera& c = run.sequence.camera();
-  return fmt::format("{}\n{}\n{} {} frames, pictures {}\n{} {} {} {} {}x{}\n{}\n{}", *program,
-                     cv::getCPUFeaturesLine(), run.sequence.kind(), run.sequence.size(),
-                     run.request.image_every, c.fx_px, c.fy_px, c.cx_px, c.cy_px, c.width_px,
-                     c.height_px, pipeline::config_text(run, 0), internal::sha256_hex(files));
-}
-
-/// What an earlier run left in the folder is removed, unless this one goes on from it. Whenever it
-/// is killed, all under final names is of one run: config.yaml comes before frames and results.
-Expected<std::optional<pipeline::Checkpoint>> prepare_out_folder(const Run& run,
-                                                                 const std::string& identity) {
+/// What an earlier run left in the folder is removed. Whenever this one is killed, all under final
+/// names is of one run: config.yaml comes before frames and results.
+Status prepare_out_folder(const Run& run) {
   const RunRequest& request = run.request;
   const std::filesystem::path& out = request.out_dir;
-  const auto file = pipeline::checkpoint_file(out);
-  auto checkpoint = request.resume ? pipeline::read_checkpoint(file, identity, run.sequence.size())
-                                   : std::optional<pipeline::Checkpoint>();
-  if (!checkpoint) {
-    return checkpoint;
-  }
-  if (*checkpoint &&
-      (!run.odometry.set_state((*checkpoint)->odometry) ||
-       run.odometry.frames().estimator().trajectory().size() != (*checkpoint)->frame)) {
-    return pipeline::damaged_checkpoint(file);
-  }
-  Status status;
-  if (!*checkpoint) {
-    status = request.image_every > 0 ? pipeline::check_pictures(out) : Status();
-    status = status ? remove_file(file) : status;
-    status = status ? pipeline::remove_earlier_results(out) : status;
-  }
+  Status status = request.image_every > 0 ? pipeline::check_pictures(out) : Status();
+  status = status ? pipeline::remove_earlier_results(out) : status;
   if (status && request.image_every > 0) {
     status = pipeline::create_out_folder(out / "pictures");
   }
   if (status) {
     status = write_text_file(out / "config.yaml", pipeline::config_text(run, 0));
   }
-  if (status) {  // from now on it can be seen how far the run is
-    status = write_text_file(out / "frames.csv",
-                             *checkpoint ? (*checkpoint)->drive.csv : frames_csv_header());
-  }
-  return status ? std::move(checkpoint) : status.error();
+  // From now on it can be seen how far the run is.
+  return status ? write_text_file(out / "frames.csv", frames_csv_header()) : status;
 }
 
 /// Results must not take the place of what they are made from.
@@ -160,43 +107,30 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-/// What the input was taken for, where a run that may go on begins, and what is lost.
-void note_start(const Run& run,
-                const std::optional<pipeline::Checkpoint>& checkpoint,
-                bool has_earlier) {
+/// What the input was taken for, and what is lost.
+void note_start(const Run& run, bool has_earlier) {
   const auto& [request, sequence, odometry] = run;
   if (!request.note) {
     return;
   }
   request.note(fmt::format("input: {} {}, {}, {}", sequence.kind(), sequence.name(),
                            describe_size(sequence), describe_truth(request, sequence)));
-  if (request.resume) {
-    request.note(
-        checkpoint ? fmt::format("goes on at frame {}", sequence.range().begin + checkpoint->frame)
-                   : "starts at the first frame: no checkpoint in " + request.out_dir.string());
-  }
-  if (has_earlier && !checkpoint) {
+  if (has_earlier) {
     request.note(
         fmt::format("results of an earlier run in {} are replaced (another --out keeps them)",
                     request.out_dir.string()));
   }
 }
 
-Expected<RunSummary> finish_run(const Run& run,
-                                const std::string& identity,
-                                std::optional<pipeline::Checkpoint> from,
-                                const RunProgress& progress) {
+Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   const RunRequest& request = run.request;
-  pipeline::Drive done = pipeline::run_drive(run, identity, std::move(from), progress);
+  pipeline::Drive done = pipeline::run_drive(run, progress);
   if (done.frames.empty()) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
                             request.sequence_dir.string()));
   }
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
-  if (!done.interrupted && written) {
-    written = remove_file(pipeline::checkpoint_file(request.out_dir));
-  }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};
 }
@@ -211,37 +145,19 @@ Expected<RunSummary> run_source(const RunRequest& request,
   }
   const Run run{request, sequence, *odometry};
   const auto lock = open_folder(request, sequence);
-  const auto identity = identity_of(run);
-  if (!lock || !identity) {
-    return lock ? identity.error() : lock.error();
+  if (!lock) {
+    return lock.error();
   }
   const bool has_earlier = pipeline::has_earlier_run(request.out_dir);
-  auto checkpoint = prepare_out_folder(run, *identity);
-  if (!checkpoint) {
-    return checkpoint.error();
+  if (const Status status = prepare_out_folder(run); !status) {
+    return status.error();
   }
   std::optional<StageRecorder> recorder;
   if (request.measure_times) {
     recorder.emplace();
   }
-  note_start(run, *checkpoint, has_earlier);
-  if (!*checkpoint) {
-    return finish_run(run, *identity, std::nullopt, progress);
-  }
-  // Whatever the checks of a forged state did not see ends as they do.
-  const auto damaged = [&](const std::exception& error) {
-    return pipeline::damaged_checkpoint(pipeline::checkpoint_file(request.out_dir), error.what());
-  };
-  try {
-    return finish_run(run, *identity, *std::move(checkpoint), progress);
-  } catch (const std::logic_error& error) {
-    return damaged(error);
-  } catch (const cv::Exception& error) {
-    if (error.code == cv::Error::StsNoMem) {
-      throw;
-    }
-    return damaged(error);
-  }
+  note_start(run, has_earlier);
+  return finish_run(run, progress);
 }
 
 }  // namespace
@@ -257,9 +173,6 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   const auto sequence = open_sequence(request);
   if (!sequence) {
     return sequence.error();
-  }
-  if (request.resume && sequence->stream() && sequence->stream()->is_live) {
-    return fail("--resume: expected a recording, found a live camera");
   }
   RunRequest effective = request;
   effective.config = dataset::with_camera_height(request.config, sequence->frames());

@@ -24,7 +24,6 @@ struct RunRequest : FrameSourceRequest {
   int num_threads = 0;         ///< 0: all cores
   int image_every = 0;         ///< 0: no per-frame images
   bool write_map = false;      ///< map.ply; needs odometry.mode map
-  bool resume = false;         ///< go on from what an interrupted run left in out_dir, if it did
   bool measure_times = false;  ///< RunSummary::report.timing
   std::string command;         ///< that repeats the run, for report.html; may be empty
   /// Told before work starts, and of a stream's ground truth after it: what the input was taken
@@ -50,7 +49,7 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
 /// (trajectory_kitti.txt, trajectory_tum.txt, with odometry.mode map both of trajectory_refined_*,
 /// frames.csv, config.yaml, metrics.json, report.html, trajectory.png, map.ply, pictures/%06d.png;
-/// until the end also checkpoint; an earlier run's are removed when this one starts, config.yaml is
+/// an earlier run's are removed when this one starts, config.yaml is
 /// written then). A wrong
 /// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that
 /// cannot be written) is an error before work starts. A frame that cannot be read is a warning and

@@ -96,18 +96,15 @@ class ChannelStretch {
   explicit ChannelStretch(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 
-  /// What it remembers of the channels before.
+ private:
   struct Limits {
     bool are_known = false;
     double low = 0.0;
     double high = 1.0;
   };
-  [[nodiscard]] const Limits& limits() const { return limits_; }
-  void set_limits(const Limits& limits) { limits_ = limits; }
 
- private:
   StemOptions options_;
-  Limits limits_;
+  Limits limits_;    ///< of the channels before
   cv::Mat resized_;  ///< buffer
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // make_corpora SOURCE OUT: for each fuzzer a folder of small files as stemvo and its tests have
 // them.
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -9,12 +8,9 @@
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
-#include "checkpoint_odometry.hpp"
 #include "config/config.hpp"
 #include "evaluation/trajectory.hpp"
-#include "pipeline/checkpoint.hpp"
 #include "report/metrics_json.hpp"
 #include "search/records.hpp"
 #include "text/text_file.hpp"
@@ -160,26 +156,6 @@ cv::Mat picture(int type, int rows, int cols) {
   return image;
 }
 
-/// Without the first line, which the fuzzer makes.
-void checkpoints(const fs::path& out) {
-  namespace pipeline = stemvo::pipeline;
-  const Corpus corpus(out, "checkpoint");
-  stemvo::PhasedOdometry odometry = stemvo::fuzz::small_odometry();
-  pipeline::Drive drive;
-  for (const int shift_px : {0, 2, 4}) {
-    const cv::Mat wide = picture(CV_8UC1, 12, 20);
-    cv::Mat image;
-    cv::resize(wide, image, cv::Size(80, 48), 0, 0, cv::INTER_CUBIC);
-    odometry.track(odometry.prepare(image.colRange(shift_px, shift_px + 64).clone()));
-    const std::size_t frame = drive.frames.size();
-    const std::string text =
-        pipeline::pack(frame, odometry.state(), drive, 0.0, stemvo::fuzz::kIdentity);
-    corpus.text(fmt::format("{}_frames", frame), text.substr(text.find('\n') + 1));
-    odometry.localize();
-    drive.frames.push_back(odometry.optimize());
-  }
-}
-
 void yaml_and_models(const fs::path& source, const fs::path& out) {
   const Corpus configuration(out, "configuration");
   configuration.text("all", stemvo::dump_config({}));
@@ -224,7 +200,6 @@ int main(int num_arguments, char** arguments) {
   recordings(out);
   metrics(out);
   records(out);
-  checkpoints(out);
   yaml_and_models(source, out);
   images(out);
   return 0;

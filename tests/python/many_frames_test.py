@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """20,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
-is kept of a frame: pose, row, landmarks, and the checkpoint's copies of them."""
+is kept of a frame: pose, row and landmarks."""
 
 import os
 import pathlib
@@ -45,8 +45,8 @@ class ManyFrames(unittest.TestCase):
         self.assertEqual(result.metrics["frames"], FRAMES)
         self.assertLess(grown_kb, MAX_KB_PER_FRAME)
         self.assertGreater(result.handles[0], 3)
-        # A leak of one a frame would be thousands, of one a checkpoint dozens; files open for a moment while the
-        # checkpoint is written are seen by one sample and missed by the next.
+        # A leak of one a frame would be thousands; a file that is open for a moment is seen by one sample and missed
+        # by the next.
         self.assertLessEqual(result.handles[1], result.handles[0] + MAX_FILES_FOR_A_MOMENT)
         self.assertLess(result.quarters_cpu_ms[3], 1.3 * min(result.quarters_cpu_ms[:3]))
 

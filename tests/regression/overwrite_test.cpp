@@ -98,8 +98,8 @@ TEST_F(Overwrite, NoResultIsAnInput) {
   const std::vector<Row> rows = {
       {{"run", sequence_, "--config", config, "--gt", truth},
        {"metrics.json", "trajectory_kitti.txt", "trajectory_tum.txt", "report.html",
-        "trajectory.png", "frames.csv", "config.yaml", "checkpoint", "map.ply",
-        "trajectory_refined_kitti.txt", "trajectory_refined_tum.txt", "metrics.json.unfinished"},
+        "trajectory.png", "frames.csv", "config.yaml", "map.ply", "trajectory_refined_kitti.txt",
+        "trajectory_refined_tum.txt", "metrics.json.unfinished"},
        all},
       {{"search", sequence_, "--config", config, "--model", "gray", "--resume"},
        {"records.jsonl", "filters.csv", "filters.json", "config.yaml", "best.yaml", "report.html",

@@ -30,12 +30,6 @@ class RoadFilter {
   [[nodiscard]] double log_scale() const { return log_scale_; }
   [[nodiscard]] double sigma() const { return sigma_; }
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(is_initialized_, log_scale_, sigma_, num_doubts_, num_believed_);
-  }
-
  private:
   RoadOptions options_;
   bool is_initialized_ = false;
@@ -62,12 +56,6 @@ class RoadPath {
   /// Fills slope, drop and their information: y = y0 + slope z + drop / height z^2 through the
   /// positions, y0 being the bounce of the present moment.
   void predict(double metres_per_unit, RoadPrior& prior) const;
-
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(positions_);
-  }
 
  private:
   RoadOptions options_;

@@ -37,20 +37,10 @@ class RoadScale {
   /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
   void restart();
 
-  /// Its state, for state_archive.hpp.
-  template <typename Archive>
-  void serialize(Archive& archive) {
-    archive(filter_, path_, past_, frames_unmeasured_);
-  }
-
  private:
   struct Past {
     RoadImage image;
     Rigid3 now_from_past;
-    template <typename Archive>
-    void serialize(Archive& archive) {
-      archive(image, now_from_past);
-    }
   };
   /// The nearest past frame that is far enough away; nullptr where the car did not move.
   [[nodiscard]] const Past* pick_past() const;
