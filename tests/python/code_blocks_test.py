@@ -13,7 +13,7 @@ import unittest
 import documented
 import numpy as np
 import yaml
-from export_stem_test import random_arrays
+from exporting import random_arrays
 
 ROOT = documented.ROOT
 PROGRAM = pathlib.Path(os.environ.get("STEMVO_PROGRAM", ROOT / "build/release/stemvo"))

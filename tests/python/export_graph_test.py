@@ -3,7 +3,7 @@
 
 import unittest
 
-from export_weights_test import Files
+from exporting import Files
 
 import numpy as np
 import onnx

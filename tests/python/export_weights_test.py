@@ -3,48 +3,32 @@
 
 import contextlib
 import io
-import pathlib
-import sys
-import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
-import _environment  # noqa: E402,F401
+import exporting
+from exporting import IMAGENET, plain_stem, random_arrays
 
-import h5py  # noqa: E402
-import numpy as np  # noqa: E402
-import onnxruntime  # noqa: E402
-import safetensors.numpy  # noqa: E402
-import yaml  # noqa: E402
+import h5py
+import numpy as np
+import onnxruntime
+import safetensors.numpy
 
-import export_stem  # noqa: E402
-import weight_file_writers as writers  # noqa: E402
-from export_stem_test import plain_stem, run_onnx  # noqa: E402
+import export_stem
 
-IMAGENET = {"input_mean": np.array([0.485, 0.456, 0.406]), "input_std": np.array([0.229, 0.224, 0.225])}
 HALF = {"input_scale": np.float64(2), "input_offset": np.float64(-1)}
 KERAS128 = {"input_scale": np.float64(255 / 128), "input_offset": np.float64(-1)}
 
 
-def random_stem(filters, kernel, stride, norm, epsilon, fed):
-    """The keys of plain_stem."""
-    rng = np.random.default_rng(5)
-    arrays = {"conv_w": rng.normal(size=(filters, 3, kernel, kernel)).astype(np.float32), "stride": stride, **fed}
-    names = ("gamma", "beta") if norm == "ln" else ("gamma", "beta", "mean", "var")
-    arrays |= {f"{norm}_{name}": rng.uniform(0.5, 2, filters).astype(np.float32) for name in names}
-    return arrays | {f"{norm}_eps": epsilon} | ({"conv_b": rng.normal(size=filters).astype(np.float32)} if norm == "ln" else {})
-
-
-def keras_arrays(stem, norm):
+def keras_arrays(stem):
     convolution = [stem["conv_w"].transpose(2, 3, 1, 0)] + ([stem["conv_b"]] if "conv_b" in stem else [])
-    names = ("gamma", "beta") if norm == "ln" else ("gamma", "beta", "mean", "var")
-    return convolution, [stem[f"{norm}_{name}"] for name in names]
+    names = [f"{norm}_{name}" for norm in ("bn", "ln") for name in ("gamma", "beta", "mean", "var")]
+    return convolution, [stem[name] for name in names if name in stem]
 
 
-def torch_arrays(stem, norm, convolution, normalization):
+def torch_arrays(stem, convolution, normalization):
     names = {"gamma": "weight", "beta": "bias", "mean": "running_mean", "var": "running_var"}
     found = {f"{convolution}.weight": stem["conv_w"]} | ({f"{convolution}.bias": stem["conv_b"]} if "conv_b" in stem else {})
-    return found | {f"{normalization}.{new}": stem[f"{norm}_{old}"] for old, new in names.items() if f"{norm}_{old}" in stem}
+    return found | {f"{normalization}.{new}": stem[f"{norm}_{old}"] for norm in ("bn", "ln") for old, new in names.items() if f"{norm}_{old}" in stem}
 
 
 def blocks(names):
@@ -59,51 +43,25 @@ RESNET18 = blocks(f"layer{stage}.{block}.conv{i}" for stage in range(1, 5) for b
 CONVNEXT_TINY = [f"convnext_tiny_stage_{s}_block_{b}_layer_scale" for s, n in enumerate((3, 3, 9, 3)) for b in range(n)]
 
 
-class Files(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def export(self, path, *options):
-        with contextlib.redirect_stdout(io.StringIO()) as said:
-            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "out"), *options]), 0)
-        self.said = said.getvalue()
-        return yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text(encoding="utf-8"))["models"]
-
-    def check(self, path, stem, network, *options, padding=(0, 0, 0, 0), size=(17, 22)):
-        entry = self.export(path, *options)[-1]
-        self.assertEqual(entry["network"], network)
-        self.assertEqual(entry["padding"], list(padding))
-        image = np.random.default_rng(3).uniform(0, 255, (3, *size))
-        want = plain_stem(stem, image, padding)
-        error = np.abs(run_onnx(self.folder / "out" / entry["file"], image) - want).max() / want.std()
-        self.assertTrue(error < 2e-5, f"error {error} standard deviations")
-        return entry
-
-    def error_of(self, path, *options):
-        """The one line; nothing may have been written."""
-        with contextlib.redirect_stderr(io.StringIO()) as said:
-            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "none"), *options]), 1)
-        self.assertEqual(said.getvalue().count("\n"), 1)
-        self.assertFalse((self.folder / "none").exists())
-        return said.getvalue()
+class Weights(exporting.Files):
+    def check(self, path, stem, network, *options, **more):
+        self.assertEqual(super().check(path, stem, *options, **more)["network"], network)
 
     def resnet(self):
-        stem = random_stem(64, 7, 2, "bn", 1e-5, IMAGENET)
+        stem = random_arrays((7, 7), 2, norm="batch", filters=64, epsilon=1e-5)
         path = self.folder / "resnet18.safetensors"
-        safetensors.numpy.save_file(torch_arrays(stem, "bn", "conv1", "bn1") | RESNET18, path)
+        safetensors.numpy.save_file(torch_arrays(stem, "conv1", "bn1") | RESNET18, path)
         return path, stem
 
 
-class Keras(Files):
+class Keras(Weights):
     def convnext(self, name, group=None, cut=None):
-        stem = random_stem(96, 4, 4, "ln", 1e-6, IMAGENET)
-        convolution, norm = keras_arrays(stem, "ln")
+        stem = random_arrays((4, 4), 4, norm="layer", filters=96)
+        convolution, norm = keras_arrays(stem)
         outer, path = "convnext_tiny_stem", self.folder / name
         layers = {(outer, f"{outer}_conv"): dict(zip(("kernel", "bias"), convolution)),
                   (outer, f"{outer}_layernorm"): dict(zip(("gamma", "beta"), norm))}
-        writers.keras_named(path, layers, ["input_1", "convnext_tiny_prestem_normalization", outer, *CONVNEXT_TINY], group, cut)
+        exporting.keras_named(path, layers, ["input_1", "convnext_tiny_prestem_normalization", outer, *CONVNEXT_TINY], group, cut)
         return path, stem
 
     def test_convnext_by_names(self):
@@ -112,40 +70,40 @@ class Keras(Files):
             self.check(path, stem, "ConvNeXt-Tiny")
 
     def test_convnext_by_numbers(self):
-        stem = random_stem(96, 4, 4, "ln", 1e-6, IMAGENET)
-        convolution, norm = keras_arrays(stem, "ln")
+        stem = random_arrays((4, 4), 4, norm="layer", filters=96)
+        convolution, norm = keras_arrays(stem)
         path = self.folder / "convnext.weights.h5"
         scales = {f"layer_scale{f'_{i}' if i else ''}": [np.ones(96, np.float32)] for i in range(36)}
         with h5py.File(path, "w") as file:
-            writers.keras_numbered(file, {"sequential/layers/conv2d": convolution,
+            exporting.keras_numbered(file, {"sequential/layers/conv2d": convolution,
                                           "sequential/layers/layer_normalization": norm, **scales})
         self.check(path, stem, "ConvNeXt-Small")
 
     def test_efficientnet_by_config_with_tensorflows_padding(self):
         for kind, fed, network, filters, count in ((["Normalization"], IMAGENET, "EfficientNetV2-B0", 32, 21),
                                                    ([], KERAS128, "EfficientNetV2-L", 32, 79)):
-            stem = random_stem(filters, 3, 2, "bn", 1e-3, fed)
-            convolution, norm = keras_arrays(stem, "bn")
+            stem = random_arrays((3, 3), 2, norm="batch", filters=filters, fed=fed)
+            convolution, norm = keras_arrays(stem)
             path = self.folder / f"{network}.keras"
             config = [("InputLayer", "in"), ("Rescaling", "rescaling"), *((name, "normalization") for name in kind),
                       ("Conv2D", "stem_conv"), ("BatchNormalization", "stem_bn"),
                       *(("Conv2D", f"block{i}a_project_conv") for i in range(1, 10)),
                       *(("Conv2D", f"block9{'abcdefghijklmnopqrstuvwxyz'[i % 26]}{i}_project_conv") for i in range(count - 9))]
-            writers.keras_zip(path, {"conv2d": convolution, "batch_normalization": norm}, config)
+            exporting.keras_zip(path, {"conv2d": convolution, "batch_normalization": norm}, config)
             self.check(path, stem, network)
             self.check(path, stem, network, "--padding", "same", padding=(0, 0, 1, 1), size=(16, 22))
             self.check(path, stem, network, "--padding", "same", "--size", "21x16", padding=(0, 1, 1, 1), size=(16, 21))
             self.assertIn("odd width and even height", self.said)
 
     def test_resnet_takes_bgr(self):
-        stem = random_stem(64, 7, 2, "bn", 1.001e-5, {"input_mean": np.array([123.68, 116.779, 103.939]) / 255,
+        stem = random_arrays((7, 7), 2, norm="batch", filters=64, epsilon=1.001e-5, fed={"input_mean": np.array([123.68, 116.779, 103.939]) / 255,
                                                       "input_std": np.full(3, 1 / 255)})
-        (kernel,), norm = keras_arrays(stem, "bn")
+        (kernel,), norm = keras_arrays(stem)
         layers = {"conv1_conv": {"kernel": kernel[:, :, ::-1]},
                   "conv1_bn": dict(zip(("gamma", "beta", "moving_mean", "moving_variance"), norm))}
         order = ["in", *layers, "conv2_block1_3_conv", *(f"conv3_block{i}_3_conv" for i in range(2, 17))]
         layers["conv2_block1_3_conv"] = {"kernel": np.zeros((1, 1, 64, 256), np.float32)}
-        writers.keras_named(self.folder / "resnet.h5", layers, order)
+        exporting.keras_named(self.folder / "resnet.h5", layers, order)
         self.check(self.folder / "resnet.h5", stem, "ResNet-50")
 
     def test_list_has_the_totals_of_table_1(self):
@@ -160,24 +118,24 @@ class Keras(Files):
         self.assertIn("used 80 (in 17 convolutions), not used 64", text)
 
 
-class Torch(Files):
+class Torch(Weights):
     def test_resnet(self):
         path, stem = self.resnet()
         self.check(path, stem, "ResNet-18")
         self.check(path, stem, "ResNet-18", "--padding", "same", padding=(3, 3, 3, 3))
 
     def test_names_of_a_model_that_was_wrapped(self):
-        stem = random_stem(96, 4, 4, "ln", 1e-6, IMAGENET)
-        arrays = torch_arrays(stem, "ln", "downsample_layers.0.0", "downsample_layers.0.1")
+        stem = random_arrays((4, 4), 4, norm="layer", filters=96)
+        arrays = torch_arrays(stem, "downsample_layers.0.0", "downsample_layers.0.1")
         arrays |= blocks(f"stages.{s}.{b}.dwconv" for s, n in enumerate((3, 3, 27, 3)) for b in range(n))
         path = self.folder / "parallel.safetensors"
         safetensors.numpy.save_file({f"module.{name}": values for name, values in arrays.items()}, path)
         self.check(path, stem, "ConvNeXt-Small")
 
     def test_the_file_tells_networks_apart_by_their_blocks(self):
-        stem = random_stem(24, 3, 2, "bn", 1e-3, HALF)
+        stem = random_arrays((3, 3), 2, norm="batch", filters=24, fed=HALF)
         path = self.folder / "s.safetensors"
-        arrays = torch_arrays(stem, "bn", "conv_stem", "bn1") | efficientnet_blocks((2, 4, 4, 6, 9, 15))
+        arrays = torch_arrays(stem, "conv_stem", "bn1") | efficientnet_blocks((2, 4, 4, 6, 9, 15))
         safetensors.numpy.save_file(arrays, path)
         self.check(path, stem, "EfficientNetV2-S")
 
@@ -198,7 +156,7 @@ class Torch(Files):
             np.testing.assert_allclose(got, plain_stem(stem, image, (0, 0, 0, 0))[7], atol=1e-3)
 
 
-class Errors(Files):
+class Errors(Weights):
     def test_weights_of_another_network(self):
         path = self.folder / "other.safetensors"
         safetensors.numpy.save_file({"features.0.weight": np.zeros((64, 3, 11, 11), np.float32)}, path)
@@ -222,7 +180,7 @@ class Errors(Files):
         tensors = self.folder / "whole.safetensors"
         safetensors.numpy.save_file({"conv1.weight": np.zeros((64, 3, 7, 7), np.float32)}, tensors)
         keras = self.folder / "whole.h5"
-        writers.keras_named(keras, {"a": {"kernel": np.ones((9, 9))}}, ["a"])
+        exporting.keras_named(keras, {"a": {"kernel": np.ones((9, 9))}}, ["a"])
         contents = [b"", b"text", whole[:len(whole) // 2], tensors.read_bytes()[:99], keras.read_bytes()[:1000]]
         for suffix in (".safetensors", ".h5", ".keras", ".onnx"):
             for content in contents:
@@ -240,10 +198,10 @@ class Errors(Files):
             self.assertIn("torch.load('resnet18.pth', weights_only=True), 'resnet18.safetensors')", message)
 
     def test_not_finite_weights(self):
-        stem = random_stem(64, 7, 2, "bn", 1e-5, IMAGENET)
+        stem = random_arrays((7, 7), 2, norm="batch", filters=64, epsilon=1e-5)
         stem["conv_w"][3] = np.nan
         path = self.folder / "nan.safetensors"
-        safetensors.numpy.save_file(torch_arrays(stem, "bn", "conv1", "bn1") | RESNET18, path)
+        safetensors.numpy.save_file(torch_arrays(stem, "conv1", "bn1") | RESNET18, path)
         self.assertIn("conv1.weight: expected finite numbers", self.error_of(path))
 
 

@@ -3,7 +3,7 @@
 
 import re
 
-from export_weights_test import Files
+import exporting
 
 import h5py
 import json
@@ -13,7 +13,6 @@ import safetensors.numpy
 from onnx import TensorProto, helper, numpy_helper
 
 import export_stem
-import weight_file_writers as writers
 
 # Name, class in Keras, filters of its output; used are the plain ones, "grouped" too, which Keras knows as Conv2D.
 LAYERS = (("first", "Conv2D", 8, True), ("depth", "DepthwiseConv2D", 8, False), ("plain", "Conv2D", 16, True), ("grouped", "Conv2D", 16, True),
@@ -66,7 +65,7 @@ def graph(path, with_constants=True):
     onnx.save(model, path)
 
 
-class OneRule(Files):
+class OneRule(exporting.Files):
     def used(self, path):
         rows = export_stem.list_layers(export_stem.parse_arguments([str(path), "--list"]))
         total = re.search(r"used (\d+) \(in", export_stem.layer_list.text(rows))
@@ -76,7 +75,7 @@ class OneRule(Files):
     def keras_files(self):
         named, weights, whole = self.folder / "whole.h5", self.folder / "net.weights.h5", self.folder / "net.keras"
         config = [(kind, name) for name, kind, *_ in LAYERS]
-        writers.keras_named(named, keras_weights(), [name for name, *_ in LAYERS], group="model_weights")
+        exporting.keras_named(named, keras_weights(), [name for name, *_ in LAYERS], group="model_weights")
         with h5py.File(named, "a") as file:
             layers = [{"class_name": kind, "config": {"name": name}} for kind, name in config]
             file.attrs["model_config"] = json.dumps({"config": {"layers": layers}})
@@ -86,8 +85,8 @@ class OneRule(Files):
             names[key] = names.get(key, -1) + 1
             numbered[key + (f"_{names[key]}" if names[key] else "")] = list(keras_weights()[name].values())
         with h5py.File(weights, "w") as file:
-            writers.keras_numbered(file, numbered)
-        writers.keras_zip(whole, numbered, config)
+            exporting.keras_numbered(file, numbered)
+        exporting.keras_zip(whole, numbered, config)
         return named, whole, weights
 
     def test_keras(self):

@@ -15,8 +15,9 @@ class SearchCost : public Search {
   /// Random filters with a layer norm; the path of the model.
   [[nodiscard]] std::string random_stem() const {
     const std::string root = STEMVO_SOURCE_DIR;
-    const ProgramResult written = test::run_program(
-        root + "/build/venv/bin/python", {root + "/bench/random_stems.py", folder_.path().string()});
+    const ProgramResult written =
+        test::run_program(root + "/build/venv/bin/python",
+                          {root + "/bench/random_stems.py", folder_.path().string()});
     EXPECT_EQ(written.exit_code, 0) << written.err;
     return folder_ / "full.onnx";
   }

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Shared by the tests of tools/export_stem.py: weights of stems, small files with the structure of Keras' (written without it),
+and what the network makes of a picture, in plain numpy."""
+
+import contextlib
+import io
+import json
+import pathlib
+import sys
+import tempfile
+import unittest
+import zipfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
+import _environment  # noqa: E402,F401
+
+import h5py  # noqa: E402
+import numpy as np  # noqa: E402
+import onnxruntime  # noqa: E402
+import yaml  # noqa: E402
+
+import export_stem  # noqa: E402
+
+IMAGENET = {"input_mean": np.array([0.485, 0.456, 0.406]), "input_std": np.array([0.229, 0.224, 0.225])}
+
+
+def run_onnx(path, image):
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    return session.run(["channels"], {"image": image[None].astype(np.float32)})[0][0]
+
+
+def plain_stem(arrays, image, padding):
+    """The network as its authors wrote it, step by step: normalise, pad, convolve, batch norm, layer norm."""
+    if "input_scale" in arrays:
+        image = image / 255.0 * arrays["input_scale"] + arrays["input_offset"]
+    elif "input_mean" in arrays:
+        image = (image / 255.0 - arrays["input_mean"].reshape(3, 1, 1)) / arrays["input_std"].reshape(3, 1, 1)
+    top, left, bottom, right = padding
+    image = np.pad(image.astype(np.float64), ((0, 0), (top, bottom), (left, right)))
+    weights, stride = arrays["conv_w"].astype(np.float64), int(arrays["stride"])
+    rows = (image.shape[1] - weights.shape[2]) // stride + 1
+    columns = (image.shape[2] - weights.shape[3]) // stride + 1
+    out = np.zeros((weights.shape[0], rows, columns))
+    for y in range(rows):
+        for x in range(columns):
+            patch = image[:, y * stride:y * stride + weights.shape[2], x * stride:x * stride + weights.shape[3]]
+            out[:, y, x] = (weights * patch).sum(axis=(1, 2, 3))
+    out += arrays.get("conv_b", np.zeros(weights.shape[0])).reshape(-1, 1, 1)
+    if "bn_eps" in arrays:
+        gamma, beta, mean, var = (arrays[f"bn_{key}"].reshape(-1, 1, 1) for key in ("gamma", "beta", "mean", "var"))
+        out = (out - mean) / np.sqrt(var + arrays["bn_eps"]) * gamma + beta
+    if "ln_eps" in arrays:
+        out = (out - out.mean(axis=0)) / np.sqrt(out.var(axis=0) + arrays["ln_eps"])
+        out = out * arrays["ln_gamma"].reshape(-1, 1, 1) + arrays["ln_beta"].reshape(-1, 1, 1)
+    return out
+
+
+def random_arrays(kernel, stride, *, norm, filters=5, epsilon=None, fed=None):
+    """A stem with the keys of an .npz. norm: none, batch or layer."""
+    rng = np.random.default_rng(7)
+    arrays = {"conv_w": rng.normal(size=(filters, 3, *kernel)), "stride": stride, **(fed or IMAGENET)}
+    if norm == "layer":
+        arrays["conv_b"] = rng.normal(size=filters)
+    for name in {"none": (), "batch": ("gamma", "beta", "mean", "var"), "layer": ("gamma", "beta")}[norm]:
+        arrays[f"{norm[0]}n_{name}"] = rng.uniform(0.1, 2, filters)
+    arrays |= {} if norm == "none" else {f"{norm[0]}n_eps": epsilon or {"batch": 1e-3, "layer": 1e-6}[norm]}
+    return {key: np.asarray(value, np.int32 if key == "stride" else np.float32) for key, value in arrays.items()}
+
+
+def keras_named(path, layers, order, group=None, cut=None):
+    """As keras.applications' downloads: layers is layer -> variable -> array; order lists all layers, in two attributes
+    (as Keras does with long lists) with the first `cut` in the first."""
+    with h5py.File(path, "w") as file:
+        root = file.create_group(group) if group else file
+        if cut:
+            root.attrs["layer_names0"] = [name.encode() for name in order[:cut]]
+            root.attrs["layer_names1"] = [name.encode() for name in order[cut:]]
+        else:
+            root.attrs["layer_names"] = [name.encode() for name in order]
+        for name in order:
+            root.create_group(name)
+        for name, variables in layers.items():
+            outer, inner = name if isinstance(name, tuple) else (name, name)
+            for variable, values in variables.items():
+                root[f"{outer}/{inner}/{variable}:0"] = values
+
+
+def keras_numbered(file, layers):
+    """As Keras 3: paths below layers/ -> list of arrays."""
+    for name, arrays in layers.items():
+        place = file.require_group("layers/" + name + "/vars")
+        for index, values in enumerate(arrays):
+            place[str(index)] = values
+
+
+def keras_zip(path, layers, config):
+    """config: (class, name) of all layers, or (class, name, inner layers)."""
+    def described(items):
+        return [{"class_name": item[0], "config": {"name": item[1]} | ({"layers": described(item[2])} if len(item) > 2 else {})}
+                for item in items]
+
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        keras_numbered(file, layers)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("config.json", json.dumps({"config": {"layers": described(config)}}))
+        archive.writestr("model.weights.h5", content.getvalue())
+
+
+class Files(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def export(self, path, *options):
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "out"), *options]), 0)
+        self.said = said.getvalue()
+        return yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text(encoding="utf-8"))["models"]
+
+    def check(self, path, arrays, *options, padding=(0, 0, 0, 0), size=(17, 22)):
+        """The exported stem gives what the arrays say. Returns its entry."""
+        entry = self.export(path, *options)[-1]
+        self.assertEqual(entry["padding"], list(padding))
+        image = np.random.default_rng(3).uniform(0, 255, (3, *size))
+        got, want = run_onnx(self.folder / "out" / entry["file"], image), plain_stem(arrays, image, padding)
+        self.assertEqual(got.shape, want.shape)
+        error = np.abs(got - want).max() / want.std()
+        self.assertTrue(error < 2e-5, f"error {error} standard deviations")
+        return entry
+
+    def error_of(self, path, *options):
+        """The one line; nothing may have been written."""
+        with contextlib.redirect_stderr(io.StringIO()) as said:
+            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "none"), *options]), 1)
+        self.assertEqual(said.getvalue().count("\n"), 1)
+        self.assertFalse((self.folder / "none").exists())
+        return said.getvalue()
