@@ -66,25 +66,28 @@ def parse_size(text):
     return int(width), int(height)
 
 
-def parse_arguments(arguments):
+def parser_of_drives(description, sequences, size):
+    """With the options that say which drives are rendered."""
     shared = os.environ.get("STEMVO_SHARED_DATA")
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cache", metavar="CACHE", type=pathlib.Path, help="created where missing")
-    parser.add_argument("--poses", metavar="DIR", type=pathlib.Path,
-                        default=pathlib.Path(shared) / "full_poses" if shared else None)
-    parser.add_argument("--sequences", default="00,05")
-    parser.add_argument("--size", type=parse_size, default=(620, 188), metavar="WxH", help="default: 620x188")
+    parser.add_argument("--poses", metavar="DIR", type=pathlib.Path, required=shared is None,
+                        default=pathlib.Path(shared or "") / "full_poses")
+    parser.add_argument("--sequences", default=sequences)
+    parser.add_argument("--size", type=parse_size, default=parse_size(size), metavar="WxH", help=f"default: {size}")
     parser.add_argument("--frames", type=int, default=0, metavar="N", help="of each drive; default: all")
+    parser.add_argument("--render-threads", type=int, default=1, metavar="N", help="0: all cores; default: 1")
+    parser.add_argument("--program", default=str(ROOT / "build/release/stemvo"))
+    return parser
+
+
+def parse_arguments(arguments):
+    parser = parser_of_drives(__doc__, "00,05", "620x188")
     parser.add_argument("--seed", type=int, default=1, help="of the street")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="as in `stemvo run`")
     parser.add_argument("--out", type=pathlib.Path, help="keeps the results of the runs, a folder per drive")
     parser.add_argument("--render-only", action="store_true")
-    parser.add_argument("--render-threads", type=int, default=1, metavar="N", help="0: all cores; default: 1")
-    parser.add_argument("--program", default=str(ROOT / "build/release/stemvo"))
-    parsed = parser.parse_args(arguments)
-    if parsed.poses is None:
-        parser.error("--poses is needed where STEMVO_SHARED_DATA is not set")
-    return parsed
+    return parser.parse_args(arguments)
 
 
 def main():

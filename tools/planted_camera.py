@@ -12,17 +12,15 @@ the true one in the runs with the camera's height, at the end and at most (x and
 
 import _environment  # noqa: F401  starts this tool again in build/venv
 
-import argparse
 import csv
 import json
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
 from drives import rendered
-from long_drives import ROOT, parse_size, row
+from long_drives import parser_of_drives, row
 
 HEADINGS = ("drive", "calibration", "camera height", "the same, from N on", "true steps", "the same, from N on",
             "px off at the end", "at most, from N on")
@@ -94,18 +92,9 @@ def parse_pixels(text):
 
 
 def parse_arguments():
-    shared = os.environ.get("STEMVO_SHARED_DATA")
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cache", metavar="CACHE", type=pathlib.Path, help="created where missing")
-    parser.add_argument("--poses", metavar="DIR", type=pathlib.Path, required=shared is None,
-                        default=pathlib.Path(shared or "") / "full_poses")
-    parser.add_argument("--sequences", default="05")
-    parser.add_argument("--size", type=parse_size, default=(1241, 376), metavar="WxH", help="default: 1241x376")
-    parser.add_argument("--frames", type=int, default=0, metavar="N", help="of each drive; default: all")
+    parser = parser_of_drives(__doc__, "05", "1241x376")
     parser.add_argument("--plant", type=parse_pixels, default=(3.0, 2.0), metavar="DX,DY", help="default: 3,2")
     parser.add_argument("--from-frame", type=int, default=500, metavar="N", help="default: 500")
-    parser.add_argument("--render-threads", type=int, default=1, metavar="N", help="0: all cores; default: 1")
-    parser.add_argument("--program", default=str(ROOT / "build/release/stemvo"))
     return parser.parse_args()
 
 
