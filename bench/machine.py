@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the benchmark ran on, and whether other programs ran there too."""
+"""Describes the machine of the benchmark, and whether other programs ran there too."""
 
 import os
 import pathlib
@@ -13,7 +13,7 @@ BUSY_LOAD_PER_CORE = 0.5
 
 
 def output(command):
-    """What a command prints; None where it does not run."""
+    """The text that a command prints; None where it does not run."""
     try:
         return subprocess.run(command, capture_output=True, text=True, check=True, cwd=places.ROOT).stdout.strip()
     except (OSError, subprocess.CalledProcessError):

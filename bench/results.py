@@ -25,7 +25,7 @@ def spread(values):
 
 
 def ratios(times, reference):
-    """Of a row's times over the reference's of the same round."""
+    """A row's times over the reference's of the same round."""
     if len(times) != len(reference):
         raise ValueError(f"expected as many times as references, found {len(times)} and {len(reference)}")
     return [mine / other for mine, other in zip(times, reference)]

@@ -54,7 +54,7 @@ class Contest:
         self.frames = {}
 
     def out(self, row):
-        """What the row writes: a folder of stemvo, a file of the peer."""
+        """The row writes it: a folder of stemvo, a file of the peer."""
         return self.scratch / (row.name.replace(" ", "_") + (".txt" if row.is_peer else ""))
 
     def trajectory(self, row):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is compared: the rows, and which of them were asked for."""
+"""The rows that are compared, and which of them were asked for."""
 
 import dataclasses
 import os

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""What each part of the program buys: the defaults, and the defaults with one part replaced.
+"""Runs the defaults, and the defaults with one part replaced: the table says how much each part buys.
 
     tools/ablation.py KITTI_ROOT --out docs/lab/ablation.md [--sequences 03,00,06] [--seeds 1,2,3]
 

@@ -17,7 +17,7 @@ sources=("$@")
 (($# > 0)) || mapfile -t sources < <(git ls-files 'src/*.cpp' 'apps/*.cpp')
 echo "==> clang-tidy over ${#sources[@]} sources of src and apps"
 failed=0
-# What libstdc++ itself uses although it is deprecated is no finding; nor are counts of warnings in system headers.
+# Deprecated functions that libstdc++ itself uses are no finding; nor are counts of warnings in system headers.
 printf '%s\0' "${sources[@]}" | xargs -0 --max-args=1 --max-procs="$(nproc)" "$CLANG_TIDY" --quiet -p "$BUILD" \
   --extra-arg=-Wno-deprecated-declarations 2>"$BUILD/stderr.log" || failed=1
 ((failed == 0)) || { grep -v ' warnings\? generated' "$BUILD/stderr.log" >&2 || true; echo "lint: not clean" >&2; exit 1; }

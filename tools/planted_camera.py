@@ -38,7 +38,7 @@ def planted(calibration, off_px):
 
 
 def principal_point(calibration):
-    """Of P2, as the program reads."""
+    """The program reads that of P2."""
     numbers = next(line for line in calibration.splitlines() if line.startswith("P2:")).split()
     return float(numbers[3]), float(numbers[7])
 

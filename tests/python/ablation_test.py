@@ -48,7 +48,7 @@ class Command(unittest.TestCase):
             self.assertEqual(len(found), 1, row.heading)
             told = any(problem.startswith(f"Not possible: {row.heading}") for problem in lines)
             self.assertTrue(told or found[0].count(" / ") == 4, found[0])  # two sequences' columns, of three errors
-        # What every build can do: the defaults.
+        # Every build can run the defaults.
         self.assertRegex(next(line for line in lines if line.startswith("| the defaults")), r"(\| \d+\.\d\d( / \d+\.\d\d){2} ){2}\|$")
 
     def test_a_sequence_that_is_not_there_is_wrong_usage(self):

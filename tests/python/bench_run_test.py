@@ -75,7 +75,7 @@ class Turns(unittest.TestCase):
 
 
 class BeforeTheFirstRun(unittest.TestCase):
-    """What is refused at once, in one line."""
+    """Wrong arguments are refused at once, in one line."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()

@@ -46,7 +46,7 @@ RUN_ELSEWHERE = {
     "tools/search_cluster.py": "tests/python/search_cluster_test.py",
     "build/venv-ray/bin/ray": "tests/python/search_cluster_test.py",
 }
-# What a reader puts in the place of a name, and what makes a command short.
+# A reader puts names in these places; the rest makes a command short.
 IN_PLACE_OF = [
     (r"--(held-out-)?frames 0:\d+", rf"--\1frames 0:{FRAMES - 1}"),
     (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
@@ -97,7 +97,7 @@ class CodeBlocks(unittest.TestCase):
         subprocess.run([PROGRAM, "synth", cls.drives / name, "--frames", str(FRAMES), *options], check=True, capture_output=True)
 
     def new_folder(self, camera):
-        """What a reader's folder holds; blocks of a page follow each other in it."""
+        """A reader's folder; blocks of a page follow each other in it."""
         made = tempfile.TemporaryDirectory()
         self.addCleanup(made.cleanup)
         folder = pathlib.Path(made.name)
@@ -136,7 +136,7 @@ class CodeBlocks(unittest.TestCase):
         self.assertGreater(num_run, 15)
 
     def test_the_demo(self):
-        # What `make demo` does with a program that is built.
+        # `make demo` does this with a program that is built.
         done = subprocess.run([ROOT / "tools/demo.sh"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("build/demo/out/report.html", done.stdout)

@@ -15,7 +15,7 @@ PROGRAM = os.environ["STEMVO_PROGRAM"]
 
 
 def path_pixels(image):
-    """Of the path so far, which is blue, right of the frame."""
+    """Counts the path so far, which is blue, right of the frame."""
     red, green, blue = np.asarray(image.convert("RGB"))[:, -180:].astype(int).transpose(2, 0, 1)
     return int(((blue > red + 40) & (blue > green + 20)).sum())
 

@@ -21,7 +21,7 @@ FRAMES = 12
 CAMERA = ("fx", "cx", "cy", "fx_sigma", "cx_sigma", "cy_sigma")
 OPTIONS = {"camera_file": "--camera", "frames": "--frames", "ground_truth": "--gt", "tolerance_s": "--gt-tolerance", "times": "--times", "masks": "--mask"}
 
-# What `stemvo run` writes, of the same recording: FOLDER, and as JSON what else read_recording takes.
+# Writes the files of `stemvo run`, of the same recording: FOLDER, and as JSON what else read_recording takes.
 TRACK = """
 import json, pathlib, sys
 import numpy as np, stemvo
@@ -183,7 +183,7 @@ class Package(unittest.TestCase):
         return call(self.python, "-I", "-c", program, *arguments, cwd=self.folder)
 
     def compare(self, recording, **more):
-        """What both make of a recording; `more`: as read_recording takes it."""
+        """Compares the program with Python on a recording; `more`: as read_recording takes it."""
         program, python = self.folder / "by_program", self.folder / "by_python"
         for folder in (program, python):
             shutil.rmtree(folder, ignore_errors=True)
@@ -206,7 +206,7 @@ class Package(unittest.TestCase):
         return done
 
     def camera_file(self, name, size, *more):
-        """Of the rendered drive's camera, for images of another size."""
+        """The file of the rendered drive's camera, for images of another size."""
         numbers = next(line for line in (self.folder / "drive/sequences/00/calib.txt").read_text().splitlines() if line.startswith("P2:")).split()
         scale = size[0] / 620
         intrinsics = [scale * float(numbers[i]) for i in (1, 6, 3, 7)]
@@ -295,7 +295,7 @@ class Package(unittest.TestCase):
             self.assertNotIn("Traceback", done.stderr)
 
     def test_bag(self):
-        # What it reads: bag_test.py.
+        # bag_test.py reads bags.
         done = subprocess.run([self.python, "-I", "-m", "stemvo.bag", "/nowhere.bag", self.folder / "bag"], capture_output=True, text=True, check=False)
         self.assertEqual((done.returncode, done.stdout), (1, ""))
         self.assertRegex(done.stderr, "^error: /nowhere.bag: [^\n]+\n$")

@@ -19,7 +19,7 @@ class DriveError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What makes a rendered drive the one asked for."""
+    """Everything that makes a rendered drive the one asked for."""
 
     poses: pathlib.Path  # a KITTI pose file; its name is the sequence's
     width_px: int = 620

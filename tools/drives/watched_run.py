@@ -62,7 +62,7 @@ def open_files(pid):
 
 
 class Messages:
-    """What a program says on standard error, where it believes to be at a terminal and tells its
+    """Reads standard error of a program, which believes to be at a terminal and tells its
     progress ten times a second."""
 
     def __init__(self):
@@ -71,7 +71,7 @@ class Messages:
         self.text = ""
 
     def frames_done(self):
-        """Of the last line of progress; 0 before."""
+        """The number in the last line of progress; 0 before."""
         try:
             while said := os.read(self.master, 1 << 16):
                 self.text += said.decode("utf-8", errors="replace")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What export_stem.py writes: a model's bytes and its layers, from any kind of weights. Nothing is written here."""
+"""Makes the model that export_stem.py writes, and its layers, from any kind of weights. Nothing is written here."""
 
 import dataclasses
 

@@ -117,7 +117,7 @@ def find(name):
 
 
 def mismatch(name, filters, kernel, stride, norm=None):
-    """What tells that a first convolution is not a known network's: "expected .., found ..", or None: it is like it, or no known
+    """Says why a first convolution is not a known network's: "expected .., found ..", or None: it is like it, or no known
     network has that name. kernel: height, width. norm: layer, batch, or None where it is folded, left out or not known."""
     network = find(name)
     if network is None:

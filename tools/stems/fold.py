@@ -18,7 +18,7 @@ import numpy as np
 
 from stems import stem as stem_module
 
-# Of the largest eigenvalue: below it, rounding.
+# A smaller share of the largest eigenvalue is rounding.
 _RANK = 1e-13
 
 

@@ -88,7 +88,7 @@ def _image_input(path, model):
 
 
 def _extracted(model, image, colours_last, tensors, size=None):
-    """What the tensors need of a network, for pictures of one size (width, height) or any."""
+    """The part of a network that the tensors need, for pictures of one size (width, height) or any."""
     sides = ["H", "W"] if size is None else [size[1], size[0]]
     whole = onnx.ModelProto()
     whole.CopyFrom(model)
@@ -111,7 +111,7 @@ def _start(colours_last):
 
 
 def filters_of(shape, field):
-    """Of a tensor of four dimensions with its Field: the one that is neither y nor x."""
+    """The dimension of a tensor of four that is neither y nor x, by its Field."""
     return shape[next(axis for axis in (1, 2, 3) if axis not in field.axes)] if len(shape or []) == 4 else None
 
 
@@ -145,7 +145,7 @@ def _make_paddings_numbers(model, shapes):
 
 
 def _without_size_arithmetic(model):
-    """What a graph computes from the size of its picture (timm's "same" padding) as numbers, for a model of one size."""
+    """A model of one size, with numbers where the graph computes them from the size of its picture (timm's "same" padding)."""
     with tempfile.TemporaryDirectory() as folder:
         options = _silent()
         options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_BASIC

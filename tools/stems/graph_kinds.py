@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the convolutions of a whole network (.onnx) are."""
+"""Tells the convolutions of a whole network (.onnx) apart."""
 
 
 def _shapes_of_constants(model):

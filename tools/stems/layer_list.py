@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `export_stem.py --list` prints: the layers of a network, their filters, and which are used by the paper's search
+"""Lists for `export_stem.py --list` the layers of a network, their filters, and which are used by the paper's search
 and which not, with the totals of its Table 1. The paper does not say its rule; this one gives its numbers exactly on
 Keras' own networks (docs/search.md): used are plain convolutions (class Conv2D, not separable, depthwise or transposed
 ones); layers nested in others and dense ones do not count.

@@ -41,7 +41,7 @@ class Axis:
 
 @dataclasses.dataclass(frozen=True)
 class Field:
-    """Of a tensor. axes: which of its dimensions are y and x. layers: windowed operations on the way."""
+    """The window of a tensor. axes: which of its dimensions are y and x. layers: windowed operations on the way."""
 
     y: Axis = Axis()
     x: Axis = Axis()
