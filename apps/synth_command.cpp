@@ -18,13 +18,12 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kSynthFooter =
-    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses; of a walk
-also camera.yaml beside calib.txt. The same options give the same files.
+    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses.
+The same options give the same files.
 
 Examples:
   stemvo synth drive --frames 200
   stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
-  stemvo synth slow --rate 30 --speed 5
   stemvo synth walk --walk --frames 600
   stemvo synth drives --name street7 --seed 7   several drives in one folder)";
 
@@ -34,10 +33,6 @@ struct SynthArguments {
 };
 
 Expected<int> render(SynthArguments& arguments) {
-  if (const Status status = check_options(arguments.options); !status) {
-    print_error(status.error().message + " (see 'stemvo synth --help')");
-    return kExitUsage;
-  }
   Progress progress("frames", /*is_quiet=*/false);
   const Status status =
       render_synthetic_drive(arguments.out_dir, arguments.options, std::ref(progress));
@@ -69,28 +64,17 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
       .add_flag("--walk", options.walk,
                 "Walk through a courtyard with the camera in the hand, in place of a drive")
       ->excludes(trajectory);
-  command
-      .add_option("--rate", options.rate_hz,
-                  "Frames per second, 1 to 1000; default 10, of a walk 30")
-      ->type_name("HZ");
-  command
-      .add_option("--speed", options.speed_m_s,
-                  "Mean speed, 0.1 to 60, of a walk to 1; default 8-12, of a walk 0.5")
-      ->type_name("M_PER_S")
-      ->excludes(trajectory);
-  command.add_option("--name", options.name, "Of the sequence; default 00")
+  command.add_option("--name", options.name, "The sequence's name; default 00")
       ->type_name("NAME")
       ->check([](const std::string& text) {
-        const bool is_name = !text.empty() && text != "." && text != ".." &&
-                             text.find('/') == std::string::npos && !text.ends_with(".unfinished");
-        return is_name
-                   ? std::string()
-                   : "expected the name of a folder (not NAME.unfinished), found '" + text + "'";
+        const bool is_name =
+            !text.empty() && text != "." && text != ".." && text.find('/') == std::string::npos;
+        return is_name ? std::string() : "expected the name of a folder, found '" + text + "'";
       });
   command.add_option("--frames", options.num_frames, "Frames to render; default 100")
       ->type_name("N")
       ->check(in_range(1, 1000000));
-  command.add_option("--seed", options.seed, "Of textures, shading and noise; default 1")
+  command.add_option("--seed", options.seed, "Seed of textures, shading and noise; default 1")
       ->type_name("S")
       ->check([](const std::string& text) {
         // CLI11 would wrap others around.
@@ -98,10 +82,10 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
                    ? std::string()
                    : "expected a whole number from 0 to 18446744073709551615, found " + text;
       });
-  command.add_option("--width", options.width_px, "Pixels; default 1241, of a walk 640")
+  command.add_option("--width", options.width_px, "Pixels; default 1241, with --walk 640")
       ->type_name("W")
       ->check(in_range(16, 8192));
-  command.add_option("--height", options.height_px, "Pixels; default 376, of a walk 480")
+  command.add_option("--height", options.height_px, "Pixels; default 376, with --walk 480")
       ->type_name("H")
       ->check(in_range(16, 8192));
   command.add_flag("--depth", options.write_depth,

@@ -83,13 +83,11 @@ class Sway {
     constexpr double kCount = 5.0;
     Draw draw(seed, 'w', key);
     const double amplitude = deviation * std::sqrt(2.0 / kCount);
-    double i = 0.0;
-    for (Wave& wave : waves_) {
+    for (int i = 0; Wave& wave : waves_) {
       wave.frequency_hz =
-          slowest_hz * std::pow(fastest_hz / slowest_hz, (i + draw.next()) / kCount);
+          slowest_hz * std::pow(fastest_hz / slowest_hz, (i++ + draw.next()) / kCount);
       wave.phase_rad = draw.in(0.0, 2.0 * kPi);
       wave.amplitude = amplitude * draw.in(0.8, 1.2);
-      i += 1.0;
     }
   }
 

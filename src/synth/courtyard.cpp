@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "synth/courtyard.hpp"
-
 #include <algorithm>
 #include <numeric>
 
 #include "synth/materials.hpp"
+#include "synth/walk.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -14,13 +13,13 @@ constexpr double kMaxRelief_m = 0.22;  // how far a wall's part stands out
 /// No surface is nearer than this to the middle of a walkway, 0.4 m more beyond its ends.
 constexpr double kWalkwayClear_m = 0.86;
 
-/// How much room a thing has: x from 0 to width, y from 0 to depth.
+/// A thing's room: x from 0 to width, y from 0 to depth.
 struct Room {
   double width_m;
   double depth_m;
 };
 
-/// Where a thing stands: at the origin of its own axes. `along` to the right of who looks at its
+/// A thing stands at the origin of its own axes. `along` points to the right of a viewer of its
 /// front, `out` towards him, up is -y.
 struct Stand {
   Scene& scene;
@@ -42,10 +41,8 @@ struct Stand {
   }
   /// A flat rectangle parallel to the front, `off_m` before it; x and height of its corner.
   void add_sheet(const Vec2& corner, const Vec2& size, double off_m, const Style& style) const {
-    const double left = corner.x();
-    const double low = corner.y();
-    const double right = left + size.x();
-    const double top = low + size.y();
+    const auto& [left, low] = std::pair(corner.x(), corner.y());
+    const auto& [right, top] = std::pair(left + size.x(), low + size.y());
     scene.add_face(
         {at(left, off_m, low), at(right, off_m, low), at(right, off_m, top), at(left, off_m, top)},
         {Vec2(0, 0), Vec2(size.x(), 0), size}, style);
@@ -64,19 +61,19 @@ Style any_colour(Draw& draw) {
 Style brick_style(Draw& draw) {
   const std::uint32_t seed = draw.bits();
   const auto hue = static_cast<float>(draw.next());
-  return {.material = &materials::kBrick,
+  return {.material = materials::brick,
           .seed = seed,
           .albedo = {0.36F + 0.12F * hue, 0.21F + 0.17F * hue, 0.15F + 0.15F * hue}};
 }
 
 Style board_style(Draw& draw) {
-  return {.material = &materials::kBoards,
+  return {.material = materials::boards,
           .seed = draw.bits(),
           .albedo = scaled({0.42F, 0.32F, 0.21F}, draw.in_float(0.6, 1.3))};
 }
 
 Style hedge_style(Draw& draw) {
-  return {.material = &materials::kNearHedge,
+  return {.material = materials::near_hedge,
           .seed = draw.bits(),
           .albedo = {draw.in_float(0.13, 0.2), 0.24F, 0.09F}};
 }
@@ -141,7 +138,7 @@ void add_brick_pillar(const Stand& stand, const Room& room, Draw draw) {
   const double x = 0.5 * (room.width_m - width_m);
   const double height_m = draw.in(2.2, 3.6);
   stand.moved(x, kCap_m, 0.0).add_block({width_m, depth_m}, height_m, style);
-  const Style stone{.material = &materials::kKerb, .albedo = {0.5F, 0.48F, 0.45F}};
+  const Style stone{.material = materials::kerb, .albedo = {0.5F, 0.48F, 0.45F}};
   const Room wide{width_m + 2.0 * kCap_m, depth_m + 2.0 * kCap_m};
   stand.moved(x - kCap_m, 0.0, height_m).add_block(wide, 0.12, stone);
   stand.moved(x - kCap_m, 0.0, 0.0).add_block(wide, 0.25, stone);
@@ -169,7 +166,7 @@ void add_crates(const Stand& stand, const Room& room, Draw draw) {
 }
 
 void add_planter(const Stand& stand, const Room& room, Draw draw) {
-  const Material* material = draw.chance(0.5) ? &materials::kKerb : &materials::kBoards;
+  const Material material = draw.chance(0.5) ? materials::kerb : materials::boards;
   const Style trough{.material = material, .seed = draw.bits(), .albedo = {0.45F, 0.42F, 0.38F}};
   const double trough_m = draw.in(0.35, 0.55);
   stand.add_block(room, trough_m, trough);
@@ -245,7 +242,7 @@ std::array<std::size_t, N> shuffled(Draw& draw) {
 void add_wall_part(const Stand& stand, double width_m, std::size_t kind, Draw draw) {
   const auto& [min_height_m, max_height_m, own_style] = kWallKinds[kind];
   const double relief_m = draw.in(0.0, kMaxRelief_m);
-  Style style{.material = &materials::kPlainWall, .seed = draw.bits()};
+  Style style{.material = materials::plain_wall, .seed = draw.bits()};
   style.albedo = scaled({0.48F, 0.45F, 0.38F}, draw.in_float(0.85, 1.15));
   if (own_style != nullptr) {
     style = own_style(draw);
@@ -255,7 +252,7 @@ void add_wall_part(const Stand& stand, double width_m, std::size_t kind, Draw dr
   stand.moved(0.0, -kWallDepth_m, 0.0).add_block({width_m, depth_m}, height_m, style);
   const Stand front = stand.moved(0.0, relief_m, 0.0);
   if (kind == kHouse) {
-    style.material = &materials::kFacade;
+    style.material = materials::facade;
     style.size = {static_cast<float>(width_m), static_cast<float>(height_m)};
     front.add_sheet({0.0, 0.0}, {width_m, height_m}, 0.0, style);
   }
@@ -324,22 +321,20 @@ void add_things_between(const Courtyard& yard, Scene& scene) {
 void add_floor(
     double left, double near, double right, double far, std::uint64_t seed, Scene& scene) {
   constexpr double kBorder_m = 1.1;
-  const auto lay = [&](double x0, double z0, double x1, double z1, const Material& material) {
-    const Style style{.material = &material,
+  const std::array<double, 4> x = {left, left + kBorder_m, right - kBorder_m, right};
+  const std::array<double, 4> z = {near, near + kBorder_m, far - kBorder_m, far};
+  const auto lay = [&](double x0, double z0, double x1, double z1, Material material) {
+    const Style style{.material = material,
                       .seed = static_cast<std::uint32_t>(hash_of(seed, 'F')),
                       .albedo = {0.43F, 0.41F, 0.38F}};
     scene.add_face({Vec3(x0, 0, z0), Vec3(x1, 0, z0), Vec3(x1, 0, z1), Vec3(x0, 0, z1)},
                    {Vec2(x0, z0), Vec2(x1, z0), Vec2(x1, z1)}, style);
   };
-  const double inner_left = left + kBorder_m;
-  const double inner_near = near + kBorder_m;
-  const double inner_right = right - kBorder_m;
-  const double inner_far = far - kBorder_m;
-  lay(inner_left, inner_near, inner_right, inner_far, materials::kSidewalk);
-  lay(left, near, right, inner_near, materials::kParking);
-  lay(left, inner_far, right, far, materials::kParking);
-  lay(left, inner_near, inner_left, inner_far, materials::kParking);
-  lay(inner_right, inner_near, right, inner_far, materials::kParking);
+  lay(x[1], z[1], x[2], z[2], materials::sidewalk);
+  lay(x[0], z[0], x[3], z[1], materials::parking);
+  lay(x[0], z[2], x[3], z[3], materials::parking);
+  lay(x[0], z[1], x[1], z[2], materials::parking);
+  lay(x[2], z[1], x[3], z[2], materials::parking);
 }
 
 }  // namespace
@@ -357,9 +352,7 @@ Courtyard lay_courtyard(std::uint64_t seed) {
   return yard;
 }
 
-Scene build_courtyard(const Courtyard& courtyard, const Vec3& camera_position, const Vec3& to_sun) {
-  constexpr double kAmbient = 0.7;  // walls light each other
-  Scene scene(camera_position, to_sun, kAmbient);
+void add_courtyard(const Courtyard& courtyard, Scene& scene) {
   const double left = courtyard.x_m.front() - courtyard.wall_m[0];
   const double right = courtyard.x_m.back() + courtyard.wall_m[1];
   const double near = courtyard.z_m.front() - courtyard.wall_m[2];
@@ -378,7 +371,6 @@ Scene build_courtyard(const Courtyard& courtyard, const Vec3& camera_position, c
     add_trees_behind(sides[i], length_m, Draw(courtyard.seed, 'Z', i));
   }
   add_things_between(courtyard, scene);
-  return scene;
 }
 
 }  // namespace stemvo::synth

@@ -3,16 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "evaluation/trajectory.hpp"
-#include "synth/basics.hpp"
+#include "synth/scene.hpp"
 
 namespace stemvo::synth {
 
-/// Spacing of the knots along a road: the arc length of knot i is i * 1 m.
-inline constexpr double kKnotSpacing_m = 1.0;
 /// Road beyond the first and the last camera, so that the view never ends in nothing.
 inline constexpr double kRoadBehind_m = 80.0;
 inline constexpr double kRoadAhead_m = 190.0;
@@ -38,7 +35,7 @@ struct RoadFrame {
   }
 };
 
-/// A road as equally spaced frames.
+/// A road as frames 1 m apart: the arc length of knot i is i.
 class RoadCurve {
  public:
   /// Points 1 m apart on the road's surface under the camera's path, and an up direction for each;
@@ -60,34 +57,26 @@ class RoadCurve {
   std::vector<RoadFrame> knots_;
 };
 
-/// On which road a frame's camera is, and how far along it.
-struct RoadPosition {
-  std::size_t road = 0;
-  double arc_m = 0.0;
-};
-
-/// Camera poses and the roads under them. The world is any frame in which -y is roughly up.
+/// Camera poses and the road under them. The world is any frame in which -y is roughly up.
 struct Drive {
+  RoadCurve road;
   Trajectory world_from_camera;
-  std::vector<RoadPosition> positions;  ///< one per pose
-  std::vector<RoadCurve> roads;         ///< more than one where the poses jump
+  std::vector<double> arcs_m;  ///< per pose, along the road
 };
 
-/// Frames per second, and how fast the camera moves in the mean.
-struct Pace {
-  double rate_hz = 10.0;
-  std::optional<double> speed_m_s = std::nullopt;  ///< nullopt: the path's own
-};
+inline constexpr double kDriveRate_hz = 10.0;
 
-/// A street with turns to both sides, gentle hills and banks, driven at 8-12 m/s or at the given
-/// mean speed (slower in turns, above 12 m/s wider turns); the camera pitches and rolls against the
-/// road by about 0.4 deg (standard deviation) and bounces by 1-2 cm.
-[[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed, const Pace& pace = {});
+/// A street with turns to both sides, gentle hills and banks, driven at 8-12 m/s (slower in turns);
+/// the camera pitches and rolls against the road by about 0.4 deg (standard deviation) and bounces
+/// by 1-2 cm.
+[[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed);
 
 /// The road that fits given camera poses: 1.65 m below the smoothed path, with its elevation and
 /// bank. The poses are kept exactly; what the smoothing takes away is how the camera moves against
-/// the road. Standing, turning on the spot, reversing and jumps (over 12 m, at less than 10
-/// frames/s over 120 m/s) are fine.
-[[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera, double rate_hz = 10.0);
+/// the road. The car may stand, turn on the spot and reverse.
+[[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera);
+
+/// The street near `arc_m`: from 60 m behind to 170 m ahead.
+void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& scene);
 
 }  // namespace stemvo::synth

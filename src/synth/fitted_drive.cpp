@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <span>
 
 #include "synth/drive.hpp"
 
@@ -14,7 +13,7 @@ Vec3 forward_of(const Rigid3& pose) { return pose.rotation_matrix().col(2); }
 Vec3 up_of(const Rigid3& pose) { return -pose.rotation_matrix().col(1); }
 
 /// The cameras that moved the path on.
-Trajectory choose_keys(std::span<const Rigid3> poses) {
+Trajectory choose_keys(const Trajectory& poses) {
   constexpr double kMinAdvance_m = 0.3;  // less is standing, turning on the spot, or reversing
   Trajectory keys = {poses.front()};
   for (const Rigid3& pose : poses) {
@@ -31,10 +30,6 @@ std::vector<Vec3> smooth(const std::vector<Vec3>& points, double sigma_m) {
   const double sigma = sigma_m / kFine_m;
   const int n = static_cast<int>(points.size());
   const int reach = static_cast<int>(std::ceil(3.0 * sigma));
-  std::vector<double> weights;
-  for (int k = -reach; k <= reach; ++k) {
-    weights.push_back(std::exp(-0.5 * k * k / (sigma * sigma)));
-  }
   std::vector<Vec3> result;
   for (int i = 0; i < n; ++i) {
     // At the ends the window shrinks evenly, so that a straight line stays where it is.
@@ -42,7 +37,7 @@ std::vector<Vec3> smooth(const std::vector<Vec3>& points, double sigma_m) {
     Vec3 sum = Vec3::Zero();
     double total = 0.0;
     for (int k = -span; k <= span; ++k) {
-      const double weight = weights[static_cast<std::size_t>(k + reach)];
+      const double weight = std::exp(-0.5 * k * k / (sigma * sigma));
       sum += weight * points[static_cast<std::size_t>(i + k)];
       total += weight;
     }
@@ -112,30 +107,19 @@ RoadCurve fit_road(const Trajectory& keys) {
     const double height_m = up.dot(loose[i] - close[i]) - kCameraHeight_m;
     ground.add(close[i] + height_m * up, up);
   }
-  const Path knots = resample(ground, kKnotSpacing_m);
+  const Path knots = resample(ground, 1.0);
   return {knots.points, knots.ups};
 }
 
 }  // namespace
 
-Drive make_drive_along(const Trajectory& world_from_camera, double rate_hz) {
-  const double jump_m = std::max(12.0, 120.0 / rate_hz);  // a step that no car makes
-  Drive drive;
-  drive.world_from_camera = world_from_camera;
-  for (auto begin = world_from_camera.begin(); begin != world_from_camera.end();) {
-    const auto is_jump = [&](const Rigid3& from, const Rigid3& to) {
-      return (to.translation - from.translation).norm() > jump_m;
-    };
-    const auto last = std::adjacent_find(begin, world_from_camera.end(), is_jump);
-    const auto end = last == world_from_camera.end() ? last : last + 1;
-    const std::span<const Rigid3> poses(begin, end);
-    drive.roads.push_back(fit_road(choose_keys(poses)));
-    double arc_m = kRoadBehind_m + kStraightOn_m;
-    for (const Rigid3& pose : poses) {
-      arc_m = drive.roads.back().nearest(pose.translation, arc_m, 2.0 * jump_m);
-      drive.positions.push_back({drive.roads.size() - 1, arc_m});
-    }
-    begin = end;
+Drive make_drive_along(const Trajectory& world_from_camera) {
+  constexpr double kReach_m = 24.0;  // a car moves less between two frames
+  Drive drive{fit_road(choose_keys(world_from_camera)), world_from_camera, {}};
+  double arc_m = kRoadBehind_m + kStraightOn_m;
+  for (const Rigid3& pose : world_from_camera) {
+    arc_m = drive.road.nearest(pose.translation, arc_m, kReach_m);
+    drive.arcs_m.push_back(arc_m);
   }
   return drive;
 }

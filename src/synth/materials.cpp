@@ -24,47 +24,26 @@ float patch_tone(const Sample& at) {
          box_coverage(at.v, at.width_v, begin_v, begin_v + breadth);
 }
 
-/// Deviations are calibrated to the real clip (docs/synthetic_drives.md).
-Rgb asphalt(const Sample& at, float, float) {
-  constexpr float kGrain = 0.18F;
-  constexpr float kMottle = 0.03F;
-  constexpr float kDashPeriod_m = 12.288F;  // a fifth of the texture's period
-  const float grain = at.grain(0.01F);
-  // Tyres polish two tracks 1.5 m apart in each lane.
-  const float track = 0.025F * std::cos(4.19F * (at.v - 0.75F));
-  const float tone =
-      1.0F + kGrain * grain + kMottle * at.grain(0.06F, 7.0F) + track + patch_tone(at);
-  // Worn white dashes in the middle of the road.
-  const float dashes =
-      box_coverage(at.v, at.width_v, -1.82F, -1.71F) * at.bars_u(kDashPeriod_m, 3.3F);
-  return blend(scaled(at.style.albedo, tone), {0.62F, 0.62F, 0.60F},
-               dashes * std::clamp(0.75F + 0.2F * grain, 0.0F, 1.0F));
-}
-
 /// The stone or brick under a footprint, of rows that are shifted by half a stone.
 struct Stone {
-  int row;
-  int column;
-  float joints;  ///< share of the footprint
-  float footprint_share;
-
-  Stone(const Sample& at, float length, float breadth) {
-    constexpr float kJoint_m = 0.012F;
-    row = static_cast<int>(std::floor(at.v / breadth));
-    const float u = at.u + (row % 2 == 0 ? 0.0F : 0.5F * length);
-    column = static_cast<int>(std::floor(u / length));
-    joints = std::max(bars_coverage(u, at.width_u, length, kJoint_m), at.bars_v(breadth, kJoint_m));
-    footprint_share = std::max(at.width_u / length, at.width_v / breadth);
-  }
+  const Sample& at;
+  float length;
+  float breadth;
+  int row = static_cast<int>(std::floor(at.v / breadth));
+  float u = at.u + (row % 2 == 0 ? 0.0F : 0.5F * length);
+  int column = static_cast<int>(std::floor(u / length));
+  /// Share of the footprint.
+  float joints = std::max(bars_coverage(u, at.width_u, length, 0.012F), at.bars_v(breadth, 0.012F));
+  float footprint_share = std::max(at.width_u / length, at.width_v / breadth);
 };
 
-/// Of a stone, brick or board: 1 while it is larger than the footprint.
+/// 1 while a stone, brick or board is larger than the footprint.
 float sharpness(float footprint_share) {
   return std::clamp(2.0F - 2.0F * footprint_share, 0.0F, 1.0F);
 }
 
 Rgb paving(const Sample& at, float length, float breadth) {
-  const Stone stone(at, length, breadth);
+  const Stone stone{at, length, breadth};
   const int period = static_cast<int>(std::lround(static_cast<float>(kTexturePeriod_m) / length));
   const int column = (stone.column % period + period) % period;
   const auto own = static_cast<float>(unit(hash_of(at.style.seed, stone.row, column)) - 0.5);
@@ -73,7 +52,7 @@ Rgb paving(const Sample& at, float length, float breadth) {
                                      0.3F * stone.joints);
 }
 
-Rgb leaves(const Sample& at, float texel_m, float contrast) {
+Rgb foliage(const Sample& at, float texel_m, float contrast) {
   const auto shift = static_cast<float>(at.style.seed % 1024U) * 0.04F;
   const float coarse = at.leaf(4.0F * texel_m, shift);
   const float tone =
@@ -83,71 +62,19 @@ Rgb leaves(const Sample& at, float texel_m, float contrast) {
   return colour;
 }
 
-Rgb kerb(const Sample& at, float, float) {
-  return scaled(at.style.albedo, 1.0F + 0.12F * at.grain(0.01F, 5.0F) +
-                                     0.08F * at.grain(0.06F, 2.0F) -
-                                     0.4F * at.bars_u(0.96F, 0.015F));
-}
-
-Rgb roof(const Sample& at, float, float) {
-  const auto shift = static_cast<float>(at.style.seed % 97U);
-  return scaled(at.style.albedo,
-                1.0F - 0.3F * at.bars_v(0.33F, 0.06F) - 0.18F * at.bars_u(0.25F, 0.05F) +
-                    0.12F * at.grain(0.03F, shift) + 0.08F * at.grain(0.25F, shift));
-}
-
-Rgb fence(const Sample& at, float, float) {
-  return scaled(at.style.albedo, 1.0F - 0.6F * at.bars_u(0.16F, 0.03F) + 0.15F * at.grain(0.02F));
-}
-
-/// For walls that are seen from a step away: grains of 3 mm, and stains.
-Rgb brick(const Sample& at, float length, float height) {
-  const Stone stone(at, length, height);
-  const auto shift = static_cast<float>(at.style.seed % 61U);
-  const float own =
-      sharpness(stone.footprint_share) *
-      (static_cast<float>(unit(hash_of(at.style.seed, stone.row, stone.column))) - 0.5F);
-  const float stains = 0.06F * at.grain(0.03F, shift) + 0.10F * at.leaf(0.04F, shift);
-  const float tone = 1.0F + 0.55F * own + 0.10F * at.grain(0.003F, shift) + stains;
-  const float gray = 0.46F * (1.0F + 0.06F * at.grain(0.004F, shift) + stains);
-  return blend(scaled(at.style.albedo, tone), {gray, 0.97F * gray, 0.92F * gray}, stone.joints);
-}
-
-/// Planks with streaks along them and gaps between them.
-Rgb boards(const Sample& at, float width, float gap) {
-  const auto board = static_cast<int>(std::floor(at.u / width));
-  const float own = sharpness(at.width_u / width) *
-                    (static_cast<float>(unit(hash_of(at.style.seed, board))) - 0.5F);
-  Sample along = at;  // ten times as long as wide
-  along.v = 0.1F * at.v + 1.7F * static_cast<float>(board);
-  along.width_v = 0.1F * at.width_v;
-  const auto shift = static_cast<float>(at.style.seed % 53U);
-  const float tone = 1.0F + 0.5F * own + 0.16F * along.grain(0.004F, shift) +
-                     0.12F * along.leaf(0.01F, shift) + 0.06F * at.grain(0.02F, shift);
-  return scaled(at.style.albedo, std::max(0.1F, tone) * (1.0F - 0.75F * at.bars_u(width, gap)));
-}
-
 constexpr float kPlinth_m = 0.6F;
 constexpr float kFloor_m = 2.9F;
 
-/// What all windows of one house have in common.
+/// All windows of one house have this in common.
 struct WindowPlan {
-  int columns;
-  float spacing;
-  float width;
-  float height;
-  bool has_shutters;
-  int door_column;
-
-  explicit WindowPlan(const Style& style) {
-    Draw draw(style.seed, 'w');
-    columns = std::max(1, static_cast<int>(style.size[0] / draw.in_float(2.1, 3.4)));
-    spacing = style.size[0] / static_cast<float>(columns);
-    width = std::min(draw.in_float(0.9, 1.5), 0.6F * spacing);
-    height = draw.in_float(1.15, 1.6);
-    has_shutters = draw.chance(0.35);
-    door_column = static_cast<int>(draw.next() * columns);
-  }
+  Draw draw;
+  float length;
+  int columns = std::max(1, static_cast<int>(length / draw.in_float(2.1, 3.4)));
+  float spacing = length / static_cast<float>(columns);
+  float width = std::min(draw.in_float(0.9, 1.5), 0.6F * spacing);
+  float height = draw.in_float(1.15, 1.6);
+  bool has_shutters = draw.chance(0.35);
+  int door_column = static_cast<int>(draw.next() * columns);
 };
 
 /// Paints one window (or the door) of the cell whose lower left corner is the origin of `at`.
@@ -187,7 +114,82 @@ Rgb opening(const Rgb& wall, const WindowPlan& plan, const Sample& at, int colum
                at.area(left - 0.12F, right + 0.12F, low - 0.16F, low - kFrame_m));
 }
 
-Rgb plaster(const Sample& at, float, float) {
+}  // namespace
+
+namespace materials {
+
+/// Deviations are calibrated to the real clip (docs/synthetic_drives.md).
+Rgb asphalt(const Sample& at) {
+  constexpr float kGrain = 0.18F;
+  constexpr float kMottle = 0.03F;
+  constexpr float kDashPeriod_m = 12.288F;  // a fifth of the texture's period
+  const float grain = at.grain(0.01F);
+  // Tyres polish two tracks 1.5 m apart in each lane.
+  const float track = 0.025F * std::cos(4.19F * (at.v - 0.75F));
+  const float tone =
+      1.0F + kGrain * grain + kMottle * at.grain(0.06F, 7.0F) + track + patch_tone(at);
+  // Worn white dashes in the middle of the road.
+  const float dashes =
+      box_coverage(at.v, at.width_v, -1.82F, -1.71F) * at.bars_u(kDashPeriod_m, 3.3F);
+  return blend(scaled(at.style.albedo, tone), {0.62F, 0.62F, 0.60F},
+               dashes * std::clamp(0.75F + 0.2F * grain, 0.0F, 1.0F));
+}
+
+Rgb parking(const Sample& at) { return paving(at, 0.24F, 0.16F); }
+Rgb sidewalk(const Sample& at) { return paving(at, 0.48F, 0.32F); }
+Rgb grass(const Sample& at) { return foliage(at, 0.015F, 0.42F); }
+Rgb hedge(const Sample& at) { return foliage(at, 0.015F, 0.75F); }
+Rgb near_hedge(const Sample& at) { return foliage(at, 0.006F, 0.6F); }
+Rgb bark(const Sample& at) { return foliage(at, 0.01F, 0.3F); }
+Rgb leaves(const Sample& at) { return foliage(at, 0.02F, 0.75F); }
+
+Rgb kerb(const Sample& at) {
+  return scaled(at.style.albedo, 1.0F + 0.12F * at.grain(0.01F, 5.0F) +
+                                     0.08F * at.grain(0.06F, 2.0F) -
+                                     0.4F * at.bars_u(0.96F, 0.015F));
+}
+
+Rgb roof(const Sample& at) {
+  const auto shift = static_cast<float>(at.style.seed % 97U);
+  return scaled(at.style.albedo,
+                1.0F - 0.3F * at.bars_v(0.33F, 0.06F) - 0.18F * at.bars_u(0.25F, 0.05F) +
+                    0.12F * at.grain(0.03F, shift) + 0.08F * at.grain(0.25F, shift));
+}
+
+Rgb fence(const Sample& at) {
+  return scaled(at.style.albedo, 1.0F - 0.6F * at.bars_u(0.16F, 0.03F) + 0.15F * at.grain(0.02F));
+}
+
+/// For walls that are seen from a step away: grains of 3 mm, and stains.
+Rgb brick(const Sample& at) {
+  const Stone stone{at, 0.25F, 0.083F};
+  const auto shift = static_cast<float>(at.style.seed % 61U);
+  const float own =
+      sharpness(stone.footprint_share) *
+      (static_cast<float>(unit(hash_of(at.style.seed, stone.row, stone.column))) - 0.5F);
+  const float stains = 0.06F * at.grain(0.03F, shift) + 0.10F * at.leaf(0.04F, shift);
+  const float tone = 1.0F + 0.55F * own + 0.10F * at.grain(0.003F, shift) + stains;
+  const float gray = 0.46F * (1.0F + 0.06F * at.grain(0.004F, shift) + stains);
+  return blend(scaled(at.style.albedo, tone), {gray, 0.97F * gray, 0.92F * gray}, stone.joints);
+}
+
+/// Planks with streaks along them and gaps between them.
+Rgb boards(const Sample& at) {
+  constexpr float kWidth_m = 0.13F;
+  const auto board = static_cast<int>(std::floor(at.u / kWidth_m));
+  const float own = sharpness(at.width_u / kWidth_m) *
+                    (static_cast<float>(unit(hash_of(at.style.seed, board))) - 0.5F);
+  Sample along = at;  // ten times as long as wide
+  along.v = 0.1F * at.v + 1.7F * static_cast<float>(board);
+  along.width_v = 0.1F * at.width_v;
+  const auto shift = static_cast<float>(at.style.seed % 53U);
+  const float tone = 1.0F + 0.5F * own + 0.16F * along.grain(0.004F, shift) +
+                     0.12F * along.leaf(0.01F, shift) + 0.06F * at.grain(0.02F, shift);
+  return scaled(at.style.albedo,
+                std::max(0.1F, tone) * (1.0F - 0.75F * at.bars_u(kWidth_m, 0.008F)));
+}
+
+Rgb plain_wall(const Sample& at) {
   const auto shift = static_cast<float>(at.style.seed % 61U);
   const float tone = 1.0F + 0.05F * at.grain(0.015F, shift) + 0.06F * at.grain(0.06F, shift);
   const float plinth = box_coverage(at.v, at.width_v, -10.0F, kPlinth_m);
@@ -195,8 +197,8 @@ Rgb plaster(const Sample& at, float, float) {
   return scaled(at.style.albedo, tone * (1.0F - dirt) * (1.0F - 0.35F * plinth));
 }
 
-Rgb facade(const Sample& at, float, float) {
-  const WindowPlan plan(at.style);
+Rgb facade(const Sample& at) {
+  const WindowPlan plan{Draw(at.style.seed, 'w'), at.style.size[0]};
   const int floors =
       std::max(1, static_cast<int>(std::lround((at.style.size[1] - kPlinth_m) / kFloor_m)));
   const int column = std::clamp(static_cast<int>(at.u / plan.spacing), 0, plan.columns - 1);
@@ -205,28 +207,8 @@ Rgb facade(const Sample& at, float, float) {
   Sample cell = at;
   cell.u -= plan.spacing * static_cast<float>(column);
   cell.v -= kPlinth_m + kFloor_m * static_cast<float>(floor);
-  return opening(plaster(at, 0.0F, 0.0F), plan, cell, column, floor);
+  return opening(plain_wall(at), plan, cell, column, floor);
 }
-
-}  // namespace
-
-namespace materials {
-
-const Material kAsphalt = {asphalt};
-const Material kParking = {paving, 0.24F, 0.16F};
-const Material kSidewalk = {paving, 0.48F, 0.32F};
-const Material kKerb = {kerb};
-const Material kGrass = {leaves, 0.015F, 0.42F};
-const Material kFacade = {facade};
-const Material kPlainWall = {plaster};
-const Material kRoof = {roof};
-const Material kHedge = {leaves, 0.015F, 0.75F};
-const Material kNearHedge = {leaves, 0.006F, 0.6F};
-const Material kFence = {fence};
-const Material kBark = {leaves, 0.01F, 0.3F};
-const Material kLeaves = {leaves, 0.02F, 0.75F};
-const Material kBrick = {brick, 0.25F, 0.083F};
-const Material kBoards = {boards, 0.13F, 0.008F};
 
 }  // namespace materials
 

@@ -1,10 +1,51 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include "synth/ripmap.hpp"
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
 #include "synth/scene.hpp"
 
 namespace stemvo::synth {
+
+/// A square tile of noise that repeats without a seam, averaged beforehand over 1, 2, 4, ... texels
+/// along each axis on its own ("ripmap"). A street is seen at grazing angles, where a pixel covers
+/// a few millimetres across and half a metre along: averaging both axes alike (a mip-map) would
+/// wash out what a real camera still sees, and averaging too little would flicker.
+class Ripmap {
+ public:
+  static constexpr int kSizeLog2 = 10;
+  static constexpr int kSize = 1 << kSizeLog2;
+
+  /// kSize * kSize values, rows along v; they are shifted and scaled to mean 0, deviation 1.
+  explicit Ripmap(std::vector<float> values);
+
+  /// Mean over a box of `width_u` x `width_v` texels around (u, v), all in texels; any reals.
+  [[nodiscard]] float sample(float u, float v, float width_u, float width_v) const;
+
+ private:
+  static constexpr int kLevels = kSizeLog2 + 1;
+
+  [[nodiscard]] float bilinear(int level_u, int level_v, float u, float v) const;
+
+  std::array<std::array<cv::Mat, kLevels>, kLevels> levels_;  // [v][u]
+};
+
+/// Sum of value noise over octaves: `amplitudes[k]` at a wavelength of 2^k texels.
+[[nodiscard]] std::vector<float> octave_noise(std::uint64_t seed,
+                                              const std::vector<double>& amplitudes);
+
+/// Every material and the sky are painted from these.
+struct Textures {
+  explicit Textures(std::uint64_t seed);
+
+  Ripmap grain;  ///< fine grains on a little of everything coarser: asphalt, plaster, stone
+  Ripmap leaf;   ///< clumps with dark gaps: leaves, grass
+  std::vector<float> ridge_rad;  ///< height of the hills around the horizon
+};
 
 /// Texture coordinates along a road start anew at multiples of this: float stays exact.
 inline constexpr double kTexturePeriod_m = 61.44;
@@ -14,9 +55,8 @@ inline constexpr double kTexturePeriod_m = 61.44;
 /// The same for bars [k * period, k * period + bar] of all integers k.
 [[nodiscard]] float bars_coverage(float x, float width, float period, float bar);
 
-/// What one pixel sees of a face of some style: the middle of its footprint and the footprint's
-/// size, in metres of the face's texture coordinates. u runs along a road or a wall, v across the
-/// road or up.
+/// A pixel's footprint on a face: its middle and its size, in metres of the face's texture
+/// coordinates. u runs along a road or a wall, v across the road or up.
 struct Sample {
   const Style& style;
   const Textures& textures;
@@ -52,40 +92,33 @@ struct Sample {
   }
 };
 
-/// Mean colour over a footprint, before light and haze, by two numbers of the material.
-struct Material {
-  Rgb (*paint)(const Sample& at, float a, float b);
-  float a = 0.0F;
-  float b = 0.0F;
-};
-
 /// Colour of the air.
 inline constexpr Rgb kHaze = {0.60F, 0.63F, 0.66F};
 
-/// What is infinitely far: blue with thin clouds, wooded hills on the horizon, fields below it. It
-/// moves with the camera's rotation only. `direction` in world axes (-y up), any length;
-/// `pixel_rad` is the angle of one pixel.
+/// The backdrop: blue with thin clouds, wooded hills on the horizon, fields below it. It is
+/// infinitely far and moves with the camera's rotation only. `direction` in world axes (-y up), any
+/// length; `pixel_rad` is the angle of one pixel.
 [[nodiscard]] Rgb sky_colour(const Vec3& direction, double pixel_rad, const Textures& textures);
 
 [[nodiscard]] float smooth_step(float begin, float end, float x);
 
 namespace materials {
 
-extern const Material kAsphalt;
-extern const Material kParking;  // small paving stones
-extern const Material kSidewalk;
-extern const Material kKerb;
-extern const Material kGrass;
-extern const Material kFacade;  // a front with a plinth, rows of windows and one door
-extern const Material kPlainWall;
-extern const Material kRoof;
-extern const Material kHedge;
-extern const Material kNearHedge;  // one that is looked at from a step away
-extern const Material kFence;
-extern const Material kBark;
-extern const Material kLeaves;
-extern const Material kBrick;
-extern const Material kBoards;  // upright planks
+Rgb asphalt(const Sample& at);
+Rgb parking(const Sample& at);  // small paving stones
+Rgb sidewalk(const Sample& at);
+Rgb kerb(const Sample& at);
+Rgb grass(const Sample& at);
+Rgb facade(const Sample& at);  // a front with a plinth, rows of windows and one door
+Rgb plain_wall(const Sample& at);
+Rgb roof(const Sample& at);
+Rgb hedge(const Sample& at);
+Rgb near_hedge(const Sample& at);  // seen from a step away
+Rgb fence(const Sample& at);
+Rgb bark(const Sample& at);
+Rgb leaves(const Sample& at);
+Rgb brick(const Sample& at);
+Rgb boards(const Sample& at);  // upright planks
 
 }  // namespace materials
 }  // namespace stemvo::synth

@@ -26,15 +26,12 @@ std::vector<double> smooth(std::vector<double> values, int reach) {
 
 /// Curvature (1/m, > 0 to the right) per knot: straights and turns in alternation, with
 /// clothoid-like entries. The first two turns go to different sides.
-std::vector<double> draw_curvature(std::size_t num_knots, std::uint64_t seed, const Pace& pace) {
+std::vector<double> draw_curvature(std::size_t num_knots, std::uint64_t seed) {
   Draw draw(seed, 'k');
-  // Turns get wider above the usual speed, so that no car has to skid.
-  const double faster = pace.speed_m_s.value_or(0.0) / kMaxSpeed_m_s;
-  const double widened = std::max(1.0, faster * faster);
   std::vector<double> curvature(static_cast<std::size_t>(kRoadBehind_m) + 12, 0.0);
   double side = draw.chance(0.5) ? 1.0 : -1.0;
   for (int turn = 0; curvature.size() < num_knots; ++turn) {
-    const double radius_m = widened * draw.in(22.0, 70.0);
+    const double radius_m = draw.in(22.0, 70.0);
     const double angle_rad = radians(draw.in(25.0, 80.0));
     curvature.insert(curvature.end(), static_cast<std::size_t>(radius_m * angle_rad),
                      side / radius_m);
@@ -60,24 +57,21 @@ RoadCurve lay_road(const std::vector<double>& curvature, std::uint64_t seed) {
   double x = 0.0;
   double z = 0.0;
   for (const double bend : curvature) {
-    const double s = static_cast<double>(points.size()) * kKnotSpacing_m;
+    const double s = static_cast<double>(points.size());
     points.emplace_back(x, -(0.7 * hills(s) + 0.12 * bumps(s)), z);
     const double bank_rad = radians(0.8 * banks(s)) + 0.5 * bend;
     const Vec3 right(std::cos(heading_rad), 0.0, -std::sin(heading_rad));
     ups.push_back(std::cos(bank_rad) * -Vec3::UnitY() - std::sin(bank_rad) * right);
-    const double middle_rad = heading_rad + 0.5 * bend * kKnotSpacing_m;
-    x += kKnotSpacing_m * std::sin(middle_rad);
-    z += kKnotSpacing_m * std::cos(middle_rad);
-    heading_rad += bend * kKnotSpacing_m;
+    const double middle_rad = heading_rad + 0.5 * bend;
+    x += std::sin(middle_rad);
+    z += std::cos(middle_rad);
+    heading_rad += bend;
   }
   return {points, ups};
 }
 
-/// Metres per second at each knot: slower in turns, changing gently; in the mean over the way of
-/// `length_m` from the first camera on as given.
-std::vector<double> plan_speed(const std::vector<double>& curvature,
-                               double length_m,
-                               const std::optional<double>& mean_m_s) {
+/// Metres per second at each knot: slower in turns, changing gently.
+std::vector<double> plan_speed(const std::vector<double>& curvature) {
   constexpr double kMinSpeed_m_s = 8.0;
   constexpr double kComfortable_m_s2 = 3.0;
   std::vector<double> speed;
@@ -85,20 +79,7 @@ std::vector<double> plan_speed(const std::vector<double>& curvature,
     const double limit = std::sqrt(kComfortable_m_s2 / std::max(std::abs(bend), 1e-6));
     speed.push_back(std::clamp(limit, kMinSpeed_m_s, kMaxSpeed_m_s));
   }
-  speed = smooth(speed, 10);
-  if (mean_m_s) {
-    const auto begin = static_cast<std::size_t>(kRoadBehind_m / kKnotSpacing_m);
-    const auto count = static_cast<std::size_t>(length_m / kKnotSpacing_m) + 1;
-    double time_s = 0.0;
-    for (std::size_t i = begin; i < begin + count; ++i) {
-      time_s += kKnotSpacing_m / speed[i];
-    }
-    const double factor = *mean_m_s * time_s / (static_cast<double>(count) * kKnotSpacing_m);
-    for (double& value : speed) {
-      value *= factor;
-    }
-  }
-  return speed;
+  return smooth(speed, 10);
 }
 
 /// How the camera moves against the road.
@@ -125,22 +106,19 @@ struct CarBody {
 
 }  // namespace
 
-Drive make_own_drive(int num_frames, std::uint64_t seed, const Pace& pace) {
-  const double interval_s = 1.0 / pace.rate_hz;
-  const double longest_m = pace.speed_m_s.value_or(kMaxSpeed_m_s) * interval_s * num_frames;
-  const auto num_knots =
-      static_cast<std::size_t>((kRoadBehind_m + longest_m + kRoadAhead_m) / kKnotSpacing_m);
-  const auto curvature = draw_curvature(num_knots, seed, pace);
-  const auto speed = plan_speed(curvature, longest_m, pace.speed_m_s);
-  Drive drive;
-  drive.roads.push_back(lay_road(curvature, seed));
+Drive make_own_drive(int num_frames, std::uint64_t seed) {
+  constexpr double kInterval_s = 1.0 / kDriveRate_hz;
+  const double longest_m = kMaxSpeed_m_s * kInterval_s * num_frames;
+  const auto num_knots = static_cast<std::size_t>((kRoadBehind_m + longest_m + kRoadAhead_m));
+  const auto curvature = draw_curvature(num_knots, seed);
+  const auto speed = plan_speed(curvature);
+  Drive drive{lay_road(curvature, seed), {}, {}};
   const CarBody body{seed};
   double arc_m = kRoadBehind_m;
   for (int i = 0; i < num_frames; ++i) {
-    drive.world_from_camera.push_back(
-        body.world_from_camera(drive.roads.front(), arc_m, interval_s * i));
-    drive.positions.push_back({0, arc_m});
-    arc_m += interval_s * speed[static_cast<std::size_t>(arc_m / kKnotSpacing_m)];
+    drive.world_from_camera.push_back(body.world_from_camera(drive.road, arc_m, kInterval_s * i));
+    drive.arcs_m.push_back(arc_m);
+    arc_m += kInterval_s * speed[static_cast<std::size_t>(arc_m)];
   }
   return drive;
 }

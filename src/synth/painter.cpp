@@ -4,21 +4,21 @@
 #include <optional>
 #include <span>
 
-#include "synth/materials.hpp"
 #include "synth/renderer.hpp"
 
 namespace stemvo::synth {
 namespace {
 
-constexpr int kBandRows = 16;  // its samples stay in the processor's cache
+constexpr int kBandRows = 16;  // the samples of so many rows stay in the processor's cache
 
 /// Eight samples per pixel: four rows of two, each row shifted by its own eighth of a pixel, so
 /// that an edge at any angle is met at eight different distances from it.
 constexpr int kSubRows = 4;
 constexpr int kSubColumns = 2;
 constexpr int kSamples = kSubRows * kSubColumns;
-/// Where the samples of sub-row j begin, in half pixels.
+/// The samples of sub-row j begin here, in half pixels.
 constexpr std::array<double, kSubRows> kRowShift = {0.125, 0.625, 0.375, 0.875};
+constexpr int kNothing = -1;  ///< in place of a face's index: the backdrop
 
 /// Position of a sample relative to the centre of its pixel, in pixels.
 Vec2 sample(int k) {
@@ -38,54 +38,40 @@ struct Linear {
 /// A face as the camera sees it. 1/z and texture/z of a plane are linear over the image, which
 /// makes depth and texture exact at every pixel (no interpolation between corners).
 struct ScreenFace {
+  const Style* style = nullptr;
   Linear inverse_z;
-  Linear u_over_z;
-  Linear v_over_z;
+  std::array<Linear, 2> texture_over_z;
   std::array<Vec2, 5> outline;  ///< pixels, clipped at the near plane
   std::size_t num_points = 0;
-  double top_px = 0.0;
-  double bottom_px = 0.0;
-  const Style* style = nullptr;
+  double top_px = std::numeric_limits<double>::max();
+  double bottom_px = std::numeric_limits<double>::lowest();
 };
 
-constexpr double kNear_m = 0.15;
-
-/// Writes the part of the polygon with z >= kNear_m (Sutherland and Hodgman) as pixels.
-void clip_and_project(std::span<const Vec3> points, const Camera& camera, ScreenFace& out) {
+/// Sets the outline: the part of the polygon before the near plane (Sutherland and Hodgman). False:
+/// it is outside the image.
+bool project_outline(std::span<const Vec3> points, const Camera& camera, ScreenFace& face) {
+  constexpr double kNear_m = 0.15;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vec3& a = points[i];
     const Vec3& b = points[(i + 1) % points.size()];
     if (a.z() >= kNear_m) {
-      out.outline[out.num_points++] = camera.project(a);
+      face.outline[face.num_points++] = camera.project(a);
     }
     if ((a.z() >= kNear_m) != (b.z() >= kNear_m)) {
-      out.outline[out.num_points++] =
+      face.outline[face.num_points++] =
           camera.project(a + (kNear_m - a.z()) / (b.z() - a.z()) * (b - a));
     }
   }
-}
-
-/// Sets the rows of the outline. False: it is empty or outside the image.
-bool find_extent(const Camera& camera, ScreenFace& face) {
   double left = std::numeric_limits<double>::max();
   double right = std::numeric_limits<double>::lowest();
-  face.top_px = left;
-  face.bottom_px = right;
   for (const Vec2& point : std::span(face.outline).first(face.num_points)) {
     left = std::min(left, point.x());
     right = std::max(right, point.x());
     face.top_px = std::min(face.top_px, point.y());
     face.bottom_px = std::max(face.bottom_px, point.y());
   }
-  return face.num_points >= 3 && right >= -0.5 && left <= camera.width_px - 0.5 &&
-         face.bottom_px >= -0.5 && face.top_px <= camera.height_px - 0.5;
-}
-
-/// The function of camera coordinates g . P, divided by z, over pixels.
-Linear over_pixels(const Vec3& g, const Camera& camera) {
-  const double gx = g.x() / camera.fx_px;
-  const double gy = g.y() / camera.fy_px;
-  return {{gx, gy, g.z() - gx * camera.cx_px - gy * camera.cy_px}};
+  return right >= -0.5 && left <= camera.width_px - 0.5 && face.bottom_px >= -0.5 &&
+         face.top_px <= camera.height_px - 0.5;
 }
 
 /// nullopt: behind the camera, outside the image, or seen edge-on.
@@ -98,8 +84,8 @@ std::optional<ScreenFace> project_face(const Face& face,
     points[i] = camera_from_world * face.points[i].cast<double>();
   }
   ScreenFace out;
-  clip_and_project(std::span(points).first(count), camera, out);
-  if (!find_extent(camera, out)) {
+  out.style = &face.style;
+  if (!project_outline(std::span(points).first(count), camera, out)) {
     return std::nullopt;
   }
   const Vec3 e1 = points[1] - points[0];
@@ -110,19 +96,23 @@ std::optional<ScreenFace> project_face(const Face& face,
   if (!(area2 > 1e-16) || !(std::abs(offset) > 1e-9 * std::sqrt(area2))) {
     return std::nullopt;
   }
+  /// The function of camera coordinates g . P, divided by z, over pixels.
+  const auto over_pixels = [&](const Vec3& g) -> Linear {
+    const double gx = g.x() / camera.fx_px;
+    const double gy = g.y() / camera.fy_px;
+    return {{gx, gy, g.z() - gx * camera.cx_px - gy * camera.cy_px}};
+  };
   const Vec3 plane = normal / offset;  // plane . P = 1 on the face
-  out.inverse_z = over_pixels(plane, camera);
-  // A texture coordinate t on the plane has the gradient g with g.e1 = dt1, g.e2 = dt2, g.n = 0.
-  const auto texture = [&](int axis) {
+  out.inverse_z = over_pixels(plane);
+  for (int axis = 0; axis < 2; ++axis) {
+    // A texture coordinate t on the plane has the gradient g with g.e1 = dt1, g.e2 = dt2, g.n = 0.
     const double t0 = static_cast<double>(face.texture[0][axis]);
     const double d1 = static_cast<double>(face.texture[1][axis]) - t0;
     const double d2 = static_cast<double>(face.texture[2][axis]) - t0;
     const Vec3 g = (d1 * e2.cross(normal) + d2 * normal.cross(e1)) / area2;
-    return over_pixels(g + (t0 - g.dot(points[0])) * plane, camera);
-  };
-  out.u_over_z = texture(0);
-  out.v_over_z = texture(1);
-  out.style = &face.style;
+    out.texture_over_z[static_cast<std::size_t>(axis)] =
+        over_pixels(g + (t0 - g.dot(points[0])) * plane);
+  }
   return out;
 }
 
@@ -151,111 +141,86 @@ int first_from(double value, int end) {
   return static_cast<int>(std::ceil(std::clamp(value, 0.0, static_cast<double>(end))));
 }
 
-/// Some rows of the image: for each sample the nearest face so far.
-class SampleBand {
- public:
-  static constexpr int kNothing = -1;
-
-  SampleBand(int width_px, int first_row, int num_rows)
-      : row_width_(width_px * kSubColumns),
-        first_row_(first_row),
-        num_sub_rows_(num_rows * kSubRows) {
-    const auto count =
-        static_cast<std::size_t>(row_width_) * static_cast<std::size_t>(num_sub_rows_);
-    inverse_z_.assign(count, 0.0F);  // infinitely far
-    ids_.assign(count, kNothing);
-  }
-
-  void draw(const ScreenFace& face, int id) {
-    const double first_y = first_row_ + sample(0).y();
-    const auto sub_row_from = [&](double y) {
-      return first_from((y - first_y) * kSubRows, num_sub_rows_);
-    };
-    const auto step = static_cast<float>(face.inverse_z.c[0] / kSubColumns);
-    for (int r = sub_row_from(face.top_px); r < sub_row_from(face.bottom_px); ++r) {
-      const double y = first_y + static_cast<double>(r) / kSubRows;
-      const auto [left, right] = crossings(face, y);
-      const double shift = kRowShift[static_cast<std::size_t>(r % kSubRows)];
-      const int begin = first_from(kSubColumns * (left + 0.5) - shift, row_width_);
-      const int end = first_from(kSubColumns * (right + 0.5) - shift, row_width_);
-      const auto base = static_cast<float>(face.inverse_z.at({shift / kSubColumns - 0.5, y}));
-      float* z = inverse_z_.data() + static_cast<std::ptrdiff_t>(r) * row_width_;
-      int* ids = ids_.data() + static_cast<std::ptrdiff_t>(r) * row_width_;
-      for (int k = begin; k < end; ++k) {
-        const float value = base + static_cast<float>(k) * step;
-        const bool nearer = value > z[k];
-        z[k] = nearer ? value : z[k];
-        ids[k] = nearer ? id : ids[k];
-      }
-    }
-  }
-
-  /// Faces at the kSamples samples of a pixel, sub-row by sub-row.
-  [[nodiscard]] std::array<int, kSamples> ids_at(int column, int row) const {
-    std::array<int, kSamples> ids{};
-    auto out = ids.begin();
-    for (int j = 0; j < kSubRows; ++j) {
-      const auto sub_row = static_cast<std::ptrdiff_t>((row - first_row_) * kSubRows + j);
-      out =
-          std::copy_n(ids_.begin() + sub_row * row_width_ + column * kSubColumns, kSubColumns, out);
-    }
-    return ids;
-  }
-
- private:
-  int row_width_;  ///< samples
-  int first_row_;
-  int num_sub_rows_;
-  std::vector<float> inverse_z_;
-  std::vector<int> ids_;
-};
-
 cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
 
-/// One frame while it is drawn.
+/// One frame while it is drawn, by bands of rows.
 class FramePainter {
  public:
-  FramePainter(const Camera& camera, const Rigid3& world_from_camera, const Textures& textures)
-      : frame{cv::Mat(camera.height_px, camera.width_px, CV_32FC3),
-              cv::Mat(camera.height_px, camera.width_px, CV_32FC1)},
-        camera_(camera),
+  FramePainter(const Scene& scene,
+               const Rigid3& world_from_camera,
+               const Camera& camera,
+               const Textures& textures)
+      : camera_(camera),
         world_from_camera_(world_from_camera.rotation_matrix()),
-        textures_(textures) {}
-
-  void paint(const Scene& scene) {
+        textures_(textures),
+        row_width_(camera.width_px * kSubColumns) {
     const Eigen::Matrix3d camera_from_world = world_from_camera_.transpose();
     for (const Face& face : scene.faces()) {
       if (const auto seen = project_face(face, camera_from_world, camera_)) {
         faces_.push_back(*seen);
       }
     }
-    for (int row = 0; row < camera_.height_px; row += kBandRows) {
-      paint_band(row, std::min(row + kBandRows, camera_.height_px));
+  }
+
+  RenderedFrame paint() {
+    RenderedFrame frame{cv::Mat(camera_.height_px, camera_.width_px, CV_32FC3),
+                        cv::Mat(camera_.height_px, camera_.width_px, CV_32FC1)};
+    for (int row = 0; row < camera_.height_px; ++row) {
+      if (row % kBandRows == 0) {
+        draw_band(row, std::min(row + kBandRows, camera_.height_px));
+      }
+      for (int column = 0; column < camera_.width_px; ++column) {
+        resolve(column, row, frame);
+      }
+    }
+    return frame;
+  }
+
+ private:
+  /// For each sample of the rows [first_row, end_row): the nearest face.
+  void draw_band(int first_row, int end_row) {
+    const int num_sub_rows = (end_row - first_row) * kSubRows;
+    const auto count = static_cast<std::size_t>(row_width_ * num_sub_rows);
+    inverse_z_.assign(count, 0.0F);  // infinitely far
+    ids_.assign(count, kNothing);
+    const double first_y = first_row + sample(0).y();
+    const auto sub_row_from = [&](double y) {
+      return first_from((y - first_y) * kSubRows, num_sub_rows);
+    };
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      for (int r = sub_row_from(faces_[i].top_px); r < sub_row_from(faces_[i].bottom_px); ++r) {
+        draw_sub_row(static_cast<int>(i), r, first_y + static_cast<double>(r) / kSubRows);
+      }
     }
   }
 
-  PaintedFrame frame;
-
- private:
-  void paint_band(int first_row, int end_row) {
-    SampleBand band(camera_.width_px, first_row, end_row - first_row);
-    for (std::size_t i = 0; i < faces_.size(); ++i) {
-      if (faces_[i].bottom_px >= first_row - 0.5 && faces_[i].top_px <= end_row - 0.5) {
-        band.draw(faces_[i], static_cast<int>(i));
-      }
-    }
-    for (int row = first_row; row < end_row; ++row) {
-      for (int column = 0; column < camera_.width_px; ++column) {
-        resolve(band.ids_at(column, row), column, row);
-      }
+  void draw_sub_row(int id, int sub_row, double y) {
+    const ScreenFace& face = faces_[static_cast<std::size_t>(id)];
+    const auto [left, right] = crossings(face, y);
+    const double shift = kRowShift[static_cast<std::size_t>(sub_row % kSubRows)];
+    const int begin = first_from(kSubColumns * (left + 0.5) - shift, row_width_);
+    const int end = first_from(kSubColumns * (right + 0.5) - shift, row_width_);
+    const auto base = static_cast<float>(face.inverse_z.at({shift / kSubColumns - 0.5, y}));
+    const auto step = static_cast<float>(face.inverse_z.c[0] / kSubColumns);
+    float* z = inverse_z_.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width_;
+    int* ids = ids_.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width_;
+    for (int k = begin; k < end; ++k) {
+      const float value = base + static_cast<float>(k) * step;
+      const bool nearer = value > z[k];
+      z[k] = nearer ? value : z[k];
+      ids[k] = nearer ? id : ids[k];
     }
   }
 
   /// Each face seen by a pixel is painted once, at the middle of the samples it holds.
-  void resolve(const std::array<int, kSamples>& ids, int column, int row) {
-    cv::Vec3f& out = frame.light.at<cv::Vec3f>(row, column);
-    float& depth = frame.depth_m.at<float>(row, column);
-    out = cv::Vec3f(0.0F, 0.0F, 0.0F);
+  void resolve(int column, int row, RenderedFrame& frame) const {
+    std::array<int, kSamples> ids{};
+    for (int k = 0; k < kSamples; ++k) {
+      const int sub_row = row % kBandRows * kSubRows + k / kSubColumns;
+      ids[static_cast<std::size_t>(k)] = ids_[static_cast<std::size_t>(
+          sub_row * row_width_ + column * kSubColumns + k % kSubColumns)];
+    }
+    cv::Vec3f light(0.0F, 0.0F, 0.0F);
     int max_count = 0;
     for (auto first = ids.begin(); first != ids.end(); ++first) {
       if (std::find(ids.begin(), first, *first) != first) {
@@ -270,12 +235,13 @@ class FramePainter {
         }
       }
       const Vec2 middle = Vec2(column, row) + sum / count;
-      out += colour_of(*first, middle) * (static_cast<float>(count) / kSamples);
+      light += colour_of(*first, middle) * (static_cast<float>(count) / kSamples);
       if (count > max_count) {
         max_count = count;
-        depth = depth_of(*first, Vec2(column, row), middle);
+        frame.depth_m.at<float>(row, column) = depth_of(*first, Vec2(column, row), middle);
       }
     }
+    frame.rgb.at<cv::Vec3f>(row, column) = light;
   }
 
   [[nodiscard]] cv::Vec3f colour_of(int id, const Vec2& pixel) const {
@@ -284,15 +250,14 @@ class FramePainter {
     const auto backdrop = [&] {
       return to_vector(sky_colour(world_from_camera_ * direction, 1.0 / camera_.fx_px, textures_));
     };
-    if (id == SampleBand::kNothing) {
+    if (id == kNothing) {
       return backdrop();
     }
     const ScreenFace& face = faces_[static_cast<std::size_t>(id)];
     const double z = 1.0 / face.inverse_z.at(pixel);
-    const Material* material = face.style->material;
-    const Rgb albedo = material == nullptr
-                           ? face.style->albedo
-                           : material->paint(sample_of(face, pixel, z), material->a, material->b);
+    const Material material = face.style->material;
+    const Rgb albedo =
+        material == nullptr ? face.style->albedo : material(sample_of(face, pixel, z));
     const auto distance_m = static_cast<float>(z * direction.norm());
     const float haze = 1.0F - std::exp(-distance_m / 700.0F);
     const cv::Vec3f lit =
@@ -312,15 +277,15 @@ class FramePainter {
       value = static_cast<float>(t);
       width = static_cast<float>(std::sqrt(dx * dx + dy * dy));
     };
-    texture(face.u_over_z, at.u, at.width_u);
-    texture(face.v_over_z, at.v, at.width_v);
+    texture(face.texture_over_z[0], at.u, at.width_u);
+    texture(face.texture_over_z[1], at.v, at.width_v);
     return at;
   }
 
   /// At the pixel's centre on the plane of the face; if that point is far off the part of the face
   /// the pixel really sees (an outline seen at a grazing angle), at the middle of that part.
   [[nodiscard]] float depth_of(int id, const Vec2& pixel, const Vec2& middle) const {
-    if (id == SampleBand::kNothing) {
+    if (id == kNothing) {
       return std::numeric_limits<float>::infinity();
     }
     const Linear& inverse_z = faces_[static_cast<std::size_t>(id)].inverse_z;
@@ -334,17 +299,18 @@ class FramePainter {
   Eigen::Matrix3d world_from_camera_;
   const Textures& textures_;
   std::vector<ScreenFace> faces_;
+  int row_width_;                 ///< samples
+  std::vector<float> inverse_z_;  ///< per sample of the band
+  std::vector<int> ids_;
 };
 
 }  // namespace
 
-PaintedFrame paint_scene(const Scene& scene,
-                         const Rigid3& world_from_camera,
-                         const Camera& camera,
-                         const Textures& textures) {
-  FramePainter painter(camera, world_from_camera, textures);
-  painter.paint(scene);
-  return painter.frame;
+RenderedFrame paint_scene(const Scene& scene,
+                          const Rigid3& world_from_camera,
+                          const Camera& camera,
+                          const Textures& textures) {
+  return FramePainter(scene, world_from_camera, camera, textures).paint();
 }
 
 }  // namespace stemvo::synth

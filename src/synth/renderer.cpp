@@ -6,8 +6,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "synth/street.hpp"
-
 namespace stemvo::synth {
 namespace {
 
@@ -23,8 +21,8 @@ float gaussian(std::uint64_t bits) {
   return (part(0) + part(16) + part(32) + part(48) - kMean) / kDeviation;
 }
 
-/// What lens and chip do to light: a point spread of 0.4 px, corners 12 % darker, noise of about
-/// 1.8 gray levels per channel, 8 bits. RGB.
+/// Lens and chip do to light: a point spread of 0.4 px, corners 12 % darker, noise of about 1.8
+/// gray levels per channel, 8 bits. RGB.
 cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
   cv::Mat blurred;
   const cv::Matx13f spread(0.08F, 0.84F, 0.08F);  // variance 0.16 px^2
@@ -70,19 +68,23 @@ const Trajectory& Renderer::world_from_camera() const {
 }
 
 Scene Renderer::scene_at(std::size_t index) const {
-  const Vec3& position = world_from_camera()[index].translation;
-  if (const auto* walk = std::get_if<Walk>(&path_)) {
-    return build_courtyard(walk->courtyard, position, to_sun_);
+  const auto* walk = std::get_if<Walk>(&path_);
+  const double ambient = walk != nullptr ? 0.7 : 0.36;  // walls light each other
+  Scene scene(world_from_camera()[index].translation, to_sun_, ambient);
+  if (walk != nullptr) {
+    add_courtyard(walk->courtyard, scene);
+  } else {
+    const auto& drive = std::get<Drive>(path_);
+    add_street(drive.road, drive.arcs_m[index], hash_of(seed_, 0), scene);
   }
-  const auto& drive = std::get<Drive>(path_);
-  const auto& [road, arc_m] = drive.positions[index];
-  return build_street(drive.roads[road], arc_m, position, to_sun_, hash_of(seed_, road));
+  return scene;
 }
 
 RenderedFrame Renderer::render(std::size_t index) const {
-  const PaintedFrame frame =
+  RenderedFrame frame =
       paint_scene(scene_at(index), world_from_camera()[index], camera_, textures_);
-  return {expose(frame.light, hash_of(seed_, 'n', index)), frame.depth_m};
+  frame.rgb = expose(frame.rgb, hash_of(seed_, 'n', index));
+  return frame;
 }
 
 }  // namespace stemvo::synth

@@ -8,27 +8,21 @@
 
 #include "stemvo/camera.hpp"
 #include "synth/drive.hpp"
-#include "synth/ripmap.hpp"
-#include "synth/scene.hpp"
+#include "synth/materials.hpp"
 #include "synth/walk.hpp"
 
 namespace stemvo::synth {
 
-struct PaintedFrame {
-  cv::Mat light;    ///< CV_32FC3, RGB, 1 = white
-  cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
-};
-
-/// What a perfect camera sees.
-[[nodiscard]] PaintedFrame paint_scene(const Scene& scene,
-                                       const Rigid3& world_from_camera,
-                                       const Camera& camera,
-                                       const Textures& textures);
-
 struct RenderedFrame {
-  cv::Mat rgb;      ///< CV_8UC3
+  cv::Mat rgb;      ///< CV_8UC3; from paint_scene() CV_32FC3, where 1 is white
   cv::Mat depth_m;  ///< CV_32FC1: z in the camera's frame, infinite in the sky
 };
+
+/// A perfect camera sees this.
+[[nodiscard]] RenderedFrame paint_scene(const Scene& scene,
+                                        const Rigid3& world_from_camera,
+                                        const Camera& camera,
+                                        const Textures& textures);
 
 /// Draws frames of a drive or of a walk. One frame needs nothing of the others, so any number of
 /// threads may call render() at once.

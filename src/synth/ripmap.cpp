@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "synth/ripmap.hpp"
-
 #include <algorithm>
 #include <numeric>
 
-#include "synth/basics.hpp"
+#include <opencv2/imgproc.hpp>
+
+#include "synth/materials.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -22,19 +22,6 @@ void normalize(std::vector<float>& values) {
   for (float& value : values) {
     value = static_cast<float>((value - mean) * scale);
   }
-}
-
-/// The means of the pairs of values (k, k + stride) in each block of two strides: halves rows
-/// (stride 1) or columns (the row's length).
-std::vector<float> halve(const std::vector<float>& from, std::size_t stride) {
-  std::vector<float> to;
-  to.reserve(from.size() / 2);
-  for (std::size_t block = 0; block < from.size(); block += 2 * stride) {
-    for (std::size_t i = block; i < block + stride; ++i) {
-      to.push_back(0.5F * (from[i] + from[i + stride]));
-    }
-  }
-  return to;
 }
 
 /// Smooth noise on a lattice of `cells` x `cells` points around the torus.
@@ -104,13 +91,13 @@ std::vector<float> octave_noise(std::uint64_t seed, const std::vector<double>& a
 
 Ripmap::Ripmap(std::vector<float> values) {
   normalize(values);
-  levels_[0][0] = std::move(values);
+  levels_[0][0] = cv::Mat(values, true).reshape(1, kSize);
   for (std::size_t v = 0; v < kLevels; ++v) {
     if (v > 0) {
-      levels_[v][0] = halve(levels_[v - 1][0], kSize);
+      cv::resize(levels_[v - 1][0], levels_[v][0], {}, 1.0, 0.5, cv::INTER_AREA);
     }
     for (std::size_t u = 1; u < kLevels; ++u) {
-      levels_[v][u] = halve(levels_[v][u - 1], 1);
+      cv::resize(levels_[v][u - 1], levels_[v][u], {}, 0.5, 1.0, cv::INTER_AREA);
     }
   }
 }
@@ -118,8 +105,6 @@ Ripmap::Ripmap(std::vector<float> values) {
 float Ripmap::bilinear(int level_u, int level_v, float u, float v) const {
   const auto& texels =
       levels_[static_cast<std::size_t>(level_v)][static_cast<std::size_t>(level_u)];
-  const int width = Ripmap::kSize >> level_u;
-  const int height = Ripmap::kSize >> level_v;
   // The texel [k, k + 1) of level 0 has its centre at k + 0.5.
   const float x = u / static_cast<float>(1 << level_u) - 0.5F;
   const float y = v / static_cast<float>(1 << level_v) - 0.5F;
@@ -127,11 +112,11 @@ float Ripmap::bilinear(int level_u, int level_v, float u, float v) const {
   const float floor_y = std::floor(y);
   const float tx = x - floor_x;
   const float ty = y - floor_y;
-  const int x0 = static_cast<int>(floor_x) & (width - 1);
-  const int x1 = (x0 + 1) & (width - 1);
-  const int y0 = static_cast<int>(floor_y) & (height - 1);
-  const float* row0 = texels.data() + static_cast<std::ptrdiff_t>(y0) * width;
-  const float* row1 = texels.data() + static_cast<std::ptrdiff_t>((y0 + 1) & (height - 1)) * width;
+  const int x0 = static_cast<int>(floor_x) & (texels.cols - 1);
+  const int x1 = (x0 + 1) & (texels.cols - 1);
+  const int y0 = static_cast<int>(floor_y) & (texels.rows - 1);
+  const auto* row0 = texels.ptr<float>(y0);
+  const auto* row1 = texels.ptr<float>((y0 + 1) & (texels.rows - 1));
   const float top = row0[x0] + tx * (row0[x1] - row0[x0]);
   const float bottom = row1[x0] + tx * (row1[x1] - row1[x0]);
   return top + ty * (bottom - top);

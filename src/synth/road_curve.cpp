@@ -2,39 +2,32 @@
 #include <algorithm>
 #include <numeric>
 
-#include "internal_check.hpp"
 #include "synth/drive.hpp"
 
 namespace stemvo::synth {
 namespace {
 
-/// `reduce(begin, end)` of the values within `reach` of each value.
-template <typename Reduce>
-std::vector<double> over_windows(const std::vector<double>& values,
-                                 std::ptrdiff_t reach,
-                                 const Reduce& reduce) {
-  std::vector<double> result;
-  for (auto at = values.begin(); at != values.end(); ++at) {
-    result.push_back(reduce(at - std::min(reach, at - values.begin()),
-                            at + std::min(reach + 1, values.end() - at)));
-  }
-  return result;
-}
-
 /// Smallest value within `reach` knots, then the mean over the same reach: smooth and never above
 /// the input, because every value in the mean already is a minimum over a window with this knot.
 std::vector<double> smooth_lower_bound(const std::vector<double>& values, std::ptrdiff_t reach) {
-  const auto lowest =
-      over_windows(values, reach, [](auto b, auto e) { return *std::min_element(b, e); });
-  return over_windows(lowest, reach, [](auto b, auto e) {
-    return std::accumulate(b, e, 0.0) / static_cast<double>(e - b);
-  });
+  std::vector<double> lowest;
+  std::vector<double> result;
+  const auto n = std::ssize(values);
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    lowest.push_back(*std::min_element(values.begin() + std::max(i - reach, 0L),
+                                       values.begin() + std::min(i + reach + 1, n)));
+  }
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    const auto begin = lowest.begin() + std::max(i - reach, 0L);
+    const auto end = lowest.begin() + std::min(i + reach + 1, n);
+    result.push_back(std::accumulate(begin, end, 0.0) / static_cast<double>(end - begin));
+  }
+  return result;
 }
 
 }  // namespace
 
 RoadCurve::RoadCurve(const std::vector<Vec3>& points, const std::vector<Vec3>& ups) {
-  STEMVO_CHECK(points.size() >= 3 && points.size() == ups.size(), "a road has 3 knots or more");
   const std::size_t last = points.size() - 1;
   knots_.resize(points.size());
   for (std::size_t i = 0; i <= last; ++i) {
@@ -47,7 +40,7 @@ RoadCurve::RoadCurve(const std::vector<Vec3>& points, const std::vector<Vec3>& u
   squeeze_in_turns();
 }
 
-/// Where the street bends with radius R, its inner edge must stay well inside R or the ribbon folds
+/// In a bend of radius R the inner edge of the street must stay well inside R or the ribbon folds
 /// over itself.
 void RoadCurve::squeeze_in_turns() {
   constexpr double kShareOfRadius = 0.72;
@@ -56,7 +49,7 @@ void RoadCurve::squeeze_in_turns() {
   std::vector<double> right(knots_.size(), 1.0);
   for (std::size_t i = 1; i + 1 < knots_.size(); ++i) {
     const Vec3 turn = knots_[i + 1].forward - knots_[i - 1].forward;
-    const double curvature = turn.dot(knots_[i].right) / (2.0 * kKnotSpacing_m);  // > 0: right
+    const double curvature = turn.dot(knots_[i].right) / (2.0);  // > 0: right
     const double room = kShareOfRadius / std::max(std::abs(curvature), 1e-9);
     (curvature > 0.0 ? right : left)[i] = std::min(1.0, room / kStreetHalfWidth_m);
   }
@@ -69,7 +62,7 @@ void RoadCurve::squeeze_in_turns() {
 }
 
 RoadFrame RoadCurve::at(double arc_m) const {
-  const double x = std::clamp(arc_m / kKnotSpacing_m, 0.0, static_cast<double>(num_knots() - 1));
+  const double x = std::clamp(arc_m, 0.0, static_cast<double>(num_knots() - 1));
   const int i = std::min(static_cast<int>(x), num_knots() - 2);
   const double t = x - i;
   const RoadFrame& a = knot(i);
@@ -78,7 +71,7 @@ RoadFrame RoadCurve::at(double arc_m) const {
   const double t3 = t2 * t;
   RoadFrame frame;
   frame.position = (2 * t3 - 3 * t2 + 1) * a.position + (3 * t2 - 2 * t3) * b.position +
-                   kKnotSpacing_m * ((t3 - 2 * t2 + t) * a.forward + (t3 - t2) * b.forward);
+                   ((t3 - 2 * t2 + t) * a.forward + (t3 - t2) * b.forward);
   frame.forward = ((1 - t) * a.forward + t * b.forward).normalized();
   frame.right = frame.forward.cross((1 - t) * a.up + t * b.up).normalized();
   frame.up = frame.right.cross(frame.forward);
@@ -89,7 +82,7 @@ RoadFrame RoadCurve::at(double arc_m) const {
 
 double RoadCurve::nearest(const Vec3& point, double guess_m, double reach_m) const {
   const auto index = [&](double arc_m) {
-    return std::clamp(static_cast<int>(std::lround(arc_m / kKnotSpacing_m)), 0, num_knots() - 1);
+    return std::clamp(static_cast<int>(std::lround(arc_m)), 0, num_knots() - 1);
   };
   int best = index(guess_m);
   for (int i = index(guess_m - reach_m); i <= index(guess_m + reach_m); ++i) {
@@ -97,7 +90,7 @@ double RoadCurve::nearest(const Vec3& point, double guess_m, double reach_m) con
       best = i;
     }
   }
-  return best * kKnotSpacing_m;
+  return best;
 }
 
 }  // namespace stemvo::synth

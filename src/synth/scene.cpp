@@ -3,7 +3,61 @@
 
 #include <algorithm>
 
+#include "synth/materials.hpp"
+
 namespace stemvo::synth {
+namespace {
+
+Vec3 random_direction(Draw& draw) {
+  const double z = draw.in(-1.0, 1.0);
+  const double angle = draw.in(0.0, 2.0 * kPi);
+  const double r = std::sqrt(1.0 - z * z);
+  return {r * std::cos(angle), z, r * std::sin(angle)};
+}
+
+/// A ball of leaves with semi-axes `semi`.
+void add_leaf_ball(const Vec3& centre, const Vec3& semi, const Style& style, Scene& scene) {
+  constexpr int kRings = 5;
+  constexpr int kSectors = 8;
+  const auto point = [&](int ring, int sector) -> Vec3 {
+    const double polar = kPi * ring / kRings;
+    const double angle = 2.0 * kPi * sector / kSectors;
+    const Vec3 direction(std::sin(polar) * std::cos(angle), -std::cos(polar),
+                         std::sin(polar) * std::sin(angle));
+    return centre + semi.cwiseProduct(direction);
+  };
+  const auto texture = [&](int ring, int sector) -> Vec2 {
+    return {2.0 * kPi * semi.x() * sector / kSectors, kPi * semi.y() * ring / kRings};
+  };
+  for (int i = 0; i < kRings; ++i) {
+    for (int k = 0; k < kSectors; ++k) {
+      scene.add_patch({point(i, k), point(i, k + 1), point(i + 1, k + 1), point(i + 1, k)},
+                      {texture(i, k), texture(i, k + 1), texture(i + 1, k + 1), texture(i + 1, k)},
+                      style);
+    }
+  }
+}
+
+/// Single leaves, as large as a hand or two, that make the outline of a ball ragged.
+void add_loose_leaves(
+    const Vec3& centre, const Vec3& semi, int count, Style style, Draw& draw, Scene& scene) {
+  for (int i = 0; i < count; ++i) {
+    const Vec3 outward = random_direction(draw);
+    const Vec3 at = centre + draw.in(0.9, 1.22) * semi.cwiseProduct(outward);
+    // One draw a statement: in a product each compiler has its own order.
+    Vec3 x = random_direction(draw);
+    x *= draw.in(0.07, 0.2);
+    Vec3 y = (0.6 * outward + random_direction(draw)).cross(x).normalized();
+    y *= draw.in(0.07, 0.2);
+    style.light = draw.in_float(0.4, 1.7);
+    const double u = draw.in(0.0, 8.0);
+    scene.add_face(
+        {at - x, at - 0.3 * x - y, at + x, at + 0.3 * x + y},
+        {Vec2(u - x.norm(), 0), Vec2(u - 0.3 * x.norm(), -y.norm()), Vec2(u + x.norm(), 0)}, style);
+  }
+}
+
+}  // namespace
 
 void Scene::add_face(std::initializer_list<Vec3> corners,
                      std::initializer_list<Vec2> texture,
@@ -70,6 +124,26 @@ void Scene::add_box(const Vec3& corner, const std::array<Vec3, 3>& edges, const 
   side(corner, across, up);
   side(corner + along, across, up);
   side(corner + up, along, across);
+}
+
+void add_crown(const Vec3& centre, double radius_m, double stretch, Draw draw, Scene& scene) {
+  const float hue = draw.in_float(0.0, 1.0);
+  Style style{.material = materials::leaves,
+              .albedo = {0.12F + 0.10F * hue, 0.19F + 0.02F * hue, 0.06F}};
+  constexpr int kBalls = 5;
+  const Vec3 shape(1.0, stretch, 1.0);
+  for (int i = 0; i < kBalls; ++i) {
+    style.seed = draw.bits();
+    style.light = draw.in_float(0.75, 1.25);
+    const double size = i == 0 ? 0.72 : draw.in(0.4, 0.62);
+    const Vec3 semi = size * radius_m * shape;
+    Vec3 at = centre;
+    if (i > 0) {
+      at += 0.55 * radius_m * shape.cwiseProduct(random_direction(draw));
+    }
+    add_leaf_ball(at, semi, style, scene);
+    add_loose_leaves(at, semi, static_cast<int>(50.0 * radius_m * size), style, draw, scene);
+  }
 }
 
 }  // namespace stemvo::synth

@@ -10,11 +10,13 @@
 
 namespace stemvo::synth {
 
-struct Material;
+struct Sample;
+/// Mean colour over a footprint, before light and haze.
+using Material = Rgb (*)(const Sample& at);
 
 /// How a face is painted.
 struct Style {
-  const Material* material = nullptr;  ///< nullptr: cars, poles, signs: one colour
+  Material material = nullptr;  ///< nullptr: cars, poles, signs: one colour
   std::uint32_t seed = 0;
   Rgb albedo = {0.5F, 0.5F, 0.5F};
   float light = 1.0F;                        ///< from its normal: 1 is full sun

@@ -2,7 +2,9 @@
 #include "synth/synth.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <span>
+#include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -10,128 +12,162 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "synth/drive_folder.hpp"
+#include "io/png.hpp"
+#include "pipeline/out_folder.hpp"
 #include "synth/renderer.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
 
-/// What the options leave open is set here.
-struct Settings {
-  synth::Pace pace;
-  Camera camera;
-};
+namespace fs = std::filesystem;
+using Path = std::variant<synth::Drive, synth::Walk>;
 
-Settings settings_of(const SyntheticDriveOptions& options) {
+Camera camera_of(const SyntheticDriveOptions& options) {
   const int width_px = options.width_px.value_or(options.walk ? 640 : 1241);
   const int height_px = options.height_px.value_or(options.walk ? 480 : 376);
   if (options.walk) {
     const double f_px = 585.0 * width_px / 640.0;
-    return {{options.rate_hz.value_or(30.0), options.speed_m_s},
-            {f_px, f_px, 0.5 * width_px, 0.5 * height_px, width_px, height_px}};
+    return {f_px, f_px, 0.5 * width_px, 0.5 * height_px, width_px, height_px};
   }
-  // The left colour camera of sequence 00, scaled to the image's width.
+  // The left colour camera of KITTI's sequence 00, scaled to the image's width.
   const double scale = width_px / 1241.0;
   const double f_px = 718.856 * scale;
-  return {{options.rate_hz.value_or(10.0), options.speed_m_s},
-          {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px}};
+  return {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px};
 }
 
-Expected<std::variant<synth::Drive, synth::Walk>> plan_path(const SyntheticDriveOptions& options,
-                                                            const synth::Pace& pace) {
+Expected<Path> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
-    return synth::make_walk(options.num_frames, options.seed, pace);
+    return synth::make_walk(options.num_frames, options.seed, options.walk_rate_hz);
   }
   if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed, pace);
+    return synth::make_own_drive(options.num_frames, options.seed);
   }
   auto poses = read_kitti_trajectory(*options.trajectory);
   if (!poses) {
     return poses.error();
   }
   poses->resize(std::min(poses->size(), static_cast<std::size_t>(options.num_frames)));
-  return synth::make_drive_along(*poses, pace.rate_hz);
+  return synth::make_drive_along(*poses);
+}
+
+/// OUT/sequences/NAME and OUT/poses/NAME.txt.
+struct DriveFolder {
+  fs::path sequence;
+  fs::path poses;
+};
+
+/// Makes the folders, empty. Error: what is there was not rendered.
+Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive, bool with_depth) {
+  const fs::path mark = drive.sequence / "rendered_by_stemvo";
+  std::error_code code;
+  for (const fs::path& path : {drive.sequence, drive.poses}) {
+    if (!fs::exists(mark, code) && fs::exists(path, code) && !fs::is_empty(path, code)) {
+      return fail(
+          fmt::format("{}: expected a drive that stemvo rendered, which a new one may replace, "
+                      "or none, found something else (--name gives another name)",
+                      path.string()));
+    }
+  }
+  for (const fs::path& folder : {drive.sequence, drive.poses.parent_path()}) {
+    if (const Status made = pipeline::create_out_folder(folder); !made) {
+      return made.error();
+    }
+  }
+  auto lock = pipeline::lock_folder(drive.sequence);
+  const Status marked = lock ? write_text_file(mark, "") : Status(lock.error());
+  if (!marked) {
+    return marked.error();
+  }
+  for (const char* content : {"image_2", "depth", "times.txt"}) {
+    fs::remove_all(drive.sequence / content, code);
+  }
+  fs::create_directory(drive.sequence / "image_2", code);
+  if (with_depth) {
+    fs::create_directory(drive.sequence / "depth", code);
+  }
+  return lock;
+}
+
+/// NumPy format 1.0, little-endian float32, rows first.
+std::string encode_npy(const cv::Mat& values) {
+  static_assert(std::endian::native == std::endian::little, "the header says '<f4'");
+  // Magic, version and the length of the header, which fills 128 bytes with them and a newline.
+  std::string bytes("\x93NUMPY\x01\x00\x76\x00", 10);
+  bytes += fmt::format(
+      "{:117}\n", fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}",
+                              values.rows, values.cols));
+  bytes.append(reinterpret_cast<const char*>(values.data), values.total() * sizeof(float));
+  return bytes;
 }
 
 /// Frames [begin, end), at once.
 Status render_frames(const synth::Renderer& renderer,
-                     const synth::DriveFolder& output,
+                     const fs::path& sequence,
                      cv::Range frames,
                      bool with_depth) {
   std::vector<Status> results(static_cast<std::size_t>(frames.size()));
   cv::parallel_for_(frames, [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
-      const auto index = static_cast<std::size_t>(i);
-      const synth::RenderedFrame frame = renderer.render(index);
-      const Status written = output.write_image(index, frame.rgb);
-      results[static_cast<std::size_t>(i - frames.start)] =
-          written && with_depth ? output.write_depth(index, frame.depth_m) : written;
+      const synth::RenderedFrame frame = renderer.render(static_cast<std::size_t>(i));
+      Status& result = results[static_cast<std::size_t>(i - frames.start)];
+      // Noise does not compress: the fastest level costs a few per cent of size.
+      result = write_text_file(sequence / fmt::format("image_2/{:06}.png", i),
+                               io::encode_png(frame.rgb, true));
+      if (result && with_depth) {
+        result = write_text_file(sequence / fmt::format("depth/{:06}.npy", i),
+                                 encode_npy(frame.depth_m));
+      }
     }
   });
   const auto failed = std::ranges::find(results, false, &Status::has_value);
   return failed == results.end() ? Status() : *failed;
 }
 
-}  // namespace
-
-Status check_options(const SyntheticDriveOptions& options) {
-  if (options.trajectory && options.walk) {
-    return fail("synth: expected a trajectory or a walk, found both");
+/// calib.txt with the same intrinsics in P0 to P3, no baseline; the poses, moved so that the first
+/// one is the identity, with 17 digits; times.txt.
+Status write_texts(const DriveFolder& drive,
+                   const Camera& camera,
+                   std::span<const Rigid3> world_from_camera,
+                   double rate_hz) {
+  std::string calibration;
+  for (int i = 0; i < 4; ++i) {
+    calibration += fmt::format("P{}: {:.12e} 0 {:.12e} 0 0 {:.12e} {:.12e} 0 0 0 1 0\n", i,
+                               camera.fx_px, camera.cx_px, camera.fy_px, camera.cy_px);
   }
-  if (options.trajectory && options.speed_m_s) {
-    return fail("synth: expected a trajectory or a speed, found both (the poses say how fast)");
-  }
-  struct Limits {
-    const char* name;
-    double value;
-    double low;
-    double high;
-  };
-  const auto& [pace, camera] = settings_of(options);
-  const double max_m_s = options.walk ? 1.0 : 60.0;  // faster, a turn on the spot would be a jerk
-  for (const auto& [name, value, low, high] :
-       {Limits{"width", 1.0 * camera.width_px, 16.0, 8192.0},
-        Limits{"height", 1.0 * camera.height_px, 16.0, 8192.0},
-        Limits{"frames", 1.0 * options.num_frames, 1.0, 1e6},  // %06d
-        Limits{"rate", pace.rate_hz, 1.0, 1000.0},
-        Limits{"speed", pace.speed_m_s.value_or(max_m_s), 0.1, max_m_s}}) {
-    if (!(value >= low && value <= high)) {
-      return fail(
-          fmt::format("synth: expected {} from {} to {}, found {}", name, low, high, value));
+  const int digits = rate_hz == 10.0 ? 6 : 12;  // KITTI's own number of digits where it is exact
+  std::string times;
+  std::string poses;
+  for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
+    times += fmt::format("{:.{}e}\n", static_cast<double>(i) / rate_hz, digits);
+    const Matrix34d m = i == 0
+                            ? Rigid3().matrix()
+                            : (world_from_camera.front().inverse() * world_from_camera[i]).matrix();
+    for (int k = 0; k < 12; ++k) {
+      poses += fmt::format("{:.16e}{}", m(k / 4, k % 4), k == 11 ? '\n' : ' ');
     }
   }
-  constexpr double kMaxWay_m = 2e6;  // a street's knots are kept in memory
-  const double way_m = pace.speed_m_s.value_or(1.0) / pace.rate_hz * options.num_frames;
-  if (way_m > kMaxWay_m) {
-    return fail(
-        fmt::format("synth: expected a way of at most {} km (frames / rate * speed), "
-                    "found {:.0f}",
-                    kMaxWay_m / 1000.0, way_m / 1000.0));
-  }
-  return {};
+  return write_text_file(drive.sequence / "calib.txt", calibration)
+      .and_then([&] { return write_text_file(drive.poses, poses); })
+      .and_then([&] { return write_text_file(drive.sequence / "times.txt", times); });
 }
 
-Status render_synthetic_drive(const std::filesystem::path& out_dir,
+}  // namespace
+
+Status render_synthetic_drive(const fs::path& out_dir,
                               const SyntheticDriveOptions& options,
                               const RenderProgress& progress) {
-  const Settings settings = settings_of(options);
-  const auto& [pace, camera] = settings;
-  if (const Status valid = check_options(options); !valid) {
-    return valid;
-  }
-  auto path = plan_path(options, pace);
+  auto path = plan_path(options);
   if (!path) {
     return path.error();
   }
-  const synth::DriveFolder output(out_dir, options.name);
-  const auto lock = output.prepare(options.write_depth);
-  Status status = lock ? output.write_calibration(camera) : Status(lock.error());
-  if (status && options.walk) {
-    status = output.write_camera_file(camera, pace.rate_hz);
+  const DriveFolder drive{out_dir / "sequences" / options.name,
+                          out_dir / "poses" / (options.name + ".txt")};
+  const auto lock = open_folder(drive, options.write_depth);
+  if (!lock) {
+    return lock.error();
   }
-  if (!status) {
-    return status;
-  }
+  const Camera camera = camera_of(options);
   const synth::Renderer renderer(std::move(*path), camera, options.seed);
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
@@ -139,19 +175,15 @@ Status render_synthetic_drive(const std::filesystem::path& out_dir,
   int done = 0;
   for (bool go_on = true; go_on && done < total;) {
     const cv::Range frames(done, std::min(done + batch, total));
-    status = render_frames(renderer, output, frames, options.write_depth);
+    const Status status = render_frames(renderer, drive.sequence, frames, options.write_depth);
     if (!status) {
       return status;
     }
     done = frames.end;
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
-  if (done < total && output.has_earlier()) {
-    return output.abandon();
-  }
-  const auto rendered = std::span(poses).first(static_cast<std::size_t>(done));
-  status = output.write_truth(rendered, pace.rate_hz);
-  return status ? output.finish() : status;
+  return write_texts(drive, camera, std::span(poses).first(static_cast<std::size_t>(done)),
+                     options.walk ? options.walk_rate_hz : synth::kDriveRate_hz);
 }
 
 }  // namespace stemvo

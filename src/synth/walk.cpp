@@ -28,27 +28,65 @@ double ramp_integral_s(double t_s, double ramp_s) {
 
 Vec3 forward(double heading_rad) { return {std::sin(heading_rad), 0.0, std::cos(heading_rad)}; }
 
-/// Where walkways meet: column and row.
+/// The camera is held that far before the axis about which a person turns.
+constexpr double kArm_m = 0.4;
+
+/// Straight on, turning on the spot, or a pause (neither).
+struct Phase {
+  double begin_s;
+  double duration_s;
+  Vec2 from_m;  ///< the axis of turning: x, z
+  Vec2 to_m;
+  double heading_from_rad;  ///< 0 is along z, positive to the right
+  double heading_to_rad;
+  double start_s;  ///< gathers speed so long; 0: goes on as fast as before
+  double stop_s;   ///< slows down so long
+
+  [[nodiscard]] double end_s() const { return begin_s + duration_s; }
+  [[nodiscard]] bool is_turn() const { return heading_from_rad != heading_to_rad; }
+  /// How much of the way or turn is behind at `time_s`.
+  [[nodiscard]] double share(double time_s) const {
+    const double t_s = std::clamp(time_s - begin_s, 0.0, duration_s);
+    if (is_turn()) {
+      return ease(t_s / duration_s);
+    }
+    const double cruise_s = duration_s - 0.5 * (start_s + stop_s);
+    const double left_s = duration_s - t_s;
+    if (t_s < start_s) {
+      return ramp_integral_s(t_s, start_s) / cruise_s;
+    }
+    return (left_s < stop_s ? cruise_s - ramp_integral_s(left_s, stop_s) : t_s - 0.5 * start_s) /
+           cruise_s;
+  }
+};
+
+/// The camera turns aside and back while the person walks on.
+struct Glance {
+  double begin_s;
+  double turn_s;  ///< each way
+  double hold_s;
+  double angle_rad;
+};
+
+/// Walkways meet at a column and a row.
 using Crossing = Eigen::Vector2i;
 
-/// Plans one walk at a given cruising speed.
-class WalkPlanner {
+/// A walk along the walkways of a courtyard: turns on the spot of about 90 degrees at their ends,
+/// glances aside by 30 to 60 degrees, pauses of about a second. The first 20 s have two turns, two
+/// glances and a pause at least.
+class WalkPlan {
  public:
-  WalkPlanner(const Courtyard& courtyard, std::uint64_t seed, double mean_m_s, double cruise_m_s)
-      : yard_(courtyard),
-        draw_(seed, 'v'),
-        seed_(seed),
-        cruise_m_s_(cruise_m_s),
-        tempo_(std::max(1.0, mean_m_s / kWalkSpeed_m_s)) {}
-
-  WalkPlan plan(double duration_s) {
+  WalkPlan(const Courtyard& courtyard, double duration_s, double cruise_m_s)
+      : yard_(courtyard), draw_(courtyard.seed, 'v'), cruise_m_s_(cruise_m_s) {
     draw_start();
     for (int leg = 0; now_s_ < duration_s; ++leg) {
       walk_leg(leg);
       turn(leg);
     }
-    return std::move(plan_);
   }
+
+  std::vector<Phase> phases;
+  std::vector<Glance> glances;
 
  private:
   /// In the middle of a way from one side to the other.
@@ -64,9 +102,9 @@ class WalkPlanner {
     heading_rad_ = heading_to(to_);
   }
 
-  /// Of a crossing, missed by a few centimetres.
+  /// A crossing is missed by a few centimetres.
   [[nodiscard]] Vec2 position(const Crossing& at) const {
-    Draw draw(seed_, 'J', at.x(), at.y());
+    Draw draw(yard_.seed, 'J', at.x(), at.y());
     return {yard_.x_m[static_cast<std::size_t>(at.x())] + draw.in(-0.05, 0.05),
             yard_.z_m[static_cast<std::size_t>(at.y())] + draw.in(-0.05, 0.05)};
   }
@@ -77,23 +115,23 @@ class WalkPlanner {
     return heading_rad_ + std::remainder(std::atan2(way.x(), way.y()) - heading_rad_, 2.0 * kPi);
   }
 
-  /// Standing for a while, from now on.
-  [[nodiscard]] WalkPhase stand(double duration_s) const {
+  /// The person stands for a while, from now on.
+  [[nodiscard]] Phase stand(double duration_s) const {
     return {now_s_, duration_s, at_m_, at_m_, heading_rad_, heading_rad_, 0.0, 0.0};
   }
 
-  void add(const WalkPhase& phase) {
+  void add(const Phase& phase) {
     now_s_ = phase.end_s();
     at_m_ = phase.to_m;
     heading_rad_ = phase.heading_to_rad;
-    plan_.phases.push_back(phase);
+    phases.push_back(phase);
   }
 
   void walk_leg(int leg) {
     const Vec2 end = position(to_);
-    const bool wants_glance = is_long_ && (plan_.glances.size() < 2 || draw_.chance(0.7));
+    const bool wants_glance = is_long_ && (glances.size() < 2 || draw_.chance(0.7));
     const bool wants_pause =
-        leg == 1 || (leg > 1 && now_s_ > last_pause_s_ + 12.0 / tempo_ && draw_.chance(0.6));
+        leg == 1 || (leg > 1 && now_s_ > last_pause_s_ + 12.0 && draw_.chance(0.6));
     const double split = is_long_ ? draw_.in(0.60, 0.66) : draw_.in(0.45, 0.55);
     walk_to(wants_pause ? (at_m_ + split * (end - at_m_)).eval() : end, leg > 0);
     if (wants_glance) {
@@ -101,16 +139,16 @@ class WalkPlanner {
     }
     if (wants_pause) {
       last_pause_s_ = now_s_;
-      add(stand(draw_.in(0.9, 1.25) / tempo_));
+      add(stand(draw_.in(0.9, 1.25)));
       walk_to(end, true);
     }
   }
 
   void walk_to(const Vec2& to, bool from_rest) {
-    const double ramp_s = 0.8 / tempo_;
-    WalkPhase phase = stand(0.0);
-    phase.start_s = from_rest ? ramp_s : 0.0;
-    phase.stop_s = ramp_s;
+    constexpr double kRamp_s = 0.8;
+    Phase phase = stand(0.0);
+    phase.start_s = from_rest ? kRamp_s : 0.0;
+    phase.stop_s = kRamp_s;
     phase.duration_s = (to - at_m_).norm() / cruise_m_s_ + 0.5 * (phase.start_s + phase.stop_s);
     phase.to_m = to;
     add(phase);
@@ -118,18 +156,18 @@ class WalkPlanner {
 
   /// Aside and back within the last phase, slower than a turn.
   void glance() {
-    const WalkPhase& phase = plan_.phases.back();
-    const double rate_rad_s = radians(42.0) * tempo_;
+    const Phase& phase = phases.back();
+    constexpr double kRate_rad_s = radians(42.0);
     const double begin_s = phase.begin_s + 0.5 * phase.start_s;
-    const double room_s = phase.end_s() - 0.1 / tempo_ - begin_s;
-    const double hold_s = draw_.in(0.3, 0.7) / tempo_;
-    const double max_rad = 0.5 * (room_s - hold_s) * rate_rad_s;
+    const double room_s = phase.end_s() - 0.1 - begin_s;
+    const double hold_s = draw_.in(0.3, 0.7);
+    const double max_rad = 0.5 * (room_s - hold_s) * kRate_rad_s;
     const double angle_rad = std::min(radians(draw_.in(32.0, 60.0)), max_rad);
-    const double turn_s = angle_rad / rate_rad_s;
-    const double late = draw_.in(0.0, plan_.glances.size() < 2 ? 0.1 : 0.8);
+    const double turn_s = angle_rad / kRate_rad_s;
+    const double late = draw_.in(0.0, glances.size() < 2 ? 0.1 : 0.8);
     const double side = draw_.chance(0.5) ? 1.0 : -1.0;
     if (angle_rad >= radians(30.0)) {
-      plan_.glances.push_back(
+      glances.push_back(
           {begin_s + late * (room_s - 2.0 * turn_s - hold_s), turn_s, hold_s, side * angle_rad});
     }
   }
@@ -137,39 +175,31 @@ class WalkPlanner {
   /// On the spot, to a new way that begins here; to the left or to the right.
   void turn(int leg) {
     std::vector<Crossing> ways;
-    std::vector<Crossing> long_ways;
-    for (const int side : {-1, 1}) {
-      for (const int count : {1, 2}) {
-        const Crossing way = side * count * Crossing(direction_.y(), -direction_.x());
-        const Crossing to = to_ + way;
-        if (to.minCoeff() >= 0 && to.maxCoeff() <= 2 && to != Crossing(1, 1)) {
-          ways.push_back(way);
-          if (count == 2) {
-            long_ways.push_back(way);
-          }
-        }
+    for (const int length : {-1, -2, 1, 2}) {
+      const Crossing way = length * Crossing(direction_.y(), -direction_.x());
+      const Crossing to = to_ + way;
+      if (to.minCoeff() >= 0 && to.maxCoeff() <= 2 && to != Crossing(1, 1)) {
+        ways.push_back(way);
       }
     }
-    const bool must_be_long = leg >= 1 && plan_.glances.size() < 2 && !long_ways.empty();
-    const auto& choice = must_be_long ? long_ways : ways;
-    const Crossing way = choice[draw_.bits() % choice.size()];
-    is_long_ = way.cwiseAbs().sum() == 2;
+    const auto is_short = [](const Crossing& way) { return way.cwiseAbs().sum() == 1; };
+    if (leg >= 1 && glances.size() < 2 && !std::ranges::all_of(ways, is_short)) {
+      std::erase_if(ways, is_short);  // only a long way leaves time for a glance
+    }
+    const Crossing way = ways[draw_.bits() % ways.size()];
+    is_long_ = !is_short(way);
     direction_ = way / way.cwiseAbs().sum();
     to_ += way;
-    WalkPhase phase = stand(0.0);
+    Phase phase = stand(0.0);
     phase.heading_to_rad = heading_to(to_);
-    const double rate_rad_s = radians(draw_.in(36.0, 46.0)) * tempo_;
+    const double rate_rad_s = radians(draw_.in(36.0, 46.0));
     phase.duration_s = std::abs(phase.heading_to_rad - heading_rad_) / rate_rad_s;
     add(phase);
   }
 
   const Courtyard& yard_;
   Draw draw_;
-  std::uint64_t seed_;
   double cruise_m_s_;
-  double tempo_;
-
-  WalkPlan plan_;
   double now_s_ = 0.0;
   double last_pause_s_ = 0.0;
   Vec2 at_m_ = Vec2::Zero();
@@ -179,17 +209,37 @@ class WalkPlanner {
   bool is_long_ = true;  ///< from one side to the other
 };
 
-/// Where the person is at one moment.
+/// Turns and pauses included, the camera then moves at 0.5 m/s in the mean.
+double cruising_speed_m_s(const Courtyard& courtyard, double duration_s) {
+  constexpr double kMean_m_s = 0.5;
+  double low_m_s = 0.2 * kMean_m_s;
+  double high_m_s = 2.0 * kMean_m_s;
+  double cruise_m_s = 0.0;
+  for (int i = 0; i < 40; ++i) {
+    cruise_m_s = 0.5 * (low_m_s + high_m_s);
+    double way_m = 0.0;
+    const WalkPlan plan(courtyard, duration_s, cruise_m_s);
+    for (const Phase& phase : plan.phases) {
+      const double turned_m = kArm_m * std::abs(phase.heading_to_rad - phase.heading_from_rad);
+      way_m += (phase.is_turn() ? turned_m : (phase.to_m - phase.from_m).norm()) *
+               phase.share(duration_s);
+    }
+    (way_m < kMean_m_s * duration_s ? low_m_s : high_m_s) = cruise_m_s;
+  }
+  return cruise_m_s;
+}
+
+/// How the person stands at one moment.
 struct Stance {
   Vec2 axis_m;  ///< x, z
   double heading_rad;
   double glance_rad;
-  double stride;  ///< 1: walks on at 0.5 m/s or more, 0: stands
+  double stride;  ///< 1: walks on at full speed, 0: stands
 };
 
-Stance stance_at(const WalkPlan& plan, double time_s, double full_stride) {
-  const auto next = std::ranges::upper_bound(plan.phases, time_s, {}, &WalkPhase::begin_s);
-  const WalkPhase& phase = *std::prev(next);
+Stance stance_at(const WalkPlan& plan, double time_s) {
+  const auto next = std::ranges::upper_bound(plan.phases, time_s, {}, &Phase::begin_s);
+  const Phase& phase = *std::prev(next);
   const double t_s = time_s - phase.begin_s;
   const double share = phase.share(time_s);
   Stance stance{phase.from_m + share * (phase.to_m - phase.from_m),
@@ -197,12 +247,11 @@ Stance stance_at(const WalkPlan& plan, double time_s, double full_stride) {
                 0.0, 0.0};
   if (phase.is_turn()) {
     const double t = t_s / phase.duration_s;
-    stance.stride = full_stride * 8.0 * t * t * (1.0 - t) * (1.0 - t);  // small steps
-  } else if (!phase.is_pause()) {
-    stance.stride = full_stride *
-                    std::min(ramp(t_s, phase.start_s), ramp(phase.duration_s - t_s, phase.stop_s));
+    stance.stride = 8.0 * t * t * (1.0 - t) * (1.0 - t);  // small steps
+  } else if (phase.to_m != phase.from_m) {
+    stance.stride = std::min(ramp(t_s, phase.start_s), ramp(phase.duration_s - t_s, phase.stop_s));
   }
-  for (const WalkGlance& glance : plan.glances) {
+  for (const Glance& glance : plan.glances) {
     const double aside_s = time_s - glance.begin_s;
     const double back_s = aside_s - (glance.turn_s + glance.hold_s);
     stance.glance_rad +=
@@ -256,56 +305,15 @@ struct Hand {
 
 }  // namespace
 
-double WalkPhase::share(double time_s) const {
-  const double t_s = std::clamp(time_s - begin_s, 0.0, duration_s);
-  if (is_turn()) {
-    return ease(t_s / duration_s);
-  }
-  const double cruise_s = duration_s - 0.5 * (start_s + stop_s);
-  const double left_s = duration_s - t_s;
-  if (t_s < start_s) {
-    return ramp_integral_s(t_s, start_s) / cruise_s;
-  }
-  return (left_s < stop_s ? cruise_s - ramp_integral_s(left_s, stop_s) : t_s - 0.5 * start_s) /
-         cruise_s;
-}
-
-double WalkPhase::walked_m(double time_s) const {
-  const double turned_m = kArm_m * std::abs(heading_to_rad - heading_from_rad);
-  return (is_turn() ? turned_m : (to_m - from_m).norm()) * share(time_s);
-}
-
-WalkPlan plan_walk(const Courtyard& courtyard,
-                   double duration_s,
-                   double mean_m_s,
-                   std::uint64_t seed) {
-  // Faster between the stops than in the mean: how much is found by halving.
-  double low_m_s = 0.2 * mean_m_s;
-  double high_m_s = 2.0 * mean_m_s;
-  WalkPlan plan;
-  for (int i = 0; i < 40; ++i) {
-    const double cruise_m_s = 0.5 * (low_m_s + high_m_s);
-    plan = WalkPlanner(courtyard, seed, mean_m_s, cruise_m_s).plan(duration_s);
-    double way_m = 0.0;
-    for (const WalkPhase& phase : plan.phases) {
-      way_m += phase.walked_m(duration_s);
-    }
-    (way_m < mean_m_s * duration_s ? low_m_s : high_m_s) = cruise_m_s;
-  }
-  return plan;
-}
-
-Walk make_walk(int num_frames, std::uint64_t seed, const Pace& pace) {
+Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz) {
   Walk walk;
   walk.courtyard = lay_courtyard(seed);
-  const double speed_m_s = pace.speed_m_s.value_or(kWalkSpeed_m_s);
-  const double full_stride = std::min(1.0, speed_m_s / kWalkSpeed_m_s);  // slow: short steps
-  const WalkPlan plan = plan_walk(walk.courtyard, num_frames / pace.rate_hz, speed_m_s, seed);
+  const double duration_s = num_frames / rate_hz;
+  const WalkPlan plan(walk.courtyard, duration_s, cruising_speed_m_s(walk.courtyard, duration_s));
   const Hand hand{seed};
   for (int i = 0; i < num_frames; ++i) {
-    const double time_s = i / pace.rate_hz;
-    walk.world_from_camera.push_back(
-        hand.world_from_camera(stance_at(plan, time_s, full_stride), time_s));
+    const double time_s = i / rate_hz;
+    walk.world_from_camera.push_back(hand.world_from_camera(stance_at(plan, time_s), time_s));
   }
   return walk;
 }

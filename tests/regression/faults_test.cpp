@@ -143,10 +143,10 @@ TEST_F(Faults, AFrameThatCannotBeReadInTheMiddleIsAWarning) {
 TEST_F(Faults, TwoRendersOfOneDrive) {
   const std::vector<std::string> arguments = {"synth", out_.string(), "--frames", "60"};
   test::RunningProgram first(STEMVO_PROGRAM, arguments);
-  for (int i = 0; i < 3000 && !fs::exists(out_ / "sequences/00.unfinished/calib.txt"); ++i) {
+  for (int i = 0; i < 3000 && !fs::exists(out_ / "sequences/00/image_2/000000.png"); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  expect_error(run_stemvo(arguments), 1, {"00.unfinished", "no other stemvo writes to"});
+  expect_error(run_stemvo(arguments), 1, {"sequences/00", "no other stemvo writes to"});
   first.send(SIGKILL);
   static_cast<void>(first.wait());
   const ProgramResult again = run_stemvo({"synth", out_.string(), "--frames", "2"});

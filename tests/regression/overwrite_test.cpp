@@ -36,24 +36,6 @@ TEST_F(Overwrite, SynthSparesWhatItDidNotRender) {
   EXPECT_EQ(read_file(folder_ / "poses/00.txt"), poses);
 }
 
-TEST_F(Overwrite, SynthSparesTextsOfItsDriveThatWereEdited) {
-  const fs::path drive = folder_ / "drive";
-  const std::vector<std::string> arguments = {
-      "synth", drive.string(), "--frames", "2", "--width", "64", "--height", "32", "--walk"};
-  ASSERT_EQ(run_stemvo(arguments).exit_code, 0);
-  ASSERT_EQ(run_stemvo(arguments).exit_code, 0);
-  for (const char* name : {"sequences/00/calib.txt", "sequences/00/times.txt",
-                           "sequences/00/camera.yaml", "poses/00.txt"}) {
-    const std::string before = read_file(drive / name);
-    write_file(drive / name, before + "\n");
-    expect_error(run_stemvo(arguments), 1, {(drive / name).string(), "found it changed"});
-    EXPECT_EQ(read_file(drive / name), before + "\n");
-    write_file(drive / name, before);
-  }
-  fs::remove(drive / "sequences/00/times.txt");  // nothing is lost
-  EXPECT_EQ(run_stemvo(arguments).exit_code, 0);
-}
-
 TEST_F(Overwrite, CalibrateSparesWhatItReads) {
   write_file(folder_ / "my.yaml", "seed: 1\n");
   fs::create_symlink(sequence_ / "times.txt", folder_ / "link.txt");

@@ -25,7 +25,7 @@ class CalibrateSequence : public ::testing::Test {
   CalibrateSequence() {
     EXPECT_TRUE(render_synthetic_drive(folder_.path(), {.walk = true,
                                                         .num_frames = kNumFrames,
-                                                        .rate_hz = 10.0,
+                                                        .walk_rate_hz = 10.0,
                                                         .width_px = 320,
                                                         .height_px = 240}));
     request_.sequence_dir = folder_ / "sequences/00";

@@ -29,16 +29,7 @@ double way_m(const Trajectory& poses, std::size_t begin, std::size_t end) {
   return sum;
 }
 
-/// Mean horizontal speed of a whole walk.
-double mean_speed_m_s(const Trajectory& poses, double rate_hz) {
-  return way_m(poses, 0, poses.size() - 1) * rate_hz / static_cast<double>(poses.size() - 1);
-}
-
-std::size_t frame_at(double time_s) {
-  return static_cast<std::size_t>(std::clamp(std::lround(time_s * kRate_hz), 0L, kFrames - 1L));
-}
-
-/// Where the camera glances, to the right of where it goes.
+/// The camera looks so far to the right of where it goes.
 double aside_deg(const Trajectory& poses, std::size_t i) {
   const Eigen::Vector3d course = level(poses[i + 3].translation - poses[i - 3].translation);
   const Eigen::Vector3d view = level(poses[i].rotation_matrix().col(2));
@@ -73,8 +64,7 @@ double distance_m(const Face& face) {
 
 TEST(Walk, IsSmooth) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const Trajectory poses = make_walk(kFrames, seed, {.rate_hz = kRate_hz}).world_from_camera;
-    ASSERT_EQ(poses.size(), static_cast<std::size_t>(kFrames));
+    const Trajectory poses = make_walk(kFrames, seed, kRate_hz).world_from_camera;
     for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
       const Eigen::Vector3d before = (poses[i].translation - poses[i - 1].translation) * kRate_hz;
       const Eigen::Vector3d after = (poses[i + 1].translation - poses[i].translation) * kRate_hz;
@@ -87,25 +77,17 @@ TEST(Walk, IsSmooth) {
   }
 }
 
-TEST(Walk, KeepsItsMeanSpeedAtAnyRate) {
+TEST(Walk, KeepsItsMeanSpeed) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    for (const double speed_m_s : {0.25, 0.5, 0.8}) {
-      for (const double rate_hz : {10.0, 30.0}) {
-        const int frames = static_cast<int>(20.0 * rate_hz);
-        const Walk walk = make_walk(frames, seed, {rate_hz, speed_m_s});
-        EXPECT_NEAR(mean_speed_m_s(walk.world_from_camera, rate_hz), speed_m_s, 0.05 * speed_m_s)
-            << "seed " << seed;
-      }
-    }
-    const Walk usual = make_walk(900, seed, {.rate_hz = kRate_hz});
-    EXPECT_NEAR(mean_speed_m_s(usual.world_from_camera, kRate_hz), 0.5, 0.025);
+    const Trajectory poses = make_walk(kFrames, seed, kRate_hz).world_from_camera;
+    EXPECT_NEAR(way_m(poses, 0, kFrames - 1) * kRate_hz / (kFrames - 1), 0.5, 0.025) << seed;
   }
 }
 
 /// Frames of another rate are other moments of the same walk, where both last equally long.
 TEST(Walk, IsTheSameAtAnyRate) {
-  const Trajectory fast = make_walk(600, 4, {.rate_hz = 30.0}).world_from_camera;
-  const Trajectory slow = make_walk(200, 4, {.rate_hz = 10.0}).world_from_camera;
+  const Trajectory fast = make_walk(600, 4, 30.0).world_from_camera;
+  const Trajectory slow = make_walk(200, 4, 10.0).world_from_camera;
   for (std::size_t i = 0; i < slow.size(); ++i) {
     const Rigid3 between = slow[i].inverse() * fast[3 * i];
     ASSERT_LT(between.translation.norm() + between.angle_rad(), 1e-9);
@@ -115,10 +97,10 @@ TEST(Walk, IsTheSameAtAnyRate) {
 TEST(Walk, ComesNearToNothing) {
   double nearest = std::numeric_limits<double>::max();
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const Walk walk = make_walk(1800, seed, {.rate_hz = kRate_hz});
+    const Walk walk = make_walk(1800, seed, kRate_hz);
     for (std::size_t i = 0; i < walk.world_from_camera.size(); i += 15) {
-      const Scene scene = build_courtyard(walk.courtyard, walk.world_from_camera[i].translation,
-                                          Eigen::Vector3d(0.0, -1.0, 0.0));
+      Scene scene(walk.world_from_camera[i].translation, Eigen::Vector3d(0.0, -1.0, 0.0), 0.5);
+      add_courtyard(walk.courtyard, scene);
       for (const Face& face : scene.faces()) {
         nearest = std::min(nearest, distance_m(face));
       }
@@ -129,66 +111,23 @@ TEST(Walk, ComesNearToNothing) {
 }
 
 TEST(Walk, TurnsGlancesAsideAndPausesWithin20Seconds) {
-  int left = 0;
-  int right = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    const WalkPlan plan = plan_walk(lay_courtyard(seed), 20.0, kWalkSpeed_m_s, seed);
-    int turns = 0;
-    int pauses = 0;
-    for (const WalkPhase& phase : plan.phases) {
-      const double angle_deg = degrees(phase.heading_to_rad - phase.heading_from_rad);
-      if (phase.is_turn() && phase.end_s() <= 20.0) {
-        EXPECT_NEAR(std::abs(angle_deg), 90.0, 12.0);
-        ++turns;
-        ++(angle_deg < 0.0 ? left : right);
-      } else if (phase.is_pause() && phase.end_s() <= 20.0) {
-        EXPECT_NEAR(phase.duration_s, 1.1, 0.3);
-        ++pauses;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Trajectory poses = make_walk(kFrames, seed, kRate_hz).world_from_camera;
+    double most_turned_deg = 0.0;  // in 3 s
+    double most_aside_deg = 0.0;   // while walking on
+    double least_way_m = 1.0;      // in 1 s
+    for (std::size_t i = 15; i + 75 < poses.size(); ++i) {
+      const double in_one_s_m = way_m(poses, i - 15, i + 15);
+      least_way_m = std::min(least_way_m, in_one_s_m);
+      if (in_one_s_m > 0.4) {
+        most_aside_deg = std::max(most_aside_deg, std::abs(aside_deg(poses, i)));
       }
+      const Rigid3 turn = poses[i - 15].inverse() * poses[i + 75];
+      most_turned_deg = std::max(most_turned_deg, degrees(turn.angle_rad()));
     }
-    const auto glances =
-        std::count_if(plan.glances.begin(), plan.glances.end(), [](const auto& glance) {
-          const double angle_deg = std::abs(degrees(glance.angle_rad));
-          EXPECT_GE(angle_deg, 29.9);
-          EXPECT_LE(angle_deg, 60.1);
-          return glance.end_s() <= 20.0;
-        });
-    EXPECT_GE(turns, 2) << "seed " << seed;
-    EXPECT_GE(glances, 2) << "seed " << seed;
-    EXPECT_GE(pauses, 1) << "seed " << seed;
-  }
-  EXPECT_GT(left, 20);
-  EXPECT_GT(right, 20);
-}
-
-/// What is planned is in the poses.
-TEST(Walk, PosesDoWhatIsPlanned) {
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const Walk walk = make_walk(kFrames, seed, {.rate_hz = kRate_hz});
-    const Trajectory& poses = walk.world_from_camera;
-    const WalkPlan plan = plan_walk(walk.courtyard, kFrames / kRate_hz, kWalkSpeed_m_s, seed);
-    for (const WalkPhase& phase : plan.phases) {
-      const std::size_t begin = frame_at(phase.begin_s);
-      const std::size_t end = frame_at(phase.end_s());
-      if (phase.end_s() > 20.0 || phase.begin_s < 0.1) {
-        continue;
-      }
-      if (phase.is_turn()) {
-        const Rigid3 step = poses[begin].inverse() * poses[end];
-        EXPECT_NEAR(degrees(step.angle_rad()), 90.0, 20.0) << "seed " << seed;
-        EXPECT_NEAR(step.translation.norm(), kArm_m * std::sqrt(2.0), 0.15) << "seed " << seed;
-      } else if (phase.is_pause()) {
-        EXPECT_LT(way_m(poses, begin, end), 0.12) << "seed " << seed;
-      }
-    }
-    for (const WalkGlance& glance : plan.glances) {
-      const std::size_t middle = frame_at(glance.begin_s + glance.turn_s + 0.5 * glance.hold_s);
-      if (glance.end_s() < 20.0) {
-        EXPECT_NEAR(aside_deg(poses, middle), degrees(glance.angle_rad), 14.0) << "seed " << seed;
-        EXPECT_GT(way_m(poses, frame_at(glance.begin_s), frame_at(glance.end_s())), 0.5)
-            << "walks on";
-      }
-    }
+    EXPECT_GT(most_turned_deg, 75.0) << "turns on the spot, seed " << seed;
+    EXPECT_GT(most_aside_deg, 25.0) << "glances aside, seed " << seed;
+    EXPECT_LT(least_way_m, 0.12) << "pauses, seed " << seed;
   }
 }
 
