@@ -27,20 +27,17 @@ Vec2 sample(int k) {
           (static_cast<double>(sub_row) + 0.5) / kSubRows - 0.5};
 }
 
-/// c[0] * x + c[1] * y + c[2] over pixels.
-struct Linear {
-  std::array<double, 3> c = {0.0, 0.0, 0.0};
-  [[nodiscard]] double at(const Vec2& pixel) const {
-    return c[0] * pixel.x() + c[1] * pixel.y() + c[2];
-  }
-};
+/// A function that is linear over the image, at a pixel.
+double at(const Vec3& linear, const Vec2& pixel) {
+  return linear.x() * pixel.x() + linear.y() * pixel.y() + linear.z();
+}
 
 /// A face as the camera sees it. 1/z and texture/z of a plane are linear over the image, which
 /// makes depth and texture exact at every pixel (no interpolation between corners).
 struct ScreenFace {
   const Style* style = nullptr;
-  Linear inverse_z;
-  std::array<Linear, 2> texture_over_z;
+  Vec3 inverse_z;
+  std::array<Vec3, 2> texture_over_z;
   std::array<Vec2, 5> outline;  ///< pixels, clipped at the near plane
   std::size_t num_points = 0;
   double top_px = std::numeric_limits<double>::max();
@@ -79,13 +76,12 @@ std::optional<ScreenFace> project_face(const Face& face,
                                        const Eigen::Matrix3d& camera_from_world,
                                        const Camera& camera) {
   std::array<Vec3, 4> points;
-  const auto count = static_cast<std::size_t>(face.num_points);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < face.num_points; ++i) {
     points[i] = camera_from_world * face.points[i].cast<double>();
   }
   ScreenFace out;
   out.style = &face.style;
-  if (!project_outline(std::span(points).first(count), camera, out)) {
+  if (!project_outline(std::span(points).first(face.num_points), camera, out)) {
     return std::nullopt;
   }
   const Vec3 e1 = points[1] - points[0];
@@ -96,11 +92,11 @@ std::optional<ScreenFace> project_face(const Face& face,
   if (!(area2 > 1e-16) || !(std::abs(offset) > 1e-9 * std::sqrt(area2))) {
     return std::nullopt;
   }
-  /// The function of camera coordinates g . P, divided by z, over pixels.
-  const auto over_pixels = [&](const Vec3& g) -> Linear {
+  // The function of camera coordinates g . P, divided by z, over pixels.
+  const auto over_pixels = [&](const Vec3& g) -> Vec3 {
     const double gx = g.x() / camera.fx_px;
     const double gy = g.y() / camera.fy_px;
-    return {{gx, gy, g.z() - gx * camera.cx_px - gy * camera.cy_px}};
+    return {gx, gy, g.z() - gx * camera.cx_px - gy * camera.cy_px};
   };
   const Vec3 plane = normal / offset;  // plane . P = 1 on the face
   out.inverse_z = over_pixels(plane);
@@ -144,92 +140,82 @@ int first_from(double value, int end) {
 cv::Vec3f to_vector(const Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
 
 /// One frame while it is drawn, by bands of rows.
-class FramePainter {
- public:
-  FramePainter(const Scene& scene,
-               const Rigid3& world_from_camera,
-               const Camera& camera,
-               const Textures& textures)
-      : camera_(camera),
-        world_from_camera_(world_from_camera.rotation_matrix()),
-        textures_(textures),
-        row_width_(camera.width_px * kSubColumns) {
-    const Eigen::Matrix3d camera_from_world = world_from_camera_.transpose();
-    for (const Face& face : scene.faces()) {
-      if (const auto seen = project_face(face, camera_from_world, camera_)) {
-        faces_.push_back(*seen);
-      }
-    }
-  }
+struct FramePainter {
+  const Camera& camera;
+  const Textures& textures;
+  Eigen::Matrix3d world_from_camera;
+  std::vector<ScreenFace> faces;
+  int row_width = camera.width_px * kSubColumns;  ///< samples
+  std::vector<float> inverse_z = {};              ///< per sample of the band
+  std::vector<int> ids = {};                      ///< the same: the nearest face
 
   RenderedFrame paint() {
-    RenderedFrame frame{cv::Mat(camera_.height_px, camera_.width_px, CV_32FC3),
-                        cv::Mat(camera_.height_px, camera_.width_px, CV_32FC1)};
-    for (int row = 0; row < camera_.height_px; ++row) {
+    RenderedFrame frame{cv::Mat(camera.height_px, camera.width_px, CV_32FC3),
+                        cv::Mat(camera.height_px, camera.width_px, CV_32FC1)};
+    for (int row = 0; row < camera.height_px; ++row) {
       if (row % kBandRows == 0) {
-        draw_band(row, std::min(row + kBandRows, camera_.height_px));
+        draw_band(row, std::min(row + kBandRows, camera.height_px));
       }
-      for (int column = 0; column < camera_.width_px; ++column) {
+      for (int column = 0; column < camera.width_px; ++column) {
         resolve(column, row, frame);
       }
     }
     return frame;
   }
 
- private:
   /// For each sample of the rows [first_row, end_row): the nearest face.
   void draw_band(int first_row, int end_row) {
     const int num_sub_rows = (end_row - first_row) * kSubRows;
-    const auto count = static_cast<std::size_t>(row_width_ * num_sub_rows);
-    inverse_z_.assign(count, 0.0F);  // infinitely far
-    ids_.assign(count, kNothing);
+    const auto count = static_cast<std::size_t>(row_width * num_sub_rows);
+    inverse_z.assign(count, 0.0F);  // infinitely far
+    ids.assign(count, kNothing);
     const double first_y = first_row + sample(0).y();
     const auto sub_row_from = [&](double y) {
       return first_from((y - first_y) * kSubRows, num_sub_rows);
     };
-    for (std::size_t i = 0; i < faces_.size(); ++i) {
-      for (int r = sub_row_from(faces_[i].top_px); r < sub_row_from(faces_[i].bottom_px); ++r) {
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      for (int r = sub_row_from(faces[i].top_px); r < sub_row_from(faces[i].bottom_px); ++r) {
         draw_sub_row(static_cast<int>(i), r, first_y + static_cast<double>(r) / kSubRows);
       }
     }
   }
 
   void draw_sub_row(int id, int sub_row, double y) {
-    const ScreenFace& face = faces_[static_cast<std::size_t>(id)];
+    const ScreenFace& face = faces[static_cast<std::size_t>(id)];
     const auto [left, right] = crossings(face, y);
     const double shift = kRowShift[static_cast<std::size_t>(sub_row % kSubRows)];
-    const int begin = first_from(kSubColumns * (left + 0.5) - shift, row_width_);
-    const int end = first_from(kSubColumns * (right + 0.5) - shift, row_width_);
-    const auto base = static_cast<float>(face.inverse_z.at({shift / kSubColumns - 0.5, y}));
-    const auto step = static_cast<float>(face.inverse_z.c[0] / kSubColumns);
-    float* z = inverse_z_.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width_;
-    int* ids = ids_.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width_;
+    const int begin = first_from(kSubColumns * (left + 0.5) - shift, row_width);
+    const int end = first_from(kSubColumns * (right + 0.5) - shift, row_width);
+    const auto base = static_cast<float>(at(face.inverse_z, {shift / kSubColumns - 0.5, y}));
+    const auto step = static_cast<float>(face.inverse_z.x() / kSubColumns);
+    float* z = inverse_z.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width;
+    int* nearest = ids.data() + static_cast<std::ptrdiff_t>(sub_row) * row_width;
     for (int k = begin; k < end; ++k) {
       const float value = base + static_cast<float>(k) * step;
-      const bool nearer = value > z[k];
-      z[k] = nearer ? value : z[k];
-      ids[k] = nearer ? id : ids[k];
+      const bool is_nearer = value > z[k];
+      z[k] = is_nearer ? value : z[k];
+      nearest[k] = is_nearer ? id : nearest[k];
     }
   }
 
   /// Each face seen by a pixel is painted once, at the middle of the samples it holds.
   void resolve(int column, int row, RenderedFrame& frame) const {
-    std::array<int, kSamples> ids{};
+    std::array<int, kSamples> seen{};
     for (int k = 0; k < kSamples; ++k) {
       const int sub_row = row % kBandRows * kSubRows + k / kSubColumns;
-      ids[static_cast<std::size_t>(k)] = ids_[static_cast<std::size_t>(
-          sub_row * row_width_ + column * kSubColumns + k % kSubColumns)];
+      seen[static_cast<std::size_t>(k)] = ids[static_cast<std::size_t>(
+          sub_row * row_width + column * kSubColumns + k % kSubColumns)];
     }
     cv::Vec3f light(0.0F, 0.0F, 0.0F);
     int max_count = 0;
-    for (auto first = ids.begin(); first != ids.end(); ++first) {
-      if (std::find(ids.begin(), first, *first) != first) {
+    for (auto first = seen.begin(); first != seen.end(); ++first) {
+      if (std::find(seen.begin(), first, *first) != first) {
         continue;  // painted already
       }
       Vec2 sum(0.0, 0.0);
       int count = 0;
       for (int k = 0; k < kSamples; ++k) {
-        if (ids[static_cast<std::size_t>(k)] == *first) {
+        if (seen[static_cast<std::size_t>(k)] == *first) {
           sum += sample(k);
           ++count;
         }
@@ -245,16 +231,16 @@ class FramePainter {
   }
 
   [[nodiscard]] cv::Vec3f colour_of(int id, const Vec2& pixel) const {
-    const Vec2 ray = camera_.normalize(pixel);
+    const Vec2 ray = camera.normalize(pixel);
     const Vec3 direction(ray.x(), ray.y(), 1.0);
     const auto backdrop = [&] {
-      return to_vector(sky_colour(world_from_camera_ * direction, 1.0 / camera_.fx_px, textures_));
+      return to_vector(sky_colour(world_from_camera * direction, 1.0 / camera.fx_px, textures));
     };
     if (id == kNothing) {
       return backdrop();
     }
-    const ScreenFace& face = faces_[static_cast<std::size_t>(id)];
-    const double z = 1.0 / face.inverse_z.at(pixel);
+    const ScreenFace& face = faces[static_cast<std::size_t>(id)];
+    const double z = 1.0 / at(face.inverse_z, pixel);
     const Material material = face.style->material;
     const Rgb albedo =
         material == nullptr ? face.style->albedo : material(sample_of(face, pixel, z));
@@ -269,17 +255,17 @@ class FramePainter {
   }
 
   [[nodiscard]] Sample sample_of(const ScreenFace& face, const Vec2& pixel, double z) const {
-    Sample at{*face.style, textures_};
-    const auto texture = [&](const Linear& over_z, float& value, float& width) {
-      const double t = over_z.at(pixel) * z;
-      const double dx = z * (over_z.c[0] - t * face.inverse_z.c[0]);
-      const double dy = z * (over_z.c[1] - t * face.inverse_z.c[1]);
+    Sample sample{*face.style, textures};
+    const auto texture = [&](const Vec3& over_z, float& value, float& width) {
+      const double t = at(over_z, pixel) * z;
+      const double dx = z * (over_z.x() - t * face.inverse_z.x());
+      const double dy = z * (over_z.y() - t * face.inverse_z.y());
       value = static_cast<float>(t);
       width = static_cast<float>(std::sqrt(dx * dx + dy * dy));
     };
-    texture(face.texture_over_z[0], at.u, at.width_u);
-    texture(face.texture_over_z[1], at.v, at.width_v);
-    return at;
+    texture(face.texture_over_z[0], sample.u, sample.width_u);
+    texture(face.texture_over_z[1], sample.v, sample.width_v);
+    return sample;
   }
 
   /// At the pixel's centre on the plane of the face; if that point is far off the part of the face
@@ -288,20 +274,12 @@ class FramePainter {
     if (id == kNothing) {
       return std::numeric_limits<float>::infinity();
     }
-    const Linear& inverse_z = faces_[static_cast<std::size_t>(id)].inverse_z;
-    const double seen = inverse_z.at(middle);
-    const double centre = inverse_z.at(pixel);
+    const Vec3& inverse_z = faces[static_cast<std::size_t>(id)].inverse_z;
+    const double seen = at(inverse_z, middle);
+    const double centre = at(inverse_z, pixel);
     const bool is_near = std::abs(centre - seen) <= 0.1 * seen;
     return static_cast<float>(1.0 / (is_near ? centre : seen));
   }
-
-  const Camera& camera_;
-  Eigen::Matrix3d world_from_camera_;
-  const Textures& textures_;
-  std::vector<ScreenFace> faces_;
-  int row_width_;                 ///< samples
-  std::vector<float> inverse_z_;  ///< per sample of the band
-  std::vector<int> ids_;
 };
 
 }  // namespace
@@ -310,7 +288,14 @@ RenderedFrame paint_scene(const Scene& scene,
                           const Rigid3& world_from_camera,
                           const Camera& camera,
                           const Textures& textures) {
-  return FramePainter(scene, world_from_camera, camera, textures).paint();
+  FramePainter painter{camera, textures, world_from_camera.rotation_matrix(), {}};
+  const Eigen::Matrix3d camera_from_world = painter.world_from_camera.transpose();
+  for (const Face& face : scene.faces()) {
+    if (const auto seen = project_face(face, camera_from_world, camera)) {
+      painter.faces.push_back(*seen);
+    }
+  }
+  return painter.paint();
 }
 
 }  // namespace stemvo::synth

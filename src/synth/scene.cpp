@@ -64,12 +64,12 @@ void Scene::add_face(std::initializer_list<Vec3> corners,
                      const Style& style) {
   constexpr double kSun = 0.95;
   Face face;
-  face.num_points = static_cast<int>(corners.size());
-  std::ranges::transform(corners, face.points.begin(), [&](const Vec3& corner) {
-    return (corner - origin_).cast<float>().eval();
-  });
-  std::ranges::transform(texture, face.texture.begin(),
-                         [](const Vec2& uv) { return uv.cast<float>().eval(); });
+  for (const Vec3& corner : corners) {
+    face.points[face.num_points++] = (corner - origin_).cast<float>();
+  }
+  for (std::size_t i = 0; i < face.texture.size(); ++i) {
+    face.texture[i] = texture.begin()[i].cast<float>();
+  }
   face.style = style;
   const Vec3* at = corners.begin();
   Vec3 normal = (at[1] - at[0]).cross(at[2] - at[0]).normalized();

@@ -28,7 +28,7 @@ struct Style {
 struct Face {
   std::array<Eigen::Vector3f, 4> points;
   std::array<Eigen::Vector2f, 3> texture;  ///< metres, at the first three points; affine on it
-  int num_points = 0;
+  std::size_t num_points = 0;
   Style style;
 };
 

@@ -45,8 +45,8 @@ double distance_to_edge_m(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 /// From the camera, at the origin of the face's points, to a convex polygon.
 double distance_m(const Face& face) {
   std::vector<Eigen::Vector3d> points;
-  for (int i = 0; i < face.num_points; ++i) {
-    points.emplace_back(face.points[static_cast<std::size_t>(i)].cast<double>());
+  for (std::size_t i = 0; i < face.num_points; ++i) {
+    points.emplace_back(face.points[i].cast<double>());
   }
   const Eigen::Vector3d normal = (points[1] - points[0]).cross(points[2] - points[0]).normalized();
   const Eigen::Vector3d foot = normal.dot(points[0]) * normal;
