@@ -274,9 +274,9 @@ struct FramePainter {
     if (id == kNothing) {
       return std::numeric_limits<float>::infinity();
     }
-    const Vec3& inverse_z = faces[static_cast<std::size_t>(id)].inverse_z;
-    const double seen = at(inverse_z, middle);
-    const double centre = at(inverse_z, pixel);
+    const Vec3& over_image = faces[static_cast<std::size_t>(id)].inverse_z;
+    const double seen = at(over_image, middle);
+    const double centre = at(over_image, pixel);
     const bool is_near = std::abs(centre - seen) <= 0.1 * seen;
     return static_cast<float>(1.0 / (is_near ? centre : seen));
   }

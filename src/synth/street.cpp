@@ -14,7 +14,7 @@ struct RoadWindow {
   int end;
 };
 
-/// All that a builder of things along the road needs.
+/// Builders of things along the road need this.
 struct Street {
   const RoadCurve& road;
   RoadWindow window;
