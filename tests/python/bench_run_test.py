@@ -15,13 +15,11 @@ from unittest import mock
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "bench"))
 
-import machine  # noqa: E402
 import places  # noqa: E402
 import results  # noqa: E402
 import rounds  # noqa: E402
 import rows  # noqa: E402
 import run  # noqa: E402
-import table  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", "")
 DATA = os.environ.get("STEMVO_SHARED_DATA")
@@ -39,39 +37,6 @@ class Statistics(unittest.TestCase):
         self.assertEqual(results.ratios([3.0, 6.0], [1.0, 2.0]), [3.0, 3.0])
         with self.assertRaises(ValueError):
             results.ratios([1.0], [1.0, 2.0])
-
-    def test_rows_of_the_table(self):
-        def result(name, fps, ratio, error):
-            def all_of(value):
-                return {"median": value, "low": value, "high": value}
-            return {"name": name, "fps": all_of(fps), "time_over_first": all_of(ratio), "cpu_ms_per_frame": all_of(20.0),
-                    "peak_mib": 99.6, "t_rel_percent": error}
-
-        lines = table.table([result("defaults", 100.0, 1.0, 0.74), result("opencv orb", 40.0, 2.5, None)]).splitlines()
-        self.assertIn("time, defaults = 1", lines[0])
-        self.assertEqual(lines[1].split(), "defaults 100.0 100.0-100.0 1.00 1.00-1.00 20.0 100 0.74".split())
-        self.assertEqual(lines[2].split(), "opencv orb 40.0 40.0-40.0 2.50 2.50-2.50 20.0 100 -".split())
-
-
-class Load(unittest.TestCase):
-    def printed(self, load, cores):
-        facts = {"load_before": load, "busy": machine.is_busy(load, cores)}
-        row = {"name": "defaults", "peak_mib": 1.0, "t_rel_percent": None,
-               **dict.fromkeys(("fps", "time_over_first", "cpu_ms_per_frame"), {"median": 1.0, "low": 1.0, "high": 1.0})}
-        return table.page(facts, [row]).splitlines()
-
-    def test_a_busy_machine_is_named_under_the_table(self):
-        self.assertRegex(self.printed(1.2, [0, 1])[-1], "^BUSY MACHINE: load average 1.20 .*more than 0.5 per core")
-        self.assertNotIn("BUSY", "".join(self.printed(1.0, [0, 1])))
-        self.assertIn("BUSY", self.printed(0.6, [0])[-1])
-
-
-class Turns(unittest.TestCase):
-    ROWS = (rows.Row("a"), rows.Row("b"), rows.Row("c"))
-
-    def test_every_row_is_first_once(self):
-        turns = ["".join(row.name for row in rounds.order(self.ROWS, number)) for number in range(4)]
-        self.assertEqual(turns, ["abc", "bca", "cab", "abc"])
 
 
 class BeforeTheFirstRun(unittest.TestCase):
@@ -182,6 +147,9 @@ class TinyDrive(unittest.TestCase):
         self.assertEqual(found["rows"][0]["time_over_first"], {"median": 1.0, "low": 1.0, "high": 1.0})
         for key in ("machine", "commit", "stemvo", "rounds", "load_before", "busy"):
             self.assertIn(f"{key}: ", said)
+        self.assertIn("time, defaults = 1", said)
+        self.assertRegex(said, r"\nfolded stem +[\d.]+ +[\d.]+-[\d.]+ ")
+        self.assertEqual(found["busy"], "BUSY MACHINE" in said)
 
     @unittest.skipUnless(places.PEER_PYTHON.exists(), NO_PEERS)
     def test_the_peer_is_a_working_odometry(self):
