@@ -169,7 +169,8 @@ void bind_result(nb::module_& module) {
       .def_ro("timestamp", &Result::timestamp, "As given")
       .def_prop_ro("num_matches", [](const Result& r) { return r.frame.num_matches; })
       .def_prop_ro("num_inliers", [](const Result& r) { return r.frame.num_inliers; })
-      .def_prop_ro("road", [](const Result& r) { return std::string(to_string(r.frame.road)); })
+      .def_prop_ro("scale_state",
+                   [](const Result& r) { return std::string(to_string(r.frame.scale_state)); })
       .def_prop_ro(
           "scale_sigma", [](const Result& r) { return r.frame.scale_sigma; },
           "Of log(metres per unit)")

@@ -46,7 +46,7 @@ ROWS = (
     Row("ORB and brute force instead of patches", ("features.method=orb",)),
     Row("pairs of frames chained instead of the map", ("odometry.mode=two_frame",)),
     Row("pairs of frames, ORB and brute force", ("odometry.mode=two_frame", "features.method=orb")),
-    Row("map without refinement", ("refine.every=0",)),
+    Row("map without refinement", ("ba.every_n_keyframes=0",)),
     Row("the paper's recipe, stand-in stem", config=PAPER),
     Row("the paper's recipe on the gray image", ("stem.model=gray", "stem.filter=-1", "stem.sampling_px=0"), PAPER),
     Row("road: dense alignment only", ("scale.estimators=dense",), scales=ROAD),

@@ -31,15 +31,15 @@ enum class FrameState {
 /// All count as measured but gated, lost and no_image.
 [[nodiscard]] bool is_measured(FrameState state);
 
-/// The road measurement of a frame's scale (`scale.source: camera_height`).
-enum class RoadState {
+/// How a frame's scale was measured from the road (`scale.source: camera_height`).
+enum class ScaleState {
   kDisabled,  ///< the scale comes from elsewhere
   kNone,      ///< no road was measured since the map started: the scale is a guess
   kHeld,      ///< measured before, not on this frame: the last scale is kept, its sigma grows
   kMeasured,  ///< measured on this frame and believed
 };
 /// `disabled`, `none`, `held`, `measured`.
-[[nodiscard]] std::string_view to_string(RoadState state);
+[[nodiscard]] std::string_view to_string(ScaleState state);
 
 /// Standard deviations of a camera's estimate, to which the one in use goes step by step; of the
 /// focal length, too, where only the principal point does.
@@ -67,7 +67,7 @@ struct FrameResult {
   double fundamental_score = 0.0;  ///< S_F
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
-  RoadState road = RoadState::kDisabled;
+  ScaleState scale_state = ScaleState::kDisabled;
   std::string_view road_reason;             ///< why the road was not measured, else empty
   Camera camera;                            ///< with what was learnt so far (`camera.refine`)
   std::optional<CameraSigma> camera_sigma;  ///< nullopt: it is not refined

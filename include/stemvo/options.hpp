@@ -40,14 +40,14 @@ struct StemNetwork {
 };
 
 /// Size of the image that points are tracked on. kAuto: for patches and KLT kHalf where the focal
-/// length is 500 px or more, else kFrame; for descriptors kBicubic.
-enum class Upsample {
+/// length is 500 px or more, else kInputZoomed; for descriptors kInput.
+enum class TrackingResolution {
   kAuto,
-  kBicubic,  ///< the input's
-  kFrame,   ///< the input's, where the sampling is even: not the channel is enlarged but the frame,
-            ///< so that a filter sees the angle it was learned for; else as kBicubic
-  kHalf,    ///< half the input's; the channel's where its sampling is odd and above 1
-  kNative,  ///< the channel's
+  kInput,        ///< the input's
+  kInputZoomed,  ///< the input's; where the sampling is even, the frame is enlarged in place of the
+                 ///< channel, so that a filter sees the angle it was learned for
+  kHalf,         ///< half the input's; the channel's where its sampling is odd and above 1
+  kNative,       ///< the channel's
 };
 
 /// Keys `stem.*`: the filter channel a frame is seen through.
@@ -61,10 +61,10 @@ struct StemOptions {
   std::optional<StemNetwork> network;
   int filter = -1;      ///< -1: the network's default_filter (gray, input_layer: 0)
   int sampling_px = 0;  ///< input pixels per channel pixel, a divisor of the stride; 0: 2, or 1
-  Upsample upsample = Upsample::kAuto;
-  double stretch_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
-  double stretch_high_percent = 99.5;
-  double stretch_memory = 0.95;  ///< share of the last limits kept at each frame
+  TrackingResolution tracking_resolution = TrackingResolution::kAuto;
+  double contrast_low_percent = 0.5;  ///< percentiles mapped to 0 and 255
+  double contrast_high_percent = 99.5;
+  double contrast_memory = 0.95;  ///< share of the last limits kept at each frame
 };
 
 enum class FeatureMethod {
@@ -124,10 +124,14 @@ struct OdometryOptions {
   double min_parallax_px = 0.6;      ///< median rotation-free flow below it: low parallax
 };
 
-/// Keys `refine.*`: bundle adjustment of the window (mode map).
-struct RefineOptions {
-  int every = 1;   ///< keyframes between refinements, the paper's m; 0: never
-  int window = 8;  ///< keyframes refined together
+/// Keys `window.*`: the keyframes that frames are localized against (mode map).
+struct KeyframeWindowOptions {
+  int num_keyframes = 8;
+};
+
+/// Keys `ba.*`: bundle adjustment of the window (mode map).
+struct BaOptions {
+  int every_n_keyframes = 1;  ///< the paper's m; 0: never
   int max_iterations = 10;
   double loss_px = 0.2;  ///< Cauchy scale on the reprojection error
 };
@@ -142,17 +146,17 @@ struct CameraOptions {
 };
 
 enum class ScaleSource {
-  kNone,          ///< up to scale
-  kConstant,      ///< steps of the same length
-  kCameraHeight,  ///< from the road, whose distance below the camera is known
-  kGroundTruth,   ///< of the program only, which rescales every step of the output
+  kNone,           ///< up to scale
+  kConstantSpeed,  ///< steps of the same length
+  kCameraHeight,   ///< from the road, whose distance below the camera is known
+  kGroundTruth,    ///< of the program only, which rescales every step of the output
 };
 enum class RoadEstimators { kBoth, kDense /* aligned image */, kPoints /* tracked corners */ };
 
 /// Keys `scale.*`.
 struct ScaleOptions {
   ScaleSource source = ScaleSource::kCameraHeight;
-  double constant_m = 1.0;        ///< per frame
+  double step_m = 1.0;            ///< per frame
   double camera_height_m = 1.65;  ///< above the road
   RoadEstimators estimators = RoadEstimators::kBoth;
   bool temporal_filter = true;  ///< of the road's measurements
@@ -164,7 +168,8 @@ struct Options {
   FeatureOptions features;
   TwoViewOptions two_view;
   OdometryOptions odometry;
-  RefineOptions refine;
+  KeyframeWindowOptions window;
+  BaOptions ba;
   CameraOptions camera;
   ScaleOptions scale;
   std::uint64_t seed = 1;  ///< of every random number

@@ -45,7 +45,7 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
 Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
   Config config = request.config;
   config.odometry.mode = OdometryMode::kMap;
-  config.scale.source = ScaleSource::kConstant;
+  config.scale.source = ScaleSource::kConstantSpeed;
   config.camera.refine = CameraRefinement::kAll;
   return pipeline::create_odometry(config, camera, request.models_dir);
 }

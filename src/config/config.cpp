@@ -67,11 +67,8 @@ Status apply_override(Config& config, const std::string& assignment) {
                                   [&name](const Field& f) { return f.name() == name; });
   if (field == fields.end()) {
     const std::string section = name.substr(0, name.find('.'));
-    const bool is_section = std::any_of(fields.begin(), fields.end(),
-                                        [&](const auto& f) { return f.section == section; });
-    return fail(
-        source + ": " +
-        config::unknown_key(is_section ? section : "", name.substr(name.find('.') + 1), fields));
+    return fail(source + ": " +
+                config::unknown_key(section, name.substr(name.find('.') + 1), fields));
   }
   const std::string problem = config::read_assigned(assignment.substr(equals + 1), *field);
   if (!problem.empty()) {

@@ -13,6 +13,37 @@
 namespace stemvo::config {
 namespace {
 
+/// Keys, and values, that had another name once.
+constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
+    {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
+    {"refine.every", "ba.every_n_keyframes"},
+    {"refine.loss_px", "ba.loss_px"},
+    {"refine.max_iterations", "ba.max_iterations"},
+    {"refine.window", "window.num_keyframes"},
+    {"scale.constant_m", "scale.step_m"},
+    {"scale.joining", "scale.temporal_filter"},
+    {"scale.source=constant", "scale.source=constant_speed"},
+    {"stem.stretch_high_percent", "stem.contrast_high_percent"},
+    {"stem.stretch_low_percent", "stem.contrast_low_percent"},
+    {"stem.stretch_memory", "stem.contrast_memory"},
+    {"stem.tracking_resolution=bicubic", "stem.tracking_resolution=input"},
+    {"stem.tracking_resolution=frame", "stem.tracking_resolution=input_zoomed"},
+    {"stem.upsample", "stem.tracking_resolution"},
+};
+
+/// "; its name is ... now", or nothing.
+std::string new_name(const std::string& key) {
+  const auto* const renamed =
+      std::ranges::find(kRenamed, key, &std::pair<std::string_view, std::string_view>::first);
+  return renamed == std::end(kRenamed) ? "" : fmt::format("; its name is {} now", renamed->second);
+}
+
+bool had_keys(const std::string& section) {
+  return !section.empty() && std::ranges::any_of(kRenamed, [&](const auto& renamed) {
+    return renamed.first.starts_with(section + ".");
+  });
+}
+
 /// Whole text or nothing; a leading '+' is allowed as in YAML.
 template <typename Number>
 bool parse_decimal(std::string_view text, Number& value) {
@@ -63,10 +94,11 @@ std::string parse_number(std::string_view text, double& value) {
   return parse_decimal(text, value) ? std::string() : expected("a number", text);
 }
 
-std::string parse_choice(const Rule& rule, const EnumValue& value, std::string_view text) {
+std::string parse_choice(const Field& field, const EnumValue& value, std::string_view text) {
+  const Rule& rule = field.rule;
   const auto found = std::find(rule.choices.begin(), rule.choices.end(), text);
   if (found == rule.choices.end()) {
-    return not_a_choice(rule, text);
+    return not_a_choice(rule, text) + new_name(fmt::format("{}={}", field.name(), text));
   }
   value.set(value.target, static_cast<int>(found - rule.choices.begin()));
   return {};
@@ -114,7 +146,7 @@ std::string parse_scalar(const Field& field, std::string_view text) {
   };
   return std::visit(
       Overloaded{
-          [&](const EnumValue& value) { return parse_choice(field.rule, value, text); },
+          [&](const EnumValue& value) { return parse_choice(field, value, text); },
           [&](std::string* value) {
             *value = text;
             return std::string();
@@ -225,7 +257,7 @@ class MapReader {
  private:
   Status read_entry(const YAML::Node& key_node, const YAML::Node& value, std::string_view section) {
     const std::string& key = key_node.Scalar();
-    if (section.empty() && is_section(key, fields_)) {
+    if (section.empty() && (is_section(key, fields_) || (value.IsMap() && had_keys(key)))) {
       return read(value, key);
     }
     const auto field = std::find_if(fields_.begin(), fields_.end(), [&](const Field& f) {
@@ -285,23 +317,19 @@ std::string format_value(const Field& field) {
 std::string unknown_key(std::string_view section,
                         std::string_view key,
                         const std::vector<Field>& fields) {
-  static const std::map<std::string, std::string_view> kRenamed = {
-      {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
-      {"scale.joining", "scale.temporal_filter"}};
-  if (const auto renamed = kRenamed.find(fmt::format("{}.{}", section, key));
-      renamed != kRenamed.end()) {
-    return fmt::format("unknown key; its name is {} now", renamed->second);
+  if (const std::string renamed = new_name(fmt::format("{}.{}", section, key)); !renamed.empty()) {
+    return "unknown key" + renamed;
   }
+  const bool is_top = !is_section(section, fields);
   std::vector<std::string_view> known;
   for (const Field& field : fields) {
-    const bool is_top = section.empty();
     const std::string_view name = is_top && !field.section.empty() ? field.section : field.key;
     const bool belongs = is_top || field.section == section;
     if (belongs && std::find(known.begin(), known.end(), name) == known.end()) {
       known.push_back(name);
     }
   }
-  const std::string of = section.empty() ? "" : fmt::format(" of {}", section);
+  const std::string of = is_top ? "" : fmt::format(" of {}", section);
   const bool is_dumped = std::ranges::find(fields, "odometry", &Field::section) != fields.end();
   return fmt::format("unknown key; known keys{}: {}{}", of, fmt::join(known, ", "),
                      is_dumped ? " ('stemvo --dump-config' explains each)" : "");

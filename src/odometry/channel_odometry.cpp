@@ -15,7 +15,8 @@ namespace {
 
 StemOptions stretch_options(const Options& options, const Camera& camera) {
   StemOptions stretch = options.stem;
-  stretch.upsample = choose_upsample(stretch.upsample, options.features.method, camera);
+  stretch.tracking_resolution =
+      choose_tracking_resolution(stretch.tracking_resolution, options.features.method, camera);
   return stretch;
 }
 

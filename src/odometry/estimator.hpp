@@ -57,7 +57,7 @@ class Estimator {
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.
 [[nodiscard]] inline double assumed_step(const ScaleOptions& scale) {
-  return scale.source == ScaleSource::kNone ? 1.0 : scale.constant_m;
+  return scale.source == ScaleSource::kNone ? 1.0 : scale.step_m;
 }
 
 /// An equal share of a motion that took several frames.

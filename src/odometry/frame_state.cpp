@@ -18,9 +18,9 @@ bool is_measured(FrameState state) {
   return state != FrameState::kGated && state != FrameState::kLost && state != FrameState::kNoImage;
 }
 
-std::string_view to_string(RoadState state) {
+std::string_view to_string(ScaleState state) {
   constexpr std::array<std::string_view, 4> kNames{"disabled", "none", "held", "measured"};
-  static_assert(kNames.size() == static_cast<std::size_t>(RoadState::kMeasured) + 1);
+  static_assert(kNames.size() == static_cast<std::size_t>(ScaleState::kMeasured) + 1);
   return kNames.at(static_cast<std::size_t>(state));
 }
 

@@ -42,28 +42,28 @@ double MetricScale::measure(const RoadImage* road, const Rigid3& cur_from_prev) 
 void MetricScale::hold(std::string_view reason) {
   if (road_.has_value()) {
     sigma_ = road_->skip();
-    state_ = state_ == RoadState::kMeasured ? RoadState::kHeld : state_;
+    state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
     reason_ = reason;
   }
 }
 
 void MetricScale::wait(std::string_view reason) {
   if (road_.has_value()) {
-    state_ = RoadState::kNone;
+    state_ = ScaleState::kNone;
     reason_ = reason;
   }
 }
 
 void MetricScale::keep(const RoadScaleEstimate& estimate) {
   sigma_ = estimate.sigma;
-  state_ = estimate.is_measured      ? RoadState::kMeasured
-           : estimate.is_initialized ? RoadState::kHeld
-                                     : RoadState::kNone;
+  state_ = estimate.is_measured      ? ScaleState::kMeasured
+           : estimate.is_initialized ? ScaleState::kHeld
+                                     : ScaleState::kNone;
   reason_ = estimate.reason;
 }
 
 void MetricScale::report(FrameResult& result) const {
-  result.road = state_;
+  result.scale_state = state_;
   result.road_reason = reason_;
   result.scale_sigma = sigma_;
 }

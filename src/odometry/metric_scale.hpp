@@ -23,7 +23,7 @@ class MetricScale {
 
   /// Of the last frame given: its lengths are metres.
   [[nodiscard]] bool has_scale() const {
-    return state_ == RoadState::kMeasured || state_ == RoadState::kHeld;
+    return state_ == ScaleState::kMeasured || state_ == ScaleState::kHeld;
   }
 
   /// The first image, or one that nothing connects with the ones before.
@@ -44,7 +44,7 @@ class MetricScale {
 
   std::optional<RoadScale> road_;
   std::optional<double> sigma_;
-  RoadState state_ = RoadState::kDisabled;
+  ScaleState state_ = ScaleState::kDisabled;
   std::string_view reason_;
 };
 

@@ -18,8 +18,8 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   }
   // A network that cannot take this camera's images is found before work starts.
   const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  const int zoom =
-      stem->frame_zoom(choose_upsample(options.stem.upsample, options.features.method, camera));
+  const int zoom = stem->frame_zoom(choose_tracking_resolution(options.stem.tracking_resolution,
+                                                               options.features.method, camera));
   if (const Expected<Channel> channel = stem->apply(blank, zoom); !channel) {
     return channel.error();
   }

@@ -32,16 +32,16 @@ constexpr double kTurnFlow = 3.0;
 WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
     : camera_(camera),
       options_(config.odometry),
-      refine_every_(config.refine.every),
+      refine_every_(config.ba.every_n_keyframes),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config, camera),
       scale_(config),
       calibration_(camera, config.camera.refine),
       step_(assumed_step(config.scale)) {
-  window_options_.num_keyframes = config.refine.window;
-  refinement_.loss_scale_px = config.refine.loss_px;
-  refinement_.max_iterations = config.refine.max_iterations;
-  localization_.loss_px = config.refine.loss_px;
+  window_options_.num_keyframes = config.window.num_keyframes;
+  refinement_.loss_scale_px = config.ba.loss_px;
+  refinement_.max_iterations = config.ba.max_iterations;
+  localization_.loss_px = config.ba.loss_px;
   localization_.seed = config.seed;
 }
 

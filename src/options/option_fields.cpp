@@ -29,16 +29,18 @@ std::vector<Field> stem_fields(StemOptions& o) {
       {"stem", "sampling_px", &o.sampling_px, Rule::between(0, 4096),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},
-      {"stem", "upsample", enum_value(&o.upsample),
-       Rule::one_of({"auto", "bicubic", "frame", "half", "native"}),
-       "size of the image to track on: bicubic (the input's), half (of the input's), "
-       "native (the channel's), or auto: half for "
-       "patch and klt where the focal length is 500 px or more, else bicubic"},
-      {"stem", "stretch_low_percent", &o.stretch_low_percent, Rule::between(0, 100),
+      {"stem", "tracking_resolution", enum_value(&o.tracking_resolution),
+       Rule::one_of({"auto", "input", "input_zoomed", "half", "native"}),
+       "size of the image to track on: input (the input's), input_zoomed (the same, the frame "
+       "enlarged before the filter), half (of the input's), native (the channel's), or auto: for "
+       "patch and klt half where the focal length is 500 px or more, else input_zoomed; for orb "
+       "and "
+       "sift input"},
+      {"stem", "contrast_low_percent", &o.contrast_low_percent, Rule::between(0, 100),
        "percentile of the response that becomes black"},
-      {"stem", "stretch_high_percent", &o.stretch_high_percent, Rule::between(0, 100),
+      {"stem", "contrast_high_percent", &o.contrast_high_percent, Rule::between(0, 100),
        "percentile of the response that becomes white"},
-      {"stem", "stretch_memory", &o.stretch_memory, Rule::between(0, 1),
+      {"stem", "contrast_memory", &o.contrast_memory, Rule::between(0, 1),
        "share of the last frame's black and white kept, so that gray values stay put"},
   };
 }
@@ -114,13 +116,20 @@ std::vector<Field> odometry_fields(OdometryOptions& o) {
   };
 }
 
-std::vector<Field> refine_fields(RefineOptions& o) {
+std::vector<Field> window_fields(KeyframeWindowOptions& o) {
   return {
-      {"refine", "every", &o.every, Rule::between(0, 1000000),
-       "keyframes between refinements of the map, the paper's m; 0: never"},
-      {"refine", "window", &o.window, Rule::between(3, 100), "keyframes refined together"},
-      {"refine", "max_iterations", &o.max_iterations, Rule::between(1, 1000), "of one refinement"},
-      {"refine", "loss_px", &o.loss_px, kPixels,
+      {"window", "num_keyframes", &o.num_keyframes, Rule::between(3, 100),
+       "keyframes whose landmarks frames are localized against, refined together"},
+  };
+}
+
+std::vector<Field> ba_fields(BaOptions& o) {
+  return {
+      {"ba", "every_n_keyframes", &o.every_n_keyframes, Rule::between(0, 1000000),
+       "keyframes between bundle adjustments of the window, the paper's m; 0: never"},
+      {"ba", "max_iterations", &o.max_iterations, Rule::between(1, 1000),
+       "of one bundle adjustment"},
+      {"ba", "loss_px", &o.loss_px, kPixels,
        "reprojection error from which an observation is mistrusted, input pixels"},
   };
 }
@@ -137,11 +146,11 @@ std::vector<Field> scale_fields(ScaleOptions& o) {
   return {
       {"scale", "source", enum_value(&o.source),
        Rule::one_of({kScaleSources.begin(), kScaleSources.end()}),
-       "length of a step: none, up to scale (1 unit; mode map: the first one); constant, the same "
-       "in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
+       "length of a step: none, up to scale (1 unit; mode map: the first one); constant_speed, the "
+       "same in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
        "paper's protocol; needs the pose file)"},
-      {"scale", "constant_m", &o.constant_m, Rule::between(1e-6, 1e6),
-       "metres per frame when constant"},
+      {"scale", "step_m", &o.step_m, Rule::between(1e-6, 1e6),
+       "metres per frame, for constant_speed"},
       {"scale", "camera_height_m", &o.camera_height_m, Rule::between(0.01, 1000),
        "above the road, for camera_height"},
       {"scale", "estimators", enum_value(&o.estimators), Rule::one_of({"both", "dense", "points"}),
@@ -200,7 +209,8 @@ std::vector<Field> fields_of(Options& options) {
   append(feature_fields(options.features));
   append(two_view_fields(options.two_view));
   append(odometry_fields(options.odometry));
-  append(refine_fields(options.refine));
+  append(window_fields(options.window));
+  append(ba_fields(options.ba));
   append(camera_fields(options.camera));
   append(scale_fields(options.scale));
   append({{"", "seed", &options.seed, {}, "of every random number"}});
@@ -256,10 +266,10 @@ Status validate(const Options& options) {
   if (Status status = options::check(options::fields_of(copy)); !status) {
     return status;
   }
-  if (!(options.stem.stretch_low_percent < options.stem.stretch_high_percent)) {
+  if (!(options.stem.contrast_low_percent < options.stem.contrast_high_percent)) {
     return fail(fmt::format(
-        "stem.stretch_low_percent: expected less than stem.stretch_high_percent ({}), found {}",
-        options.stem.stretch_high_percent, options.stem.stretch_low_percent));
+        "stem.contrast_low_percent: expected less than stem.contrast_high_percent ({}), found {}",
+        options.stem.contrast_high_percent, options.stem.contrast_low_percent));
   }
   return {};
 }

@@ -69,8 +69,8 @@ struct Field {
   }
 };
 
-inline constexpr std::array<std::string_view, 4> kScaleSources{"none", "constant", "camera_height",
-                                                               "ground_truth"};
+inline constexpr std::array<std::string_view, 4> kScaleSources{"none", "constant_speed",
+                                                               "camera_height", "ground_truth"};
 [[nodiscard]] inline std::string_view to_string(ScaleSource source) {
   return kScaleSources.at(static_cast<std::size_t>(source));
 }

@@ -203,7 +203,7 @@ class ResultWriter {
     report.camera = {drive_.frames.back().camera, drive_.frames.back().camera_sigma};
     if (config.scale.source == ScaleSource::kCameraHeight) {
       report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
-        return frame.road == RoadState::kMeasured;
+        return frame.scale_state == ScaleState::kMeasured;
       });
     }
     if (truth_) {
@@ -310,8 +310,8 @@ std::string config_text(const Run& run, std::size_t num_frames) {
   }
   // With what auto, -1 and 0 stand for, which may change with the manifest.
   Config effective = run.request.config;
-  effective.stem.upsample =
-      choose_upsample(effective.stem.upsample, effective.features.method, sequence.camera());
+  effective.stem.tracking_resolution = choose_tracking_resolution(
+      effective.stem.tracking_resolution, effective.features.method, sequence.camera());
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;
   return text + "\n" + dump_config(effective);

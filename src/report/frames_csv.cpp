@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kHeader =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,road,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
+    "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
 
 constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
@@ -24,7 +24,7 @@ std::string frames_csv_row(std::size_t frame, double timestamp_s, const FrameRes
       "{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{},{:.2f},{:.2f},{:.2f},{}\n",
       frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
       r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
-      r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.road),
+      r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.scale_state),
       r.camera.fx_px, r.camera.cx_px, r.camera.cy_px,
       sigmas ? fmt::format("{:.2f},{:.2f},{:.2f}", sigmas->fx_px, sigmas->cx_px, sigmas->cy_px)
              : ",,");

@@ -11,9 +11,9 @@ namespace stemvo {
 
 /// The header of frames.csv, with its newline. Columns: frame, timestamp_s, state, matches,
 /// inliers, s_h, s_f, r_h, model, stem_ms, features_ms, pose_ms, scale_sigma (of log(metres per
-/// unit); empty where no road is asked), road (-, none, held, measured: RoadState), fx_px, cx_px,
-/// cy_px (what was learnt of the camera), fx_sigma_px, cx_sigma_px, cy_sigma_px (empty where it is
-/// not refined).
+/// unit); empty where no road is asked), scale_state (-, none, held, measured: ScaleState), fx_px,
+/// cx_px, cy_px (what was learnt of the camera), fx_sigma_px, cx_sigma_px, cy_sigma_px (empty where
+/// it is not refined).
 [[nodiscard]] std::string_view frames_csv_header();
 /// A row with its newline; the frame in the folder's numbering.
 [[nodiscard]] std::string frames_csv_row(std::size_t frame,

@@ -17,10 +17,10 @@ std::string scale_explained(const MetricsReport& report) {
   if (source == "none" && report.metrics) {
     return source + " (files: up to scale; here: fitted to the true metres)";
   }
-  return source == "ground_truth" ? source + " (each step rescaled to its true length)"
-         : source == "constant"   ? source + " (every step the same length: not metric)"
-         : source == "none"       ? source + " (up to scale: units, not metres)"
-                                  : source;
+  return source == "ground_truth"     ? source + " (each step rescaled to its true length)"
+         : source == "constant_speed" ? source + " (every step the same length: not metric)"
+         : source == "none"           ? source + " (up to scale: units, not metres)"
+                                      : source;
 }
 
 std::string head(const MetricsReport& report) {

@@ -103,10 +103,11 @@ std::string fit_layer(const SearchRequest& request,
     return channels.error().message;
   }
   const cv::Size size = channels->front().values.size();
-  const Upsample upsample =
-      choose_upsample(layer.config.stem.upsample, layer.config.features.method, camera);
+  const TrackingResolution resolution = choose_tracking_resolution(
+      layer.config.stem.tracking_resolution, layer.config.features.method, camera);
   const int sampling_px = identity.sampling_px / zoom;
-  const double factor = static_cast<double>(sampling_px) / image_sampling_px(upsample, sampling_px);
+  const double factor =
+      static_cast<double>(sampling_px) / image_sampling_px(resolution, sampling_px);
   const std::size_t num_run = request.only_sequence ? 1 : num_sequences(request);
   const std::size_t bytes = bytes_in_flight(size, cv::Size2d(size) * factor, num_run);
   layer.max_in_flight = std::clamp<std::size_t>(kBlockBytes / bytes, 1, layer.max_in_flight);

@@ -23,7 +23,7 @@ struct PlanLayer {
 [[nodiscard]] inline int frame_zoom(const PlanLayer& layer, const Camera& camera) {
   const Config& config = layer.config;
   return layer.stem.frame_zoom(
-      choose_upsample(config.stem.upsample, config.features.method, camera));
+      choose_tracking_resolution(config.stem.tracking_resolution, config.features.method, camera));
 }
 
 /// A path that holds in any folder.

@@ -75,12 +75,12 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
   std::vector<float> samples = sample(channel.values);
   if (!samples.empty()) {
     const double margin = kMargin * (limits_.high - limits_.low);
-    const double low = percentile(samples, options_.stretch_low_percent, limits_.low + margin);
-    const double high = percentile(samples, options_.stretch_high_percent, limits_.high - margin);
+    const double low = percentile(samples, options_.contrast_low_percent, limits_.low + margin);
+    const double high = percentile(samples, options_.contrast_high_percent, limits_.high - margin);
     if (has_contrast(low, high)) {
       const double change = std::max(std::abs(low - limits_.low), std::abs(high - limits_.high));
       const bool has_jumped = change > kJump * (limits_.high - limits_.low);
-      const double memory = limits_.are_known && !has_jumped ? options_.stretch_memory : 0.0;
+      const double memory = limits_.are_known && !has_jumped ? options_.contrast_memory : 0.0;
       limits_.low = memory * limits_.low + (1.0 - memory) * low;
       limits_.high = memory * limits_.high + (1.0 - memory) * high;
       limits_.are_known = true;
@@ -92,7 +92,7 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
   const int sampling = static_cast<int>(std::lround(channel.map.scale.x()));
   STEMVO_CHECK(channel.map.scale.x() == sampling && channel.map.scale.y() == sampling,
                "a channel's sampling is a whole number of pixels");
-  const int wanted = image_sampling_px(options_.upsample, sampling);
+  const int wanted = image_sampling_px(options_.tracking_resolution, sampling);
   // Floats first: as fast as resizing 8 bits (0.46 against 0.52 ms for a frame of KITTI at sampling
   // 2), and rounded once, not twice (0.29 against 0.56 gray values rms).
   const cv::Mat* values = &channel.values;
@@ -112,22 +112,25 @@ ChannelImage ChannelStretch::apply(const Channel& channel) {
   return image;
 }
 
-Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera) {
+TrackingResolution choose_tracking_resolution(TrackingResolution asked,
+                                              FeatureMethod method,
+                                              const Camera& camera) {
   constexpr double kLongFocal_px = 500.0;
-  if (asked != Upsample::kAuto) {
+  if (asked != TrackingResolution::kAuto) {
     return asked;
   }
   if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
-    return Upsample::kBicubic;
+    return TrackingResolution::kInput;
   }
-  return camera.mean_focal_px() >= kLongFocal_px ? Upsample::kHalf : Upsample::kFrame;
+  return camera.mean_focal_px() >= kLongFocal_px ? TrackingResolution::kHalf
+                                                 : TrackingResolution::kInputZoomed;
 }
 
-int image_sampling_px(Upsample upsample, int sampling_px) {
-  if (upsample == Upsample::kNative) {
+int image_sampling_px(TrackingResolution resolution, int sampling_px) {
+  if (resolution == TrackingResolution::kNative) {
     return sampling_px;
   }
-  if (upsample == Upsample::kHalf) {
+  if (resolution == TrackingResolution::kHalf) {
     return sampling_px == 1 || sampling_px % 2 == 0 ? 2 : sampling_px;
   }
   return 1;

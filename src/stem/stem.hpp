@@ -50,8 +50,8 @@ class Stem {
 
   [[nodiscard]] const StemInfo& info() const { return info_; }
   /// How many times larger (bicubic) the frame is made for the filters: 2 or 1.
-  [[nodiscard]] int frame_zoom(Upsample upsample) const {
-    const bool is_asked = upsample == Upsample::kFrame && info_.takes_any_size;
+  [[nodiscard]] int frame_zoom(TrackingResolution resolution) const {
+    const bool is_asked = resolution == TrackingResolution::kInputZoomed && info_.takes_any_size;
     return is_asked && info_.sampling_px % 2 == 0 ? 2 : 1;
   }
   /// The one filter chosen.
@@ -79,11 +79,13 @@ class Stem {
 };
 
 /// What kAuto stands for: for tracked points kHalf where half the size still has many pixels per
-/// degree (a focal length of 500 px and more in the input), else kFrame; for others kBicubic.
-[[nodiscard]] Upsample choose_upsample(Upsample asked, FeatureMethod method, const Camera& camera);
+/// degree (a focal length of 500 px and more in the input), else kInputZoomed; for others kInput.
+[[nodiscard]] TrackingResolution choose_tracking_resolution(TrackingResolution asked,
+                                                            FeatureMethod method,
+                                                            const Camera& camera);
 
 /// Input pixels per pixel of the image made from a channel of `sampling_px`.
-[[nodiscard]] int image_sampling_px(Upsample upsample, int sampling_px);
+[[nodiscard]] int image_sampling_px(TrackingResolution resolution, int sampling_px);
 
 /// Float channel -> 8-bit image: percentile limits that change slowly along the drive, so that a
 /// patch keeps its gray value from frame to frame; then bicubic upsampling by the whole factor that
@@ -92,7 +94,8 @@ class Stem {
 /// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
 class ChannelStretch {
  public:
-  /// Of `options.upsample`, kAuto and kFrame stand for kBicubic: see choose_upsample.
+  /// Of `options.tracking_resolution`, kAuto and kInputZoomed stand for
+  /// kInput: see choose_tracking_resolution.
   explicit ChannelStretch(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 

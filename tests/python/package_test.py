@@ -41,7 +41,7 @@ errors = truth is not None and stemvo.evaluate(poses[frames], truth, "sim3" if s
 def camera_of(result):  # as frames.csv has it
     camera, sigma = result.camera, result.camera_sigma
     return [f"{value:.2f}" for value in (camera.fx, camera.cx, camera.cy, sigma.fx, sigma.cx, sigma.cy)]
-print(json.dumps({"states": [[r.state, r.num_matches, r.num_inliers, r.road, r.timestamp, *camera_of(r)] for r in results], "scale_source": scale,
+print(json.dumps({"states": [[r.state, r.num_matches, r.num_inliers, r.scale_state, r.timestamp, *camera_of(r)] for r in results], "scale_source": scale,
                   "errors": errors or None, "true_frames": None if frames is None else frames.tolist()}))
 """
 
@@ -194,7 +194,7 @@ class Package(unittest.TestCase):
         for name in ("trajectory_kitti.txt", "trajectory_refined_kitti.txt"):
             self.assertEqual((python / name).read_text(), (program / name).read_text(), f"{recording}: {name}")
         rows = list(csv.DictReader((program / "frames.csv").read_text().splitlines()))
-        states = [[row["state"], int(row["matches"]), int(row["inliers"]), row["road"], float(row["timestamp_s"]), *(row[f"{key}_px"] for key in CAMERA)] for row in rows]
+        states = [[row["state"], int(row["matches"]), int(row["inliers"]), row["scale_state"], float(row["timestamp_s"]), *(row[f"{key}_px"] for key in CAMERA)] for row in rows]
         self.assertEqual(done["states"], states, recording)
         metrics = json.loads((program / "metrics.json").read_text())
         self.assertEqual(done["scale_source"], metrics["scale_source"], recording)

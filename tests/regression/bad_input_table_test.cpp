@@ -91,7 +91,7 @@ TEST_F(BadInputTable, CameraFile) {
 }
 
 TEST_F(BadInputTable, ConfigurationFile) {
-  write_file(folder_ / "my.yaml", "scale:\n  constant_m: 1.5\n");
+  write_file(folder_ / "my.yaml", "scale:\n  step_m: 1.5\n");
   expect_refused_with_faults(
       folder_ / "my.yaml", "1.5",
       {"run", folder_ / "none", "--out", folder_ / "out", "--config", folder_ / "my.yaml"},
@@ -230,7 +230,7 @@ TEST_F(BadInputTable, ConfigurationKeys) {
           key);
       add(key, "nan", key);
       add(key, "1e300", key);
-      const bool is_pair = key.starts_with("stem.stretch_");  // one of them ends at the other
+      const bool is_pair = key.starts_with("stem.contrast_");  // one of them ends at the other
       add(key, fmt::format("{}", field.rule.min), is_pair ? "error" : none);
       add(key, fmt::format("{}", field.rule.max), is_pair ? "error" : none);
     }

@@ -311,9 +311,10 @@ TEST_F(BadInput, Configuration) {
   expect_error(run({"--set", "stem.filtre=3"}), 1, {"--set stem.filtre: unknown key"});
   expect_error(run({"--set", "scale.source=gps"}), 1,
                {"none, constant, camera_height, ground_truth, found 'gps'"});
-  expect_error(run({"--set", "scale.constant_m=nan"}), 1, {"scale.constant_m", "nan"});
-  expect_error(run({"--map", "--set", "odometry.mode=two_frame", "--set", "scale.source=constant"}),
-               1, {"--map", "odometry.mode map", "found two_frame"});
+  expect_error(run({"--set", "scale.step_m=nan"}), 1, {"scale.step_m", "nan"});
+  expect_error(
+      run({"--map", "--set", "odometry.mode=two_frame", "--set", "scale.source=constant_speed"}), 1,
+      {"--map", "odometry.mode map", "found two_frame"});
 }
 
 TEST_F(BadInput, FramesOutsideTheSequence) {

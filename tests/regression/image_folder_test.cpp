@@ -131,7 +131,7 @@ TEST_F(ImageFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   write_file(folder_ / "my.yaml", "scale:\n  camera_height_m: 1.5\n  source: camera_height\n");
   expect_scale({}, "none", "1.65");
   expect_scale({"--set", "scale.source=camera_height"}, "camera_height", "1.65");
-  expect_scale({"--set", "scale.source=constant"}, "constant", "1.65");
+  expect_scale({"--set", "scale.source=constant_speed"}, "constant_speed", "1.65");
   expect_scale({"--config", folder_ / "my.yaml"}, "camera_height", "1.5");
   expect_scale({"--config", "fast"}, "none", "1.65");
   write_file(camera_, height);

@@ -137,7 +137,7 @@ TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
   const ProgramResult program =
       run_stemvo({"search", small.string(), "--exhaustive", "--no-baselines", "--model", "paper",
                   "--filters", "0:2", "--set", "stem.sampling_px=4", "--set",
-                  "stem.upsample=bicubic", "--out", folder_ / "small"});
+                  "stem.tracking_resolution=input", "--out", folder_ / "small"});
   ASSERT_EQ(program.exit_code, 0) << program.err;
   EXPECT_THAT(program.out, AllOf(HasSubstr("not detected"), HasSubstr("channel 40x12")));
   // It never ran, so there are no numbers that could look good.

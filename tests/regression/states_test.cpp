@@ -37,7 +37,7 @@ class States : public ::testing::TestWithParam<std::string> {
   }
   /// Lengths that nobody gave.
   [[nodiscard]] StateRun run_without_truth(const fs::path& sequence) const {
-    return run(sequence, is_map() ? "camera_height" : "constant");
+    return run(sequence, is_map() ? "camera_height" : "constant_speed");
   }
   [[nodiscard]] StateRun run(const fs::path& sequence, const std::string& scale) const {
     return run_states(sequence, GetParam(), scale);
@@ -151,7 +151,7 @@ TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
                   "odometry.mode=map", "--set", "scale.source=camera_height"});
   ASSERT_EQ(done.exit_code, 0) << done.err;
   const std::string csv = read_file(out + "/frames.csv");
-  const std::vector<std::string> roads = column(csv, "road");
+  const std::vector<std::string> roads = column(csv, "scale_state");
   const std::vector<std::string> sigmas = column(csv, "scale_sigma");
   const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");
   ASSERT_TRUE(poses) << poses.error().message;

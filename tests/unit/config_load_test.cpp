@@ -5,7 +5,9 @@
 #include <iterator>
 #include <limits>
 #include <string>
+#include <utility>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -91,12 +93,31 @@ TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
 }
 
 TEST_F(ConfigLoad, ARenamedKeyNamesItsNewName) {
-  EXPECT_EQ(error_of("scale:\n  joining: false\n"),
-            ":2: scale.joining: unknown key; its name is scale.temporal_filter now");
+  for (const auto& [old_name, new_name] : {std::pair("refine.window", "window.num_keyframes"),
+                                           {"refine.every", "ba.every_n_keyframes"},
+                                           {"refine.max_iterations", "ba.max_iterations"},
+                                           {"refine.loss_px", "ba.loss_px"},
+                                           {"scale.constant_m", "scale.step_m"},
+                                           {"scale.joining", "scale.temporal_filter"},
+                                           {"stem.upsample", "stem.tracking_resolution"},
+                                           {"stem.stretch_memory", "stem.contrast_memory"}}) {
+    const std::string name = old_name;
+    const std::string problem = fmt::format("{}: unknown key; its name is {} now", name, new_name);
+    const std::size_t dot = name.find('.');
+    EXPECT_EQ(error_of(name.substr(0, dot) + ":\n  " + name.substr(dot + 1) + ": 1\n"),
+              ":2: " + problem);
+    Config config;
+    EXPECT_EQ(apply_override(config, name + "=1").error().message, "--set " + problem);
+  }
+}
+
+TEST_F(ConfigLoad, ARenamedValueNamesItsNewName) {
+  EXPECT_THAT(error_of("scale:\n  source: constant\n"),
+              AllOf(StartsWith(":2: scale.source: expected one of none, constant_speed, "),
+                    EndsWith("found 'constant'; its name is scale.source=constant_speed now")));
   Config config;
-  const Status status = apply_override(config, "odometry.standing_flow_px=0.2");
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, EndsWith("its name is odometry.stationary_flow_px now"));
+  EXPECT_THAT(apply_override(config, "stem.tracking_resolution=bicubic").error().message,
+              EndsWith("its name is stem.tracking_resolution=input now"));
 }
 
 TEST_F(ConfigLoad, DuplicatedKeyNamesBothLines) {
@@ -132,10 +153,10 @@ TEST_F(ConfigLoad, ValueOutOfRangeNamesTheLine) {
             ":2: features.method: expected one of patch, klt, orb, sift, found 'surf'");
   EXPECT_EQ(error_of("features:\n  klt_window: 20\n"),
             ":2: features.klt_window: expected a whole number odd, from 3 to 201, found 20");
-  EXPECT_EQ(error_of("scale:\n  constant_m: nan\n"),
-            ":2: scale.constant_m: expected a number from 1e-06 to 1000000, found nan");
-  EXPECT_EQ(error_of("scale:\n  constant_m: inf\n"),
-            ":2: scale.constant_m: expected a number from 1e-06 to 1000000, found inf");
+  EXPECT_EQ(error_of("scale:\n  step_m: nan\n"),
+            ":2: scale.step_m: expected a number from 1e-06 to 1000000, found nan");
+  EXPECT_EQ(error_of("scale:\n  step_m: inf\n"),
+            ":2: scale.step_m: expected a number from 1e-06 to 1000000, found inf");
   EXPECT_EQ(error_of("seed: -1\n"), ":1: seed: expected a whole number of at least 0, found '-1'");
   EXPECT_EQ(error_of("stem:\n  filter: 99999999999\n"),
             ":2: stem.filter: expected a whole number, found '99999999999'");
@@ -171,7 +192,7 @@ TEST_F(ConfigLoad, DumpReadsBackToTheSameBits) {
   config.stem.model = "models/a b: \"c\" #\n\xc3\xa9.onnx";
   config.two_view.sigma_px = 0.1 + 0.2;
   config.two_view.refine_loss_px = std::nextafter(1.0, 2.0);
-  config.scale.constant_m = 1e-6;
+  config.scale.step_m = 1e-6;
   config.scale.camera_height_m = 1e3 / 7.0;
   config.evaluation.segment_lengths_m = {1.0 / 3.0, 5.0};
   config.seed = std::numeric_limits<std::uint64_t>::max();
@@ -180,7 +201,7 @@ TEST_F(ConfigLoad, DumpReadsBackToTheSameBits) {
   EXPECT_EQ(read->stem.model, config.stem.model);
   EXPECT_EQ(read->two_view.sigma_px, config.two_view.sigma_px);
   EXPECT_EQ(read->two_view.refine_loss_px, config.two_view.refine_loss_px);
-  EXPECT_EQ(read->scale.constant_m, config.scale.constant_m);
+  EXPECT_EQ(read->scale.step_m, config.scale.step_m);
   EXPECT_EQ(read->evaluation.segment_lengths_m, config.evaluation.segment_lengths_m);
   EXPECT_EQ(dump_config(*read), dump_config(config));
   for (const char* model : {"null", "~", "10", "true", "-", "- a", "a: b", "#x"}) {
@@ -220,7 +241,7 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
   EXPECT_THAT(error_of("stem.filter"), HasSubstr("expected key=value"));
   EXPECT_EQ(error_of("stem.filter=a"), "--set stem.filter: expected a whole number, found 'a'");
   EXPECT_EQ(error_of("scale.source=gps"),
-            "--set scale.source: expected one of none, constant, camera_height, ground_truth, "
+            "--set scale.source: expected one of none, constant_speed, camera_height, ground_truth, "
             "found 'gps'");
   EXPECT_EQ(error_of("stem.model="), "--set stem.model: expected a text, found nothing");
   EXPECT_EQ(
@@ -239,9 +260,9 @@ TEST(ConfigValidate, EveryNumberRefusesNan) {
   };
   EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.sigma_px; }));
   EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.homography_ratio; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.scale.constant_m; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.scale.step_m; }));
   EXPECT_TRUE(refuses([](Config& c) -> double& { return c.features.min_distance_px; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.stem.stretch_low_percent; }));
+  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.stem.contrast_low_percent; }));
   Config config;
   config.evaluation.segment_lengths_m = {100.0, nan};
   EXPECT_FALSE(validate(config));
@@ -249,10 +270,10 @@ TEST(ConfigValidate, EveryNumberRefusesNan) {
 
 TEST(ConfigValidate, PercentilesMustBeInOrder) {
   Config config;
-  config.stem.stretch_low_percent = 99.9;
+  config.stem.contrast_low_percent = 99.9;
   ASSERT_FALSE(validate(config));
   EXPECT_THAT(validate(config).error().message,
-              StartsWith("stem.stretch_low_percent: expected less than "));
+              StartsWith("stem.contrast_low_percent: expected less than "));
 }
 
 TEST(ConfigFiles, DefaultYamlIsWhatTheProgramWrites) {

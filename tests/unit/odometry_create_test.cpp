@@ -132,7 +132,7 @@ TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
   camera.width_px = 1;
   camera.height_px = 1;
   Options options;
-  options.stem.upsample = Upsample::kHalf;
+  options.stem.tracking_resolution = TrackingResolution::kHalf;
   EXPECT_THAT(error_of(options, camera), HasSubstr("found 1x1"));
 }
 

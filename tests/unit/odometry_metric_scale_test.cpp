@@ -42,7 +42,7 @@ TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
   run.road = [&](int i) { return drive.road_image(i, i < num_seen); };
   run.add_all();
   const double unknown = run.results[0].scale_sigma.value();
-  EXPECT_EQ(run.results[0].road, RoadState::kNone);
+  EXPECT_EQ(run.results[0].scale_state, ScaleState::kNone);
   EXPECT_EQ(run.results[0].road_reason, "first frame");
   double last_sigma = unknown;
   for (int i = 1; i < 20; ++i) {
@@ -50,13 +50,13 @@ TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
     if (step_m(run, i) == 0.0) {  // waits for parallax
       EXPECT_LT(i, 5);
       EXPECT_EQ(result.state, FrameState::kInitializing) << i;
-      EXPECT_EQ(result.road, RoadState::kNone) << i;
+      EXPECT_EQ(result.scale_state, ScaleState::kNone) << i;
       EXPECT_EQ(result.road_reason, "no map") << i;
     } else if (i < num_seen) {
-      EXPECT_EQ(result.road, RoadState::kMeasured) << i << ": " << result.road_reason;
+      EXPECT_EQ(result.scale_state, ScaleState::kMeasured) << i << ": " << result.road_reason;
       EXPECT_EQ(result.road_reason, "");
     } else {
-      EXPECT_EQ(result.road, RoadState::kHeld) << i;
+      EXPECT_EQ(result.scale_state, ScaleState::kHeld) << i;
       EXPECT_NE(result.road_reason, "");
       EXPECT_GT(result.scale_sigma.value(), last_sigma) << i;
       EXPECT_NEAR(step_m(run, i), kStep_m, 0.03 * kStep_m) << i;
@@ -69,13 +69,13 @@ TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
 TEST_P(MetricScaleOf, ARoadThatIsNotAskedIsDisabled) {
   const RoadDrive drive(4);
   Options config = metric_config(GetParam());
-  config.scale.source = ScaleSource::kConstant;
+  config.scale.source = ScaleSource::kConstantSpeed;
   const auto estimator = make_estimator(config, drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_all();
   for (const FrameResult& result : run.results) {
-    EXPECT_EQ(result.road, RoadState::kDisabled);
+    EXPECT_EQ(result.scale_state, ScaleState::kDisabled);
     EXPECT_FALSE(result.scale_sigma.has_value());
   }
 }
@@ -88,12 +88,12 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
   run.add_range(0, 10);
   const FrameResult missing = run.add_missing();
   EXPECT_EQ(missing.state, FrameState::kNoImage);
-  EXPECT_EQ(missing.road, RoadState::kHeld);
+  EXPECT_EQ(missing.scale_state, ScaleState::kHeld);
   EXPECT_EQ(missing.road_reason, "no image");
   EXPECT_GT(missing.scale_sigma, run.results[9].scale_sigma);
   EXPECT_NEAR(step_m(run, 10), kStep_m, 0.03 * kStep_m);  // the motion goes on
   const FrameResult after = run.add(11);
-  EXPECT_EQ(after.road, RoadState::kMeasured) << after.road_reason;
+  EXPECT_EQ(after.scale_state, ScaleState::kMeasured) << after.road_reason;
   EXPECT_NEAR(
       after.world_from_camera.translation.z() - run.results[9].world_from_camera.translation.z(),
       2.0 * kStep_m, 0.05 * kStep_m);
@@ -118,13 +118,13 @@ TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
   EstimatorRun run(estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, i >= first_road); };
   run.add_range(0, first_road);
-  EXPECT_EQ(run.results.back().road, RoadState::kNone);
+  EXPECT_EQ(run.results.back().scale_state, ScaleState::kNone);
   const double unit_m = kStep_m / step_m(run, first_road - 1);
   EXPECT_NEAR(step_m(run, first_road - 1), 1.0, 0.05);  // the assumed step
   const int left_before = estimator.window().keyframes.front().frame;
   ASSERT_GT(left_before, 2);
   run.add_range(first_road, num_frames);
-  EXPECT_EQ(run.results.back().road, RoadState::kMeasured);
+  EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured);
   EXPECT_NEAR(step_m(run, num_frames - 1), kStep_m, 0.02 * kStep_m);
   const std::vector<Rigid3> refined = estimator.refined_trajectory();
   ASSERT_EQ(refined.size(), static_cast<std::size_t>(num_frames));
@@ -149,7 +149,7 @@ TEST(MetricScale, DisabledItChangesNothing) {
   scale.hold("no image");
   FrameResult result;
   scale.report(result);
-  EXPECT_EQ(result.road, RoadState::kDisabled);
+  EXPECT_EQ(result.scale_state, ScaleState::kDisabled);
   EXPECT_EQ(result.road_reason, "");
   EXPECT_FALSE(result.scale_sigma.has_value());
 }

@@ -25,7 +25,7 @@ MeasuredMotion driven(const Eigen::Vector3d& direction,
 
 MotionChain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
   ScaleOptions scale;
-  scale.constant_m = step_m;
+  scale.step_m = step_m;
   return {options, scale};
 }
 
@@ -39,7 +39,7 @@ TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
 TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
   ScaleOptions scale;
   scale.source = ScaleSource::kNone;
-  scale.constant_m = 0.7;
+  scale.step_m = 0.7;
   MotionChain chain({}, scale);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));

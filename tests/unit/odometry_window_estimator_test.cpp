@@ -328,11 +328,12 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
   EstimatorRun run(estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_range(0, 10);
-  EXPECT_EQ(run.results.back().road, RoadState::kMeasured);
+  EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured);
   const FrameResult lost = run.add_matches({}, 10);
   EXPECT_EQ(lost.state, FrameState::kLost);
   EXPECT_EQ(lost.num_inliers, 0);
-  EXPECT_NE(lost.road, RoadState::kMeasured);  // a motion that was not measured measures no road
+  EXPECT_NE(lost.scale_state,
+            ScaleState::kMeasured);  // a motion that was not measured measures no road
   EXPECT_GE(lost.scale_sigma.value(), run.results[9].scale_sigma.value());
   bool is_new_map = false;
   for (int i = 11; i < 24; ++i) {
@@ -343,7 +344,7 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
     const FrameResult result = run.add_matches(matches, i);
     EXPECT_NE(result.state, FrameState::kLost) << i;
     if (result.state == FrameState::kInitializing) {  // the old map's scale is not the new one's
-      EXPECT_NE(result.road, RoadState::kHeld) << i;
+      EXPECT_NE(result.scale_state, ScaleState::kHeld) << i;
     }
     if (!is_new_map && result.state == FrameState::kTracking) {
       is_new_map = true;
@@ -351,7 +352,8 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
     }
   }
   EXPECT_TRUE(is_new_map);
-  EXPECT_EQ(run.results.back().road, RoadState::kMeasured) << run.results.back().road_reason;
+  EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured)
+      << run.results.back().road_reason;
   const double step = (run.results[23].world_from_camera.translation -
                        run.results[22].world_from_camera.translation)
                           .norm();

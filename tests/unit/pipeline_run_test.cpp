@@ -106,7 +106,7 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
 
 TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
-  request_.config.scale.source = ScaleSource::kConstant;
+  request_.config.scale.source = ScaleSource::kConstantSpeed;
   ASSERT_TRUE(run_sequence(request_).value().written);
   const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   request_.config.scale.source = ScaleSource::kGroundTruth;
@@ -157,7 +157,7 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
 TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kNone;
-  request_.config.scale.constant_m = 0.25;
+  request_.config.scale.step_m = 0.25;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
@@ -219,7 +219,7 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
 }
 
 TEST_F(PipelineRun, WhereNoRunHasBeenNothingIsRemoved) {
-  request_.config.scale.source = ScaleSource::kConstant;
+  request_.config.scale.source = ScaleSource::kConstantSpeed;
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "map.ply") << "somebody's";
   ASSERT_TRUE(run_sequence(request_));
@@ -230,7 +230,7 @@ TEST_F(PipelineRun, WhereNoRunHasBeenNothingIsRemoved) {
 
 TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
-  request_.config.scale.source = ScaleSource::kConstant;
+  request_.config.scale.source = ScaleSource::kConstantSpeed;
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "frames.csv") << frames_csv_header();
   std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
@@ -287,8 +287,8 @@ TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
 
 TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
   RunRequest request = request_;
-  request.config.scale.constant_m = 0.0;
-  EXPECT_THAT(error_of(request), HasSubstr("scale.constant_m"));
+  request.config.scale.step_m = 0.0;
+  EXPECT_THAT(error_of(request), HasSubstr("scale.step_m"));
   request = request_;
   request.config.stem.model = "nothing";
   EXPECT_THAT(error_of(request), HasSubstr("nothing"));

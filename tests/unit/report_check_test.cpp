@@ -15,7 +15,7 @@ using ::stemvo::testing::TempFolder;
 using ::testing::HasSubstr;
 
 constexpr char kMetrics[] = R"({"t_rel_percent": 0.83, "tracked_fraction": 1.0, "frames": 400,
-  "r_rel_deg_per_100m": null, "scale_source": "constant", "segment_lengths_m": [100.0],
+  "r_rel_deg_per_100m": null, "scale_source": "constant_speed", "segment_lengths_m": [100.0],
   "ate_rmse_m": {"none": 2.5, "sim3": 1.25}, "gone": null})";
 
 Expected<std::vector<ThresholdResult>> check(const std::string& thresholds,

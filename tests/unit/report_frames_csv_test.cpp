@@ -15,7 +15,7 @@ using ::testing::StartsWith;
 
 constexpr char kHeader[] =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
-    "scale_sigma,road,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
+    "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px\n";
 
 FrameResult tracked() {
   FrameResult result;
@@ -26,7 +26,7 @@ FrameResult tracked() {
   result.fundamental_score = 4321.0;
   result.homography_ratio = 0.22221;
   result.model = TwoViewModel::kEssential;
-  result.road = RoadState::kHeld;
+  result.scale_state = ScaleState::kHeld;
   result.scale_sigma = 0.01234;
   result.camera = {700.0, 710.0, 600.5, 180.25, 1241, 376};
   result.camera_sigma = {3.5, 0.5, 0.75};

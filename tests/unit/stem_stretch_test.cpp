@@ -28,8 +28,8 @@ Channel ramp(float low, float high) {
 
 TEST(ChannelStretch, PercentilesBecomeBlackAndWhite) {
   StemOptions options;
-  options.stretch_low_percent = 10.0;
-  options.stretch_high_percent = 60.0;
+  options.contrast_low_percent = 10.0;
+  options.contrast_high_percent = 60.0;
   ChannelStretch stretch(options);
   const ChannelImage image = stretch.apply(ramp(-3.0F, 7.0F));
   ASSERT_EQ(image.pixels.type(), CV_8UC1);
@@ -46,9 +46,9 @@ TEST(ChannelStretch, PercentilesBecomeBlackAndWhite) {
 
 TEST(ChannelStretch, LimitsFollowSlowly) {
   StemOptions options;
-  options.stretch_low_percent = 0.0;
-  options.stretch_high_percent = 100.0;
-  options.stretch_memory = 0.75;
+  options.contrast_low_percent = 0.0;
+  options.contrast_high_percent = 100.0;
+  options.contrast_memory = 0.75;
   ChannelStretch stretch(options);
   (void)stretch.apply(ramp(0.0F, 100.0F));
   // White moves from 100 to 0.75 * 100 + 0.25 * 116 = 104.
@@ -61,8 +61,8 @@ TEST(ChannelStretch, LimitsFollowSlowly) {
 /// A lamp goes on, a tunnel ends: nothing of the new image is cut off or lost in a few gray values.
 TEST(ChannelStretch, LimitsJumpWithTheLight) {
   StemOptions options;
-  options.stretch_low_percent = 0.0;
-  options.stretch_high_percent = 100.0;
+  options.contrast_low_percent = 0.0;
+  options.contrast_high_percent = 100.0;
   ChannelStretch stretch(options);
   const cv::Mat before = stretch.apply(ramp(0.0F, 100.0F)).pixels;
   for (const float white : {200.0F, 20.0F}) {
@@ -112,9 +112,9 @@ TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsOfThatSize) {
     channel.map.scale = Eigen::Vector2d::Constant(sampling);
     channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
     StemOptions options;
-    options.upsample = Upsample::kNative;
+    options.tracking_resolution = TrackingResolution::kNative;
     const ChannelImage native = ChannelStretch(options).apply(channel);
-    options.upsample = Upsample::kHalf;
+    options.tracking_resolution = TrackingResolution::kHalf;
     const ChannelImage half = ChannelStretch(options).apply(channel);
     EXPECT_EQ(cv::norm(native.pixels, half.pixels, cv::NORM_INF), 0.0);
     EXPECT_EQ(native.map.scale, half.map.scale);
@@ -129,9 +129,9 @@ TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   cv::theRNG().state = 1;
   cv::randu(channel.values, 0.0, 255.0);
   StemOptions options;
-  options.upsample = Upsample::kHalf;
-  options.stretch_low_percent = 0.0;
-  options.stretch_high_percent = 100.0;
+  options.tracking_resolution = TrackingResolution::kHalf;
+  options.contrast_low_percent = 0.0;
+  options.contrast_high_percent = 100.0;
   const ChannelImage half = ChannelStretch(options).apply(channel);
   ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
   const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
@@ -142,7 +142,7 @@ TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
 
 TEST(ChannelStretch, NativeKeepsTheSize) {
   StemOptions options;
-  options.upsample = Upsample::kNative;
+  options.tracking_resolution = TrackingResolution::kNative;
   ChannelStretch stretch(options);
   Channel channel = ramp(0.0F, 1.0F);
   channel.map.scale = Eigen::Vector2d(2, 2);
@@ -168,27 +168,27 @@ Eigen::Vector2d centre_of(const cv::Mat& pixels) {
 struct Case {
   const TinyStem* stem;
   int sampling;
-  Upsample upsample;
+  TrackingResolution resolution;
 };
 
 void PrintTo(const Case& tested, std::ostream* out) {
   *out << tested.stem->name << "_at_" << tested.sampling << '_'
-       << static_cast<int>(tested.upsample);
+       << static_cast<int>(tested.resolution);
 }
 
 class BrightSpot : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
-  const auto& [tiny, sampling, upsample] = GetParam();
+  const auto& [tiny, sampling, resolution] = GetParam();
   const testing::TempFolder folder;
   testing::write_models(folder, *tiny);
   StemOptions options;
   options.model = tiny->name;
   options.filter = 0;  // a box: the only symmetric one
   options.sampling_px = sampling;
-  options.upsample = upsample;
-  options.stretch_low_percent = 0.0;
-  options.stretch_high_percent = 100.0;
+  options.tracking_resolution = resolution;
+  options.contrast_low_percent = 0.0;
+  options.contrast_high_percent = 100.0;
   auto stem = create_stem(options, folder.path());
   ASSERT_TRUE(stem) << stem.error().message;
   for (const Eigen::Vector2d& spot :
@@ -207,12 +207,12 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
-    if (upsample == Upsample::kHalf) {
+    if (resolution == TrackingResolution::kHalf) {
       const cv::Size size = channel->values.size();
       EXPECT_EQ(image.pixels.size(), sampling == 1 ? size / 2 : size * (sampling / 2));
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(2, 2));
     }
-    if (upsample == Upsample::kBicubic) {
+    if (resolution == TrackingResolution::kInput) {
       EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(1, 1));
     }
@@ -221,36 +221,36 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
 
 INSTANTIATE_TEST_SUITE_P(All,
                          BrightSpot,
-                         ::testing::Values(Case{&testing::kPlain4, 4, Upsample::kBicubic},
-                                           Case{&testing::kPlain4, 2, Upsample::kBicubic},
-                                           Case{&testing::kPlain4, 2, Upsample::kNative},
-                                           Case{&testing::kPlain4, 4, Upsample::kHalf},
-                                           Case{&testing::kPlain4, 2, Upsample::kHalf},
-                                           Case{&testing::kPlain4, 1, Upsample::kHalf},
-                                           Case{&testing::kPlain4, 1, Upsample::kBicubic},
-                                           Case{&testing::kPadded3, 2, Upsample::kBicubic},
-                                           Case{&testing::kPadded3, 2, Upsample::kNative},
-                                           Case{&testing::kPadded3, 1, Upsample::kBicubic},
-                                           Case{&testing::kSame3, 2, Upsample::kBicubic},
-                                           Case{&testing::kPadded7, 2, Upsample::kBicubic},
-                                           Case{&testing::kPadded7, 1, Upsample::kBicubic}),
+                         ::testing::Values(Case{&testing::kPlain4, 4, TrackingResolution::kInput},
+                                           Case{&testing::kPlain4, 2, TrackingResolution::kInput},
+                                           Case{&testing::kPlain4, 2, TrackingResolution::kNative},
+                                           Case{&testing::kPlain4, 4, TrackingResolution::kHalf},
+                                           Case{&testing::kPlain4, 2, TrackingResolution::kHalf},
+                                           Case{&testing::kPlain4, 1, TrackingResolution::kHalf},
+                                           Case{&testing::kPlain4, 1, TrackingResolution::kInput},
+                                           Case{&testing::kPadded3, 2, TrackingResolution::kInput},
+                                           Case{&testing::kPadded3, 2, TrackingResolution::kNative},
+                                           Case{&testing::kPadded3, 1, TrackingResolution::kInput},
+                                           Case{&testing::kSame3, 2, TrackingResolution::kInput},
+                                           Case{&testing::kPadded7, 2, TrackingResolution::kInput},
+                                           Case{&testing::kPadded7, 1, TrackingResolution::kInput}),
                          ::testing::PrintToStringParamName());
 
 TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
-  using enum Upsample;
+  using enum TrackingResolution;
   const auto camera = [](double focal_px) {
     return Camera{focal_px, focal_px, 320, 240, 640, 480};
   };
   for (const FeatureMethod method : {FeatureMethod::kPatch, FeatureMethod::kKlt}) {
-    EXPECT_EQ(choose_upsample(kAuto, method, camera(718)), kHalf);
-    EXPECT_EQ(choose_upsample(kAuto, method, camera(500)), kHalf);
-    EXPECT_EQ(choose_upsample(kAuto, method, camera(499)), kFrame);
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(718)), kHalf);
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(500)), kHalf);
+    EXPECT_EQ(choose_tracking_resolution(kAuto, method, camera(499)), kInputZoomed);
   }
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kOrb, camera(718)), kBicubic);
-  EXPECT_EQ(choose_upsample(kAuto, FeatureMethod::kSift, camera(718)), kBicubic);
-  for (const Upsample asked : {kBicubic, kFrame, kHalf, kNative}) {
-    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kKlt, camera(718)), asked);
-    EXPECT_EQ(choose_upsample(asked, FeatureMethod::kOrb, camera(300)), asked);
+  EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kOrb, camera(718)), kInput);
+  EXPECT_EQ(choose_tracking_resolution(kAuto, FeatureMethod::kSift, camera(718)), kInput);
+  for (const TrackingResolution asked : {kInput, kInputZoomed, kHalf, kNative}) {
+    EXPECT_EQ(choose_tracking_resolution(asked, FeatureMethod::kKlt, camera(718)), asked);
+    EXPECT_EQ(choose_tracking_resolution(asked, FeatureMethod::kOrb, camera(300)), asked);
   }
 }
 

@@ -160,11 +160,12 @@ TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
       ASSERT_NEAR(channel.values.at<float>(row, column), 2.0 * uv.x() + 3.0 * uv.y(), 0.51);
     }
   }
-  EXPECT_EQ(gray.frame_zoom(Upsample::kFrame), 1) << "its sampling is odd: nothing to gain";
+  EXPECT_EQ(gray.frame_zoom(TrackingResolution::kInputZoomed), 1)
+      << "its sampling is odd: nothing to gain";
 
   const Stem learned = Stem::create({}).value();
-  EXPECT_EQ(learned.frame_zoom(Upsample::kBicubic), 1);
-  ASSERT_EQ(learned.frame_zoom(Upsample::kFrame), 2);
+  EXPECT_EQ(learned.frame_zoom(TrackingResolution::kInput), 1);
+  ASSERT_EQ(learned.frame_zoom(TrackingResolution::kInputZoomed), 2);
   const Channel fine = learned.apply(ramp, 2).value();
   EXPECT_EQ(fine.values.size(), ramp.size());
   EXPECT_EQ(fine.map.scale, Eigen::Vector2d::Ones());
@@ -271,13 +272,13 @@ TEST_F(StemErrors, SmallFramesAndFixedSizes) {
   EXPECT_EQ(stem.apply(cv::Mat1b(5, 6, 1))->values.size(), cv::Size(2, 1));
   EXPECT_THAT(stem.apply(cv::Mat1b(3, 9, 1)).error().message,
               HasSubstr("expected frames of at least 4x4, found 9x3"));
-  EXPECT_EQ(stem.frame_zoom(Upsample::kFrame), 2);
+  EXPECT_EQ(stem.frame_zoom(TrackingResolution::kInputZoomed), 2);
   EXPECT_THAT(stem.apply(cv::Mat1b(1, 9, 1), 2).error().message,
               AllOf(HasSubstr("at least 4x4, found 18x2"), HasSubstr("a frame of 9x1 enlarged")));
   const testing::TempFolder other;
   testing::write_models(other, testing::kFixed4);
   const Stem fixed = make_stem(other, testing::kFixed4, 2);
-  EXPECT_EQ(fixed.frame_zoom(Upsample::kFrame), 1);
+  EXPECT_EQ(fixed.frame_zoom(TrackingResolution::kInputZoomed), 1);
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
   EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
               HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
