@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""20,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
+"""10,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
 is kept of a frame: pose, row and landmarks."""
 
 import os
@@ -12,7 +12,7 @@ from drives import watched_run
 
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 RENDERED = 100
-FRAMES = 20000
+FRAMES = 10000
 MAX_KB_PER_FRAME = 8.0
 MAX_FILES_FOR_A_MOMENT = 3
 
