@@ -64,7 +64,7 @@ Expected<int> run(RobustnessArguments& arguments) {
     print(robustness::format_table(*report));
     print(fmt::format("report: {}\n", (request.out_dir / "report.html").string()));
   }
-  print_json(nlohmann::ordered_json::parse(robustness::format_json(*report)));
+  print_json(robustness::document(*report));
   if (report->interrupted) {
     print_warning("interrupted; the rows that were finished are written");
     return kExitInterrupted;

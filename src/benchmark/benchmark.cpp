@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "benchmark/kept_run.hpp"
+#include "html/page.hpp"
 #include "pipeline/earlier_run.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/json_file.hpp"
@@ -133,9 +134,7 @@ class Benchmark {
       if (!paths) {
         return paths.error();
       }
-      if (!paths->empty()) {
-        paths_[text_of(sequence["name"])] = *std::move(paths);
-      }
+      paths_[text_of(sequence["name"])] = *std::move(paths);
       if (const Status written = write_files(); !written) {
         return written.error();
       }
@@ -291,20 +290,24 @@ class Benchmark {
     return benchmark::write_page(request_.out_dir / "report.html", report_, paths_, request_);
   }
 
-  /// Of the runs that are done, after the ground truth.
-  [[nodiscard]] Expected<std::vector<html::PathFromAbove>> paths_of(const Json& sequence) {
-    std::vector<html::PathFromAbove> paths;
+  /// The ground truth, where there is one, then the runs that are done.
+  [[nodiscard]] Expected<Json> paths_of(const Json& sequence) {
+    Json paths = Json::array();
+    const auto add = [&](const std::string& name, const Trajectory& poses) {
+      paths.push_back(html::path_json(poses));
+      paths.back()["name"] = name;
+    };
+    if (const auto& truth = truths_[text_of(sequence["name"])]) {
+      add("ground truth", *truth);
+    }
     for (const Json& run : sequence["runs"]) {
       if (run["state"] == "done") {
         const auto poses = read_kitti_trajectory(run_dir(sequence, run) / benchmark::kPosesFile);
         if (!poses) {
           return poses.error();
         }
-        paths.push_back({benchmark::name_of(run), html::seen_from_above(*poses)});
+        add(benchmark::name_of(run), *poses);
       }
-    }
-    if (const auto& truth = truths_[text_of(sequence["name"])]; truth && !paths.empty()) {
-      paths.insert(paths.begin(), {"ground truth", html::seen_from_above(*truth), true});
     }
     return paths;
   }

@@ -11,7 +11,6 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "config/config.hpp"
-#include "html/figures.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
@@ -63,11 +62,11 @@ namespace benchmark {
 /// zero-motion baseline and, where all official frames ran, the published numbers.
 [[nodiscard]] std::string format_markdown(const nlohmann::ordered_json& report);
 
-/// What was driven, by the name of the sequence.
-using SequencePaths = std::map<std::string, std::vector<html::PathFromAbove>>;
+/// Lists of {name, x, y, z} by the name of the sequence: the ground truth, and what was driven.
+using SequencePaths = std::map<std::string, nlohmann::ordered_json>;
 /// report.html: benchmark.json as figures. Error: the file cannot be written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,
-                                const nlohmann::ordered_json& report,
+                                nlohmann::ordered_json report,
                                 const SequencePaths& paths,
                                 const BenchmarkRequest& request);
 

@@ -19,15 +19,11 @@
   extern "C" const char name##_end[]
 
 STEMVO_ASSET(stemvo_page_html, STEMVO_PAGE_HTML);
-STEMVO_ASSET(stemvo_plotly_gz, STEMVO_PLOTLY_DIR "/plotly.min.js.gz");
-STEMVO_ASSET(stemvo_plotly_licence, STEMVO_PLOTLY_DIR "/LICENSE.txt");
+STEMVO_ASSET(stemvo_plotly_gz, STEMVO_PLOTLY_GZ);
 
 namespace stemvo::html {
 
 std::string_view page_template() { return {stemvo_page_html_begin, stemvo_page_html_end}; }
 std::string_view plotly_gz() { return {stemvo_plotly_gz_begin, stemvo_plotly_gz_end}; }
-std::string_view plotly_licence() {
-  return {stemvo_plotly_licence_begin, stemvo_plotly_licence_end};
-}
 
 }  // namespace stemvo::html

@@ -5,11 +5,10 @@
 
 namespace stemvo::html {
 
-/// src/html/page.html, with the places that HtmlPage fills in.
+/// page.html with the styles and scripts beside it and plotly.js' licence, and the places that
+/// write_page() fills in.
 [[nodiscard]] std::string_view page_template();
 /// plotly.min.js, packed by gzip, as `make build` fetched it.
 [[nodiscard]] std::string_view plotly_gz();
-/// Its licence, whole.
-[[nodiscard]] std::string_view plotly_licence();
 
 }  // namespace stemvo::html

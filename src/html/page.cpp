@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "html/page.hpp"
 
-#include <memory>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -9,13 +9,12 @@
 #include <openssl/evp.h>
 
 #include "html/assets.hpp"
-#include "internal_check.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::html {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 std::string base64(std::string_view bytes) {
   std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');  // and a final zero
@@ -26,89 +25,45 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-/// plotly.js takes some HTML in names, hover texts and categories: here every letter is itself, and
-/// a new line is one.
-json literal(const json& value) {
-  json result = value;
-  if (value.is_structured()) {
-    for (json& element : result) {
-      element = literal(element);
-    }
-  } else if (value.is_string()) {
-    std::string text;
-    for (const char letter : value.get_ref<const std::string&>()) {
-      text += letter == '&'    ? "&amp;"
-              : letter == '<'  ? "&lt;"
-              : letter == '>'  ? "&gt;"
-              : letter == '\n' ? "<br>"
-                               : std::string(1, letter);
-    }
-    result = std::move(text);
-  }
-  return result;
-}
-
 /// JSON inside a script element: no text in it can end the element.
-std::string script_json(const json& content) {
-  std::string text = content.dump(-1, ' ', false, json::error_handler_t::replace);
-  for (std::size_t at = 0; (at = text.find('<', at)) != std::string::npos;) {
-    text.replace(at, 1, "\\u003c");
+std::string script_json(const Json& content) {
+  const std::string json = content.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text;
+  for (const char letter : json) {
+    text += letter == '<' ? "\\u003c" : std::string(1, letter);
   }
   return text;
 }
 
-/// Puts `value` in the place of `{{name}}`, which the template has once.
-void fill_in(std::string& page, std::string_view name, std::string_view value) {
-  const std::string place = "{{" + std::string(name) + "}}";
-  const std::size_t at = page.find(place);
-  STEMVO_CHECK(at != std::string::npos, "a place of the template");
-  page.replace(at, place.size(), value);
+void fill_in(std::string& page, std::string_view place, std::string_view value) {
+  page.replace(page.find(place), place.size(), value);
 }
 
 }  // namespace
 
-Page::Page(const std::string& title, const std::string& subtitle)
-    : content_(std::make_unique<json>(json{{"title", title},
-                                           {"subtitle", subtitle},
-                                           {"frames", json::array()},
-                                           {"sections", json::array()}})) {}
-Page::Page(Page&&) noexcept = default;
-Page& Page::operator=(Page&&) noexcept = default;
-Page::~Page() = default;
-
-void Page::set_frames(const std::vector<std::string>& descriptions) {
-  (*content_)["frames"] = descriptions;
-}
-
-void Page::add_figure(const Figure& figure) {
-  (*content_)["sections"].push_back({{"heading", figure.heading},
-                                     {"note", figure.note},
-                                     {"traces", literal(figure.traces)},
-                                     {"layout", literal(figure.layout)},
-                                     {"frame_trace", figure.frame_trace}});
-}
-
-void Page::add_images(const std::string& heading, const std::vector<CaptionedImage>& images) {
-  json list = json::array();
+Json images_json(const std::vector<CaptionedImage>& images) {
+  Json list = Json::array();
   for (const CaptionedImage& image : images) {
     list.push_back({{"caption", image.caption}, {"jpeg", base64(image.jpeg)}});
   }
-  (*content_)["sections"].push_back({{"heading", heading}, {"images", std::move(list)}});
+  return list;
 }
 
-void Page::add_text(const std::string& heading, const std::string& text) {
-  (*content_)["sections"].push_back({{"heading", heading}, {"text", text}, {"folded", false}});
+Json path_json(std::span<const Rigid3> poses) {
+  Json path;
+  for (const auto& [name, axis] : {std::pair("x", 0), std::pair("y", 1), std::pair("z", 2)}) {
+    Json& values = path[name] = Json::array();
+    for (const Rigid3& pose : poses) {
+      values.push_back(std::round(pose.translation[axis] * 1e5) / 1e5);  // null where not finite
+    }
+  }
+  return path;
 }
 
-void Page::add_folded_text(const std::string& heading, const std::string& text) {
-  (*content_)["sections"].push_back({{"heading", heading}, {"text", text}, {"folded", true}});
-}
-
-Status Page::write(const std::filesystem::path& file) const {
+Status write_page(const std::filesystem::path& file, const Json& content) {
   std::string page(page_template());
-  fill_in(page, "licence", plotly_licence());
-  fill_in(page, "plotly", base64(plotly_gz()));
-  fill_in(page, "content", script_json(*content_));  // last: it may hold any text
+  fill_in(page, "{{plotly}}", base64(plotly_gz()));
+  fill_in(page, "{{content}}", script_json(content));  // last: it may hold any text
   return write_text_file(file, page);
 }
 

@@ -2,14 +2,17 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "stemvo/error.hpp"
+#include "stemvo/rigid3.hpp"
 
+/// Pages for a browser. The program puts numbers and texts into them as JSON; the scripts beside
+/// page.html, which every page holds, make figures of them.
 namespace stemvo::html {
 
 /// An image under its text.
@@ -17,44 +20,16 @@ struct CaptionedImage {
   std::string caption;
   std::string jpeg;  ///< the file's bytes
 };
+/// [{caption, jpeg}], the bytes as base64.
+[[nodiscard]] nlohmann::ordered_json images_json(const std::vector<CaptionedImage>& images);
 
-/// A figure of plotly.js: the lists `traces` and the object `layout` are those of its reference
-/// (without colours and fonts, which are the page's, for light and dark), and of the page: `large`,
-/// or `small`, several of which stand beside each other, or a `plot_height`: pixels without what
-/// the legend and the texts take.
-struct Figure {
-  std::string heading;
-  std::string note;  ///< a sentence under the heading; may be empty
-  const nlohmann::json& traces;
-  const nlohmann::json& layout;
-  /// The trace whose k-th point is frame k, for the page's slider; -1: none.
-  int frame_trace = -1;
-};
+/// {x, y, z}: lists of metres to the fifth decimal, null where a position is not finite.
+[[nodiscard]] nlohmann::ordered_json path_json(std::span<const Rigid3> poses);
 
-/// One HTML file that holds all it needs: opened without a network, it shows the sections in the
-/// order they were added. Texts are UTF-8 and never taken for HTML, those of figures neither.
-class Page {
- public:
-  explicit Page(const std::string& title, const std::string& subtitle = "");
-  Page(Page&&) noexcept;
-  Page& operator=(Page&&) noexcept;
-  ~Page();
-
-  /// Below the title a slider over the frames, with a line of text each; the figures with a
-  /// `frame_trace` mark the frame chosen.
-  void set_frames(const std::vector<std::string>& descriptions);
-  void add_figure(const Figure& figure);
-  void add_images(const std::string& heading, const std::vector<CaptionedImage>& images);
-  /// As it is, in letters of one width.
-  void add_text(const std::string& heading, const std::string& text);
-  /// The same, folded away behind the heading.
-  void add_folded_text(const std::string& heading, const std::string& text);
-
-  /// Error: the file cannot be written.
-  [[nodiscard]] Status write(const std::filesystem::path& file) const;
-
- private:
-  std::unique_ptr<nlohmann::json> content_;
-};
+/// Writes one HTML file that holds all it needs to be shown without a network. `content` is what
+/// the script of its key `page` (run, search, robustness, benchmark) says. Texts are never taken
+/// for HTML. Error: the file cannot be written.
+[[nodiscard]] Status write_page(const std::filesystem::path& file,
+                                const nlohmann::ordered_json& content);
 
 }  // namespace stemvo::html

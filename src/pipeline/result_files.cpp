@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <utility>
@@ -145,11 +144,9 @@ class ResultWriter {
 
   [[nodiscard]] Status write_page(const MetricsReport& report) const {
     const TrajectoryPlot plot = make_plot(report);
-    std::vector<std::size_t> numbers(drive_.frames.size());
-    std::iota(numbers.begin(), numbers.end(), sequence_.range().begin);
     return write_run_page(request_.out_dir / "report.html",
-                          {plot.title, plot.subtitle, plot.unit, report, drive_.frames, numbers,
-                           plot.estimate, truth_, drive_.images, config_text_, request_.command});
+                          {plot.title, plot.subtitle, plot.unit, report, drive_.csv, plot.estimate,
+                           truth_, drive_.images, config_text_, request_.command});
   }
 
  private:

@@ -2,10 +2,7 @@
 #include "report/check.hpp"
 
 #include <algorithm>
-#include <limits>
-#include <set>
 #include <string_view>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -20,10 +17,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string first_line(std::string_view text) {
-  return std::string(text.substr(0, text.find('\n')));
-}
-
 /// `{max: 1.0}`, `{min: 0.99}` or both under each metric's name.
 Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
   const Expected<YAML::Node> root =
@@ -31,7 +24,7 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
         return config::parse_document(text, file.string());
       });
   if (!root) {
-    return fail(first_line(root.error().message));
+    return fail(root.error().message.substr(0, root.error().message.find('\n')));
   }
   if (!root->IsMap() || root->size() == 0) {
     return fail(fmt::format("{}: expected lines like 't_rel_percent: {{max: 1.0}}', found none",
@@ -41,44 +34,24 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
     return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, one_line(problem)));
   };
   std::vector<ThresholdResult> bounds;
-  std::set<std::pair<std::string, std::string>> seen;
   for (const auto& entry : *root) {
-    const YAML::Node& key_node = entry.first;
-    const YAML::Node& bounds_node = entry.second;
-    const std::string key = key_node.Scalar();
-    if (!key_node.IsScalar()) {
-      return fail_at(key_node, "expected the name of a metric, found another kind of key");
-    }
-    if (!seen.emplace(key, "").second) {
-      return fail_at(key_node, fmt::format("expected {} once, found it twice", key));
-    }
-    if (!bounds_node.IsMap() || bounds_node.size() == 0) {
-      return fail_at(key_node,
+    const std::string key = entry.first.Scalar();
+    if (!entry.second.IsMap() || entry.second.size() == 0) {
+      return fail_at(entry.first,
                      fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
-                                 bounds_node.IsScalar() ? bounds_node.Scalar() : "no bound"));
+                                 entry.second.IsScalar() ? entry.second.Scalar() : "no bound"));
     }
-    double min = std::numeric_limits<double>::lowest();
-    double max = std::numeric_limits<double>::max();
-    for (const auto& bound : bounds_node) {
-      const YAML::Node& name_node = bound.first;
-      const std::string name = name_node.Scalar();
+    for (const auto& bound : entry.second) {
+      const std::string name = bound.first.Scalar();
       if (name != "min" && name != "max") {
-        return fail_at(name_node, fmt::format("{}: expected min or max, found '{}'", key, name));
-      }
-      if (!seen.emplace(key, name).second) {
-        return fail_at(name_node, fmt::format("{}: expected {} once, found it twice", key, name));
+        return fail_at(bound.first, fmt::format("{}: expected min or max, found '{}'", key, name));
       }
       const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
       if (!limit) {
-        return fail_at(name_node, fmt::format("{}.{}: {}", key, name, limit.error().message));
-      }
-      (name == "max" ? max : min) = limit->front();
-      if (min > max) {
-        return fail_at(name_node,
-                       fmt::format("{}: expected min up to max, found {} and {}", key, min, max));
+        return fail_at(bound.first, fmt::format("{}.{}: {}", key, name, limit.error().message));
       }
       bounds.push_back(
-          {key, name == "max", limit->front(), key_node.Mark().line + 1, std::nullopt, false});
+          {key, name == "max", limit->front(), entry.first.Mark().line + 1, std::nullopt, false});
     }
   }
   return bounds;

@@ -13,9 +13,9 @@ namespace stemvo {
 /// One bound of a thresholds file, held against a metrics.json.
 struct ThresholdResult {
   std::string key;     ///< dotted, e.g. "ate_rmse_m.none"
-  bool is_max = true;  ///< of `limit`
+  bool is_max = true;  ///< whether `limit` is a maximum
   double limit = 0.0;
-  int line = 0;                  ///< of the thresholds file
+  int line = 0;                  ///< in the thresholds file
   std::optional<double> number;  ///< as found; nullopt: null
   bool passed = false;
 };
@@ -23,9 +23,8 @@ struct ThresholdResult {
 /// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, `tracked_fraction: {min: 0.99}`, nested keys
 /// dotted (`ate_rmse_m.none: {max: 3}`); min and max may stand together and are two results, in the
 /// file's order. A metric that is null fails. Errors (file, and line where there is one): file
-/// missing, not JSON, not YAML, no thresholds, a key twice, a bound other than min and max, a bound
-/// that is not a finite number, min above max, a key the metrics do not have, a metric that is not
-/// a number.
+/// missing, not JSON, not YAML, no thresholds, a bound other than min and max, a bound that is not
+/// a finite number, a key the metrics do not have, a metric that is not a number.
 [[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(
     const std::filesystem::path& metrics_file, const std::filesystem::path& thresholds_file);
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kAlignments = {"none", "scale", "se3", "sim3"};
 
-/// Those poses of the two files that belong together.
+/// The poses of the two files that belong together.
 struct Pairs {
   Trajectory estimate;
   Trajectory truth;

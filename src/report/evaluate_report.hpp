@@ -31,8 +31,8 @@ struct EvaluationRequest {
 struct EvaluationRow {
   std::string name;  ///< the path as given, or "(zero motion)"
   Metrics metrics;
-  std::size_t num_poses = 0;  ///< of the file
-  std::size_t num_pairs = 0;  ///< of them compared with a true pose
+  std::size_t num_poses = 0;  ///< in the file
+  std::size_t num_pairs = 0;  ///< poses that were compared with a true one
 };
 
 struct EvaluationReport {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -56,16 +55,9 @@ cv::Scalar flow_color(double share) {
   return {color[0], color[1], color[2]};
 }
 
-/// 8-bit image of a CV_32FC1 channel between its percentiles 0.5 and 99.5; values that are not
-/// finite are black.
+/// 8-bit image of a CV_32FC1 channel between its percentiles 0.5 and 99.5.
 cv::Mat stretch_for_the_eye(const cv::Mat& values) {
-  std::vector<float> sorted;
-  std::copy_if(values.begin<float>(), values.end<float>(), std::back_inserter(sorted),
-               [](float value) { return std::isfinite(value); });
-  cv::Mat image = cv::Mat::zeros(values.size(), CV_8UC1);
-  if (sorted.empty()) {
-    return image;
-  }
+  std::vector<float> sorted(values.begin<float>(), values.end<float>());
   std::sort(sorted.begin(), sorted.end());
   const auto percentile = [&](double share) {
     return static_cast<double>(
@@ -74,10 +66,8 @@ cv::Mat stretch_for_the_eye(const cv::Mat& values) {
   const double low = percentile(0.005);
   const double high = percentile(0.995);
   const double gain = high > low ? 255.0 / (high - low) : 0.0;
-  std::transform(values.begin<float>(), values.end<float>(), image.begin<uchar>(), [&](float v) {
-    const double gray = (static_cast<double>(v) - low) * gain;
-    return std::isfinite(gray) ? cv::saturate_cast<uchar>(gray) : uchar{0};
-  });
+  cv::Mat image;
+  values.convertTo(image, CV_8UC1, gain, -gain * low);
   return image;
 }
 
@@ -85,9 +75,8 @@ cv::Mat stretch_for_the_eye(const cv::Mat& values) {
 double longest_flow_px(const Matches& matches, const std::vector<char>& inlier_mask) {
   std::vector<double> lengths;
   for (std::size_t i = 0; i < inlier_mask.size(); ++i) {
-    const double length_px = (matches.cur_uv[i] - matches.prev_uv[i]).norm();
-    if (inlier_mask[i] != 0 && std::isfinite(length_px)) {
-      lengths.push_back(length_px);
+    if (inlier_mask[i] != 0) {
+      lengths.push_back((matches.cur_uv[i] - matches.prev_uv[i]).norm());
     }
   }
   if (lengths.empty()) {
@@ -104,10 +93,6 @@ cv::Point to_subpixels(const Eigen::Vector2d& uv) {
   return {cvRound(scaled.x()), cvRound(scaled.y())};
 }
 
-bool is_drawable(const Eigen::Vector2d& uv) {
-  return uv.allFinite() && uv.cwiseAbs().maxCoeff() < 1e5;
-}
-
 /// `to_image` maps input pixels to pixels of `rgb`.
 template <typename Map>
 void draw_matches(cv::Mat& rgb,
@@ -119,18 +104,16 @@ void draw_matches(cv::Mat& rgb,
   for (const bool draw_inliers : {false, true}) {
     for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
       const bool is_inlier = i < inlier_mask.size() && inlier_mask[i] != 0;
-      const Eigen::Vector2d prev = to_image(matches.prev_uv[i]);
-      const Eigen::Vector2d cur = to_image(matches.cur_uv[i]);
-      if (is_inlier != draw_inliers || !is_drawable(prev) || !is_drawable(cur)) {
+      if (is_inlier != draw_inliers) {
         continue;
       }
+      const cv::Point prev = to_subpixels(to_image(matches.prev_uv[i]));
+      const cv::Point cur = to_subpixels(to_image(matches.cur_uv[i]));
       const double length_px = (matches.cur_uv[i] - matches.prev_uv[i]).norm();
       const cv::Scalar color = is_inlier ? flow_color(length_px / longest_px) : kOutlier;
-      cv::line(rgb, to_subpixels(prev), to_subpixels(cur), color, is_inlier ? 2 : 1, cv::LINE_AA,
-               kSubpixelBits);
+      cv::line(rgb, prev, cur, color, is_inlier ? 2 : 1, cv::LINE_AA, kSubpixelBits);
       if (is_inlier) {
-        cv::circle(rgb, to_subpixels(cur), 2 << kSubpixelBits, color, cv::FILLED, cv::LINE_AA,
-                   kSubpixelBits);
+        cv::circle(rgb, cur, 2 << kSubpixelBits, color, cv::FILLED, cv::LINE_AA, kSubpixelBits);
       }
     }
   }

@@ -22,7 +22,7 @@ namespace stemvo {
                                        const ChannelImage& channel,
                                        const Matches& matches,
                                        const std::vector<char>& inlier_mask);
-/// What its colours mean; empty where there are no matches.
+/// Says what its colours mean; empty where there are no matches.
 [[nodiscard]] std::string describe_flow(const Matches& matches,
                                         const std::vector<char>& inlier_mask);
 /// It below a band with these texts, which may be empty.

@@ -48,17 +48,14 @@ Status write_map_ply(const std::filesystem::path& file,
   std::string vertices;
   std::size_t num_points = 0;
   for (const ColoredPoint& point : points) {
-    if (point.position.allFinite()) {
+    if (point.position.allFinite()) {  // a landmark may be as good as infinitely far
       append_vertex(point, vertices);
       ++num_points;
     }
   }
-  std::size_t num_cameras = 0;
+  const std::size_t num_cameras = world_from_camera.size();
   for (const Rigid3& pose : world_from_camera) {
-    if (pose.translation.allFinite()) {
-      append_vertex({pose.translation.cast<float>(), kMapPathColor}, vertices);
-      ++num_cameras;
-    }
+    append_vertex({pose.translation.cast<float>(), kMapPathColor}, vertices);
   }
   std::string edges;
   for (std::size_t i = 1; i < num_cameras; ++i) {

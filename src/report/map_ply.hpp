@@ -24,7 +24,7 @@ inline constexpr std::array<std::uint8_t, 3> kMapPathColor{255, 64, 0};
 
 /// A map as binary little-endian PLY: `vertex` (float x y z, uchar red green blue) with the points,
 /// then the camera positions, and `edge` (int vertex1 vertex2) from each camera position to the
-/// next. Points and positions that are not finite are left out. Error: it cannot be written.
+/// next. Points that are not finite are left out. Error: it cannot be written.
 [[nodiscard]] Status write_map_ply(const std::filesystem::path& file,
                                    std::span<const ColoredPoint> points,
                                    std::span<const Rigid3> world_from_camera);

@@ -20,7 +20,7 @@ struct CameraReport {
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
 };
 
-/// What metrics.json holds. Everything in `metrics` is null in the file without ground truth.
+/// The numbers of metrics.json. Everything in `metrics` is null in the file without ground truth.
 struct MetricsReport {
   std::string stemvo_version;
   std::string sequence;         ///< folder name, e.g. "03"

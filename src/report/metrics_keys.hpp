@@ -10,7 +10,7 @@
 #include "evaluation/metrics.hpp"
 #include "stemvo/error.hpp"
 
-/// What may be missing is null in JSON.
+/// An optional without a value is null in JSON.
 template <typename T>
 struct nlohmann::adl_serializer<std::optional<T>> {
   template <typename Json>
@@ -29,7 +29,7 @@ struct nlohmann::adl_serializer<std::optional<T>> {
 namespace stemvo {
 
 struct MetricsReport;
-/// What metrics.json holds.
+/// The document that metrics.json holds.
 [[nodiscard]] nlohmann::ordered_json metrics_document(const MetricsReport& report);
 
 /// Adds the keys of metrics.json that need ground truth; all null without metrics.

@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,29 +11,27 @@
 #include "html/page.hpp"
 #include "report/metrics_json.hpp"
 #include "stemvo/error.hpp"
-#include "stemvo/frame_result.hpp"
 
 namespace stemvo {
 
-/// What report.html of a run shows: a pose per frame, at least one (checked), in the world of the
-/// ground truth, which some frames may lack.
+/// The content of a run's report.html: a row and a pose per frame, in the world of the ground
+/// truth, which some frames may lack.
 struct RunPage {
   std::string title;
   std::string subtitle;
-  std::string unit = "m";  ///< of the trajectories
+  std::string unit = "m";  ///< in which the trajectories are
   const MetricsReport& report;
-  std::span<const FrameResult> frames;
-  std::span<const std::size_t> numbers;  ///< of the frames, in the sequence
-  const Trajectory& estimate;            ///< after the alignment of report.metrics
+  const std::string& frames_csv;
+  const Trajectory& estimate;  ///< after the alignment of report.metrics
   const std::optional<GroundTruth>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
   std::string config;   ///< YAML
   std::string command;  ///< that repeats the run; may be empty
 };
 
-/// Top view with a slider over the frames, numbers, the path in 3D, errors over distance and by
-/// segment length (with ground truth), tracks, states and R_H, scale and camera with their sigma,
-/// time per stage, images, configuration. Error: the file cannot be written.
+/// Path from above with a slider over the frames, numbers, the path in 3D, errors over distance and
+/// by segment length (with ground truth), tracks, states and R_H, scale and camera with their
+/// sigma, time per stage, images, configuration. Error: the file cannot be written.
 [[nodiscard]] Status write_run_page(const std::filesystem::path& file, const RunPage& run);
 
 }  // namespace stemvo

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -38,14 +37,8 @@ constexpr int kLine_px = 50;  // of text
 constexpr double kTick_px = 105.0;
 constexpr int kPlotSubpixelBits = 4;
 
-std::vector<Eigen::Vector2d> finite_positions(const Trajectory& trajectory) {
-  std::vector<Eigen::Vector2d> positions;
-  for (const Rigid3& pose : trajectory) {
-    if (pose.translation.allFinite()) {
-      positions.emplace_back(pose.translation.x(), pose.translation.z());
-    }
-  }
-  return positions;
+Eigen::Vector2d seen_from_above(const Rigid3& pose) {
+  return {pose.translation.x(), pose.translation.z()};
 }
 
 /// Where metres are in the figure: one scale for both axes, with some air around all positions.
@@ -114,8 +107,8 @@ void draw_path(const Trajectory& path,
                int width_px,
                cv::Mat& image) {
   std::vector<cv::Point> points;
-  for (const Eigen::Vector2d& position : finite_positions(path)) {
-    points.emplace_back(view.to_px(position) * (1 << kPlotSubpixelBits));
+  for (const Rigid3& pose : path) {
+    points.emplace_back(view.to_px(seen_from_above(pose)) * (1 << kPlotSubpixelBits));
   }
   cv::polylines(image, points, false, color, width_px, cv::LINE_AA, kPlotSubpixelBits);
 }
@@ -161,14 +154,11 @@ void draw_legend(bool has_truth, cv::Mat& image) {
 
 cv::Mat draw_trajectory(const TrajectoryPlot& plot) {
   STEMVO_CHECK(!plot.estimate.empty(), "at least one pose to draw");
-  const std::vector<Eigen::Vector2d> estimate = finite_positions(plot.estimate);
   Eigen::AlignedBox2d box;
-  for (const auto& positions :
-       {estimate, finite_positions(plot.ground_truth.value_or(Trajectory()))}) {
-    std::ranges::for_each(positions, [&](const Eigen::Vector2d& one) { box.extend(one); });
-  }
-  if (box.isEmpty()) {
-    box.extend(Eigen::Vector2d::Zero());
+  for (const auto& trajectory : {plot.estimate, plot.ground_truth.value_or(Trajectory())}) {
+    for (const Rigid3& pose : trajectory) {
+      box.extend(seen_from_above(pose));
+    }
   }
   const View view(box);
   const int width_px = view.frame.br().x + kRight_px;
@@ -182,10 +172,8 @@ cv::Mat draw_trajectory(const TrajectoryPlot& plot) {
     draw_path(*plot.ground_truth, view, kTruth, kTruthWidth_px, image);
   }
   draw_path(plot.estimate, view, kEstimate, kEstimateWidth_px, image);
-  if (!estimate.empty()) {
-    draw_marker(false, view.to_px(estimate.back()), image);
-    draw_marker(true, view.to_px(estimate.front()), image);
-  }
+  draw_marker(false, view.to_px(seen_from_above(plot.estimate.back())), image);
+  draw_marker(true, view.to_px(seen_from_above(plot.estimate.front())), image);
   return image;
 }
 

@@ -17,11 +17,10 @@ struct TrajectoryPlot {
   std::string subtitle;  ///< the numbers, one line; may be empty
   Trajectory estimate;   ///< at least one pose (checked)
   std::optional<Trajectory> ground_truth;
-  std::string unit = "m";  ///< of both axes
+  std::string unit = "m";  ///< in which both axes are
 };
 
-/// 1100 to 1600 pixels wide, 780 to 1400 high, after the drive's shape; CV_8UC3, RGB. Positions
-/// that are not finite are left out.
+/// 1100 to 1600 pixels wide, 780 to 1400 high, after the drive's shape; CV_8UC3, RGB.
 [[nodiscard]] cv::Mat draw_trajectory(const TrajectoryPlot& plot);
 
 }  // namespace stemvo

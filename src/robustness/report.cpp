@@ -244,7 +244,7 @@ std::string format_csv(const RobustnessReport& report) {
   return text;
 }
 
-std::string format_json(const RobustnessReport& report) {
+Json document(const RobustnessReport& report) {
   Json rows = Json::array();
   for (const Row& row : report.rows) {
     Json channels = Json::array();
@@ -291,11 +291,11 @@ std::string format_json(const RobustnessReport& report) {
                         {"rotation_ratio", ratio_on_drive(report.rows, i - 1, drive)}});
     }
   }
-  return to_text({{"drives", report.drives},
-                  {"interrupted", report.interrupted},
-                  {"groups", groups},
-                  {"by_drive", drives},
-                  {"rows", rows}});
+  return {{"drives", report.drives},
+          {"interrupted", report.interrupted},
+          {"groups", groups},
+          {"by_drive", drives},
+          {"rows", rows}};
 }
 
 }  // namespace stemvo::robustness

@@ -10,6 +10,7 @@
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/thread_scope.hpp"
+#include "report/metrics_keys.hpp"
 #include "robustness/contenders.hpp"
 #include "robustness/disturbance.hpp"
 #include "text/text_file.hpp"
@@ -73,7 +74,7 @@ std::vector<Verdict> verdicts_of(const Row& row) {
 Status write_report(const RobustnessReport& report, const RobustnessRequest& request) {
   const std::filesystem::path& folder = request.out_dir;
   for (const auto& [name, text] : {std::pair("robustness.csv", format_csv(report)),
-                                   std::pair("robustness.json", format_json(report)),
+                                   std::pair("robustness.json", to_text(document(report))),
                                    std::pair("robustness.txt", format_table(report))}) {
     if (const Status written = write_text_file(folder / name, text); !written) {
       return written;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "config/config.hpp"
 #include "dataset/sequence.hpp"
 #include "evaluation/paired_ratio.hpp"
@@ -90,7 +92,8 @@ struct Summary {
 [[nodiscard]] std::string format_table(const RobustnessReport& report);
 /// A line per row, drive and contender.
 [[nodiscard]] std::string format_csv(const RobustnessReport& report);
-[[nodiscard]] std::string format_json(const RobustnessReport& report);
+/// What robustness.json holds.
+[[nodiscard]] nlohmann::ordered_json document(const RobustnessReport& report);
 /// A page for a browser: ratios with their intervals, error over strength. Error: cannot be
 /// written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,

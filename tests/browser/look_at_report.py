@@ -36,8 +36,8 @@ def x_range(page):
 def middle_of_path(page):
     """On the screen, of the estimate's middle point in the top view."""
     return page.evaluate(f"""(() => {{
-        const div = document.querySelector('{TOP_VIEW}'), box = div.getBoundingClientRect(), layout = div._fullLayout;
-        const trace = content.sections[0].traces[content.sections[0].frame_trace], k = Math.floor(trace.x.length / 2);
+        const {{ section, div }} = figures[0], box = div.getBoundingClientRect(), layout = div._fullLayout;
+        const trace = section.traces[section.frame_trace], k = Math.floor(trace.x.length / 2);
         return [box.x + layout._size.l + layout.xaxis.d2p(trace.x[k]), box.y + layout._size.t + layout.yaxis.d2p(trace.y[k])];
     }})()""")
 
@@ -137,6 +137,8 @@ def look(browser, report, screenshot):
     found["headings"] = page.locator("h2, summary").all_text_contents()
     found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
     found["points"] = page.evaluate("figures.map(({ section }) => section.traces.reduce((sum, trace) => sum + trace.x.length, 0))")
+    found["traces"] = page.evaluate("""Object.fromEntries(figures.map(({ section }) => [section.heading,
+        Object.fromEntries(section.traces.map(({ name, x, y, z }) => [name, { x, y, z }]))]))""")
     found["categories"] = page.locator(".xtick text, .ytick text").all_text_contents()
     found["images"] = page.evaluate("[...document.images].map((image) => image.naturalWidth)")
     found["captions"] = page.locator("figcaption").all_text_contents()

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: MIT
 """report.html of run, search, benchmark and robustness in Chromium: it draws without a network, hover, wheel and keyboard work."""
 
+import csv
+import itertools
 import json
+import math
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -24,6 +28,11 @@ def look_at(report):
     if look.returncode != 0:
         raise AssertionError(look.stderr)
     return json.loads(look.stdout)
+
+
+def read_positions(file):
+    poses = [list(map(float, line.split())) for line in file.read_text().splitlines()]
+    return [(pose[3], pose[7], pose[11]) for pose in poses]
 
 
 @unittest.skipUnless(BROWSER.exists() and pathlib.Path("/usr/bin/chromium").exists(), "tools/setup.sh browser has not run")
@@ -101,6 +110,32 @@ class ReportPage(unittest.TestCase):
             self.assertRegex(caption, r"^frame \d+: \w+, \d+ of \d+ matches; flow 0 \(blue\) to \d+ px \(yellow\), outliers red$")
         for heading in ("Path from above", "Numbers", "Error by segment length", "Scale and camera", "Command", "Configuration"):
             self.assertIn(heading, self.found["headings"])
+
+    def test_figures_say_what_the_files_say(self):
+        result, traces = self.folder / "result", self.found["traces"]
+        with (result / "frames.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        estimate, truth = (read_positions(path) for path in (result / "trajectory_kitti.txt", self.folder / "drive/poses/00.txt"))
+        steps = [math.dist(a, b) for a, b in itertools.pairwise(truth)]
+        off = [math.dist(a, b) for a, b in zip(estimate, truth, strict=True)]
+
+        def expect(figure, name, axis, values, digits=3):
+            for found, value in zip(traces[figure][name][axis], values, strict=True):
+                self.assertAlmostEqual(found, value, digits, f"{figure}, {name}, {axis}")
+
+        expect("Path from above", "estimate", "y", [z for _, _, z in estimate])
+        expect("Path from above", "ground truth", "x", [x for x, _, _ in truth])
+        expect("Path in space", "estimate", "z", [-y for _, y, _ in estimate])
+        expect("Error over distance", "position", "x", itertools.accumulate(steps, initial=0.0))
+        expect("Error over distance", "position", "y", off)
+        expect("Error over distance", "height, too high is above 0", "y", [b[1] - a[1] for a, b in zip(estimate, truth, strict=True)])
+        expect("Tracks, model and state", "inliers", "y", [int(row["inliers"]) for row in rows])
+        self.assertEqual(traces["Tracks, model and state"]["state"]["y"], [row["state"] for row in rows])
+        traces["Scale and camera"]["length of a step"]["y"].pop(0)  # the first frame has none
+        expect("Scale and camera", "length of a step", "y", [math.dist(a, b) for a, b in itertools.pairwise(estimate)])
+        expect("Scale and camera", "principal point, x", "y", [float(row["cx_px"]) - float(rows[0]["cx_px"]) for row in rows])
+        expect("Time per stage", "pose", "y", [float(row["pose_ms"]) for row in rows])
+        self.assertAlmostEqual(float(re.search(r", ([\d.]+) m off", self.found["by_keyboard"]).group(1)), off[2], 2)
 
     def test_keyboard_hover_and_wheel(self):
         self.assertTrue(self.found["by_keyboard"].startswith("frame 2: "), self.found["by_keyboard"])

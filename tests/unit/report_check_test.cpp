@@ -96,29 +96,25 @@ TEST_P(BrokenThresholds, AreNamedWithTheirLine) {
 INSTANTIATE_TEST_SUITE_P(
     Check,
     BrokenThresholds,
-    ::testing::Values(
-        std::tuple("frames: {min: 1}\nt_rel: {max: 1}\n", ":2: expected a metric of"),
-        std::tuple("ate_rmse_m.se4: {max: 1}\n", "found 'ate_rmse_m.se4'"),
-        std::tuple("frames.sub: {max: 1}\n", "found 'frames.sub'"),
-        std::tuple("t_rel_percent: {maximum: 1}\n",
-                   ":1: t_rel_percent: expected min or max, found 'maximum'"),
-        std::tuple("t_rel_percent: 1.0\n", "expected {max: NUMBER} or {min: NUMBER}, found '1.0'"),
-        std::tuple("t_rel_percent:\n", "expected {max: NUMBER}"),
-        std::tuple("t_rel_percent: {}\n", "expected {max: NUMBER}"),
-        std::tuple("t_rel_percent: {max: low}\n",
-                   "t_rel_percent.max: expected a finite number, found 'low'"),
-        std::tuple("t_rel_percent: {max: nan}\n", "expected a finite number"),
-        std::tuple("t_rel_percent: {max: .nan}\n", "expected a finite number"),
-        std::tuple("t_rel_percent: {max: .inf}\n", "expected a finite number"),
-        std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 number, found 0"),
-        std::tuple("frames: {min: 1}\nframes: {min: 2}\n", ":2: expected frames once"),
-        std::tuple("frames: {min: 1, min: 2}\n", "expected min once"),
-        std::tuple("frames: {min: 1}\nt_rel_percent: {max: 1, min: 2}\n",
-                   ":2: t_rel_percent: expected min up to max, found 2 and 1"),
-        std::tuple("frames: {min: 1\n", "not YAML"),
-        std::tuple("- frames\n", "expected lines like"),
-        std::tuple("", "expected lines like"),
-        std::tuple("[a]: {min: 1}\n", "expected the name of a metric")));
+    ::testing::Values(std::tuple("frames: {min: 1}\nt_rel: {max: 1}\n", ":2: expected a metric of"),
+                      std::tuple("ate_rmse_m.se4: {max: 1}\n", "found 'ate_rmse_m.se4'"),
+                      std::tuple("frames.sub: {max: 1}\n", "found 'frames.sub'"),
+                      std::tuple("t_rel_percent: {maximum: 1}\n",
+                                 ":1: t_rel_percent: expected min or max, found 'maximum'"),
+                      std::tuple("t_rel_percent: 1.0\n",
+                                 "expected {max: NUMBER} or {min: NUMBER}, found '1.0'"),
+                      std::tuple("t_rel_percent:\n", "expected {max: NUMBER}"),
+                      std::tuple("t_rel_percent: {}\n", "expected {max: NUMBER}"),
+                      std::tuple("t_rel_percent: {max: low}\n",
+                                 "t_rel_percent.max: expected a finite number, found 'low'"),
+                      std::tuple("t_rel_percent: {max: nan}\n", "expected a finite number"),
+                      std::tuple("t_rel_percent: {max: .nan}\n", "expected a finite number"),
+                      std::tuple("t_rel_percent: {max: .inf}\n", "expected a finite number"),
+                      std::tuple("t_rel_percent: {max: [1]}\n", "expected 1 number, found 0"),
+                      std::tuple("frames: {min: 1\n", "not YAML"),
+                      std::tuple("- frames\n", "expected lines like"),
+                      std::tuple("", "expected lines like"),
+                      std::tuple("[a]: {min: 1}\n", "expected a metric of")));
 
 TEST(Check, NamesMetricsThatCannotBeRead) {
   const std::string thresholds = "t_rel_percent: {max: 1}\n";
@@ -134,12 +130,8 @@ TEST(Check, NamesMetricsThatCannotBeRead) {
               HasSubstr("t_rel_percent: expected a number, found string"));
   EXPECT_THAT(message(R"({"t_rel_percent": true})"), HasSubstr("expected a number, found boolean"));
   EXPECT_THAT(message(R"({"t_rel_percent": 1e999})"), HasSubstr("not JSON"));
-  EXPECT_THAT(message(R"({"t_rel_percent": 1, "a": {"frames": 2}, "t_rel_percent": 2})"),
-              HasSubstr("metrics.json: expected the key 't_rel_percent' once, found it twice"));
-  EXPECT_THAT(message(R"({"a": {"frames": 1}, "b": {"frames": 2}, "t_rel_percent": "low"})"),
-              HasSubstr("expected a number"));
-  EXPECT_THAT(message("{\"a\": " + std::string(100, '[') + std::string(100, ']') + "}"),
-              HasSubstr("expected at most 64 levels, found more"));
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  EXPECT_EQ(message("{\"t_rel_percent\": 1, \"a\": " + deep + "}"), "no error");
   EXPECT_LT(message("{\"" + std::string(10000, 'x')).size(), 1000U);
 
   const TempFolder folder;

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// Draws what the page's function makes of the content that the program put into it.
+
+const pages = { run: run_page, search: search_page, robustness: robustness_page, benchmark: benchmark_page };
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const figures = [];  // {section, div}
+let frames = [];  // a line of text for each, where there is a slider
+
+function element(parent, name, text, attributes) {
+  const made = Object.assign(document.createElement(name), attributes || {});
+  if (text !== undefined) made.textContent = text;
+  return parent.appendChild(made);
+}
+
+// plotly.js takes some HTML in names, hover texts and categories: here every letter is itself, and a new line is one.
+function literal(value) {
+  const letters = { "&": "&amp;", "<": "&lt;", ">": "&gt;", "\n": "<br>" };
+  if (typeof value === "string") return value.replace(/[&<>\n]/g, (letter) => letters[letter]);
+  if (Array.isArray(value)) return value.map(literal);
+  return value instanceof Object ? Object.fromEntries(Object.entries(value).map(([key, part]) => [key, literal(part)])) : value;
+}
+
+// Colours that are told apart without red or green (Okabe and Ito), as far as they stand on the page's ground.
+function theme() {
+  const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
+  const axis = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), linecolor: colour("--line"), automargin: true };
+  const space = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), backgroundcolor: colour("--back") };
+  return { paper_bgcolor: colour("--back"), plot_bgcolor: colour("--back"),
+    font: { color: colour("--ink"), family: "system-ui, sans-serif", size: 13 },
+    colorway: dark.matches ? ["#56b4e9", "#e69f00", "#009e73", "#f0e442", "#cc79a7", "#d55e00"]
+                           : ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"],
+    margin: { l: 60, r: 20, t: 20, b: 50 }, hovermode: "closest",
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", traceorder: "normal" },
+    template: { layout: { xaxis: axis, yaxis: axis, scene: { xaxis: space, yaxis: space, zaxis: space } } } };
+}
+
+// Maps take the wheel. A finger goes on scrolling the page: the buttons make it move a map, a tap makes it turn a space.
+const touch = matchMedia("(hover: none)").matches;
+function is_space(section) { return "scene" in section.layout; }
+function follows_frames(section) { return section.frame_trace >= 0; }
+function is_map(section) { return section.layout.dragmode === "pan" || is_space(section); }
+
+// One colour for a name in all figures of the page; in a figure none twice while there are enough.
+const places = new Map();
+function colours_of(section, palette) {
+  const used = new Set(section.traces.map((trace) => places.get(trace.name)));
+  for (const { name, line } of section.traces) {
+    if (places.has(name) || line?.color) continue;
+    const free = palette.findIndex((_, place) => !used.has(place));
+    places.set(name, free < 0 ? places.size % palette.length : free);
+    used.add(places.get(name));
+  }
+  return section.traces.map(({ name, line }) => line?.color || palette[places.get(name)]);
+}
+
+// As far away as shows the whole box and the texts around it; the layout says from where.
+function stand_back({ aspectratio, camera: { eye } }, div) {
+  const length = (of) => Math.hypot(...Object.values(of)), texts = 50;  // pixels
+  const visible = Math.min(div.clientWidth, div.clientHeight) / 2;
+  const half_angle = Math.atan(Math.tan(Math.PI / 8) * 2 * visible / div.clientHeight);
+  const factor = length(aspectratio) / 2 / Math.sin(half_angle) * visible / (visible - texts) / length(eye);
+  for (const axis in eye) eye[axis] *= factor;
+}
+
+function layout_of(section, div) {
+  const layout = Object.assign(theme(), structuredClone(section.layout)), is_phone = div.clientWidth < 500;
+  if (is_space(section)) {
+    layout.margin = { l: 0, r: 0, t: 20, b: 0 };
+    stand_back(layout.scene, div);
+    if (is_phone)
+      for (const axis of ["xaxis", "yaxis", "zaxis"]) {
+        Object.assign(layout.scene[axis], { nticks: 4, tickfont: { size: 10 } });
+        layout.scene[axis].title.font = { size: 11 };
+      }
+  }
+  if (is_phone) {
+    for (const [key, axis] of Object.entries(layout)) {
+      if (/^[xy]axis/.test(key) && axis.title) axis.title.font = { size: 13 };
+      if (/^xaxis/.test(key) && axis.type === "log") Object.assign(axis, { nticks: 3, tickangle: 0 });
+    }
+  }
+  layout.colorway = colours_of(section, layout.colorway);
+  if (touch && !is_space(section)) layout.dragmode = false;
+  if (is_phone && layout.grid) {  // upright: below each other
+    [layout.grid.rows, layout.grid.columns] = [layout.grid.columns, layout.grid.rows];
+    layout.grid.ygap = 0.3;
+  }
+  return layout;
+}
+
+// `plot_height` is without what the legend and the texts take.
+function fit_height(section, div) {
+  const { t, b } = div._fullLayout._size, height = Math.ceil(section.layout.plot_height + t + b);
+  if (Math.abs(height - div.clientHeight) < 2) return;
+  div.style.height = height + "px";
+  Plotly.Plots.resize(div);
+}
+
+function cursor(section) {
+  const { type, xaxis, yaxis } = section.traces[section.frame_trace];
+  const color = getComputedStyle(document.documentElement).getPropertyValue("--ink").trim();
+  const point = { name: "frame chosen", showlegend: false, hoverinfo: "skip", mode: "markers", x: [], y: [] };
+  return type === "scatter3d" ? { ...point, type, z: [], marker: { size: 5, color } }
+                              : { ...point, xaxis, yaxis, marker: { size: 12, color, symbol: "circle-open", line: { width: 3 } } };
+}
+
+function add_figure(parent, drawn) {
+  const section = { ...drawn, traces: literal(drawn.traces), layout: literal(drawn.layout) };
+  if (section.note) element(parent, "p", section.note);
+  const kinds = { large: section.layout.large, space: is_space(section), grid: section.layout.grid };
+  const div = element(parent, "div", undefined, { role: "img", ariaLabel: section.heading,
+    className: ["figure", ...Object.keys(kinds).filter((kind) => kinds[kind])].join(" ") });
+  const traces = follows_frames(section) ? section.traces.concat(cursor(section)) : section.traces;
+  Plotly.newPlot(div, traces, layout_of(section, div), { responsive: true, scrollZoom: is_map(section), displaylogo: false,
+                                                         modeBarButtonsToRemove: ["select2d", "lasso2d"] });
+  figures.push({ section, div });
+  if (section.layout.plot_height) {
+    div.on("plotly_afterplot", () => fit_height(section, div));
+    fit_height(section, div);
+  }
+  for (const [key, axis] of Object.entries(section.layout))
+    if (axis.type === "log" && div._fullLayout[key].dtick === "D1")
+      Plotly.relayout(div, { [key + ".dtick"]: axis.dtick = "D2" });  // 1, 2, 5, 10
+  if (touch && is_space(section)) {
+    div.classList.add("still");
+    document.addEventListener("touchstart", (event) => div.classList.toggle("still", !div.contains(event.target)), { passive: true });
+  }
+  if (follows_frames(section)) {
+    div.on("plotly_hover", (event) => {
+      const point = event.points.find((found) => found.curveNumber === section.frame_trace);
+      if (point) choose(point.pointNumber ?? point.pointIndex);
+    });
+  }
+}
+
+function add_images(parent, section) {
+  const grid = element(parent, "div", undefined, { className: "images" });
+  for (const image of section.images) {
+    const figure = element(grid, "figure");
+    element(figure, "img", undefined, { src: "data:image/jpeg;base64," + image.jpeg, alt: image.caption });
+    element(figure, "figcaption", image.caption);
+  }
+}
+
+function add_section(section) {
+  const main = document.querySelector("main");
+  const is_panel = section.layout?.small, last = main.lastElementChild;
+  const panels = is_panel && (last?.className === "panels" ? last : element(main, "div", undefined, { className: "panels" }));
+  const parent = element(panels || main, "section");
+  if (section.folded) {
+    const fold = element(parent, "details");
+    element(fold, "summary", section.heading);
+    element(fold, "pre", section.text);
+    return;
+  }
+  element(parent, "h2", section.heading);
+  if (section.traces) add_figure(parent, section);
+  else if (section.text !== undefined) element(parent, "pre", section.text);
+  else add_images(parent, section);
+}
+
+const slider = document.getElementById("frame");
+function choose(k) {
+  slider.value = k;
+  document.querySelector("#frames output").textContent = frames[k];
+  for (const { section, div } of figures) {
+    if (!follows_frames(section)) continue;
+    const trace = section.traces[section.frame_trace], at = { x: [[trace.x[k]]], y: [[trace.y[k]]] };
+    if (trace.z) at.z = [[trace.z[k]]];
+    Plotly.restyle(div, at, [section.traces.length]);
+  }
+}
+
+async function unpack(id) {
+  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+}
+
+async function show() {
+  const content = JSON.parse(document.getElementById("content").textContent);
+  const shown = pages[content.page](content);
+  document.title = shown.title + " - stemvo";
+  document.getElementById("title").textContent = shown.title;
+  document.getElementById("subtitle").textContent = shown.subtitle;
+  element(document.head, "script", await unpack("plotly"));
+  frames = shown.frames ?? [];
+  shown.sections.filter(Boolean).forEach(add_section);
+  if (frames.length > 0) {
+    document.getElementById("frames").hidden = false;
+    slider.max = frames.length - 1;
+    slider.addEventListener("input", () => choose(Number(slider.value)));
+    choose(0);
+  }
+  for (const media of [dark, matchMedia("(max-width: 530px)")])  // the ground's colour, the phone's side
+    media.addEventListener("change", () => figures.forEach(({ section, div }) => Plotly.relayout(div, layout_of(section, div))));
+  document.body.dataset.shown = "yes";
+}
+show().catch((error) => { element(document.querySelector("main"), "p", "This browser cannot draw the figures: " + error); throw error; });
