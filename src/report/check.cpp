@@ -36,7 +36,7 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
   std::vector<ThresholdResult> bounds;
   for (const auto& entry : *root) {
     const std::string key = entry.first.Scalar();
-    if (!entry.second.IsMap() || entry.second.size() == 0) {
+    if (!entry.first.IsScalar() || !entry.second.IsMap() || entry.second.size() == 0) {
       return fail_at(entry.first,
                      fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
                                  entry.second.IsScalar() ? entry.second.Scalar() : "no bound"));

@@ -114,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
                       std::tuple("frames: {min: 1\n", "not YAML"),
                       std::tuple("- frames\n", "expected lines like"),
                       std::tuple("", "expected lines like"),
-                      std::tuple("[a]: {min: 1}\n", "expected a metric of")));
+                      std::tuple("[a]: {min: 1}\n", "expected {max: NUMBER}")));
 
 TEST(Check, NamesMetricsThatCannotBeRead) {
   const std::string thresholds = "t_rel_percent: {max: 1}\n";
