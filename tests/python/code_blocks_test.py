@@ -42,7 +42,7 @@ RUN_ELSEWHERE = {
     "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
-    "stemvo calibrate": "tests/regression/calibrate_test.cpp",  # a short drive does not tell of the camera
+    "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
     "tools/search_cluster.py": "tests/python/search_cluster_test.py",
     "build/venv-ray/bin/ray": "tests/python/search_cluster_test.py",
 }

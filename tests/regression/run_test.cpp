@@ -108,26 +108,6 @@ TEST_F(Run, MetricsHaveEveryKeyOfTheContract) {
             0.2 * metrics["null_offset_m"].get<double>());
 }
 
-TEST_F(Run, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
-  std::vector<std::vector<std::string>> variants = {{}};
-  for (int round = 0; round < 5; ++round) {
-    for (const char* threads : {"1", "2", "4"}) {
-      variants.push_back({"--threads", threads});
-    }
-  }
-  std::string first;
-  for (std::size_t i = 0; i < variants.size(); ++i) {
-    const std::string out = out_ + std::to_string(i);
-    ASSERT_EQ(run_drive(sequence_, out, variants[i]).exit_code, 0);
-    const std::string bytes = read_file(out + "/trajectory_kitti.txt") +
-                              read_file(out + "/trajectory_tum.txt") +
-                              read_file(out + "/trajectory_refined_kitti.txt");
-    first = i == 0 ? bytes : first;
-    EXPECT_FALSE(bytes.empty());
-    EXPECT_TRUE(bytes == first) << "variant " << i;
-  }
-}
-
 /// The code for processors without AVX2: bytes of its own for any number of threads, and a path
 /// near the other one.
 TEST_F(Run, PortableCodeHasItsOwnBytesAndTheSamePath) {
@@ -306,18 +286,6 @@ TEST_F(Run, InterruptWritesWhatWasComputed) {
     EXPECT_EQ(count_lines(read_file(out + "/frames.csv")), num_poses + 1);
     EXPECT_TRUE(fs::exists(out + "/trajectory.png"));
   }
-}
-
-TEST(RunFullSize, HundredRenderedFramesStayUnderTheLimit) {
-  const TempFolder folder;
-  const fs::path drive = rendered_drive({100, 1241, 376});
-  const std::string out = folder / "result";
-  const ProgramResult result = run_drive(drive / "sequences/00", out, {"--set", kTrueScale});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const ProgramResult check =
-      run_stemvo({"check", out + "/metrics.json", "--against",
-                  STEMVO_SOURCE_DIR "/tests/regression/thresholds/rendered.yaml"});
-  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
 }
 
 }  // namespace

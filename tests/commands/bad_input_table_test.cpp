@@ -2,14 +2,12 @@
 #include "support/bad_input_table.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "options/option_fields.hpp"
 #include "support/sealed_records.hpp"
 #include "support/search_program.hpp"
 #include "support/tiny_stem.hpp"
@@ -205,42 +203,6 @@ TEST_F(BadInputTable, Records) {
   }
   expect_refused_with_faults(records, "\"rung\":0",
                              {"search", "--merge", part, "--out", folder_ / "merged"}, {}, more);
-}
-
-/// Every key with every value that it cannot have; and that it can have those at its ends, which
-/// shows in that the next thing is missed.
-TEST_F(BadInputTable, ConfigurationKeys) {
-  Options options;
-  std::vector<Case> cases;
-  const std::string none = folder_ / "none";
-  const auto add = [&](const std::string& key, const std::string& value, const std::string& word) {
-    const std::string assignment = key + "=" + value;
-    cases.push_back(
-        {assignment, {"run", none, "--out", folder_ / "out", "--set", assignment}, word});
-  };
-  for (const options::Field& field : options::fields_of(options)) {
-    const bool is_whole = std::holds_alternative<int*>(field.value);
-    const std::string key = field.name();
-    if (is_whole || std::holds_alternative<double*>(field.value)) {
-      const double step = is_whole ? 1.0 : 1e-6;
-      add(key, fmt::format("{}", field.rule.min - step), key);
-      add(key,
-          fmt::format("{}", is_whole ? std::ceil(1.001 * field.rule.max + step)
-                                     : 1.001 * field.rule.max + step),
-          key);
-      add(key, "nan", key);
-      add(key, "1e300", key);
-      const bool is_pair = key.starts_with("stem.contrast_");  // one of them ends at the other
-      add(key, fmt::format("{}", field.rule.min), is_pair ? "error" : none);
-      add(key, fmt::format("{}", field.rule.max), is_pair ? "error" : none);
-    }
-    if (!std::holds_alternative<std::string*>(field.value)) {
-      add(key, "x", key);
-      add(key, "", key);
-    }
-  }
-  EXPECT_GT(cases.size(), 250U);
-  expect_refused(cases);
 }
 
 }  // namespace

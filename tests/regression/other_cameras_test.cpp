@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "evaluation/trajectory.hpp"
+#include "support/program_test.hpp"
+#include "support/state_runs.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Images of other people's cameras.
+class OtherCameras : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!test::shared_data()) {
+      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+    }
+  }
+  void expect_poses(std::vector<std::string> arguments, std::size_t count) const {
+    const std::string out = folder_ / "out";
+    arguments.insert(arguments.begin(), "run");
+    arguments.insert(arguments.end(), {"--out", out});
+    const ProgramResult result = run_stemvo(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, Not(HasSubstr("warning")));
+    const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");
+    ASSERT_TRUE(poses) << poses.error().message;  // it refuses what is not finite
+    EXPECT_EQ(poses->size(), count);
+  }
+  [[nodiscard]] std::vector<std::string> states() const {
+    return test::column(read_file(folder_ / "out/frames.csv"), "state");
+  }
+  static std::size_t num_images(const fs::path& folder) {
+    return static_cast<std::size_t>(
+        std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+  }
+  test::TempFolder folder_;
+};
+
+/// The hand-held camera, its frames in an order of ours.
+class Handheld : public OtherCameras {
+ protected:
+  /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
+  void expect_followed(int first, int step, std::size_t count, double max_ate_m) const {
+    const fs::path data = *test::shared_data() / "handheld";
+    std::vector<fs::path> images(fs::directory_iterator(data / "images"), {});
+    std::sort(images.begin(), images.end());
+    std::istringstream lines(read_file(data / "poses.txt"));
+    std::vector<std::string> poses(images.size());
+    for (std::string& pose : poses) {
+      std::getline(lines, pose);
+    }
+    fs::create_directory(folder_ / "images");
+    std::string chosen;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto from = static_cast<std::size_t>(first + step * static_cast<int>(i));
+      fs::create_symlink(images[from], folder_ / fmt::format("images/{:06d}.jpg", i));
+      chosen += poses[from] + "\n";
+    }
+    write_file(folder_ / "poses.txt", chosen);
+    expect_poses({folder_ / "images", "--camera", (data / "camera.yaml").string(), "--gt",
+                  folder_ / "poses.txt", "--set", "scale.source=none"},
+                 count);
+    const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+    EXPECT_LE(metrics.at("ate_rmse_m").at("sim3").get<double>(), max_ate_m);
+    EXPECT_GE(metrics.at("tracked_fraction").get<double>(), 0.97);
+    const std::vector<std::string> seen = states();
+    EXPECT_LE(std::find(seen.begin(), seen.end(), "tracking") - seen.begin(), 40);
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), "lost"), 0);
+  }
+};
+
+TEST_F(Handheld, Forwards) { expect_followed(0, 1, 400, 0.055); }
+TEST_F(Handheld, Backwards) { expect_followed(399, -1, 400, 0.095); }
+TEST_F(Handheld, EverySecondFrame) { expect_followed(0, 2, 200, 0.065); }
+TEST_F(Handheld, EveryThirdFrame) { expect_followed(0, 3, 134, 0.055); }
+
+TEST_F(OtherCameras, HandheldJpegsWithPosesAndTimes) {
+  const fs::path data = *test::shared_data() / "handheld";
+  expect_poses(
+      {(data / "images").string(), "--camera", (data / "camera.yaml").string(), "--gt",
+       (data / "poses.txt").string(), "--times", (data / "times.txt").string(), "--frames", "0:60"},
+      60);
+  const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
+  EXPECT_EQ(metrics.at("sequence"), "handheld");
+  EXPECT_EQ(metrics.at("alignment"), "sim3");
+}
+
+TEST_F(OtherCameras, DroneOfEuroc) {
+  const fs::path data = *test::shared_data() / "euroc/mav0/cam0";
+  expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
+               num_images(data / "data"));
+  // It hovers: nothing to make a map of, and nothing is lost.
+  for (const std::string& state : states()) {
+    EXPECT_THAT(state, ::testing::AnyOf("first", "stationary", "rotating"));
+  }
+}
+
+TEST_F(OtherCameras, KinectOfTum) {
+  const fs::path images = *test::shared_data() / "tum/rgb";
+  write_file(folder_ / "camera.yaml",
+             "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
+             "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
+             "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\nrate_hz: 10\n");
+  expect_poses({images.string(), "--camera", folder_ / "camera.yaml"}, num_images(images));
+  const std::vector<std::string> seen = states();
+  EXPECT_GE(std::count(seen.begin(), seen.end(), "tracking"), 15);
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "support/drives.hpp"
+#include "support/run_program.hpp"
+
+namespace stemvo::test {
+
+using Runner = ProgramResult (*)(const std::vector<std::string>& arguments);
+
+/// A real clip, held against tests/regression/thresholds/kitti_NN_PROTOCOL.yaml.
+inline void hold(Runner run_by,
+                 const std::string& clip,
+                 const std::string& scale_source,
+                 const std::string& thresholds,
+                 const std::string& out) {
+  const auto data = shared_data();
+  const ProgramResult run = run_by({"run", (*data / "kitti/sequences" / clip).string(), "--out",
+                                    out, "--set", "scale.source=" + scale_source});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const ProgramResult check =
+      run_stemvo({"check", out + "/metrics.json", "--against",
+                  STEMVO_SOURCE_DIR "/tests/regression/thresholds/kitti_" + clip + thresholds});
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  std::cout << run.out << check.out;
+}
+
+class NeedsClips : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!shared_data()) {
+      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
+    }
+  }
+  TempFolder folder_;
+};
+
+}  // namespace stemvo::test
