@@ -17,19 +17,20 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kBenchmarkFooter =
-    R"(KITTI_ROOT holds sequences/NN (as 'stemvo run' takes them) and poses/NN.txt. Each sequence runs with
-the default configuration and the paper's, each with metres from the camera's height (no ground
-truth, no alignment) and with per-step ground-truth scale (the paper's
-protocol).
+    R"(KITTI_ROOT holds sequences/NN (as 'stemvo run' takes them) and poses/NN.txt.
+Each sequence runs with the default configuration and the paper's, each with
+metres from the camera's height (no ground truth, no alignment) and with
+per-step ground-truth scale (the paper's protocol).
 
---out receives benchmark.md and benchmark.json, report.html, speed.json, and all files of
-every run under runs/. The paper's and other published numbers stand beside a sequence where all of
-its official frames ran.
+--out receives benchmark.md and benchmark.json, report.html, speed.json, and all
+files of every run under runs/. The paper's and other published numbers stand
+beside a sequence where all of its official frames ran.
 
-Stopped with Ctrl-C, the same command goes on where it was: a run is repeated only where its
-configuration, the program, the model, the frames, the calibration or the ground truth changed. A
-sequence that fails is a row with the reason; the exit code is 1 then. A sequence without ground truth
-is no failure: its errors are '-'.
+Stopped with Ctrl-C, the same command goes on where it was: a run is repeated
+only where its configuration, the program, the model, the frames, the
+calibration or the ground truth changed. A sequence that fails is a row with the
+reason; the exit code is 1 then. A sequence without ground truth is no failure:
+its errors are '-'.
 
 Examples:
   stemvo benchmark kitti --out result

@@ -15,10 +15,10 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kCalibrateFooter =
-    R"(Runs the odometry (mode map, no scale, camera.refine all) and writes down what it has learnt of the
-camera by the end. Turns tell of it, a straight road does not: a number that the drive does not
-determine stays as given and is marked. Ground truth is not read. Nothing uses FILE unless it is
-given to a run.
+    R"(Runs the odometry (mode map, no scale, camera.refine all) and writes down what
+it has learnt of the camera by the end. Turns tell of it, a straight road does
+not: a number that the drive does not determine stays as given and is marked.
+Ground truth is not read. Nothing uses FILE unless it is given to a run.
 
 Examples:
   stemvo calibrate kitti/sequences/00 --out refined.txt

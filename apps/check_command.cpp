@@ -13,7 +13,8 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kCheckFooter =
-    R"(THRESHOLDS.yaml holds one line per number of metrics.json that must stay inside its bounds:
+    R"(THRESHOLDS.yaml holds one line per number of metrics.json that must stay inside
+its bounds:
   t_rel_percent: {max: 1.0}
   tracked_fraction: {min: 0.99}
   ate_rmse_m.sim3: {max: 3}

@@ -15,8 +15,8 @@ inline constexpr int kExitFailed = 1;  ///< the world disagreed
 inline constexpr int kExitUsage = 2;
 inline constexpr int kExitInterrupted = 130;
 
-/// What the command line asks for; set while parsing, called afterwards. Returns the exit code; an
-/// error is printed, and means kExitFailed.
+/// The work that the command line asks for; set while parsing, called afterwards. Returns the exit
+/// code; an error is printed, and means kExitFailed.
 using Action = std::function<Expected<int>()>;
 
 struct CommandText {

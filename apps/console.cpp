@@ -1,21 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "console.hpp"
 
-#include <cerrno>
-#include <csignal>
+#include <algorithm>
 #include <cstdio>
-#include <cstdlib>
-#include <exception>
 #include <fstream>
-#include <new>
 #include <string>
-#include <system_error>
-
-#include <execinfo.h>
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <opencv2/core.hpp>
-#include <unistd.h>
 
 #include "commands.hpp"
 #include "report/metrics_keys.hpp"
@@ -23,117 +12,47 @@
 namespace stemvo::apps {
 namespace {
 
-constexpr const char* kNoThreads =
-    "out of threads: expected more than 'ulimit -u' allows, or more memory for them";
-constexpr const char* kNoMemory =
-    "out of memory: expected more than there is, or than 'ulimit -v' allows";
-
-std::FILE* console = stderr;  // ours; `stderr` is what libraries print to
-int first_failure = 0;        // errno of the first write to standard output that failed
 bool is_json = false;
 
-void write_out(std::string_view text) {
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && first_failure == 0) {
-    first_failure = errno;
-  }
-}
-
-void print_labelled(std::string_view label, std::string_view message) {
-  std::string line = label.empty() ? std::string(message) : fmt::format("{}: {}", label, message);
-  for (char& c : line) {
-    c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;  // libraries' messages may be many lines
-  }
-  line += '\n';
-  print_note(line);
-}
-
-/// Whatever ends the program says so.
-[[noreturn]] void on_terminate() {
-  const std::string what = describe(std::current_exception());
-  print_error(what);
-  if (what.starts_with("internal")) {
-    std::abort();
-  }
-  std::_Exit(kExitFailed);
+/// On one line: the messages of libraries may have many.
+void print_labelled(std::string line, std::string_view message) {
+  line += message;
+  std::ranges::replace_if(line, [](unsigned char c) { return c < 0x20; }, ' ');
+  print_note(line + '\n');
 }
 
 }  // namespace
 
-std::string describe(const std::exception_ptr& error) {
-  try {
-    std::rethrow_exception(error);
-  } catch (const std::bad_alloc&) {
-    return kNoMemory;
-  } catch (const cv::Exception& opencv) {
-    return opencv.code == cv::Error::StsNoMem ? kNoMemory
-                                              : std::string("internal: ") + opencv.what();
-  } catch (const std::system_error& system) {
-    return system.code() == std::errc::resource_unavailable_try_again ? kNoThreads : system.what();
-  } catch (const std::exception& other) {  // ONNX Runtime's say it in words only
-    return std::string_view(other.what()).find("pthread_create") != std::string_view::npos
-               ? kNoThreads
-               : std::string("internal: ") + other.what();
-  } catch (...) {
-    return "internal: unknown exception";
-  }
-}
-
-void prepare_console() {
-  // The C library loads what unwinds the stack at its first use, which may be where memory has run
-  // out (backtrace(3), notes): from here on it is there.
-  void* frame = nullptr;
-  backtrace(&frame, 1);
-  // A file opened while descriptor 1 is closed would become standard output. Only to be read: what
-  // is printed there fails.
-  int descriptor = 0;
-  do {
-    descriptor = ::open("/dev/null", O_RDONLY);
-  } while (descriptor >= 0 && descriptor <= STDERR_FILENO);
-  if (descriptor >= 0) {
-    ::close(descriptor);
-  }
-  std::signal(SIGPIPE, SIG_IGN);
-  std::set_terminate(on_terminate);
-#ifdef __GLIBC__  // where the manual says that the variable may be set
-  if (std::FILE* const nowhere = std::fopen("/dev/null", "we")) {
-    stderr = nowhere;
-  }
-#endif
-}
-
-void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size(), console); }
+void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }
 
 void print(std::string_view text) {
   if (!is_json) {
-    write_out(text);
+    print_help(text);
   }
 }
 
-void print_help(std::string_view text) { write_out(text); }
+void print_help(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 
 void choose_json() { is_json = true; }
 
 void print_json(const nlohmann::ordered_json& document) {
   if (is_json) {
-    write_out(to_text(document));
+    print_help(to_text(document));
   }
 }
 
-void print_error(std::string_view message) { print_labelled("error", message); }
+void print_error(std::string_view message) { print_labelled("error: ", message); }
 
 void print_line(std::string_view message) { print_labelled("", message); }
 
-void print_warning(std::string_view message) { print_labelled("warning", message); }
+void print_warning(std::string_view message) { print_labelled("warning: ", message); }
 
 int flush_console(int exit_code) {
-  if (std::fflush(stdout) != 0 && first_failure == 0) {
-    first_failure = errno;
-  }
-  if (first_failure == 0 || first_failure == EPIPE || exit_code != kExitDone) {
+  const bool is_written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (is_written || exit_code != kExitDone) {
     return exit_code;
   }
-  print_error(fmt::format("standard output: cannot be written ({})",
-                          std::generic_category().message(first_failure)));
+  print_error("standard output: expected a file or pipe that takes the result, found none");
   return kExitFailed;
 }
 

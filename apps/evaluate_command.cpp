@@ -12,10 +12,12 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kEvaluateFooter =
-    R"(Pose files are KITTI's (12 numbers a line), TUM's (8) or EuRoC's (state_groundtruth_estimate0/data.csv,
-the body's pose, which T_BS of ../cam0/sensor.yaml, or of --camera, makes the camera's). Where both
-files have times, each pose is compared with the true one nearest in time; else line by line. Both
-trajectories are moved to start at the identity; nothing else is fitted unless --align says so.
+    R"(Pose files are KITTI's (12 numbers a line), TUM's (8) or EuRoC's
+(state_groundtruth_estimate0/data.csv, the body's pose, which T_BS of
+../cam0/sensor.yaml, or of --camera, makes the camera's). Where both files have
+times, each pose is compared with the true one nearest in time; else line by
+line. Both trajectories are moved to start at the identity; nothing else is
+fitted unless --align says so.
 
 Examples:
   stemvo evaluate --gt kitti/poses/03.txt result/trajectory_kitti.txt

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <new>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -10,7 +11,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/core/utils/logger.hpp>
-#include <sys/resource.h>
 
 #include "commands.hpp"
 #include "config/config.hpp"
@@ -18,6 +18,7 @@
 #include "help_format.hpp"
 #include "interrupt.hpp"
 #include "stemvo/version.hpp"
+#include "text/text_file.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -30,12 +31,13 @@ With KITTI:
 With your own camera (see 'stemvo run --help'):
   stemvo run drive/images --camera camera.yaml --out result
 
-'stemvo COMMAND --help' explains a command; with --json it prints its result for a program. Every configuration key is explained by
+'stemvo COMMAND --help' explains a command; with --json it prints its result for
+a program. Every configuration key is explained by
   stemvo --dump-config > my.yaml
 edit it, then: stemvo run ... --config my.yaml
 
-Exit codes: 0 done, 1 something is wrong with a file, model or key (one line says what), 2 wrong
-usage, 130 interrupted (what was computed is written).)";
+Exit codes: 0 done, 1 something is wrong with a file, model or key (one line
+says what), 2 wrong usage, 130 interrupted (what was computed is written).)";
 
 /// "expected a command: run, evaluate, .., found 'runn'"
 std::string expected_command(const CLI::App& app, const std::string& found) {
@@ -62,7 +64,6 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   for (const CLI::App* sub : app.get_subcommands()) {
     command += " " + sub->get_name();
   }
-  constexpr std::size_t kMaxShown = 300;  // the shell may have made a thousand names of a pattern
   std::string message = error.what();
   if (app.get_subcommands().empty()) {
     const std::vector<std::string> words = app.remaining();
@@ -72,9 +73,7 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
       message = expected_command(app, "'" + *word + "'");
     }
   }
-  if (message.size() > kMaxShown) {
-    message = message.substr(0, kMaxShown) + " ..";
-  }
+  message = one_line(message);  // the shell may have made a thousand names of a pattern
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr &&
       std::ranges::any_of(app.remaining(true), is_image)) {
     message += "; a pattern of files must be quoted";
@@ -83,23 +82,7 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   return kExitUsage;
 }
 
-/// Of the main thread and, as the C library has it, of every other. OpenCV and ONNX Runtime ran
-/// with an eighth of it.
-Status check_stack() {
-  constexpr rlim_t kLeastBytes = 1U << 20U;
-  struct rlimit limit = {};
-  if (::getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= kLeastBytes) {
-    return {};
-  }
-  return fail(fmt::format("out of stack: expected at least {} kB, found {} ('ulimit -s')",
-                          kLeastBytes >> 10U, limit.rlim_cur >> 10U));
-}
-
 int run_program(int argc, char** argv) {
-  if (const Status status = check_stack(); !status) {
-    print_error(status.error().message);
-    return kExitFailed;
-  }
   CLI::App app("stemvo: camera frames in, a trajectory out, seen through one learned filter.",
                "stemvo");
   app.set_version_flag("--version", "stemvo " + std::string(version()));
@@ -144,13 +127,14 @@ int run_program(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   stemvo::apps::process_start();
-  stemvo::apps::prepare_console();
   stemvo::apps::catch_interrupts();
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // errors are ours to tell
   try {
     return stemvo::apps::flush_console(stemvo::apps::run_program(argc, argv));
-  } catch (...) {
-    stemvo::apps::print_error(stemvo::apps::describe(std::current_exception()));
+  } catch (const std::bad_alloc&) {
+    stemvo::apps::print_error("out of memory");
+  } catch (const std::exception& error) {
+    stemvo::apps::print_error(std::string("internal: ") + error.what());
   }
   return stemvo::apps::kExitFailed;
 }

@@ -3,9 +3,7 @@
 
 #include <chrono>
 #include <cstddef>
-#include <optional>
 #include <string>
-#include <utility>
 
 namespace stemvo::apps {
 
@@ -22,15 +20,16 @@ class Progress {
 
  private:
   using Clock = std::chrono::steady_clock;
-  [[nodiscard]] bool is_due(Clock::time_point now, bool is_last) const;
+  [[nodiscard]] std::string line(std::size_t done,
+                                 std::size_t total,
+                                 double elapsed_s,
+                                 bool is_last) const;
 
   std::string unit_;
   bool is_quiet_;
   bool is_terminal_;
   Clock::time_point start_;
   Clock::time_point last_;
-  /// What the rate is counted from: not what an earlier call had done (--resume).
-  std::optional<std::pair<std::size_t, Clock::time_point>> base_;
 };
 
 }  // namespace stemvo::apps

@@ -19,18 +19,22 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kRobustnessFooter =
-    R"(Each drive runs as it is and under each disturbance, at three strengths, through the configured
-channel and through controls: gray, log, census (and red, green, blue where frames are colour), which
-differ in nothing but the channel, and orb and sift, matched between pairs of frames of the gray image.
-Every step has its true length (--set scale.source=camera_height: metres from the road instead).
+    R"(Each drive runs as it is and under each disturbance, at three strengths, through
+the configured channel and through controls: gray, log, census (and red, green,
+blue where frames are colour), which differ in nothing but the channel, and orb
+and sift, matched between pairs of frames of the gray image. Every step has its
+true length (--set scale.source=camera_height: metres from the road instead).
 
---out receives robustness.csv (a line per disturbance, strength, channel and drive), robustness.json
-(with the verdicts), robustness.txt (the tables) and report.html (figures, for a browser), written after every
-row. The table shows r_rel in degrees per 100 m, in brackets the share of frames with a measured motion where some have
-none, and how many times as large the channel's rotation error is as a control's over segments of an
-eighth of the path, from every frame on, with the 95 % interval; * where the interval leaves out 1, else
-the two cannot be told apart; - where there are too few segments. A second table sums up
-groups of disturbances: geometric means of the ratios, and how many rows are decided for whom.
+--out receives robustness.csv (a line per disturbance, strength, channel and
+drive), robustness.json (with the verdicts), robustness.txt (the tables) and
+report.html (figures, for a browser), written after every row. The table shows
+r_rel in degrees per 100 m, in brackets the share of frames with a measured
+motion where some have none, and how many times as large the channel's rotation
+error is as a control's over segments of an eighth of the path, from every frame
+on, with the 95 % interval; * where the interval leaves out 1, else the two
+cannot be told apart; - where there are too few segments. A second table sums up
+groups of disturbances: geometric means of the ratios, and how many rows are
+decided for whom.
 
 Examples:
   stemvo robustness kitti/sequences/03 --out result

@@ -19,14 +19,17 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kSearchFooter =
-    R"(Every filter of the model (and, for comparison, ORB on the gray image and the input's R, G and B)
-is given an odometry of its own, each step having its true length. First come the filters that cannot
-be told from the best (paired bootstrap over segments, 95 %), a group of equals, then the others by
-t_rel. --kinds has disturbed sequences count too. Ground truth is needed. Hopeless filters are stopped
-early (successive halving); --exhaustive runs all to the end.
+    R"(Every filter of the model (and, for comparison, ORB on the gray image and the
+input's R, G and B) is given an odometry of its own, each step having its true
+length. First come the filters that cannot be told from the best (paired
+bootstrap over segments, 95 %), a group of equals, then the others by t_rel.
+--kinds has disturbed sequences count too. Ground truth is needed. Hopeless
+filters are stopped early (successive halving); --exhaustive runs all to the
+end.
 
---out receives filters.csv and filters.json (the table), config.yaml (the odometry of all rows),
-best.yaml (for 'stemvo run --config'), report.html, sheet.png (best, median, worst, baselines) and records.jsonl, from which
+--out receives filters.csv and filters.json (the table), config.yaml (the
+odometry of all rows), best.yaml (for 'stemvo run --config'), report.html,
+sheet.png (best, median, worst, baselines) and records.jsonl, from which
 --resume goes on after Ctrl-C or a crash.
 
 Examples:

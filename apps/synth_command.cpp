@@ -18,8 +18,8 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kSynthFooter =
-    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with exact poses.
-The same options give the same files.
+    R"(Writes OUT_DIR/sequences/NAME and OUT_DIR/poses/NAME.txt in KITTI's layout, with
+exact poses. The same options give the same files.
 
 Examples:
   stemvo synth drive --frames 200

@@ -38,7 +38,7 @@ std::filesystem::path file_of_kind(bool as_color) {
 void decode(State& state, bool as_color) {
   const auto file = file_of_kind(as_color);
   for (auto _ : state) {
-    auto image = io::read_png(file, as_color);
+    auto image = io::read_image(file, as_color);
     if (!image) {
       state.SkipWithError(image.error().message.c_str());
       return;

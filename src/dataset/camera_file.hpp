@@ -10,7 +10,7 @@
 
 namespace stemvo::dataset {
 
-/// What a camera file says.
+/// Contents of a camera file.
 struct CameraFile {
   Lens lens;
   std::optional<double> rate_hz;

@@ -111,12 +111,11 @@ Status add_ground_truth(FrameList& frames,
 Status check_center(const Camera& camera) {
   const bool is_inside = camera.cx_px > 0.0 && camera.cx_px < camera.width_px &&
                          camera.cy_px > 0.0 && camera.cy_px < camera.height_px;
-  if (!is_inside) {
-    return fail(
-        fmt::format("expected a principal point inside images of {}x{} pixels, found ({}, {})",
-                    camera.width_px, camera.height_px, camera.cx_px, camera.cy_px));
-  }
-  return {};
+  return is_inside
+             ? Status()
+             : Status(fail(fmt::format(
+                   "expected a principal point inside images of {}x{} pixels, found ({}, {})",
+                   camera.width_px, camera.height_px, camera.cx_px, camera.cy_px)));
 }
 
 Status add_view(FrameList& frames,
@@ -137,33 +136,12 @@ Status add_view(FrameList& frames,
   return {};
 }
 
-namespace {
-
-/// The first of equals; there is one.
-template <typename Vote>
-Vote most_frequent(const std::vector<Vote>& votes) {
-  return *std::max_element(votes.begin(), votes.end(), [&](const Vote& a, const Vote& b) {
-    return std::count(votes.begin(), votes.end(), a) < std::count(votes.begin(), votes.end(), b);
-  });
-}
-
-}  // namespace
-
-Expected<io::ImageKind> vote_on_images(
-    const std::vector<fs::path>& files,
-    const std::function<Expected<io::ImageKind>(const fs::path&, const io::WantedSize&)>& kind_of) {
+Expected<io::ImageKind> vote_on_images(const std::vector<fs::path>& files) {
   constexpr std::size_t kNumVotes = 5;
-  std::vector<io::WantedSize> sizes;
-  for (std::size_t i = 0; i < std::min(files.size(), kNumVotes); ++i) {
-    if (const auto size = io::declared_size(files[i])) {
-      sizes.push_back(size);
-    }
-  }
-  const io::WantedSize wanted = sizes.empty() ? std::nullopt : most_frequent(sizes);
   std::string first_message;
   std::vector<io::ImageKind> votes;
   for (auto file = files.begin(); file != files.end() && votes.size() < kNumVotes; ++file) {
-    const auto kind = kind_of(*file, wanted);
+    const auto kind = io::read_image_kind(*file);
     if (kind) {
       votes.push_back(*kind);
     } else if (first_message.empty()) {
@@ -174,7 +152,10 @@ Expected<io::ImageKind> vote_on_images(
     return fail(
         fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
   }
-  return most_frequent(votes);
+  const auto num_votes = [&](const io::ImageKind& kind) {
+    return std::count(votes.begin(), votes.end(), kind);
+  };
+  return *std::ranges::max_element(votes, {}, num_votes);
 }
 
 }  // namespace stemvo::dataset

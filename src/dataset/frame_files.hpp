@@ -20,7 +20,7 @@
 #include "io/image_file.hpp"
 #include "stemvo/error.hpp"
 
-/// What all frame sources that read files share.
+/// Parts that all frame sources share.
 namespace stemvo::dataset {
 
 [[nodiscard]] bool is_folder(const std::filesystem::path& path);
@@ -29,7 +29,7 @@ namespace stemvo::dataset {
 /// The last part of a folder's name that tells it from others: not `images`, `rgb`, `data`, `mav0`,
 /// `cam0` or `image_2`, as the folders of every recording are called.
 [[nodiscard]] std::string recording_name(const std::filesystem::path& folder);
-/// What lies in a folder, in no order. Error: it cannot be listed.
+/// All entries of a folder, in no order. Error: it cannot be listed.
 [[nodiscard]] Expected<std::vector<std::filesystem::path>> list_folder(
     const std::filesystem::path& folder);
 
@@ -77,12 +77,9 @@ namespace stemvo::dataset {
                               const std::vector<std::string>& masks,
                               std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
-/// What most of the first readable images are, of the size that most of the first say they have; of
-/// equals the one seen first. One odd frame must not throw the rest away. `kind_of`: of a file,
-/// where it is of that size. Error: none can be read.
+/// The size and colours that most of the first five readable images have: one odd frame must not
+/// throw the rest away. Error: none can be read.
 [[nodiscard]] Expected<io::ImageKind> vote_on_images(
-    const std::vector<std::filesystem::path>& files,
-    const std::function<Expected<io::ImageKind>(const std::filesystem::path&,
-                                                const io::WantedSize&)>& kind_of);
+    const std::vector<std::filesystem::path>& files);
 
 }  // namespace stemvo::dataset

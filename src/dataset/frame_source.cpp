@@ -22,14 +22,14 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, code);
 }
 
-/// What `python -m stemvo.bag` reads.
+/// A file or folder that `python -m stemvo.bag` reads.
 bool is_bag(const fs::path& path) {
   const fs::path kind = path.extension();
   return is_file(path) ? kind == ".bag" || kind == ".mcap" || kind == ".db3"
                        : is_file(path / "metadata.yaml");
 }
 
-/// Nothing that is known.
+/// The error for an input that is none of those that are read.
 Error refuse(const fs::path& path) {
   std::string problem =
       "expected KITTI's layout (image_2 or image_0, calib.txt, times.txt), EuRoC's (mav0/cam0), "
@@ -95,12 +95,12 @@ Expected<cv::Mat> FrameSource::read(std::size_t index) const {
 }
 
 Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
-  const std::size_t colon = text.find(':');
+  const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string first = text.substr(0, colon);
-  const std::string last = colon == std::string::npos ? "" : text.substr(colon + 1);
-  const std::optional<std::size_t> begin = parse_index(first.empty() ? "0" : first);
+  const std::string last = text.substr(std::min(colon + 1, text.size()));
+  const std::optional<std::size_t> begin = first.empty() ? 0 : parse_index(first);
   const std::optional<std::size_t> end = parse_index(last);
-  if (colon == std::string::npos || text.size() == 1 || !begin || (!last.empty() && !end)) {
+  if (colon == text.size() || text == ":" || !begin || (!last.empty() && !end)) {
     return fail(fmt::format("expected A:B, A: or :B with whole numbers, found '{}'", text));
   }
   if (end && *end <= *begin) {

@@ -30,7 +30,7 @@ struct FrameRangeRequest {
 };
 [[nodiscard]] Expected<FrameRangeRequest> parse_frame_range(const std::string& text);
 
-/// What is known of frames that come one behind the other: of a video, of a camera.
+/// Properties of frames that come one behind the other, from a video or a camera.
 struct StreamInfo {
   std::size_t max_frames = 0;                 ///< as asked for; the stream may end before
   std::size_t expected_frames = 0;            ///< what the container says; 0: not known
@@ -44,7 +44,7 @@ struct GroundTruth {
   std::vector<std::size_t> frames;  ///< whose they are; increasing
 };
 
-/// What a source knows of its frames before one is read. Files, times and poses are those of the
+/// All that a source knows of its frames before one is read. Files, times and poses are those of the
 /// range, one per frame; a stream has none of them but a video's file.
 struct FrameList {
   std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
@@ -67,16 +67,17 @@ struct FrameList {
   /// order; an empty image behind the last.
   std::function<Expected<cv::Mat>(std::size_t)> read;
   std::optional<StreamInfo> stream = std::nullopt;
-  /// Of a stream with a pose file: true poses by the times of frames that were read.
+  /// Finds the true poses by the times of frames that were read; only a stream with a pose file
+  /// has it.
   std::function<Expected<GroundTruth>(const std::vector<double>& times_s)> match = nullptr;
 };
 
-/// Frames of one camera, in order; what is known of them as in FrameList.
+/// Frames of one camera, in order, with a FrameList.
 class FrameSource {
  public:
   explicit FrameSource(FrameList frames) : frames_(std::move(frames)) {}
 
-  /// Of a stream the most there may be.
+  /// The number of frames; of a stream the most there may be.
   [[nodiscard]] std::size_t size() const {
     return frames_.stream ? frames_.stream->max_frames : frames_.files.size();
   }
@@ -91,11 +92,11 @@ class FrameSource {
     return frames_.ground_truth;
   }
   [[nodiscard]] bool has_ground_truth() const { return frames_.ground_truth || frames_.match; }
-  /// Of a frame; of a stream's after it was read.
+  /// The time of a frame; a stream knows it after the frame was read.
   [[nodiscard]] double time_s(std::size_t index) const {
     return frames_.stream ? frames_.stream->time_s(index) : frames_.timestamps_s[index];
   }
-  /// Of those of the first `num_frames` that have a true pose; nullopt: there is no ground truth.
+  /// True poses of the first `num_frames`, where they have one; nullopt: there is no ground truth.
   /// Error, of a stream only: no times match.
   [[nodiscard]] Expected<std::optional<GroundTruth>> ground_truth_of(std::size_t num_frames) const;
   [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
@@ -134,7 +135,7 @@ struct SequenceOptions {
   std::optional<std::filesystem::path> calibration = std::nullopt;
 };
 
-/// What was asked for, and the files given beside it.
+/// The recording that was asked for, and the files given beside it.
 struct FrameSourceRequest : SequenceOptions {
   /// A folder, a pattern such as `drive/left_*.png` (* and ? in the last part), a video file, or
   /// `camera:N`.

@@ -73,7 +73,7 @@ Eigen::Vector2d source_of(const Lens& lens, const Camera& view, double u, double
   return lens.camera.project({xy.x(), xy.y(), 1.0});
 }
 
-/// Of all pixels: those of the rim say it.
+/// Whether all pixels of the view come from inside the lens' image. Those of the rim decide.
 bool lies_inside(const Lens& lens, const Camera& view) {
   const double right = view.width_px - 1;
   const double bottom = view.height_px - 1;

@@ -47,11 +47,11 @@ class FrameView {
   [[nodiscard]] static Expected<FrameView> create(const Lens& lens,
                                                   const std::filesystem::path& camera_file);
 
-  /// Of what apply() makes.
+  /// The camera of the frames that apply() makes.
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// Of the frames as they come.
+  /// The size of the frames as they come.
   [[nodiscard]] cv::Size full_size() const { return full_size_; }
-  /// Of a frame of full_size(); several threads may call it.
+  /// Makes the view of a frame of full_size(); several threads may call it.
   [[nodiscard]] cv::Mat apply(const cv::Mat& image) const;
   /// The mask as the frames are: 255 where all of a pixel may be used, else 0.
   [[nodiscard]] cv::Mat apply_to_mask(const cv::Mat& mask) const;

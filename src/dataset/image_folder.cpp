@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of all images.
+/// The times of all images.
 Expected<std::vector<double>> find_times(const Listing& listing,
                                          const FrameSourceRequest& request,
                                          const fs::path& camera_file,
@@ -46,7 +46,7 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
                             const fs::path& folder,
                             const fs::path& camera_file,
                             const Camera& camera) {
-  const auto kind = vote_on_images(files, io::read_image_kind);
+  const auto kind = vote_on_images(files);
   if (!kind) {
     return kind.error();
   }

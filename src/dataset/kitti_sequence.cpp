@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -19,29 +20,28 @@ constexpr std::size_t kDigits = 6;  // of KITTI's %06d.png
 
 /// 0..3; colour cameras are 2 and 3.
 Expected<int> choose_camera(const fs::path& directory, const std::string& option) {
-  bool is_known = option == "auto";
-  for (const int index : {2, 0, 1, 3}) {
-    const std::string name = fmt::format("image_{}", index);
-    const bool is_wanted = option == "auto" ? index % 2 == 0 : option == name;
-    if (is_wanted && dataset::is_folder(directory / name)) {
-      return index;
-    }
-    is_known = is_known || is_wanted;
-  }
-  if (!is_known) {
+  constexpr std::array<int, 4> kOrder = {2, 0, 1, 3};
+  const auto is_there = [&](int index) {
+    return dataset::is_folder(directory / fmt::format("image_{}", index));
+  };
+  const auto found = std::ranges::find_if(kOrder, [&](int index) {
+    return option == "auto" ? index % 2 == 0 && is_there(index)
+                            : option == fmt::format("image_{}", index);
+  });
+  if (found == kOrder.end() && option != "auto") {
     return fail(
         fmt::format("input.camera: expected auto or image_0 .. image_3, found '{}'", option));
   }
-  // Commands that read other recordings too open none of them as KITTI's.
-  const char* why = looks_like_kitti(directory)
-                        ? ""
-                        : "; this command reads KITTI's layout only (image_2/000000.png, .., "
-                          "calib.txt, times.txt), 'stemvo run' others too";
-  return fail(option == "auto"
-                  ? fmt::format("{}: expected a folder image_2 or image_0, found neither{}",
-                                directory.string(), why)
-                  : fmt::format("{}: expected a folder (input.camera is {}), found none{}",
-                                (directory / option).string(), option, why));
+  if (found == kOrder.end() || !is_there(*found)) {
+    // Commands that read other recordings too open none of them as KITTI's.
+    const char* why = looks_like_kitti(directory)
+                          ? ""
+                          : "; this command reads KITTI's layout only (image_2/000000.png, .., "
+                            "calib.txt, times.txt), 'stemvo run' others too";
+    return fail(fmt::format("{}: expected a folder {}, found none{}", directory.string(),
+                            option == "auto" ? "image_2 or image_0" : option, why));
+  }
+  return *found;
 }
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.
@@ -74,63 +74,44 @@ Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
   return files;
 }
 
-/// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists.
-/// Error: that cannot be told.
-Expected<std::optional<fs::path>> find_ground_truth(const fs::path& absolute,
-                                                    const std::string& name) {
+/// `../../poses/NN.txt` as typed, or behind a link to the folder; nullopt if neither exists. A link
+/// to nowhere is one: poses that cannot be read are not poses that are not there.
+std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::string& name) {
   std::error_code code;
   for (const fs::path& base : {absolute, fs::weakly_canonical(absolute, code)}) {
     fs::path file = base.parent_path().parent_path() / "poses" / (name + ".txt");
-    if (fs::exists(fs::symlink_status(file, code))) {  // a link to nowhere is read, and refused
-      return std::optional(file);
-    }
-    if (code && code != std::errc::no_such_file_or_directory &&
-        code != std::errc::not_a_directory) {
-      return fail(fmt::format("{}: cannot be told from none: {}", file.string(), code.message()));
+    if (fs::exists(fs::symlink_status(file, code))) {
+      return file;
     }
   }
-  return std::optional<fs::path>();
+  return std::nullopt;
 }
 
-/// Of the file that was asked for, or of the sequence's own, if there is one.
+/// Adds the poses of the file that was asked for, or of the sequence's own, if there is one.
 Status add_truth(const fs::path& absolute,
                  const SequenceOptions& options,
                  std::size_t num_images,
                  FrameList& frames) {
   const auto file =
       options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
-  if (!file || !*file) {
-    return file ? Status() : Status(file.error());
-  }
-  const Status status = dataset::add_ground_truth(
-      frames, **file, std::nullopt, options.ground_truth_tolerance_s, num_images, false);
-  if (status && !options.ground_truth && frames.ground_truth_frames) {
-    return fail(fmt::format("{}: expected a pose for each of {} frames, found those of {}",
-                            (*file)->string(), frames.files.size(),
-                            frames.ground_truth_frames->size()));
-  }
-  return status;
+  return file ? dataset::add_ground_truth(frames, *file, std::nullopt,
+                                          options.ground_truth_tolerance_s, num_images, false)
+              : Status();
 }
 
-/// The size that most images have.
-Status set_size(bool is_color, FrameList& frames) {
-  const auto kind = dataset::vote_on_images(
-      frames.files, [is_color](const fs::path& file, const io::WantedSize& wanted) {
-        return io::read_png(file, is_color, wanted).map([is_color](const cv::Mat& image) {
-          return io::ImageKind{image.size(), is_color};
-        });
-      });
+/// Sets the size that most images have.
+Status set_size(const fs::path& calibration, FrameList& frames) {
+  const auto kind = dataset::vote_on_images(frames.files);
   if (!kind) {
     return kind.error();
   }
   frames.full_size = kind->size;
   frames.camera.width_px = kind->size.width;
   frames.camera.height_px = kind->size.height;
-  const Status status = frames.given_calibration ? dataset::check_center(frames.camera) : Status();
+  const Status status = dataset::check_center(frames.camera);
   return status ? status
                 : Status(fail(fmt::format("{}: {}: a calibration of another image size",
-                                          frames.given_calibration->string(),
-                                          status.error().message)));
+                                          calibration.string(), status.error().message)));
 }
 
 }  // namespace
@@ -182,7 +163,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   frames.given_calibration = options.calibration;
   const bool is_color = *camera_index >= 2;
   const Status status = add_truth(absolute, options, images->size(), frames).and_then([&] {
-    return set_size(is_color, frames);
+    return set_size(calibration, frames);
   });
   const auto mask = dataset::make_mask(options.masks, frames.full_size);
   if (!status || !mask) {
@@ -190,7 +171,7 @@ Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
   }
   frames.mask = *mask;
   frames.read = [files = frames.files, is_color, size = frames.full_size](std::size_t index) {
-    return io::read_png(files[index], is_color, size);
+    return io::read_image(files[index], is_color, size);
   };
   return KittiSequence(std::move(frames));
 }

@@ -27,7 +27,6 @@ std::optional<fs::path> if_exists(const fs::path& file) {
 /// The listing with the rows `time name` of a list, `#` before comments; times increase. `unit_s`:
 /// of the times.
 Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing) {
-  constexpr std::size_t kMaxImages = 300000;  // half a kB each
   const auto lines = read_lines(list);
   if (!lines) {
     return lines.error();
@@ -53,10 +52,6 @@ Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing
       return fail_at(
           list, i,
           fail(fmt::format("expected a time after that of the image before, found {}", words[0])));
-    }
-    if (listing.files.size() == kMaxImages) {
-      return fail_at(list, i,
-                     fail(fmt::format("expected at most {} images, found more", kMaxImages)));
     }
     listing.times_s.push_back(time_s);
     listing.files.push_back(listing.folder / words[1]);

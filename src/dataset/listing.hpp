@@ -23,7 +23,7 @@ struct Listing {
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
 };
 
-/// Of a folder in one of these layouts; nullopt: another one, or none.
+/// The listing of a folder in one of these layouts; nullopt: another one, or none.
 /// EuRoC: `mav0`, its parent, or one camera of it (cam0, cam1): data.csv names the images of
 /// data/ and their times in ns, sensor.yaml is the camera, state_groundtruth_estimate0/data.csv the
 /// ground truth where it exists.

@@ -21,7 +21,8 @@ Status check_stream_size(const cv::Size& size, const Camera& camera, const std::
   return {};
 }
 
-/// What the container says may be wrong; what --frames says is what is read.
+/// Error: poses without times are fewer than the frames. The container's count may be wrong, so
+/// that --frames overrides it.
 Status check_length(const PoseFile& truth,
                     const FrameList& frames,
                     const FrameSourceRequest& request) {

@@ -46,7 +46,7 @@ class VideoStream {
   /// Each is read once; several threads may ask for frames that follow one another, and wait for
   /// their turn. Error: a frame that cannot be decoded.
   [[nodiscard]] Expected<cv::Mat> read(std::size_t index);
-  /// Of a frame that was read, in seconds; increasing.
+  /// The time of a frame that was read, in seconds; increasing.
   [[nodiscard]] double time_s(std::size_t index) const;
 
  private:

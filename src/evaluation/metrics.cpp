@@ -82,7 +82,7 @@ AbsoluteTrajectoryError ate_rmse(std::span<const Rigid3> estimate,
           after_m(Alignment::kSim3)};
 }
 
-/// What is left of the true motion first -> last after undoing the estimated one (devkit).
+/// The rest of the true motion first -> last after undoing the estimated one (devkit).
 Rigid3 motion_error(std::span<const Rigid3> estimate,
                     std::span<const Rigid3> ground_truth,
                     std::size_t first,

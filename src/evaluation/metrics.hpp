@@ -33,7 +33,7 @@ struct AbsoluteTrajectoryError {
 
 /// Everything that needs ground truth. Both trajectories are first moved to start at the identity.
 struct Metrics {
-  /// What was fitted before the offset, t_rel, r_rel and the RPE were taken.
+  /// The alignment that was fitted before the offset, t_rel, r_rel and the RPE were taken.
   Alignment alignment = Alignment::kNone;
   double path_length_m = 0.0;     ///< of the ground truth
   double average_offset_m = 0.0;  ///< paper: mean of |dx| + |dz|
@@ -76,7 +76,7 @@ struct SegmentError {
                                                         std::span<const Rigid3> ground_truth,
                                                         std::span<const double> path_shares);
 
-/// What two methods are compared by (paired_ratio): segments of an eighth of the path from every
+/// Errors that two methods are compared by (paired_ratio): segments of an eighth of the path from every
 /// frame on or, of more than `max_segments`, evenly spaced ones.
 struct DenseErrors {
   std::vector<double> t_percent;

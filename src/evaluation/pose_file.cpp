@@ -18,14 +18,7 @@ namespace fs = std::filesystem;
 
 enum class Format { kKitti, kTum, kEuroc };
 
-/// Up to `limit`: a line of a hostile file may have millions.
-std::size_t count_words(std::string_view line, std::size_t limit) {
-  std::size_t count = 0;
-  while (count < limit && !take_word(line).empty()) {
-    ++count;
-  }
-  return count;
-}
+bool is_blank(std::string_view line) { return take_word(line).empty(); }
 
 Format format_of(std::string_view text) {
   bool has_comment = false;  // KITTI's have none
@@ -35,9 +28,9 @@ Format format_of(std::string_view text) {
     const bool is_comment = first.starts_with('#');
     has_comment = has_comment || is_comment;
     if (!first.empty() && !is_comment) {
-      return line.find(',') != std::string_view::npos   ? Format::kEuroc
-             : has_comment || count_words(line, 9) == 8 ? Format::kTum
-                                                        : Format::kKitti;
+      return line.find(',') != std::string_view::npos         ? Format::kEuroc
+             : has_comment || split_words(line).size() == 8 ? Format::kTum
+                                                              : Format::kKitti;
     }
   }
   return has_comment ? Format::kTum : Format::kKitti;
@@ -52,17 +45,6 @@ struct TimedPose {
 /// Entries of R^T R, or the length of a quaternion, may differ this much from the exact ones.
 constexpr double kRotationTolerance = 1e-3;
 
-/// Metres: further than any drive, and near enough that squares and sums stay finite.
-constexpr double kFurthest_m = 1e9;
-
-Expected<TimedPose> with_near_translation(double time, const Rigid3& pose) {
-  if (!(pose.translation.cwiseAbs().maxCoeff() <= kFurthest_m)) {
-    return fail(fmt::format("expected a position within {} m, found ({}, {}, {})", kFurthest_m,
-                            pose.translation.x(), pose.translation.y(), pose.translation.z()));
-  }
-  return TimedPose{time, pose};
-}
-
 Expected<TimedPose> pose_from_matrix_row(const std::vector<double>& numbers) {
   const Matrix34d matrix =
       Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
@@ -74,10 +56,10 @@ Expected<TimedPose> pose_from_matrix_row(const std::vector<double>& numbers) {
         "expected a rotation in the first three columns, found R^T R off the identity by {:.3g}",
         deviation));
   }
-  if (!(rotation.determinant() > 0.0)) {
+  if (rotation.determinant() < 0.0) {
     return fail("expected a rotation in the first three columns, found a reflection");
   }
-  return with_near_translation(0.0, Rigid3::from_matrix(matrix));
+  return TimedPose{0.0, Rigid3::from_matrix(matrix)};
 }
 
 Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
@@ -87,7 +69,7 @@ Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
         fmt::format("expected a quaternion of length 1 in the last four numbers, found {:.6g}",
                     rotation.norm()));
   }
-  return with_near_translation(n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3])));
+  return TimedPose{n[0], Rigid3(rotation, Eigen::Vector3d(n[1], n[2], n[3]))};
 }
 
 /// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
@@ -118,7 +100,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   const double unit_s = format == Format::kEuroc ? 1e-9 : 1.0;
   std::vector<std::string_view> lines = split_lines(text);
   // Empty lines at the end of a file are no poses; within KITTI's they would shift the frames.
-  while (!lines.empty() && count_words(lines.back(), 1) == 0) {
+  while (!lines.empty() && is_blank(lines.back())) {
     lines.pop_back();
   }
   PoseFile result;
@@ -126,7 +108,7 @@ Expected<PoseFile> parse_rows(const fs::path& file, std::string_view text, Forma
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string_view line =
         format == Format::kKitti ? lines[i] : lines[i].substr(0, lines[i].find('#'));
-    if (format != Format::kKitti && count_words(line, 1) == 0) {
+    if (format != Format::kKitti && is_blank(line)) {
       continue;
     }
     const Expected<TimedPose> row = parse_row(format, line);
@@ -158,7 +140,7 @@ void sort_by_time(PoseFile& file) {
   std::sort(times_s.begin(), times_s.end());
 }
 
-/// Of a list in order that is not empty; of equals the first.
+/// The index of the nearest time of a list in order that is not empty; of equals the first.
 std::size_t nearest(std::span<const double> times_s, double time_s) {
   const auto above = std::lower_bound(times_s.begin(), times_s.end(), time_s);
   const auto index = static_cast<std::size_t>(above - times_s.begin());
@@ -172,13 +154,13 @@ std::size_t nearest(std::span<const double> times_s, double time_s) {
 }  // namespace
 
 Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
-  return read_rows(file)
+  return read_text_file(file)
       .and_then([&](const std::string& text) { return parse_rows(file, text, Format::kKitti); })
       .map([](const PoseFile& read) { return read.poses; });
 }
 
 Expected<PoseFile> read_pose_file(const fs::path& file) {
-  Expected<PoseFile> result = read_rows(file).and_then(
+  Expected<PoseFile> result = read_text_file(file).and_then(
       [&](const std::string& text) { return parse_rows(file, text, format_of(text)); });
   if (result) {
     sort_by_time(*result);

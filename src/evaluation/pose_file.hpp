@@ -18,7 +18,7 @@ struct PoseFile {
   bool is_of_body = false;  ///< EuRoC's: world_from_body in place of world_from_camera
 };
 
-/// Told by the first row that is no comment: EuRoC's has commas (`time in ns, x, y, z, qw, qx, qy,
+/// The first row that is no comment tells the format: EuRoC's has commas (`time in ns, x, y, z, qw, qx, qy,
 /// qz, ..`), TUM's eight numbers (`time in s, x, y, z, qx, qy, qz, qw`), KITTI's twelve. Errors:
 /// file and line: a wrong count of numbers, not a number, not finite, not a
 /// rotation, nothing in it.
@@ -39,7 +39,7 @@ struct TimePairs {
                                      std::span<const double> second_s,
                                      double tolerance_s);
 
-/// Those of the indices, in their order.
+/// The poses of the indices, in their order.
 [[nodiscard]] Trajectory take_poses(std::span<const Rigid3> poses,
                                     std::span<const std::size_t> indices);
 

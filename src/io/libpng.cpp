@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What of png.hpp libpng does.
+// The part of png.hpp that libpng does: unusual kinds of PNG, and writing.
 #include <algorithm>
 #include <csetjmp>
-#include <cstring>
 #include <new>
 #include <vector>
 
@@ -14,13 +13,13 @@
 namespace stemvo::io {
 namespace {
 
-/// libpng's state. It leaves a call that fails by longjmp: past the two functions with setjmp,
-/// which own nothing.
+/// libpng's state and what it fills. libpng leaves a call that fails by longjmp: past `read`, which
+/// owns nothing.
 class LibpngReader {
  public:
   explicit LibpngReader(Bytes bytes)
       : rest_(bytes),
-        png_(png_create_read_struct(PNG_LIBPNG_VER_STRING, this, &fail, [](auto...) {})),
+        png_(png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, &fail, [](auto...) {})),
         info_(png_ != nullptr ? png_create_info_struct(png_) : nullptr) {
     if (info_ == nullptr) {
       throw std::bad_alloc();
@@ -31,14 +30,28 @@ class LibpngReader {
   LibpngReader(const LibpngReader&) = delete;
   LibpngReader& operator=(const LibpngReader&) = delete;
 
-  /// The header; sets that pixels are 8 bits, gray or RGB, without transparency. False: damaged.
-  [[nodiscard]] bool read_header(bool as_color) {
+  /// Empty: damaged.
+  [[nodiscard]] cv::Mat decode(bool as_color) { return read(as_color) ? image_ : cv::Mat(); }
+
+ private:
+  bool read(bool as_color) {
     if (setjmp(png_jmpbuf(png_)) != 0) {
       return false;
     }
-    constexpr png_byte kTexts[] = "zTXt\0iTXt";  // skipped: each would be unpacked to several MB
-    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, kTexts, 2);
     png_read_info(png_, info_);
+    choose_output(as_color);
+    image_.create(static_cast<int>(png_get_image_height(png_, info_)),
+                  static_cast<int>(png_get_image_width(png_, info_)),
+                  as_color ? CV_8UC3 : CV_8UC1);
+    for (int v = 0; v < image_.rows; ++v) {
+      rows_.push_back(image_.ptr(v));
+    }
+    png_read_image(png_, rows_.data());
+    png_read_end(png_, nullptr);
+    return true;
+  }
+  /// Pixels of 8 bits, gray or RGB, without transparency.
+  void choose_output(bool as_color) {
     const bool is_color = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0;
     png_set_expand(png_);
     png_set_strip_16(png_);
@@ -48,87 +61,31 @@ class LibpngReader {
     } else if (!as_color && is_color) {
       png_set_rgb_to_gray(png_, PNG_ERROR_ACTION_NONE, 0.299, 0.587);  // ITU-R BT.601
     }
-    num_passes_ = png_set_interlace_handling(png_);
+    png_set_interlace_handling(png_);
     png_read_update_info(png_, info_);
-    return true;
   }
-  [[nodiscard]] cv::Size size() const {
-    return {static_cast<int>(png_get_image_width(png_, info_)),
-            static_cast<int>(png_get_image_height(png_, info_))};
-  }
-  [[nodiscard]] bool read_rows(std::vector<png_bytep>& rows) {
-    if (setjmp(png_jmpbuf(png_)) != 0) {
-      return false;
-    }
-    read_passes(rows);
-    png_read_end(png_, nullptr);
-    return true;
-  }
-  [[nodiscard]] bool lacks_memory() const { return lacks_memory_; }
-
- private:
-  static constexpr png_uint_32 kPixels = 0x49444154;  ///< IDAT
-
-  void read_passes(std::vector<png_bytep>& rows) {
-    for (int pass = 1; pass <= num_passes_; ++pass) {
-      png_read_rows(png_, rows.data(), nullptr, static_cast<png_uint_32>(rows.size() - 1));
-      is_last_row_ = pass == num_passes_;
-      png_read_row(png_, rows.back(), nullptr);
-    }
-  }
-  /// Packed: what the last row, and the end of the stream, can take.
-  [[nodiscard]] std::size_t max_bytes_at_end() const {
-    return (1U << 13U) + 9 * std::size_t{png_get_image_width(png_, info_)};
-  }
-  [[noreturn]] static void fail(png_structp png, png_const_charp message) {
-    auto* self = static_cast<LibpngReader*>(png_get_error_ptr(png));
-    self->lacks_memory_ = std::strstr(message, "memory") != nullptr;
+  [[noreturn]] static void fail(png_structp png, png_const_charp /*message*/) {
     png_longjmp(png, 1);
   }
   static void give(png_structp png, png_bytep to, std::size_t size) {
-    auto* self = static_cast<LibpngReader*>(png_get_io_ptr(png));
-    if (size > self->rest_.size()) {
+    Bytes& rest = static_cast<LibpngReader*>(png_get_io_ptr(png))->rest_;
+    if (size > rest.size()) {
       png_error(png, "cut off");
     }
-    // With the last row it unpacks, and throws away, all that stands behind it.
-    if (self->is_last_row_ && png_get_io_chunk_type(png) == kPixels) {
-      self->num_bytes_at_end_ += size;
-      if (self->num_bytes_at_end_ > self->max_bytes_at_end()) {
-        png_error(png, "more pixels than the header says");
-      }
-    }
-    std::copy_n(self->rest_.begin(), size, to);
-    self->rest_ = self->rest_.subspan(size);
+    std::copy_n(rest.begin(), size, to);
+    rest = rest.subspan(size);
   }
 
   Bytes rest_;
-  int num_passes_ = 1;  ///< more: interlaced
-  bool is_last_row_ = false;
-  std::size_t num_bytes_at_end_ = 0;
-  bool lacks_memory_ = false;
+  cv::Mat image_;
+  std::vector<png_bytep> rows_;
   png_structp png_;
   png_infop info_;
 };
 
 }  // namespace
 
-cv::Mat decode_any_png(Bytes bytes, bool as_color) {
-  LibpngReader reader(bytes);
-  cv::Mat image;
-  bool is_sound = reader.read_header(as_color);
-  if (is_sound) {
-    image.create(reader.size(), as_color ? CV_8UC3 : CV_8UC1);
-    std::vector<png_bytep> rows;
-    for (int v = 0; v < image.rows; ++v) {
-      rows.push_back(image.ptr(v));
-    }
-    is_sound = reader.read_rows(rows);
-  }
-  if (reader.lacks_memory()) {
-    throw std::bad_alloc();  // the file is not to blame
-  }
-  return is_sound ? image : cv::Mat();
-}
+cv::Mat decode_any_png(Bytes bytes, bool as_color) { return LibpngReader(bytes).decode(as_color); }
 
 std::string encode_png(const cv::Mat& image, bool is_fast) {
   STEMVO_CHECK(!image.empty() && image.isContinuous() &&

@@ -26,7 +26,7 @@ std::uint32_t big_endian_32(Bytes bytes) {
 struct Chunk {
   std::string_view type;  ///< empty: there is no such chunk inside the file
   Bytes data;
-  Bytes checked;               ///< type and data: what the checksum is of
+  Bytes checked;               ///< type and data, which the checksum covers
   std::uint32_t checksum = 0;  ///< CRC-32, as it stands in the file
 
   [[nodiscard]] bool is_sound() const {
@@ -48,17 +48,6 @@ Chunk next_chunk(Bytes& rest) {
                     big_endian_32(rest.subspan(8 + length))};
   rest = rest.subspan(kFrame + length);
   return chunk;
-}
-
-/// Each chunk must lie inside the file, the last is IEND.
-bool is_complete(Bytes bytes) {
-  Bytes rest = bytes.subspan(kSignature.size());
-  for (Chunk chunk = next_chunk(rest); !chunk.type.empty(); chunk = next_chunk(rest)) {
-    if (chunk.type == "IEND") {
-      return true;
-    }
-  }
-  return false;
 }
 
 /// IHDR (specification, section 11.2.2) of an image that is not interlaced.
@@ -103,7 +92,7 @@ struct Row {
   std::size_t size;
 };
 
-/// Of left, above and above left the nearest to left + above - above left.
+/// The nearest of left, above and above left to left + above - above left.
 int paeth(int left, int above, int above_left) {
   const int to_left = std::abs(above - above_left);
   const int to_above = std::abs(left - above_left);
@@ -223,44 +212,28 @@ cv::Mat decode_plain_png(Bytes bytes, bool as_color) {
 }
 
 Status check_size(const std::string& name, const DeclaredSize& found, const WantedSize& wanted) {
-  constexpr std::uint64_t kMaxPixels = 1U << 27U;
-  const auto [width, height] = found;
-  if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
+  constexpr std::int64_t kMaxPixels = 1 << 27;
+  if (found.width > kMaxPixels || found.height > kMaxPixels ||
+      found.width * found.height > kMaxPixels) {
     return fail(fmt::format("{}: expected an image of at most {} pixels, found {}x{}", name,
-                            kMaxPixels, width, height));
+                            kMaxPixels, found.width, found.height));
   }
-  if (wanted && *wanted != cv::Size(static_cast<int>(width), static_cast<int>(height))) {
+  if (wanted && (found.width != wanted->width || found.height != wanted->height)) {
     return fail(fmt::format("{}: expected an image of {}x{} pixels, found {}x{}", name,
-                            wanted->width, wanted->height, width, height));
+                            wanted->width, wanted->height, found.width, found.height));
   }
   return {};
-}
-
-std::optional<DeclaredSize> png_size(Bytes bytes) {
-  constexpr std::string_view kHeader = "IHDR";  // behind the signature and a length
-  constexpr std::size_t kType = 12;
-  if (!is_png(bytes) || bytes.size() < kType + kHeader.size() + 8 ||
-      !std::equal(kHeader.begin(), kHeader.end(), bytes.begin() + kType)) {
-    return std::nullopt;
-  }
-  const Bytes data = bytes.subspan(kType + kHeader.size());
-  return DeclaredSize{big_endian_32(data), big_endian_32(data.subspan(4))};
 }
 
 Expected<cv::Mat> decode_png(Bytes bytes,
                              const std::string& name,
                              bool as_color,
                              const WantedSize& wanted) {
-  if (!is_png(bytes)) {
-    return fail(fmt::format("{}: expected a PNG image, found {}", name,
-                            bytes.empty() ? "an empty file" : "another kind of file"));
-  }
-  if (!is_complete(bytes)) {
-    return fail(fmt::format("{}: expected a complete PNG image, found one cut off after {} bytes",
-                            name, bytes.size()));
-  }
-  if (const auto size = png_size(bytes)) {
-    if (const Status status = check_size(name, *size, wanted); !status) {
+  Bytes rest = bytes.subspan(kSignature.size());
+  const Chunk header = next_chunk(rest);
+  if (header.type == "IHDR" && header.data.size() >= 8) {
+    const DeclaredSize size{big_endian_32(header.data), big_endian_32(header.data.subspan(4))};
+    if (const Status status = check_size(name, size, wanted); !status) {
       return status.error();
     }
   }
@@ -269,7 +242,8 @@ Expected<cv::Mat> decode_png(Bytes bytes,
     image = decode_any_png(bytes, as_color);
   }
   if (image.empty()) {
-    return fail(fmt::format("{}: expected a sound PNG image, found damaged data", name));
+    return fail(
+        fmt::format("{}: expected a sound PNG image, found one damaged or cut off", name));
   }
   return image;
 }

@@ -17,9 +17,8 @@ using Bytes = std::span<const std::uint8_t>;
 /// The one size that an image may have; none: any, up to more pixels than a camera has.
 using WantedSize = std::optional<cv::Size>;
 
-/// A complete PNG as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors, starting
-/// with `name`: not a PNG; of another size; cut off; damaged. An image is never partly decoded: the
-/// chunks are walked to the end first, because some decoders fill what is missing with gray.
+/// The PNG, which is_png(), as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors,
+/// starting with `name`: of another size; cut off or damaged. An image is never partly decoded.
 [[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes,
                                            const std::string& name,
                                            bool as_color,
@@ -39,20 +38,18 @@ using WantedSize = std::optional<cv::Size>;
 /// std::bad_alloc.
 [[nodiscard]] std::string encode_png(const cv::Mat& image, bool is_fast = false);
 
-/// As a file declares it, which may be anything.
+/// The size as a file declares it, which may be anything of 32 bits.
 struct DeclaredSize {
-  std::uint64_t width = 0;
-  std::uint64_t height = 0;
+  std::int64_t width = 0;
+  std::int64_t height = 0;
 };
-/// Error, starting with `name`: another one than is wanted. Asked before memory is.
+/// Error, starting with `name`: another size than is wanted. Called before memory is asked for.
 [[nodiscard]] Status check_size(const std::string& name,
                                 const DeclaredSize& found,
                                 const WantedSize& wanted);
 
-/// By the first bytes. No size: they are too few, or of no PNG.
-[[nodiscard]] std::optional<DeclaredSize> png_size(Bytes bytes);
 [[nodiscard]] bool is_png(Bytes bytes);
-/// Of a PNG: palettes are colour.
+/// Whether a PNG has colours; palettes are colour.
 [[nodiscard]] bool is_color_png(Bytes bytes);
 
 }  // namespace stemvo::io

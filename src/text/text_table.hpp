@@ -29,7 +29,7 @@ class TextTable {
 /// Metres: three significant digits below 1 (and above 0.1 mm), else this many decimals.
 [[nodiscard]] std::string format_length(double length_m, int decimals);
 
-/// Of a CSV file: quoted where it must be (RFC 4180).
+/// A cell of a CSV file, quoted where it must be (RFC 4180).
 [[nodiscard]] std::string csv_cell(const std::string& text);
 
 /// "100..800 m": first and last of the lengths.

@@ -125,34 +125,11 @@ TEST(CommandLine, ModelsListsTheManifest) {
   EXPECT_THAT(result.out, HasSubstr("default: sound"));
 }
 
-// Standard output that cannot be written is an error; one that nobody reads any more is not; one
-// that is closed is an error too, and sends the results into no other file.
 TEST(CommandLine, OutputThatCannotBeWrittenIsAnError) {
-  const std::string program = STEMVO_PROGRAM;
-  const auto shell = [](const std::string& command) {
-    return test::run_program("/bin/sh", {"-c", command});
-  };
-  const ProgramResult full = shell(program + " --dump-config > /dev/full");
+  const ProgramResult full = test::run_program(
+      "/bin/sh", {"-c", std::string(STEMVO_PROGRAM) + " --dump-config > /dev/full"});
   EXPECT_EQ(full.exit_code, 1);
-  EXPECT_THAT(full.err, HasSubstr("standard output"));
-  EXPECT_EQ(shell("{ " + program + " --dump-config; echo $? >&2; } | head -n 1").err, "0\n");
-  EXPECT_EQ(shell(program + " --dump-config >&- 2>&-").exit_code, 1);
-  TempFolder folder;
-  const std::string poses = folder.file("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
-  const std::string metrics = folder.file("metrics.json", "{\"frames\": 2}");
-  const std::string bounds = folder.file("bounds.yaml", "frames: {min: 1}\n");
-  for (const std::string& command :
-       {std::string("--version"), std::string("--help"), std::string("models"),
-        "evaluate " + poses + " --gt " + poses, "evaluate --json " + poses + " --gt " + poses,
-        "check " + metrics + " --against " + bounds}) {
-    for (const char* closed : {" >&-", " > /dev/full"}) {
-      const ProgramResult result = shell(program + " " + command + closed);
-      EXPECT_EQ(result.exit_code, 1) << command << closed;
-      EXPECT_THAT(result.err, StartsWith("error: standard output: cannot be written ("))
-          << command << closed;
-      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
-    }
-  }
+  EXPECT_THAT(full.err, StartsWith("error: standard output: "));
 }
 
 }  // namespace

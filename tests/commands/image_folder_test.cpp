@@ -163,7 +163,7 @@ TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
   const ProgramResult result = run({"--quiet"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("warning: " + (images_ / "000003.jpg").string() +
-                                    ": expected a complete JPEG image, found one cut off"));
+                                    ": expected a sound JPEG image, found damaged data (Premature end"));
   EXPECT_THAT(result.err, HasSubstr("000005.png: expected an image of 620x188 pixels, found 100x"));
   EXPECT_EQ(num_poses(), 10U);
 }
@@ -198,49 +198,12 @@ TEST_F(ImageFolderRun, APatternThatTheShellReplaced) {
   EXPECT_LT(result.err.size(), 500U);
 }
 
-TEST_F(ImageFolderRun, BadCameraFiles) {
-  write_file(camera_, "intrinsics: [1, 2\n");
-  expect_error(run(), 1, {"camera.yaml:2", "not YAML"});
+TEST_F(ImageFolderRun, ErrorsOfTheReadersAreOneLine) {
   expect_error(run_with_camera("intrinsics", "intrinsic"), 1,
                {"camera.yaml:3: intrinsic: unknown key; known keys: image_width"});
-  expect_error(run_with_camera("intrinsics: [", "# ["), 1,
-               {"camera.yaml: expected intrinsics: [fx, fy, cx, cy], found no such key"});
-  expect_error(run_with_camera("intrinsics: [", "intrinsics: [-"), 1,
-               {"camera.yaml:3: intrinsics: expected positive focal lengths"});
-  expect_error(run_with_camera("image_width: 620", "image_width: 200"), 1,
-               {"camera.yaml:3: intrinsics: expected a principal point inside images of 200x188"});
-  expect_error(run_with_camera("image_width: 620", "image_width: 0"), 1,
-               {"camera.yaml:1: image_width: expected a whole number from 1", "found 0"});
-  expect_error(run_with_camera("image_width: 620", "image_width: 621"), 1,
-               {"my images: expected images of 621x188 pixels", "found 620x188"});
-  expect_error(run_with_camera("none", "radial"), 1,
-               {"camera.yaml:4: distortion_model: expected one of none, radial-tangential, radtan, "
-                "equidistant, found 'radial'"});
-  expect_error(run_with_camera("none", "radtan\ndistortion_coefficients: [0.1]"), 1,
-               {"camera.yaml:5: distortion_coefficients: expected [k1, k2, p1, p2]", "found 1"});
-  expect_error(run_with_camera("none", "radtan\ndistortion_coefficients: [.nan, 0, 0, 0]"), 1,
-               {"camera.yaml:5: distortion_coefficients: expected a number, found"});
-  expect_error(run_with_camera("rate_hz: 10", "rate_hz: 0"), 1,
-               {"camera.yaml:5: rate_hz: expected a number from 1e-09", "found 0"});
-  expect_error(run_with_camera("rate_hz: 10", ""), 1,
-               {"camera.yaml: expected rate_hz (frames per second) or --times FILE"});
-}
-
-TEST_F(ImageFolderRun, BadFoldersTimesAndPoses) {
-  expect_error(run_path(folder_ / "none", {"--camera", camera_}), 1, {"none: expected a folder"});
-  fs::create_directories(folder_.path() / "empty");
-  expect_error(run_path(folder_ / "empty", {"--camera", camera_}), 1,
-               {"empty: expected images (.png, .jpg, .jpeg), found none"});
-  write_file(folder_ / "times.txt", "0\n0.1\n");
-  expect_error(run({"--times", folder_ / "times.txt"}), 1,
-               {"times.txt: expected a time for each of 10", "found 2"});
-  write_file(folder_ / "times.txt", "0\n1\n2\n3\n4\n4\n6\n7\n8\n9\n");
-  expect_error(run({"--times", folder_ / "times.txt"}), 1,
-               {"times.txt:6: expected a time after 4 s, found 4 s"});
-  expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
+  write_file(camera_, good_camera_);
   expect_error(run({"--set", "scale.source=ground_truth"}), 1,
                {"my images: expected a pose file, which scale.source=ground_truth needs", "--gt"});
-  expect_error(run({"--frames", "5:11"}), 1, {"my images", "0:10", "5:11"});
   for (const auto& entry : fs::directory_iterator(images_)) {
     fs::resize_file(entry.path(), 50);
   }

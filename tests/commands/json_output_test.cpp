@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-/// What the program's help lists.
+/// The commands that the program's help lists.
 std::set<std::string> commands() {
   const std::string help = run_stemvo({"--help"}).out;
   const std::size_t begin = std::min(help.find("\nSubcommands:"), help.size());
@@ -47,7 +47,7 @@ class JsonOutput : public ::testing::Test {
   std::string sequence_ = drive_ / "sequences/00";
 };
 
-// What each command is called with, and a key that its document must have. A command that the help
+// The arguments of each command, and a key that its document must have. A command that the help
 // lists and this table does not is a failure.
 TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
   const std::string run = folder_ / "run";

@@ -43,7 +43,7 @@ class RecordingsRun : public ::testing::Test {
     more.insert(more.begin(), {"run", input, "--out", out_});
     return run_stemvo(more);
   }
-  /// Of the same images in KITTI's layout.
+  /// The poses of the same images in KITTI's layout.
   std::string expected_poses() const {
     const std::string out = folder_ / "kitti";
     const ProgramResult result =

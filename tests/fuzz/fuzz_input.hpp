@@ -33,7 +33,7 @@ class InputFile {
   int number_;
 };
 
-/// What a reader promises of the values it gives: a find where it is not so.
+/// A promise that a reader makes of the values it gives: a find where it is broken.
 inline void expect(bool holds, const char* promise) {
   if (!holds) {
     std::fprintf(stderr, "broken promise: %s\n", promise);

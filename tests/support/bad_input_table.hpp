@@ -10,12 +10,11 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "support/program_test.hpp"
 
-/// What may become of a file, and that the program refuses it.
+/// Faults of files, and that the program refuses them.
 namespace stemvo {
 
 using Words = std::vector<std::string>;
@@ -41,7 +40,7 @@ inline void expect_refused(const std::vector<Case>& cases) {
   }
 }
 
-/// What may become of a file.
+/// A name and what it does to a file.
 using Fault = std::pair<std::string, std::function<void(const fs::path&)>>;
 
 inline std::string replace_first(std::string text, const std::string& from, const std::string& to) {
@@ -81,20 +80,10 @@ inline std::vector<Fault> faults(const std::string& number) {
          fs::create_directory(file);
        }},
       {"missing", [](const fs::path& file) { fs::remove(file); }},
-      {"loop",
-       [](const fs::path& file) {
-         fs::remove(file);
-         fs::create_symlink(file.filename(), file);
-       }},
       {"link to nowhere",
        [](const fs::path& file) {
          fs::remove(file);
          fs::create_symlink("none", file);
-       }},
-      {"pipe",
-       [](const fs::path& file) {
-         fs::remove(file);
-         ::mkfifo(file.c_str(), 0600);
        }},
       {"device",
        [](const fs::path& file) {

@@ -13,7 +13,7 @@
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
 
-/// What tests of whole programs call by short names.
+/// Short names for tests of whole programs.
 namespace stemvo {
 
 namespace fs = std::filesystem;

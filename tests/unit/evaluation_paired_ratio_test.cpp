@@ -52,7 +52,7 @@ TEST(PairedRatio, FindsAFactorAndTurnsWithIt) {
   EXPECT_NEAR(back.low * ratio.high, 1.0, 0.01);
 }
 
-/// What the interval is for. Blocks of one segment would call many equals different.
+/// The purpose of the interval. Blocks of one segment would call many equals different.
 TEST(PairedRatio, EqualMethodsAreCalledDifferentSeldom) {
   std::mt19937_64 random(3);
   constexpr int kTrials = 200;
@@ -68,7 +68,7 @@ TEST(PairedRatio, EqualMethodsAreCalledDifferentSeldom) {
   EXPECT_GT(num_single, kTrials / 3);
 }
 
-/// Of so many blocks each; a share.
+/// A share; drives of so many blocks each.
 double decided_by_chance(std::size_t num_drives, std::size_t num_blocks) {
   std::mt19937_64 random(4);
   constexpr int kTrials = 200;

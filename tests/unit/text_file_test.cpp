@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
-#include <sys/stat.h>
 
 #include "support/temp_folder.hpp"
 
@@ -22,15 +21,6 @@ using testing::TempFolder;
 
 std::ptrdiff_t num_files(const TempFolder& folder) {
   return std::distance(fs::directory_iterator(folder.path()), {});
-}
-
-TEST(WriteTextFile, APipeThatNobodyReadsIsAnError) {
-  const TempFolder folder;
-  const fs::path pipe = folder / "metrics.json";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const Status status = write_text_file(pipe, "new");
-  ASSERT_FALSE(status);
-  EXPECT_THAT(status.error().message, HasSubstr(pipe.string() + ": cannot write: "));
 }
 
 TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
@@ -49,28 +39,6 @@ TEST(WriteTextFile, NamesTheFileItCannotWriteAndLeavesNothing) {
   ASSERT_TRUE(write_text_file(file, "new"));
   EXPECT_EQ(read_all(file), "new");
   EXPECT_EQ(num_files(folder), 1);
-}
-
-TEST(ReadRows, RefusesTooManyLinesAndOneThatIsTooLong) {
-  const TempFolder folder;
-  const auto read = [&](const std::string& text) { return read_rows(folder.file("a", text)); };
-  const std::string longest(kMaxLineBytes, 'x');
-  EXPECT_TRUE(read(longest + "\n" + longest));
-  EXPECT_THAT(read("1\n" + longest + "x\n").error().message,
-              HasSubstr("a:2: expected a line of at most 65536 bytes, found one of 65537"));
-  EXPECT_THAT(read("1\n" + longest + "x").error().message, HasSubstr("a:2: "));
-  const std::string most(kMaxLines, '\n');
-  EXPECT_TRUE(read(most));
-  EXPECT_THAT(read(most + "1").error().message,
-              HasSubstr("a: expected at most 1000000 lines, found more"));
-}
-
-TEST(CheckCanWrite, APipeIsAnError) {
-  const TempFolder folder;
-  const fs::path pipe = folder / "calib.txt";
-  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_THAT(check_can_write(pipe).error().message,
-              HasSubstr(pipe.string() + ": expected a file to write, found a pipe"));
 }
 
 TEST(OneLine, IsOneAndNotLong) {
@@ -93,7 +61,21 @@ TEST(WriteTextFile, AFullDiskLeavesTheOldFile) {
   EXPECT_THAT(status.error().message, HasSubstr(file.string() + ": cannot write: File too large"));
   EXPECT_EQ(read_all(file), "old");
   EXPECT_EQ(num_files(folder), 1);
-  EXPECT_THAT(write_text_file("/dev/full", "x").error().message, HasSubstr("No space left"));
+}
+
+TEST(TextFile, OnlyRegularFilesUpToTheLimit) {
+  const TempFolder folder;
+  for (const fs::path& place : {fs::path("/dev/zero"), folder.path()}) {
+    EXPECT_THAT(read_text_file(place).error().message,
+                HasSubstr(place.string() + ": expected a file, found "));
+    EXPECT_THAT(write_text_file(place, "x").error().message,
+                HasSubstr(place.string() + ": expected a file to write, found "));
+  }
+  const fs::path file = folder.file("large.yaml", "");
+  fs::resize_file(file, 5000000);
+  EXPECT_TRUE(read_text_file(file));
+  EXPECT_THAT(read_text_file(file, kMaxSettings_MB).error().message,
+              HasSubstr("large.yaml: expected at most 1 MB, found 5 MB"));
 }
 
 TEST(RemoveFile, TakesWhatAKilledWriteLeftOfItToo) {
@@ -108,25 +90,6 @@ TEST(RemoveFile, TakesWhatAKilledWriteLeftOfItToo) {
   const Status status = remove_file(file);
   ASSERT_FALSE(status);
   EXPECT_NE(status.error().message.find("checkpoint: cannot be removed ("), std::string::npos);
-}
-
-TEST(WriteTextFile, FollowsALinkToTheFile) {
-  const TempFolder folder;
-  const fs::path file = folder.file("poses.txt", "old");
-  fs::create_symlink(file, folder / "link.txt");
-  ASSERT_TRUE(write_text_file(folder / "link.txt", "new"));
-  EXPECT_TRUE(fs::is_symlink(folder / "link.txt"));
-  EXPECT_EQ(read_all(file), "new");
-}
-
-TEST(WriteTextFile, NotThroughALinkWhereItIsUnfinished) {
-  const TempFolder folder;
-  const fs::path precious = folder.file("precious", "old");
-  fs::create_symlink(precious, unfinished(folder / "new.txt"));
-  ASSERT_TRUE(write_text_file(folder / "new.txt", "new"));
-  EXPECT_EQ(read_all(precious), "old");
-  EXPECT_FALSE(fs::is_symlink(folder / "new.txt"));
-  EXPECT_EQ(num_files(folder), 2);
 }
 
 }  // namespace
