@@ -27,7 +27,6 @@ Examples:
 struct CalibrateArguments {
   CalibrationRequest request;
   ConfigArguments config;
-  std::string calibration;
   bool is_quiet = false;
 };
 
@@ -81,9 +80,6 @@ Expected<int> calibrate(CalibrateArguments& arguments) {
   CalibrationRequest& request = arguments.request;
   request.config = *config;
   request.models_dir = data_folder("models");
-  if (!arguments.calibration.empty()) {
-    request.calibration = arguments.calibration;
-  }
   Progress progress("frames", arguments.is_quiet);
   const Expected<CalibrationReport> result = calibrate_sequence(request, std::ref(progress));
   if (!result) {
@@ -100,10 +96,8 @@ void add_options(CLI::App& command, CalibrateArguments& arguments) {
   command.add_option("--out", request.out_file, "File for the calibration, as KITTI's calib.txt")
       ->required()
       ->type_name("FILE");
-  command
-      .add_option("--calib", arguments.calibration,
-                  "Calibration to start from; default: the folder's calib.txt")
-      ->type_name("FILE");
+  add_file_option(command, "--calib", request.calibration,
+                  "Calibration to start from; default: the folder's calib.txt");
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");
   add_config_options(command, arguments.config);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");

@@ -52,7 +52,7 @@ int flush_console(int exit_code) {
   if (is_written || exit_code != kExitDone) {
     return exit_code;
   }
-  print_error("standard output: expected a file or pipe that takes the result, found none");
+  print_error("standard output: cannot be written");
   return kExitFailed;
 }
 

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <string>
-#include <string_view>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
 #include "config/config_yaml.hpp"
@@ -19,44 +19,38 @@
 namespace stemvo::dataset {
 namespace {
 
-using options::Field;
-using options::Rule;
-
-/// How a kind of camera file says what ours says.
+/// The names by which a kind of camera file says what ours says.
 struct Format {
-  std::string_view width = "image_width";
-  std::string_view height = "image_height";
-  std::string_view intrinsics = "intrinsics";
+  std::string width = "image_width";
+  std::string height = "image_height";
+  std::string intrinsics = "intrinsics";
   std::size_t num_intrinsics = 4;
-  std::string_view intrinsics_form = "[fx, fy, cx, cy]";
+  std::string intrinsics_form = "[fx, fy, cx, cy]";
   std::array<std::size_t, 4> places = {0, 1, 2, 3};  ///< of fx, fy, cx, cy among them
-  std::string_view coefficients = "distortion_coefficients";
-  std::vector<std::string_view> models = {"none", "radial-tangential", "radtan", "equidistant"};
-  std::string_view body = "T_BS";
-  std::vector<const char*> matrices = {"T_BS"};  ///< keys whose value may be one
-  std::vector<std::string_view> known = {};      ///< all that is read; empty: what else is there
-                                                 ///< is an error
+  std::string coefficients = "distortion_coefficients";
+  std::vector<std::string> models = {"none", "radial-tangential", "radtan", "equidistant"};
+  std::string body = "T_BS";
+  bool has_more_keys = false;  ///< else a key that is not read is an error
+
+  [[nodiscard]] std::vector<std::string> keys() const {
+    return {width,        height, "resolution", "camera_model", intrinsics, "distortion_model",
+            coefficients, body,   "rate_hz",    "camera_height"};
+  }
+  [[nodiscard]] bool is_of_matrices() const { return num_intrinsics == 9; }
 };
 
 const Format kKalibr = {
-    .coefficients = "distortion_coeffs",
-    .body = "T_cam_imu",
-    .matrices = {"T_cam_imu"},
-    .known = {"camera_model", "intrinsics", "distortion_model", "distortion_coeffs", "resolution",
-              "T_cam_imu", "rate_hz", "camera_height"}};
+    .coefficients = "distortion_coeffs", .body = "T_cam_imu", .has_more_keys = true};
 
 /// OpenCV's and ROS'.
-const Format kMatrices = {
-    .intrinsics = "camera_matrix",
-    .num_intrinsics = 9,
-    .intrinsics_form = "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]",
-    .places = {0, 4, 2, 5},
-    .models = {"plumb_bob", "equidistant", "fisheye", "none"},
-    .matrices = {"camera_matrix", "distortion_coefficients"},
-    .known = {"image_width", "image_height", "camera_matrix", "distortion_model",
-              "distortion_coefficients", "rate_hz", "camera_height"}};
+const Format kMatrices = {.intrinsics = "camera_matrix",
+                          .num_intrinsics = 9,
+                          .intrinsics_form = "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]",
+                          .places = {0, 4, 2, 5},
+                          .models = {"plumb_bob", "equidistant", "fisheye", "none"},
+                          .has_more_keys = true};
 
-/// ROS' message as `topic echo` prints it; capitals in ROS 1.
+/// ROS' message as `topic echo` prints it.
 const Format kMessage = {.width = "width",
                          .height = "height",
                          .intrinsics = "k",
@@ -65,79 +59,66 @@ const Format kMessage = {.width = "width",
                          .places = kMatrices.places,
                          .coefficients = "d",
                          .models = kMatrices.models,
-                         .matrices = {},
-                         .known = {"width", "height", "k", "K", "distortion_model", "d", "D"}};
+                         .has_more_keys = true};
 
-/// A matrix {rows, cols, data: [..]}, or Kalibr's list of rows, becomes the list of its numbers.
-void flatten(YAML::Node map, const char* key) {
-  constexpr std::size_t kMaxRows = 4;                // aliases of one may be many
-  const YAML::Node value = std::as_const(map)[key];  // the other [] makes what is not there
-  if (!value) {
-    return;
-  }
-  if (value.IsMap() && value["data"]) {
-    map[key] = value["data"];
-  } else if (value.IsSequence() && value.size() > 0 && value.size() <= kMaxRows &&
-             std::all_of(value.begin(), value.end(),
-                         [](const YAML::Node& row) { return row.IsSequence(); })) {
-    std::vector<YAML::Node> others;  // first of all: a row may be an alias of the first
-    for (std::size_t row = 1; row < value.size(); ++row) {
-      for (const YAML::Node& number : value[row]) {
-        others.push_back(number);
-      }
-    }
-    YAML::Node numbers = value[0];  // which has a line
-    for (const YAML::Node& number : others) {
-      numbers.push_back(number);
-    }
-    map[key] = numbers;
-  }
+/// The same in capitals.
+Format message_of_ros_1() {
+  Format format = kMessage;
+  format.intrinsics = "K";
+  format.coefficients = "D";
+  return format;
 }
 
-/// What is left of a map; a key that is there twice stays so.
-YAML::Node only(const YAML::Node& map, const std::vector<std::string_view>& known) {
-  YAML::Node kept(YAML::NodeType::Map);
-  for (const auto& entry : map) {
-    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-    if (std::find(known.begin(), known.end(), key) != known.end()) {
-      kept.force_insert(entry.first, entry.second);
+/// `map` is the document, a map.
+Format format_of(const YAML::Node& map) {
+  return map["cam0"] && map["cam0"].IsMap() ? kKalibr
+         : map["camera_matrix"]             ? kMatrices
+         : map["k"]                         ? kMessage
+         : map["K"]                         ? message_of_ros_1()
+                                            : Format();
+}
+
+/// Adds the numbers of a list, or of a list of rows (Kalibr's matrices).
+Status add_numbers(const YAML::Node& list, bool may_have_rows, std::vector<double>& numbers) {
+  constexpr std::size_t kMost = 16;
+  for (const YAML::Node& element : list) {
+    const bool is_row = may_have_rows && element.IsSequence();
+    const Status status =
+        is_row ? add_numbers(element, false, numbers)
+               : parse_numbers(element.IsScalar() ? element.Scalar() : "", 1)
+                     .and_then([&](const std::vector<double>& one) {
+                       numbers.push_back(one.front());
+                       return Status();
+                     });
+    if (!status || numbers.size() > kMost) {
+      return status ? fail(fmt::format("expected at most {} numbers, found more", kMost)) : status;
     }
   }
-  return kept;
+  return {};
 }
 
-/// Our name for a model of distortion; a name that is not known stays.
-std::string_view model_name(std::string_view name) {
-  if (name == "radtan" || name == "plumb_bob") {
-    return "radial-tangential";
-  }
-  return name == "fisheye" ? "equidistant" : name;
-}
-
+/// Reads values; the first that is wrong is the error, those behind it are as if absent.
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file) {}
 
   Expected<CameraFile> read() {
-    CameraFile result;
-    Status status = read_values();
-    status = status ? set_size(result.lens.camera) : status;
-    status = status ? set_intrinsics(result.lens.camera) : status;
-    status = status ? set_distortion(result.lens) : status;
-    status = status ? set_body(result.body_from_camera) : status;
-    if (!status) {
+    if (const Status status = collect(); !status) {
       return status.error();
     }
-    const auto if_given = [](double value) {
-      return value > 0.0 ? std::optional(value) : std::nullopt;
-    };
-    result.rate_hz = if_given(rate_hz_);
-    result.camera_height_m = if_given(camera_height_m_);
-    return result;
+    CameraFile result;
+    set_size(result.lens.camera);
+    set_intrinsics(result.lens.camera);
+    set_distortion(result.lens);
+    set_body(result.body_from_camera);
+    result.rate_hz = number("rate_hz", 1e-9, 1e5);
+    result.camera_height_m = number("camera_height", 1e-9, 1000.0);
+    return status_ ? Expected<CameraFile>(result) : status_.error();
   }
 
  private:
-  Status read_values() {
+  /// Parses the file, and finds the values of the keys that are read.
+  Status collect() {
     Expected<std::string> text = read_text_file(file_, kMaxSettings_MB);
     if (!text) {
       return text.error();
@@ -148,110 +129,133 @@ class Reader {
     if (text->ends_with("\n---\n")) {  // behind each message that ROS prints
       text->resize(text->size() - 4);
     }
-    Expected<YAML::Node> root = config::parse_document(*text, file_.string());
-    if (!root) {
-      return root.error();
+    const Expected<YAML::Node> root = config::parse_document(*text, file_.string());
+    if (!root || root->IsNull()) {
+      return root ? Status() : Status(root.error());
     }
-    choose_format(*root);
-    std::vector<Field> fields = this->fields();
-    return config::read_document(root_, file_.string(), fields);
+    if (!root->IsMap()) {
+      return fail_at(file_, 0, fail("expected keys with values, found none"));
+    }
+    format_ = format_of(*root);
+    const YAML::Node fisheye = (*root)["fisheye_model"];  // OpenCV's, in place of a name
+    is_fisheye_ = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
+    return collect_keys(format_.body == kKalibr.body ? (*root)["cam0"] : *root);
   }
-
-  /// Also takes from the camera's keys what is not read, and makes lists of its matrices.
-  void choose_format(const YAML::Node& root) {
-    const bool is_map = root.IsMap();
-    if (is_map && root["cam0"] && root["cam0"].IsMap()) {
-      format_ = kKalibr;
-      root_ = root["cam0"];
-    } else {
-      root_ = root;
-      format_ = !is_map                  ? Format()
-                : root["camera_matrix"]  ? kMatrices
-                : root["k"] || root["K"] ? kMessage
-                                         : Format();
-      if (is_map && root["K"]) {
-        format_.intrinsics = "K";
-        format_.coefficients = "D";
+  Status collect_keys(const YAML::Node& map) {
+    const std::vector<std::string> known = format_.keys();
+    for (const auto& entry : map) {
+      const YAML::Node& value = entry.second;
+      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
+      const auto line = static_cast<std::size_t>(entry.first.Mark().line);
+      if (std::ranges::find(known, key) != known.end()) {
+        const bool is_matrix = value.IsMap() && value["data"];  // {rows, cols, data: [..]}
+        if (!values_.emplace(key, is_matrix ? value["data"] : value).second) {
+          return fail_at(file_, line, fail(key + ": duplicated key"));
+        }
+      } else if (!format_.has_more_keys && key != "sensor_type" && key != "comment") {  // EuRoC's
+        return fail_at(file_, line,
+                       fail(fmt::format("{}: unknown key; known keys: {}", one_line(key),
+                                        fmt::join(known, ", "))));
       }
-    }
-    if (is_of_matrices() && !root["distortion_model"]) {
-      const YAML::Node fisheye = root["fisheye_model"];
-      const bool is_fisheye = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
-      distortion_model_ = is_fisheye ? "equidistant" : "radial-tangential";
-    }
-    if (!is_map) {
-      return;
-    }
-    for (const char* key : format_.matrices) {
-      flatten(root_, key);
-    }
-    if (!format_.known.empty()) {
-      root_.reset(only(root_, format_.known));
-    } else {
-      root_.remove("sensor_type");  // EuRoC's
-      root_.remove("comment");
-    }
-  }
-  [[nodiscard]] bool is_of_matrices() const { return format_.num_intrinsics == 9; }
-
-  [[nodiscard]] YAML::Node value_of(std::string_view key) const { return root_[std::string(key)]; }
-  [[nodiscard]] Error missing(std::string_view expected) const {
-    return fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected));
-  }
-  /// "<file>:<line>: <key>: <problem>"
-  [[nodiscard]] Error refuse(std::string_view key, const std::string& problem) const {
-    return fail(fmt::format("{}: {}: {}",
-                            at_line(file_, static_cast<std::size_t>(value_of(key).Mark().line) + 1),
-                            key, problem));
-  }
-  /// Whether a list has one of these lengths; `expected` names them.
-  [[nodiscard]] Status check_length(std::string_view key,
-                                    const std::vector<double>& numbers,
-                                    const std::vector<std::size_t>& lengths,
-                                    std::string_view expected) const {
-    const bool may_be_absent = std::count(lengths.begin(), lengths.end(), 0U) != 0;
-    if (!root_.IsMap() || !value_of(key)) {
-      return may_be_absent ? Status() : missing(fmt::format("{}: {}", key, expected));
-    }
-    if (std::count(lengths.begin(), lengths.end(), numbers.size()) == 0) {
-      return refuse(key, fmt::format("expected {}, found {} numbers", expected, numbers.size()));
     }
     return {};
   }
 
-  Status set_size(Camera& camera) const {
-    camera.width_px = width_px_;
-    camera.height_px = height_px_;
-    if ((width_px_ == 0) != (height_px_ == 0)) {
-      return fail(fmt::format("{}: expected {} and {}, found {} alone", file_.string(),
-                              format_.width, format_.height,
-                              width_px_ == 0 ? format_.height : format_.width));
-    }
-    if (width_px_ > 0) {
-      return {};
-    }
-    if (resolution_.empty()) {
-      return missing("image_width and image_height, or resolution: [width, height]");
-    }
-    for (const double side : resolution_) {
-      if (side != std::floor(side)) {
-        return refuse("resolution", fmt::format("expected whole pixels, found {}", side));
-      }
-    }
-    const Status status = check_length("resolution", resolution_, {2}, "[width, height]");
-    if (status) {
-      camera.width_px = static_cast<int>(resolution_[0]);
-      camera.height_px = static_cast<int>(resolution_[1]);
-    }
-    return status;
+  [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
+  void refuse(const Error& error) { status_ = status_ ? Status(error) : status_; }
+  /// "<file>:<line>: <key>: <problem>"
+  void refuse(const std::string& key, const std::string& problem) {
+    const auto line = static_cast<std::size_t>(values_.at(key).Mark().line);
+    refuse(fail_at(file_, line, fail(key + ": " + problem)));
+  }
+  void miss(const std::string& expected) {
+    refuse(fail(fmt::format("{}: expected {}, found no such key", file_.string(), expected)));
   }
 
-  Status set_intrinsics(Camera& camera) const {
-    const std::string_view key = format_.intrinsics;
-    const std::vector<double>& numbers = intrinsics_;
-    Status status = check_length(key, numbers, {format_.num_intrinsics}, format_.intrinsics_form);
-    if (!status) {
-      return status;
+  /// One value as text; empty: there is no such key.
+  std::string scalar(const std::string& key) {
+    if (has(key) && !values_.at(key).IsScalar()) {
+      refuse(key, "expected one value, found none or several");
+    }
+    return has(key) && values_.at(key).IsScalar() ? values_.at(key).Scalar() : "";
+  }
+  std::optional<double> number(const std::string& key, double min, double max) {
+    const std::string text = scalar(key);
+    const auto numbers = parse_numbers(text, 1);
+    const bool is_inside = numbers && numbers->front() >= min && numbers->front() <= max;
+    if (has(key) && !is_inside) {
+      refuse(key, fmt::format("expected a number from {} to {}, found {}", min, max, text));
+    }
+    return is_inside ? std::optional(numbers->front()) : std::nullopt;
+  }
+  /// A number of pixels; 0: there is none.
+  int side(const std::string& key, double given) {
+    const bool is_side = given == std::floor(given) && given >= 1.0 && given <= kMaxImageSide_px;
+    if (has(key) && !is_side) {
+      refuse(key, fmt::format("expected whole pixels from 1 to {}, found {}", kMaxImageSide_px,
+                              given));
+    }
+    return is_side ? static_cast<int>(given) : 0;
+  }
+  std::string choice(const std::string& key, const std::vector<std::string>& choices) {
+    std::string text = scalar(key);
+    if (has(key) && std::ranges::find(choices, text) == choices.end()) {
+      refuse(key, fmt::format("expected one of {}, found '{}'", fmt::join(choices, ", "), text));
+    }
+    return text;
+  }
+  /// A list of one of these lengths; with 0 among them it may be absent. `expected` names them.
+  std::vector<double> list(const std::string& key,
+                           const std::vector<std::size_t>& lengths,
+                           const std::string& expected) {
+    std::vector<double> numbers;
+    if (!has(key)) {
+      if (std::ranges::find(lengths, 0U) == lengths.end()) {
+        miss(key + ": " + expected);
+      }
+    } else if (!values_.at(key).IsSequence()) {
+      refuse(key, fmt::format("expected a list of numbers, found '{}'", scalar(key)));
+    } else if (const Status read = add_numbers(values_.at(key), true, numbers); !read) {
+      refuse(key, read.error().message);
+    } else {
+      drop_zeros(key, lengths.back(), numbers);
+      if (std::ranges::find(lengths, numbers.size()) == lengths.end()) {
+        refuse(key, fmt::format("expected {}, found {} numbers", expected, numbers.size()));
+      }
+    }
+    return numbers;
+  }
+  /// OpenCV and ROS write coefficients with the zeros of models that have more.
+  void drop_zeros(const std::string& key, std::size_t most, std::vector<double>& numbers) const {
+    while (format_.is_of_matrices() && key == format_.coefficients && numbers.size() > most &&
+           numbers.back() == 0.0) {
+      numbers.pop_back();
+    }
+  }
+
+  void set_size(Camera& camera) {
+    const std::string& width = format_.width;
+    const std::string& height = format_.height;
+    if (has(width) != has(height)) {
+      refuse(fail(fmt::format("{}: expected {} and {}, found {} alone", file_.string(), width,
+                              height, has(width) ? width : height)));
+    } else if (has(width)) {
+      camera.width_px = side(width, number(width, 1.0, kMaxImageSide_px).value_or(1.0));
+      camera.height_px = side(height, number(height, 1.0, kMaxImageSide_px).value_or(1.0));
+    } else if (!has("resolution")) {
+      miss("image_width and image_height, or resolution: [width, height]");
+    } else if (const auto sides = list("resolution", {2}, "[width, height]"); status_) {
+      camera.width_px = side("resolution", sides[0]);
+      camera.height_px = side("resolution", sides[1]);
+    }
+    choice("camera_model", {"pinhole"});
+  }
+
+  void set_intrinsics(Camera& camera) {
+    const std::string& key = format_.intrinsics;
+    const auto numbers = list(key, {format_.num_intrinsics}, format_.intrinsics_form);
+    if (!status_) {
+      return;
     }
     const auto& places = format_.places;
     camera.fx_px = numbers[places[0]];
@@ -259,54 +263,47 @@ class Reader {
     camera.cx_px = numbers[places[2]];
     camera.cy_px = numbers[places[3]];
     if (!(camera.fx_px >= 1e-3) || !(camera.fy_px >= 1e-3)) {
-      return refuse(key, fmt::format("expected positive focal lengths, found {} and {}",
-                                     camera.fx_px, camera.fy_px));
+      refuse(key, fmt::format("expected positive focal lengths, found {} and {}", camera.fx_px,
+                              camera.fy_px));
     }
-    status = check_center(camera);
-    return status ? status : refuse(key, status.error().message);
+    if (const Status status = check_center(camera); !status) {
+      refuse(key, status.error().message);
+    }
   }
 
-  Status set_distortion(Lens& lens) const {
-    const std::string_view model = model_name(distortion_model_);
-    std::vector<double> numbers = distortion_coefficients_;
+  void set_distortion(Lens& lens) {
+    const std::string& key = format_.coefficients;
+    std::string model = choice("distortion_model", format_.models);
+    if (model.empty() && format_.is_of_matrices()) {
+      model = is_fisheye_ ? "fisheye" : "plumb_bob";
+    }
+    const bool has_none = format_.is_of_matrices() && has(key) && values_.at(key).size() == 0;
+    std::vector<double> numbers;
     if (model.empty()) {
-      return missing("distortion_model: none, radial-tangential or equidistant");
-    }
-    const std::string_view key = format_.coefficients;
-    if (is_of_matrices()) {  // written with the zeros of models that have more
-      const std::size_t least = model == "equidistant" ? 4U : 5U;
-      while (numbers.size() > least && numbers.back() == 0.0) {
-        numbers.pop_back();
-      }
-    }
-    Status status;
-    if (model == "none" || (is_of_matrices() && numbers.empty() && value_of(key))) {
-      lens.distortion = Distortion::kNone;
-      status = check_length(key, numbers, {0}, "[] for distortion_model none");
-    } else if (model == "equidistant") {
+      miss("distortion_model: none, radial-tangential or equidistant");
+    } else if (model == "none" || has_none) {
+      list(key, {0}, "[] for distortion_model none");
+    } else if (model == "equidistant" || model == "fisheye") {
       lens.distortion = Distortion::kEquidistant;
-      status = check_length(key, numbers, {4}, "[k1, k2, k3, k4]");
+      numbers = list(key, {4}, "[k1, k2, k3, k4]");
     } else {
       lens.distortion = Distortion::kRadialTangential;
-      status = check_length(key, numbers, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
+      numbers = list(key, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
     }
-    if (status) {
-      std::copy(numbers.begin(), numbers.end(), lens.coefficients.begin());
+    if (status_) {
+      std::ranges::copy(numbers, lens.coefficients.begin());
     }
-    return status;
   }
 
   /// [R | t] of 12 numbers, or 16 with a last row that is not looked at.
-  Status set_body(std::optional<Rigid3>& body_from_camera) const {
-    if (transform_.empty()) {
-      return {};
-    }
-    const std::string_view key = format_.body;
-    if (const Status status = check_length(key, transform_, {12, 16}, "16 numbers"); !status) {
-      return status;
+  void set_body(std::optional<Rigid3>& body_from_camera) {
+    const std::string& key = format_.body;
+    const auto numbers = list(key, {0, 12, 16}, "16 numbers");
+    if (!status_ || numbers.empty()) {
+      return;
     }
     const Matrix34d matrix =
-        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(transform_.data());
+        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
     const Eigen::Matrix3d rotation = matrix.leftCols<3>();
     constexpr double kTolerance = 1e-3;
     if (!(rotation.transpose() * rotation).isIdentity(kTolerance) || rotation.determinant() < 0.0) {
@@ -314,37 +311,13 @@ class Reader {
     }
     const Rigid3 transform = Rigid3::from_matrix(matrix);
     body_from_camera = key == kKalibr.body ? transform.inverse() : transform;
-    return {};
-  }
-
-  std::vector<Field> fields() {
-    const Rule side = Rule::between(1.0, kMaxImageSide_px);
-    return {{"", format_.width, &width_px_, side, ""},
-            {"", format_.height, &height_px_, side, ""},
-            {"", "resolution", &resolution_, side, ""},
-            {"", "camera_model", &camera_model_, Rule::one_of({"pinhole"}), ""},
-            {"", format_.intrinsics, &intrinsics_, Rule::between(-1e6, 1e6), ""},
-            {"", "distortion_model", &distortion_model_, Rule::one_of(format_.models), ""},
-            {"", format_.coefficients, &distortion_coefficients_, Rule::between(-1e4, 1e4), ""},
-            {"", format_.body, &transform_, Rule::between(-1e6, 1e6), ""},
-            {"", "rate_hz", &rate_hz_, Rule::between(1e-9, 1e5), ""},
-            {"", "camera_height", &camera_height_m_, Rule::between(1e-9, 1000.0), ""}};
   }
 
   std::filesystem::path file_;
   Format format_;
-  YAML::Node root_;  ///< the camera's keys; lines are those of the file
-  // What the keys say; as here where they are absent.
-  int width_px_ = 0;
-  int height_px_ = 0;
-  std::vector<double> resolution_;
-  std::string camera_model_;
-  std::vector<double> intrinsics_;
-  std::string distortion_model_;
-  std::vector<double> distortion_coefficients_;
-  std::vector<double> transform_;
-  double rate_hz_ = 0.0;
-  double camera_height_m_ = 0.0;
+  bool is_fisheye_ = false;
+  std::map<std::string, YAML::Node> values_;  ///< of the camera's keys that are there
+  Status status_;
 };
 
 }  // namespace

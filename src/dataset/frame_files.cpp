@@ -89,12 +89,9 @@ Status add_ground_truth(FrameList& frames,
     return truth.error();
   }
   frames.ground_truth_file = poses;
-  const std::size_t num_expected = is_exact ? num_files : frames.range.end;
-  const std::size_t num_found = truth->poses.size();
-  if (truth->timestamps_s.empty() &&
-      (num_found < num_expected || (is_exact && num_found > num_expected))) {
+  if (is_exact && truth->timestamps_s.empty() && truth->poses.size() != num_files) {
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
-                            poses.string(), num_expected, num_found));
+                            poses.string(), num_files, truth->poses.size()));
   }
   const auto matched =
       match_frames(*truth, poses, frames.range.begin, frames.timestamps_s, tolerance_s);

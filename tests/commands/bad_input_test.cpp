@@ -163,7 +163,7 @@ TEST_F(BadInput, Poses) {
   replace_line(poses, 4, "1 0 0 x 0 1 0 0 0 0 1 0");
   expect_error(run(), 1, {"00.txt:4:", "x"});
   write_file(poses, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
-  expect_error(run(), 1, {"00.txt", "each of 10 images", "found 2"});
+  expect_error(run(), 1, {"00.txt", "each of 10 frames", "found 2"});
   expect_error(run({"--gt", folder_ / "none.txt"}), 1, {"none.txt"});
   fs::remove(poses);
   expect_error(run({"--set", "scale.source=ground_truth"}), 1,
