@@ -48,10 +48,10 @@ std::string Progress::line(std::size_t done,
                            bool is_last) const {
   const double per_s = static_cast<double>(done) / std::max(elapsed_s, 1e-9);
   const std::string of = total == 0 ? "" : fmt::format("/{}", total);
-  const std::string time =
-      is_last      ? describe_time(elapsed_s) + " in all"
-      : total == 0 ? describe_time(elapsed_s) + " so far"
-                   : describe_time(static_cast<double>(total - done) / per_s) + " left";
+  const std::string time = is_last ? describe_time(elapsed_s) + " in all"
+                           : total == 0
+                               ? describe_time(elapsed_s) + " so far"
+                               : describe_time(static_cast<double>(total - done) / per_s) + " left";
   const std::string text =
       fmt::format("{}{} {}, {:.1f} {}/s, {}", done, of, unit_, per_s, unit_, time);
   // \r and "erase to the end" keep a terminal's cursor on one line until the last.

@@ -83,13 +83,12 @@ Status add_numbers(const YAML::Node& list, bool may_have_rows, std::vector<doubl
   constexpr std::size_t kMost = 16;
   for (const YAML::Node& element : list) {
     const bool is_row = may_have_rows && element.IsSequence();
-    const Status status =
-        is_row ? add_numbers(element, false, numbers)
-               : parse_numbers(element.IsScalar() ? element.Scalar() : "", 1)
-                     .and_then([&](const std::vector<double>& one) {
-                       numbers.push_back(one.front());
-                       return Status();
-                     });
+    const Status status = is_row ? add_numbers(element, false, numbers)
+                                 : parse_numbers(element.IsScalar() ? element.Scalar() : "", 1)
+                                       .and_then([&](const std::vector<double>& one) {
+                                         numbers.push_back(one.front());
+                                         return Status();
+                                       });
     if (!status || numbers.size() > kMost) {
       return status ? fail(fmt::format("expected at most {} numbers, found more", kMost)) : status;
     }
@@ -192,8 +191,8 @@ class Reader {
   int side(const std::string& key, double given) {
     const bool is_side = given == std::floor(given) && given >= 1.0 && given <= kMaxImageSide_px;
     if (has(key) && !is_side) {
-      refuse(key, fmt::format("expected whole pixels from 1 to {}, found {}", kMaxImageSide_px,
-                              given));
+      refuse(key,
+             fmt::format("expected whole pixels from 1 to {}, found {}", kMaxImageSide_px, given));
     }
     return is_side ? static_cast<int>(given) : 0;
   }

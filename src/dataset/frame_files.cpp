@@ -108,11 +108,10 @@ Status add_ground_truth(FrameList& frames,
 Status check_center(const Camera& camera) {
   const bool is_inside = camera.cx_px > 0.0 && camera.cx_px < camera.width_px &&
                          camera.cy_px > 0.0 && camera.cy_px < camera.height_px;
-  return is_inside
-             ? Status()
-             : Status(fail(fmt::format(
-                   "expected a principal point inside images of {}x{} pixels, found ({}, {})",
-                   camera.width_px, camera.height_px, camera.cx_px, camera.cy_px)));
+  return is_inside ? Status()
+                   : Status(fail(fmt::format(
+                         "expected a principal point inside images of {}x{} pixels, found ({}, {})",
+                         camera.width_px, camera.height_px, camera.cx_px, camera.cy_px)));
 }
 
 Status add_view(FrameList& frames,

@@ -44,8 +44,8 @@ struct GroundTruth {
   std::vector<std::size_t> frames;  ///< whose they are; increasing
 };
 
-/// All that a source knows of its frames before one is read. Files, times and poses are those of the
-/// range, one per frame; a stream has none of them but a video's file.
+/// All that a source knows of its frames before one is read. Files, times and poses are those of
+/// the range, one per frame; a stream has none of them but a video's file.
 struct FrameList {
   std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
   std::string name;    ///< of the folder, e.g. "03"

@@ -17,9 +17,9 @@ constexpr int kBlack = 128;
 std::optional<cv::Rect2d> parse_rectangle(std::string part) {
   std::ranges::replace(part, ',', ' ');
   const auto numbers = parse_numbers(part, 4);
-  return numbers ? std::optional(cv::Rect2d((*numbers)[0], (*numbers)[1], (*numbers)[2],
-                                            (*numbers)[3]))
-                 : std::nullopt;
+  return numbers
+             ? std::optional(cv::Rect2d((*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3]))
+             : std::nullopt;
 }
 
 Status add_part(const std::string& part, cv::Mat& mask) {
@@ -34,9 +34,10 @@ Status add_part(const std::string& part, cv::Mat& mask) {
   }
   const auto image = io::read_image(part, false);
   if (!image) {
-    return fail(fmt::format("--mask: expected X,Y,WIDTH,HEIGHT in pixels of the frames, as "
-                            "0,300,1241,76, or an image, found {}",
-                            image.error().message));
+    return fail(
+        fmt::format("--mask: expected X,Y,WIDTH,HEIGHT in pixels of the frames, as "
+                    "0,300,1241,76, or an image, found {}",
+                    image.error().message));
   }
   if (image->size() != mask.size()) {
     return fail(fmt::format("{}: expected a mask of {}x{} pixels, as the frames, found {}x{}", part,

@@ -76,8 +76,8 @@ struct SegmentError {
                                                         std::span<const Rigid3> ground_truth,
                                                         std::span<const double> path_shares);
 
-/// Errors that two methods are compared by (paired_ratio): segments of an eighth of the path from every
-/// frame on or, of more than `max_segments`, evenly spaced ones.
+/// Errors that two methods are compared by (paired_ratio): segments of an eighth of the path from
+/// every frame on or, of more than `max_segments`, evenly spaced ones.
 struct DenseErrors {
   std::vector<double> t_percent;
   std::vector<double> r_deg_per_100m;

@@ -28,9 +28,9 @@ Format format_of(std::string_view text) {
     const bool is_comment = first.starts_with('#');
     has_comment = has_comment || is_comment;
     if (!first.empty() && !is_comment) {
-      return line.find(',') != std::string_view::npos         ? Format::kEuroc
+      return line.find(',') != std::string_view::npos       ? Format::kEuroc
              : has_comment || split_words(line).size() == 8 ? Format::kTum
-                                                              : Format::kKitti;
+                                                            : Format::kKitti;
     }
   }
   return has_comment ? Format::kTum : Format::kKitti;

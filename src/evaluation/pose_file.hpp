@@ -18,10 +18,10 @@ struct PoseFile {
   bool is_of_body = false;  ///< EuRoC's: world_from_body in place of world_from_camera
 };
 
-/// The first row that is no comment tells the format: EuRoC's has commas (`time in ns, x, y, z, qw, qx, qy,
-/// qz, ..`), TUM's eight numbers (`time in s, x, y, z, qx, qy, qz, qw`), KITTI's twelve. Errors:
-/// file and line: a wrong count of numbers, not a number, not finite, not a
-/// rotation, nothing in it.
+/// The first row that is no comment tells the format: EuRoC's has commas (`time in ns, x, y, z, qw,
+/// qx, qy, qz, ..`), TUM's eight numbers (`time in s, x, y, z, qx, qy, qz, qw`), KITTI's twelve.
+/// Errors: file and line: a wrong count of numbers, not a number, not finite, not a rotation,
+/// nothing in it.
 [[nodiscard]] Expected<PoseFile> read_pose_file(const std::filesystem::path& file);
 
 /// How far apart in time a frame and its true pose may be: half the time between two poses of a

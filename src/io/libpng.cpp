@@ -41,8 +41,7 @@ class LibpngReader {
     png_read_info(png_, info_);
     choose_output(as_color);
     image_.create(static_cast<int>(png_get_image_height(png_, info_)),
-                  static_cast<int>(png_get_image_width(png_, info_)),
-                  as_color ? CV_8UC3 : CV_8UC1);
+                  static_cast<int>(png_get_image_width(png_, info_)), as_color ? CV_8UC3 : CV_8UC1);
     for (int v = 0; v < image_.rows; ++v) {
       rows_.push_back(image_.ptr(v));
     }

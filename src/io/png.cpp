@@ -242,8 +242,7 @@ Expected<cv::Mat> decode_png(Bytes bytes,
     image = decode_any_png(bytes, as_color);
   }
   if (image.empty()) {
-    return fail(
-        fmt::format("{}: expected a sound PNG image, found one damaged or cut off", name));
+    return fail(fmt::format("{}: expected a sound PNG image, found one damaged or cut off", name));
   }
   return image;
 }

@@ -63,9 +63,10 @@ TEST_F(BadInput, MoreBehindTheDocument) {
 }
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {
-  for (const auto& [path, found] : {std::pair<std::string, std::string>("/dev/zero", "neither a file nor a folder"),
-                                    {folder_.path(), "a folder"},
-                                    {folder_ / "none.h5", "nothing of that name"}}) {
+  for (const auto& [path, found] :
+       {std::pair<std::string, std::string>("/dev/zero", "neither a file nor a folder"),
+        {folder_.path(), "a folder"},
+        {folder_ / "none.h5", "nothing of that name"}}) {
     expect_error(run({"--set", "stem.model=" + path}), 1, {path + ": expected the name", found});
     expect_error(run_stemvo({"models", path}), 1, {path + ": expected the name", found});
   }
@@ -103,9 +104,10 @@ TEST_F(BadInput, BrokenImagesAreOneWarningEach) {
   const ProgramResult result = run({"--quiet"});
   EXPECT_EQ(result.exit_code, 0);
   EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 5) << result.err;
-  EXPECT_THAT(result.err, AllOf(HasSubstr("warning: " + images.string() + "/000003.png"),
-                                HasSubstr("000008.png: expected a sound PNG image, found one damaged"),
-                                Not(HasSubstr("libpng"))));
+  EXPECT_THAT(result.err,
+              AllOf(HasSubstr("warning: " + images.string() + "/000003.png"),
+                    HasSubstr("000008.png: expected a sound PNG image, found one damaged"),
+                    Not(HasSubstr("libpng"))));
 }
 
 TEST_F(BadInput, BrokenJpegsAreOneWarningEach) {

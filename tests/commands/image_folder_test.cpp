@@ -162,8 +162,9 @@ TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
   cv::imwrite((images_ / "000005.png").string(), image(cv::Rect(0, 0, 100, 100)));
   const ProgramResult result = run({"--quiet"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("warning: " + (images_ / "000003.jpg").string() +
-                                    ": expected a sound JPEG image, found damaged data (Premature end"));
+  EXPECT_THAT(result.err,
+              HasSubstr("warning: " + (images_ / "000003.jpg").string() +
+                        ": expected a sound JPEG image, found damaged data (Premature end"));
   EXPECT_THAT(result.err, HasSubstr("000005.png: expected an image of 620x188 pixels, found 100x"));
   EXPECT_EQ(num_poses(), 10U);
 }

@@ -17,8 +17,17 @@ namespace {
 class LongRun : public ::testing::Test {
  protected:
   [[nodiscard]] std::vector<std::string> arguments() const {
-    return {"run", drive_.string(), "--out", out_.string(), "--quiet", "--threads", "1",
-            "--set", "features.method=sift", "--set", "odometry.mode=two_frame"};
+    return {"run",
+            drive_.string(),
+            "--out",
+            out_.string(),
+            "--quiet",
+            "--threads",
+            "1",
+            "--set",
+            "features.method=sift",
+            "--set",
+            "odometry.mode=two_frame"};
   }
   [[nodiscard]] std::ptrdiff_t num_lines(const char* name) const {
     return std::ranges::count(read_file(out_ / name), '\n');
