@@ -64,21 +64,13 @@ double rmse_m(std::span<const Eigen::Vector3d> estimate, std::span<const Eigen::
   return std::sqrt(sum / static_cast<double>(estimate.size()));
 }
 
-/// Under each alignment.
 AbsoluteTrajectoryError ate_rmse(std::span<const Rigid3> estimate,
                                  std::span<const Rigid3> ground_truth) {
-  const std::vector<Eigen::Vector3d> from = positions(estimate);
-  const std::vector<Eigen::Vector3d> to = positions(ground_truth);
-  std::vector<Eigen::Vector3d> moved(from.size());
+  const std::vector<Eigen::Vector3d> truth = positions(ground_truth);
   const auto after_m = [&](Alignment alignment) {
-    const Similarity3 by = align_positions(from, to, alignment);
-    const Eigen::Quaterniond rotation(by.rotation);
-    std::ranges::transform(from, moved.begin(), [&](const Eigen::Vector3d& position) {
-      return Eigen::Vector3d(by.scale * (rotation * position) + by.translation);
-    });
-    return rmse_m(moved, to);
+    return rmse_m(positions(align(estimate, ground_truth, alignment)), truth);
   };
-  return {rmse_m(from, to), after_m(Alignment::kScale), after_m(Alignment::kSe3),
+  return {rmse_m(positions(estimate), truth), after_m(Alignment::kScale), after_m(Alignment::kSe3),
           after_m(Alignment::kSim3)};
 }
 
@@ -125,16 +117,17 @@ void add_segment_errors(std::span<const Rigid3> estimate,
   const std::vector<SegmentError> segments =
       segment_errors(estimate, ground_truth, metrics.segment_lengths_m, first_frame_step);
   metrics.num_segments = static_cast<int>(segments.size());
-  if (!segments.empty()) {
-    double t_sum = 0.0;
-    double r_sum = 0.0;
-    for (const SegmentError& segment : segments) {
-      t_sum += segment.t_percent;
-      r_sum += segment.r_deg_per_100m;
-    }
-    metrics.t_rel_percent = t_sum / metrics.num_segments;
-    metrics.r_rel_deg_per_100m = r_sum / metrics.num_segments;
+  if (segments.empty()) {
+    return;
   }
+  double t_sum = 0.0;
+  double r_sum = 0.0;
+  for (const SegmentError& segment : segments) {
+    t_sum += segment.t_percent;
+    r_sum += segment.r_deg_per_100m;
+  }
+  metrics.t_rel_percent = t_sum / metrics.num_segments;
+  metrics.r_rel_deg_per_100m = r_sum / metrics.num_segments;
 }
 
 std::vector<double> segment_lengths(const EvaluationOptions& options, double path_length_m) {
