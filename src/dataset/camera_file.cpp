@@ -106,10 +106,10 @@ class Reader {
       return status.error();
     }
     CameraFile result;
+    set_body(result.body_from_camera);
     set_size(result.lens.camera);
     set_intrinsics(result.lens.camera);
     set_distortion(result.lens);
-    set_body(result.body_from_camera);
     result.rate_hz = number("rate_hz", 1e-9, 1e5);
     result.camera_height_m = number("camera_height", 1e-9, 1000.0);
     return status_ ? Expected<CameraFile>(result) : status_.error();
