@@ -162,7 +162,7 @@ class SearchCluster(unittest.TestCase):
         done = subprocess.run([RAY, ROOT / "tools/search_cluster.py", *what, "--model", "default", "--layers", "fine", "--program", PROGRAM,
                                "--filters-per-task", "2", "--out", self.folder / "damaged_cluster"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(done.stderr.count(f"warning: {frame}: expected a complete PNG image"), 1, done.stderr)
+        self.assertEqual(done.stderr.count(f"warning: {frame}: expected a sound PNG image"), 1, done.stderr)
         self.assertIn("warning: --layers: default has stem, not fine; nothing of it is searched", done.stderr)
         table = (self.folder / "damaged_cluster/result/filters.csv").read_bytes()
         self.assertEqual(table, (self.folder / "damaged_single/filters.csv").read_bytes())
