@@ -42,7 +42,7 @@ Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_
 undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
 (scale.source=none).
 
---out (results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
+--out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
 poses), trajectory_refined_*.txt (odometry.mode map: the same with look-ahead), report.html (all
 there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the
 numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
@@ -129,8 +129,10 @@ void add_options(CLI::App& command, RunArguments& arguments) {
           "A recording: a folder, a video, a quoted pattern of images, camera:N (see below)")
       ->required()
       ->type_name("");
-  add_out_folder(command, request.out_dir,
-                 "Folder for the results; created, files replaced; default: results/NAME of INPUT")
+  add_out_folder(
+      command, request.out_dir,
+      "Folder for the results; created; one of stemvo's is replaced, others are refused; "
+      "default: a new results/NAME of INPUT")
       ->required(false);
   add_config_options(command, arguments.config);
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");

@@ -12,7 +12,6 @@
 
 #include "benchmark/kept_run.hpp"
 #include "html/page.hpp"
-#include "pipeline/earlier_run.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
@@ -104,7 +103,7 @@ class Benchmark {
     const Json publications = published_rows(published.at("published"), name);
     truths_[name] = opened ? opened->ground_truth() : std::nullopt;
     if (opened) {
-      const auto files = pipeline::input_files(*opened, Config{}, request_.models_dir);
+      const auto files = pipeline::input_files(*opened, Config{});
       inputs_.insert(inputs_.end(), files.begin(), files.end());
     }
     const bool is_complete = opened && !official.empty() && is_official(official, *opened);
@@ -144,22 +143,6 @@ class Benchmark {
     }
     summary_.json = to_text(report_);
     return summary_;
-  }
-
-  /// In the folder for the results: its own files, and those of kept runs.
-  [[nodiscard]] std::vector<std::string> outputs() const {
-    std::vector<std::string> names = {"benchmark.md", "benchmark.json", "speed.json",
-                                      "report.html"};
-    for (const Json& sequence : report_["sequences"]) {
-      for (const Json& run : sequence["runs"]) {
-        const fs::path folder = run_dir(sequence, run).lexically_relative(request_.out_dir);
-        for (const std::string& name : pipeline::run_files()) {
-          names.push_back(folder / name);
-        }
-        names.push_back(folder / benchmark::kInputsFile);
-      }
-    }
-    return names;
   }
 
   /// Of the sequences in the plan.
@@ -343,8 +326,7 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
     return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",
                             request.published.string(), error.what()));
   }
-  const auto lock =
-      pipeline::open_out_folder(request.out_dir, benchmark.outputs(), benchmark.inputs());
+  const auto lock = pipeline::open_out_folder(request.out_dir, benchmark.inputs());
   return lock ? benchmark.run() : lock.error();
 }
 

@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "pipeline/earlier_run.hpp"
-#include "pipeline/input_hashes.hpp"
+#include "pipeline/result_files.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
+#include "search/input_hashes.hpp"
 #include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 /// With the hashes of the results beside them: one that was touched does not count.
 Json with_results(const fs::path& folder, Json hashes) {
-  for (const std::string& name : pipeline::run_files()) {
+  for (const char* name : pipeline::kResultNames) {
     const Expected<std::string> text = read_text_file(folder / name);
     hashes[name] = text ? internal::sha256_hex(*text) : "cannot be read";
   }
@@ -32,10 +32,10 @@ Json with_results(const fs::path& folder, Json hashes) {
 }  // namespace
 
 Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
-  const auto program = pipeline::hash_program();
-  const auto model = pipeline::hash_model(run.config, run.models_dir);
+  const auto program = search::hash_program();
+  const auto model = search::hash_model(run.config, run.models_dir);
   const auto files =
-      pipeline::hash_sequence(sequence, run.sequence_dir, pipeline::FrameIdentity::kNamesAndSizes);
+      search::hash_sequence(sequence, run.sequence_dir, search::FrameIdentity::kNamesAndSizes);
   if (!program || !model || !files) {
     return !program ? program.error() : !model ? model.error() : files.error();
   }

@@ -13,7 +13,6 @@
 #include "odometry/self_calibration.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
-#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 
@@ -35,11 +34,17 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
   if (const Status status = validate(request.config); !status) {
     return status;
   }
-  std::vector<fs::path> inputs =
-      pipeline::input_files(sequence, request.config, request.models_dir);
-  inputs.push_back(calibration_file(request));
-  const Status status = check_spares_inputs({request.out_file}, inputs);
-  return status ? check_can_write(request.out_file) : status;
+  std::vector<fs::path> inputs = pipeline::input_files(sequence, request.config);
+  inputs.insert(inputs.end(), {calibration_file(request), request.config.file,
+                               request.sequence_dir / "times.txt"});
+  for (const fs::path& input : inputs) {
+    std::error_code code;
+    if (fs::equivalent(request.out_file, input, code)) {
+      return fail(fmt::format("{}: expected a file to write that is no input, found {}",
+                              request.out_file.string(), input.string()));
+    }
+  }
+  return check_can_write(request.out_file);
 }
 
 Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {

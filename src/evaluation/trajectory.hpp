@@ -13,6 +13,9 @@ namespace stemvo {
 /// Poses world_from_camera, one per frame; metres.
 using Trajectory = std::vector<Rigid3>;
 
+/// A line of a KITTI pose file, and of a TUM one.
+[[nodiscard]] std::string kitti_row(const Rigid3& world_from_camera);
+[[nodiscard]] std::string tum_row(double timestamp_s, const Rigid3& world_from_camera);
 /// KITTI pose file: 12 numbers a line, row-major [R | t]. Errors name file and line: wrong count of
 /// numbers, not a number, not finite, not a rotation (by more than 1e-3), empty file.
 [[nodiscard]] Expected<Trajectory> read_kitti_trajectory(const std::filesystem::path& file);

@@ -12,27 +12,6 @@
 #include "report/frame_image.hpp"
 
 namespace stemvo {
-namespace {
-
-/// The frames' own folder is refused too: what is written there would be read as frames.
-Expected<pipeline::FolderLock> open_folder(const ChannelImagesRequest& request,
-                                           const FrameSource& sequence) {
-  auto inputs = pipeline::input_files(request, sequence, request.config, request.models_dir);
-  if (!sequence.stream()) {
-    inputs.push_back(sequence.file(0).parent_path());
-  }
-  std::vector<std::string> names = {"."};
-  for (const auto& file :
-       dataset::list_folder(request.out_dir).value_or(std::vector<std::filesystem::path>())) {
-    if (file.extension() == ".png") {
-      names.push_back(file.filename().string());
-    }
-  }
-  return pipeline::open_out_folder(request.out_dir, names, inputs);
-}
-
-}  // namespace
-
 Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
                                            const RunProgress& progress) {
   if (const Status status = validate(request.config); !status) {
@@ -54,7 +33,8 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
   if (!filters) {
     return filters.error();
   }
-  const auto lock = open_folder(request, *sequence);
+  const auto lock = pipeline::open_out_folder(
+      request.out_dir, pipeline::input_files(request, *sequence, request.config));
   Status status = lock ? Status() : lock.error();
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {

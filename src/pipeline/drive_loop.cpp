@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/drive_loop.hpp"
 
-#include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <chrono>
-#include <future>
+#include <fstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -13,14 +14,36 @@
 #include "pipeline/frame_pipeline.hpp"
 #include "report/frame_image.hpp"
 #include "report/frames_csv.hpp"
-#include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Seconds = std::chrono::duration<double>;
+
+/// A file of rows that grows while frames are done. A buffer longer than the stream's own is
+/// written at once, so that a run that is killed leaves whole rows.
+class GrowingFile {
+ public:
+  explicit GrowingFile(const std::filesystem::path& file)
+      : file_(file), stream_(file, std::ios::binary) {}
+
+  void add(std::string_view rows) { rows_ += rows; }
+  void write() {
+    stream_ << std::exchange(rows_, {}) << std::flush;
+    if (!stream_ && status_) {
+      status_ = fail(fmt::format("{}: cannot write: {}", file_.string(),
+                                 std::generic_category().message(errno)));
+    }
+  }
+  [[nodiscard]] const Status& status() const { return status_; }
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+  std::string rows_;
+  Status status_;
+};
 
 /// Whether frame i is one of the few in report.html: evenly spaced among n, each twice as far as
 /// the one before where n is not known (0).
@@ -40,10 +63,12 @@ std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
 
 class DriveLoop {
  public:
-  DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {}
+  DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {
+    rows_.add(frames_csv_header());
+    write_rows();
+  }
 
   Drive drive() {
-    drive_.csv = frames_csv_header();
     run_frames(run_.sequence, run_.odometry,
                [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
                  return visit(i, frame, pose);
@@ -51,7 +76,10 @@ class DriveLoop {
     if (run_.sequence.stream()) {
       end_stream(*run_.sequence.stream());
     }
-    finish_files();
+    write_rows();
+    for (const GrowingFile* file : {&rows_, &kitti_, &tum_}) {
+      keep_first(drive_.written, file->status());
+    }
     return std::move(drive_);
   }
 
@@ -67,8 +95,13 @@ class DriveLoop {
     }
     drive_.frames.push_back(pose);
     const StageTimer timer(Stage::kFrameFiles);
-    drive_.csv += frames_csv_row(number, run_.sequence.time_s(i), pose);
-    keep_files();
+    const double time_s = run_.sequence.time_s(i);
+    rows_.add(frames_csv_row(number, time_s, pose));
+    kitti_.add(kitti_row(pose.world_from_camera));
+    tum_.add(tum_row(time_s, pose.world_from_camera));
+    if (Clock::now() - last_written_ > std::chrono::seconds(1)) {
+      write_rows();
+    }
     keep_image(i, frame, pose);
     const std::size_t expected = expected_frames(run_.sequence, i + 1);
     drive_.interrupted = progress_ && !progress_(i + 1, expected) && i + 1 < run_.sequence.size();
@@ -102,35 +135,11 @@ class DriveLoop {
     }
   }
 
-  /// The files so far, once a second, while the frames go on.
-  void keep_files() {
-    const bool is_busy =
-        writing_.valid() && writing_.wait_for(Seconds(0)) == std::future_status::timeout;
-    if (is_busy || Clock::now() - last_files_ < std::chrono::seconds(1)) {
-      return;
+  void write_rows() {
+    for (GrowingFile* file : {&rows_, &kitti_, &tum_}) {
+      file->write();
     }
-    last_files_ = Clock::now();
-    auto write = [out = run_.request.out_dir, csv = drive_.csv,
-                  trajectory = drive_.trajectory(run_)]() mutable {
-      static_cast<void>(write_text_file(out / "frames.csv", std::exchange(csv, {})));
-      static_cast<void>(
-          write_kitti_trajectory(out / "trajectory_kitti.txt", std::exchange(trajectory, {})));
-    };
-    // What cannot be written now is written, or reported, at the end. The future keeps what its
-    // thread does not let go; one that was put off would write what it has been moved from.
-    try {
-      writing_ = std::async(std::launch::async, std::move(write));
-    } catch (const std::system_error&) {  // NOLINT: no thread is to be had
-    }
-  }
-
-  /// The trajectories are the caller's.
-  void finish_files() {
-    if (writing_.valid()) {
-      writing_.wait();
-    }
-    const std::filesystem::path& out = run_.request.out_dir;
-    keep_first(drive_.written, write_text_file(out / "frames.csv", drive_.csv));
+    last_written_ = Clock::now();
   }
 
   /// Frames in all are known now. An interrupt is the usual end of a live camera; a video that ends
@@ -158,8 +167,10 @@ class DriveLoop {
   const Run& run_;
   const RunProgress& progress_;
   Drive drive_;
-  Clock::time_point last_files_ = Clock::now();
-  std::future<void> writing_;
+  GrowingFile rows_{run_.request.out_dir / "frames.csv"};
+  GrowingFile kitti_{run_.request.out_dir / "trajectory_kitti.txt"};
+  GrowingFile tum_{run_.request.out_dir / "trajectory_tum.txt"};
+  Clock::time_point last_written_;
 };
 
 }  // namespace

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/out_folder.hpp"
 
+#include <algorithm>
 #include <cerrno>
-#include <string>
-#include <string_view>
 #include <system_error>
-#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "dataset/listing.hpp"
-#include "models/manifest.hpp"
-#include "text/spared_inputs.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::pipeline {
@@ -23,45 +18,39 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A file that is gone when it is closed, however the process ends; -1: errno says why not.
-int open_nameless(const fs::path& folder) {
-  const int file = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
-  if (file >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) {
-    return file;
+constexpr const char* kMark = ".stemvo";
+
+Error refuse(const fs::path& folder, const std::string& found) {
+  return fail(fmt::format("{}: expected an output folder that can be written, found: {}",
+                          folder.string(), found));
+}
+
+Status check_is_ours(const fs::path& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code) || fs::is_empty(folder, code) || is_our_folder(folder)) {
+    return {};
   }
-  const fs::path probe = folder / ".stemvo_probe";  // a file system without such files
-  const int named = ::open(probe.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
-  if (named >= 0) {
-    ::unlink(probe.c_str());
-  }
-  return named;
+  return fail(
+      fmt::format("{}: expected a new folder, an empty one or results of stemvo, found other "
+                  "files (no {})",
+                  folder.string(), kMark));
+}
+
+Status check_holds_none(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  std::error_code code;
+  const fs::path root = fs::weakly_canonical(fs::absolute(folder, code), code);
+  const auto is_inside = [&](const fs::path& input) {
+    const fs::path parent = fs::weakly_canonical(fs::absolute(input, code).parent_path(), code);
+    return std::ranges::mismatch(root, parent).in1 == root.end() && fs::exists(input, code);
+  };
+  const auto found = std::ranges::find_if(inputs, is_inside);
+  return found == inputs.end()
+             ? Status()
+             : Status(fail(fmt::format("{}: expected a folder that holds no input, found {}",
+                                       folder.string(), found->string())));
 }
 
 }  // namespace
-
-Status create_out_folder(const fs::path& folder) {
-  const auto refuse = [&folder](const std::string& found) {
-    return fail(fmt::format("{}: expected an output folder that can be written, found: {}",
-                            folder.string(), found));
-  };
-  std::error_code code;
-  fs::create_directories(folder, code);
-  std::error_code ignored;
-  if (fs::exists(folder, ignored) && !fs::is_directory(folder, ignored)) {
-    return refuse(fmt::format("{} of that name", kind_of(folder)));
-  }
-  if (code) {
-    return refuse(code.message());
-  }
-  const int file = open_nameless(folder);
-  constexpr std::string_view kText = "can be written\n";
-  const bool is_written = file >= 0 && ::write(file, kText.data(), kText.size()) > 0;
-  const int error = errno;
-  if (file >= 0) {
-    ::close(file);
-  }
-  return is_written ? Status() : Status(refuse(std::generic_category().message(error)));
-}
 
 Expected<FolderLock> lock_folder(const fs::path& folder) {
   const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -79,79 +68,60 @@ Expected<FolderLock> lock_folder(const fs::path& folder) {
   return lock;
 }
 
-namespace {
-
-/// Nobody reads a pipe whose bytes come at the end of a run.
-Status check_are_no_pipes(const std::vector<fs::path>& outputs) {
-  for (const fs::path& file : outputs) {
-    std::error_code ignored;
-    if (fs::is_fifo(file, ignored) || fs::is_socket(file, ignored)) {
-      return fail(
-          fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
-    }
-  }
-  return {};
+Status create_out_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  return code ? Status(refuse(folder, code.message())) : Status();
 }
 
-/// trajectory.png would be a frame of the next run.
-Status check_holds_no_images(const fs::path& folder, const std::vector<fs::path>& inputs) {
-  for (const fs::path& input : inputs) {
-    std::error_code code;
-    if (dataset::is_image_file(input) && fs::equivalent(input.parent_path(), folder, code)) {
-      return fail(fmt::format("{}: expected a folder without the recording's images, found {}",
-                              folder.string(), input.filename().string()));
-    }
-  }
-  return {};
+bool is_our_folder(const fs::path& folder) {
+  std::error_code code;
+  return fs::exists(folder / kMark, code);
 }
 
-}  // namespace
-
-Expected<FolderLock> open_out_folder(const fs::path& folder,
-                                     const std::vector<std::string>& names,
-                                     const std::vector<fs::path>& inputs) {
-  std::vector<fs::path> outputs;
-  for (const std::string& name : names) {
-    outputs.push_back(folder / name);
+Expected<fs::path> create_results_folder(const std::string& name) {
+  const fs::path results = "results";
+  if (const Status created = create_out_folder(results); !created) {
+    return created.error();
   }
-  const Status status = check_spares_inputs(outputs, inputs)
-                            .and_then([&] { return check_are_no_pipes(outputs); })
-                            .and_then([&] { return check_holds_no_images(folder, inputs); })
+  fs::path folder = results / name;
+  std::error_code code;
+  for (int i = 2; !fs::create_directory(folder, code) && !code; ++i) {
+    folder = results / fmt::format("{}_{}", name, i);
+  }
+  return code ? Expected<fs::path>(refuse(folder, code.message())) : folder;
+}
+
+Expected<FolderLock> open_out_folder(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  const Status status = check_is_ours(folder)
+                            .and_then([&] { return check_holds_none(folder, inputs); })
                             .and_then([&] { return create_out_folder(folder); });
-  return status ? lock_folder(folder) : status.error();
+  if (!status) {
+    return status.error();
+  }
+  auto lock = lock_folder(folder);
+  const Status marked =
+      lock ? write_text_file(folder / kMark,
+                             "Results of stemvo: its next command may replace them.\n")
+           : Status();
+  return marked ? std::move(lock) : refuse(folder, marked.error().message);
 }
 
-std::vector<fs::path> input_files(const FrameSource& source,
-                                  const Config& config,
-                                  const fs::path& models_dir) {
+std::vector<fs::path> input_files(const FrameSource& source, const Config& config) {
   std::vector<fs::path> files = source.frames().files;
-  files.insert(files.end(), {config.file, config.stem.model, models_dir / "manifest.yaml"});
+  files.emplace_back(config.stem.model);
   for (const auto& file : {source.ground_truth_file(), source.given_calibration()}) {
-    if (file) {
-      files.push_back(*file);
-    }
-  }
-  if (!source.frames().files.empty()) {
-    const fs::path folder = source.file(0).parent_path();
-    for (const char* name :
-         {"calib.txt", "times.txt", "camera.yaml", "rgb.txt", "data.csv", "sensor.yaml"}) {
-      files.insert(files.end(), {folder / name, folder.parent_path() / name});
-    }
-  }
-  if (const auto model = find_model(config.stem.model, config.stem.layer, models_dir)) {
-    files.push_back(model->file);
+    files.push_back(file.value_or(""));
   }
   return files;
 }
 
 std::vector<fs::path> input_files(const FrameSourceRequest& request,
                                   const FrameSource& source,
-                                  const Config& config,
-                                  const fs::path& models_dir) {
-  std::vector<fs::path> files = input_files(source, config, models_dir);
-  for (const auto& file : {request.times, request.camera_file}) {
-    files.push_back(file.value_or(""));
-  }
+                                  const Config& config) {
+  std::vector<fs::path> files = input_files(source, config);
+  files.insert(files.end(), {request.sequence_dir, request.times.value_or(""),
+                             request.camera_file.value_or("")});
   files.insert(files.end(), request.masks.begin(), request.masks.end());
   return files;
 }

@@ -12,7 +12,6 @@
 
 #include "internal_check.hpp"
 #include "options/option_fields.hpp"
-#include "pipeline/earlier_run.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
 #include "report/map_ply.hpp"
@@ -92,7 +91,15 @@ double share_in_place(const std::vector<FrameResult>& frames) {
                            : 0.0;
 }
 
-/// As result files hold it.
+Trajectory poses_of(const Drive& drive) {
+  Trajectory poses;
+  for (const FrameResult& frame : drive.frames) {
+    poses.push_back(frame.world_from_camera);
+  }
+  return poses;
+}
+
+/// As result files hold it: of scale.source=ground_truth with the ground truth's step lengths.
 Trajectory as_written(const Run& run, Trajectory trajectory) {
   return run.request.config.scale.source == ScaleSource::kGroundTruth
              ? rescale_steps(trajectory,
@@ -107,7 +114,7 @@ class ResultWriter {
         sequence_(run.sequence),
         run_(run),
         drive_(drive),
-        trajectory_(drive.trajectory(run)),
+        trajectory_(as_written(run, poses_of(drive))),
         config_text_(config_text(run, trajectory_.size())) {
     const auto truth = sequence_.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
     matched_ = truth ? Status() : truth.error();
@@ -123,10 +130,6 @@ class ResultWriter {
   [[nodiscard]] Status write(MetricsReport& report) const {
     const std::filesystem::path& folder = request_.out_dir;
     Status written = write_poses();
-    if (!written && make_room()) {  // they come before all else
-      static_cast<void>(write_poses());
-      static_cast<void>(write_text_file(folder / "frames.csv", drive_.csv));
-    }
     report = make_report();
     keep_first(written, drive_.written);
     keep_first(written, write_text_file(folder / "config.yaml", config_text_));
@@ -165,20 +168,6 @@ class ResultWriter {
                  write_tum_trajectory(folder / "trajectory_refined_tum.txt", times_s, *refined_));
     }
     return written;
-  }
-
-  /// On a disk that is full: this run's images go. False: the disk is not to blame.
-  [[nodiscard]] bool make_room() const {
-    constexpr std::uintmax_t kFull = 16'000'000;
-    std::error_code code;
-    if (const auto space = std::filesystem::space(request_.out_dir, code);
-        code || space.available > kFull) {
-      return false;
-    }
-    for (const std::filesystem::path& image : old_pictures(request_.out_dir)) {
-      std::filesystem::remove(image, code);
-    }
-    return true;
   }
 
   [[nodiscard]] MetricsReport make_report() const {
@@ -283,14 +272,6 @@ void keep_first(Status& first, Status next) {
   if (first && !next) {
     first = std::move(next);
   }
-}
-
-Trajectory Drive::trajectory(const Run& run) const {
-  Trajectory poses;
-  for (const FrameResult& frame : frames) {
-    poses.push_back(frame.world_from_camera);
-  }
-  return as_written(run, std::move(poses));
 }
 
 std::string config_text(const Run& run, std::size_t num_frames) {

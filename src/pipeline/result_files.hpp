@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -14,6 +15,18 @@
 
 namespace stemvo::pipeline {
 
+/// Files that a run writes into its folder, beside pictures/.
+inline constexpr std::array kResultNames = {"config.yaml",
+                                            "frames.csv",
+                                            "metrics.json",
+                                            "trajectory_kitti.txt",
+                                            "report.html",
+                                            "trajectory_refined_kitti.txt",
+                                            "trajectory_tum.txt",
+                                            "trajectory.png",
+                                            "trajectory_refined_tum.txt",
+                                            "map.ply"};
+
 /// What works together while a sequence is run.
 struct Run {
   const RunRequest& request;
@@ -24,15 +37,10 @@ struct Run {
 /// What the loop over the frames leaves behind.
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
-  std::string csv;                           ///< frames.csv of them
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images
-
-  /// Of the frames, as trajectory_kitti.txt holds it: of scale.source=ground_truth with the ground
-  /// truth's step lengths.
-  [[nodiscard]] Trajectory trajectory(const Run& run) const;
 };
 
 /// " for 11 of 12 frames", and why not for the others.

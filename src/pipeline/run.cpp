@@ -9,12 +9,10 @@
 
 #include "dataset/camera_height.hpp"
 #include "pipeline/drive_loop.hpp"
-#include "pipeline/earlier_run.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "pipeline/result_files.hpp"
 #include "pipeline/thread_scope.hpp"
-#include "report/frames_csv.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -50,36 +48,17 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
 /// What an earlier run left in the folder is removed. Whenever this one is killed, all under final
 /// names is of one run: config.yaml comes before frames and results.
 Status prepare_out_folder(const Run& run) {
-  const RunRequest& request = run.request;
-  const std::filesystem::path& out = request.out_dir;
-  Status status = request.image_every > 0 ? pipeline::check_pictures(out) : Status();
-  status = status ? pipeline::remove_earlier_results(out) : status;
-  if (status && request.image_every > 0) {
+  const std::filesystem::path& out = run.request.out_dir;
+  Status status;
+  for (const char* name : pipeline::kResultNames) {
+    status = status ? remove_file(out / name) : status;
+  }
+  std::error_code code;
+  std::filesystem::remove_all(out / "pictures", code);
+  if (status && run.request.image_every > 0) {
     status = pipeline::create_out_folder(out / "pictures");
   }
-  if (status) {
-    status = write_text_file(out / "config.yaml", pipeline::config_text(run, 0));
-  }
-  // From now on it can be seen how far the run is.
-  return status ? write_text_file(out / "frames.csv", frames_csv_header()) : status;
-}
-
-/// Results must not take the place of what they are made from.
-Expected<pipeline::FolderLock> open_folder(const RunRequest& request, const FrameSource& sequence) {
-  std::vector<std::string> names = pipeline::run_files();
-  auto inputs = pipeline::input_files(request, sequence, request.config, request.models_dir);
-  // The configuration of an earlier run may be that of the next, in the same folder.
-  const auto config = read_text_file(request.config.file);
-  if (config && config->starts_with("# stemvo ")) {
-    std::erase(inputs, request.config.file);
-  }
-  if (request.image_every > 0) {
-    names.emplace_back("pictures");
-    if (!sequence.frames().files.empty()) {  // a live camera has none
-      inputs.push_back(sequence.file(0).parent_path());
-    }
-  }
-  return pipeline::open_out_folder(request.out_dir, names, inputs);
+  return status ? write_text_file(out / "config.yaml", pipeline::config_text(run, 0)) : status;
 }
 
 std::string describe_truth(const RunRequest& request, const FrameSource& sequence) {
@@ -108,14 +87,14 @@ std::string describe_size(const FrameSource& sequence) {
 }
 
 /// What the input was taken for, and what is lost.
-void note_start(const Run& run, bool has_earlier) {
+void note_start(const Run& run, bool is_replacing) {
   const auto& [request, sequence, odometry] = run;
   if (!request.note) {
     return;
   }
   request.note(fmt::format("input: {} {}, {}, {}", sequence.kind(), sequence.name(),
                            describe_size(sequence), describe_truth(request, sequence)));
-  if (has_earlier) {
+  if (is_replacing) {
     request.note(
         fmt::format("results of an earlier run in {} are replaced (another --out keeps them)",
                     request.out_dir.string()));
@@ -135,28 +114,35 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
                     std::move(written)};
 }
 
-Expected<RunSummary> run_source(const RunRequest& request,
+Expected<RunSummary> run_source(RunRequest request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
+  request.config = dataset::with_camera_height(request.config, sequence.frames());
   Expected<PhasedOdometry> odometry = pipeline::create_odometry(
       request.config, sequence.camera(), request.models_dir, sequence.frames().mask);
   if (!odometry) {
     return odometry.error();
   }
-  const Run run{request, sequence, *odometry};
-  const auto lock = open_folder(request, sequence);
-  if (!lock) {
-    return lock.error();
+  if (request.out_dir.empty()) {
+    const auto folder = pipeline::create_results_folder(sequence.name());
+    if (!folder) {
+      return folder.error();
+    }
+    request.out_dir = *folder;
   }
-  const bool has_earlier = pipeline::has_earlier_run(request.out_dir);
-  if (const Status status = prepare_out_folder(run); !status) {
-    return status.error();
+  const Run run{request, sequence, *odometry};
+  const bool is_replacing = pipeline::is_our_folder(request.out_dir);
+  const auto lock = pipeline::open_out_folder(
+      request.out_dir, pipeline::input_files(request, sequence, request.config));
+  const Status prepared = lock ? prepare_out_folder(run) : lock.error();
+  if (!prepared) {
+    return prepared.error();
   }
   std::optional<StageRecorder> recorder;
   if (request.measure_times) {
     recorder.emplace();
   }
-  note_start(run, has_earlier);
+  note_start(run, is_replacing);
   return finish_run(run, progress);
 }
 
@@ -174,12 +160,7 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (!sequence) {
     return sequence.error();
   }
-  RunRequest effective = request;
-  effective.config = dataset::with_camera_height(request.config, sequence->frames());
-  if (request.out_dir.empty()) {
-    effective.out_dir = std::filesystem::path("results") / sequence->name();
-  }
-  return run_source(effective, *sequence, progress);
+  return run_source(request, *sequence, progress);
 }
 
 }  // namespace stemvo

@@ -18,7 +18,7 @@ namespace stemvo {
 /// Everything `stemvo run` was asked for. The camera is that of `config`, the height
 /// as dataset::with_camera_height says.
 struct RunRequest : FrameSourceRequest {
-  std::filesystem::path out_dir;  ///< empty: results/ and the recording's name
+  std::filesystem::path out_dir;  ///< empty: a new results/NAME
   std::filesystem::path models_dir;
   Config config;
   int num_threads = 0;         ///< 0: all cores

@@ -111,7 +111,7 @@ class Robustness {
   [[nodiscard]] std::vector<std::filesystem::path> inputs() const {
     std::vector<std::filesystem::path> inputs;
     for (const FrameSource& source : sources_) {
-      const auto files = pipeline::input_files(source, request_.config, request_.models_dir);
+      const auto files = pipeline::input_files(source, request_.config);
       inputs.insert(inputs.end(), files.begin(), files.end());
     }
     return inputs;
@@ -279,9 +279,7 @@ Expected<RobustnessReport> run_robustness(const RobustnessRequest& request) {
   if (const Status status = robustness.plan(); !status) {
     return status.error();
   }
-  const auto lock = pipeline::open_out_folder(
-      request.out_dir, {"robustness.csv", "robustness.json", "robustness.txt", "report.html"},
-      robustness.inputs());
+  const auto lock = pipeline::open_out_folder(request.out_dir, robustness.inputs());
   if (!lock) {
     return lock.error();
   }

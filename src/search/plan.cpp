@@ -7,8 +7,8 @@
 
 #include "models/manifest.hpp"
 #include "options/option_fields.hpp"
-#include "pipeline/input_hashes.hpp"
 #include "robustness/disturbance.hpp"
+#include "search/input_hashes.hpp"
 #include "search/race.hpp"
 #include "stem/hand_made.hpp"
 
@@ -77,7 +77,7 @@ Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan&
                             request.model, info.layer.empty() ? "" : " layer " + info.layer,
                             filters.begin, filters.end));
   }
-  const auto hash = pipeline::hash_model(config, request.models_dir);
+  const auto hash = hash_model(config, request.models_dir);
   if (!hash) {
     return hash.error();
   }
@@ -206,7 +206,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   if (!status) {
     return status.error();
   }
-  const auto program = pipeline::hash_program();
+  const auto program = hash_program();
   if (!program) {
     return program.error();
   }

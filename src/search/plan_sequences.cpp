@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "evaluation/metrics.hpp"
-#include "pipeline/input_hashes.hpp"
 #include "robustness/disturbance.hpp"
+#include "search/input_hashes.hpp"
 #include "search/race.hpp"
 
 namespace stemvo::search {
@@ -53,7 +53,7 @@ struct OpenedSequence {
   fs::path directory;
   KittiSequence sequence;
   bool is_held_out = false;
-  pipeline::SequenceHashes hashes;
+  SequenceHashes hashes;
 };
 
 /// `is_run`: else the contents of its frames do not matter here.
@@ -82,10 +82,9 @@ Expected<OpenedSequence> open_sequence(const SearchRequest& request,
         metrics.segment_lengths_m.empty() ? 0.0 : metrics.segment_lengths_m.front(),
         metrics.path_length_m, sequence->size()));
   }
-  using pipeline::FrameIdentity;
-  return pipeline::hash_sequence(*sequence, directory,
-                                 is_run ? FrameIdentity::kContents : FrameIdentity::kNamesAndSizes)
-      .map([&](const pipeline::SequenceHashes& hashes) {
+  return hash_sequence(*sequence, directory,
+                       is_run ? FrameIdentity::kContents : FrameIdentity::kNamesAndSizes)
+      .map([&](const SequenceHashes& hashes) {
         return OpenedSequence{directory, *sequence, is_held_out, hashes};
       });
 }

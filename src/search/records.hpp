@@ -121,7 +121,7 @@ struct SequenceIdentity {
   std::string disturbance = {};  ///< "_dusk_0.03", the end of the name; empty: as the frames are
   std::size_t first_frame = 0;
   std::size_t num_frames = 0;
-  std::string frames;  ///< hashes, as pipeline::SequenceHashes; empty: not run here
+  std::string frames;  ///< hashes, as SequenceHashes; empty: not run here
   std::string calibration;
   std::string ground_truth;
   std::string directory;  ///< where it was found; not compared

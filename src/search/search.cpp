@@ -110,21 +110,12 @@ std::vector<LayerIdentity> join_layers(const SearchIdentity& parts, const Scores
   return joined;
 }
 
-/// What a search writes; `inputs` are not among it.
-Expected<pipeline::FolderLock> open_folder(const fs::path& out_dir,
-                                           const std::vector<fs::path>& inputs) {
-  return pipeline::open_out_folder(out_dir,
-                                   {kRecordsFile, "filters.csv", "filters.json", "config.yaml",
-                                    "best.yaml", "report.html", "sheet.png"},
-                                   inputs);
-}
-
 std::vector<fs::path> inputs_of(const SearchRequest& request, const SearchPlan& plan) {
   Config config = request.config;
   config.stem.model = request.model;
   std::vector<fs::path> inputs;
   for (const PlanSequence& one : plan.sequences) {
-    const auto files = pipeline::input_files(one.sequence, config, request.models_dir);
+    const auto files = pipeline::input_files(one.sequence, config);
     inputs.insert(inputs.end(), files.begin(), files.end());
   }
   return inputs;
@@ -173,7 +164,7 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!plan) {
     return plan.error();
   }
-  const auto lock = open_folder(request.out_dir, inputs_of(request, *plan));
+  const auto lock = pipeline::open_out_folder(request.out_dir, inputs_of(request, *plan));
   if (!lock) {
     return lock.error();
   }
@@ -232,7 +223,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
-  const auto lock = open_folder(out_dir, inputs);
+  const auto lock = pipeline::open_out_folder(out_dir, inputs);
   if (!lock) {
     return lock.error();
   }

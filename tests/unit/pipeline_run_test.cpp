@@ -221,22 +221,36 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   EXPECT_EQ(summary->report.refined.has_value(), true);
 }
 
-TEST_F(PipelineRun, WhereNoRunHasBeenNothingIsRemoved) {
+TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
   request_.config.scale.source = ScaleSource::kConstantSpeed;
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "map.ply") << "somebody's";
-  ASSERT_TRUE(run_sequence(request_));
+  EXPECT_THAT(error_of(request_), HasSubstr("expected a new folder, an empty one or results of"));
   EXPECT_EQ(read_file(request_.out_dir / "map.ply"), "somebody's");
-  ASSERT_TRUE(run_sequence(request_));  // now one has been
+  fs::remove(request_.out_dir / "map.ply");
+  request_.image_every = 1;
+  ASSERT_TRUE(run_sequence(request_));
+  EXPECT_TRUE(fs::exists(request_.out_dir / "pictures/000001.png"));
+  std::ofstream(request_.out_dir / "map.ply") << "of an earlier run";
+  std::ofstream(request_.out_dir / "notes.txt") << "somebody's";
+  request_.image_every = 0;
+  ASSERT_TRUE(run_sequence(request_));
   EXPECT_FALSE(fs::exists(request_.out_dir / "map.ply"));
+  EXPECT_FALSE(fs::exists(request_.out_dir / "pictures"));
+  EXPECT_TRUE(fs::exists(request_.out_dir / "notes.txt"));
+}
+
+TEST_F(PipelineRun, AFolderWithAnInputIsRefused) {
+  ASSERT_TRUE(run_sequence(request_));
+  RunRequest again = request_;
+  again.ground_truth = request_.out_dir / "trajectory_kitti.txt";
+  EXPECT_THAT(error_of(again), HasSubstr("expected a folder that holds no input, found "));
+  EXPECT_TRUE(fs::exists(*again.ground_truth));
 }
 
 TEST_F(PipelineRun, TwoFramesMakeNeitherAMapNorARefinedTrajectory) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kConstantSpeed;
-  fs::create_directories(request_.out_dir);
-  std::ofstream(request_.out_dir / "frames.csv") << frames_csv_header();
-  std::ofstream(request_.out_dir / "trajectory_refined_kitti.txt") << "of an earlier run";
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_FALSE(fs::exists(request_.out_dir / "trajectory_refined_kitti.txt"));
@@ -306,10 +320,12 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
 }
 
 TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
-  fs::create_directories(request_.out_dir / "trajectory_tum.txt");
-  fs::create_directories(request_.out_dir / "report.html");
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
-  const auto summary = run_sequence(request_);
+  const auto summary = run_sequence(request_, [&](std::size_t, std::size_t) {
+    fs::create_directories(request_.out_dir / "trajectory_tum.txt.unfinished");
+    fs::create_directories(request_.out_dir / "report.html");
+    return true;
+  });
   ASSERT_TRUE(summary) << summary.error().message;
   ASSERT_FALSE(summary->written);
   EXPECT_THAT(summary->written.error().message, HasSubstr("trajectory_tum.txt"));

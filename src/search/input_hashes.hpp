@@ -9,7 +9,7 @@
 #include "stemvo/error.hpp"
 
 /// Hashes of what a result depends on, so that kept results can be told from outdated ones.
-namespace stemvo::pipeline {
+namespace stemvo::search {
 
 /// What tells whether the frames are those of before.
 enum class FrameIdentity {
@@ -34,4 +34,4 @@ struct SequenceHashes {
 /// Of the version; of a build without a clean commit the file as well.
 [[nodiscard]] Expected<std::string> hash_program();
 
-}  // namespace stemvo::pipeline
+}  // namespace stemvo::search

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "pipeline/input_hashes.hpp"
+#include "search/input_hashes.hpp"
 
 #include <system_error>
 #include <vector>
@@ -13,7 +13,7 @@
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 
-namespace stemvo::pipeline {
+namespace stemvo::search {
 namespace {
 
 namespace fs = std::filesystem;
@@ -88,4 +88,4 @@ Expected<std::string> hash_program() {
   });
 }
 
-}  // namespace stemvo::pipeline
+}  // namespace stemvo::search
