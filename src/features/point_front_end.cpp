@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
@@ -98,9 +97,6 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   matches.num_keypoints = static_cast<int>(from.points.size());
   const std::vector<std::optional<cv::Point2f>> found =
       timed(Stage::kTracking, [&] { return track_points(from, to); });
-  if (StageRecorder::active() != nullptr) {
-    count_lost(from, found);
-  }
   to.points.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (!found[i].has_value()) {
@@ -115,38 +111,9 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   return matches;
 }
 
-/// A point that was not found is out of view where the nearest one that was would have taken it
-/// out.
-void PointFrontEnd::count_lost(const View& from,
-                               const std::vector<std::optional<cv::Point2f>>& found) {
-  const cv::Rect2f inside({}, cv::Size2f(from.image->channel.pixels.size()));
-  std::size_t num_out_of_view = 0;
-  std::size_t num_not_found = 0;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    if (found[i].has_value()) {
-      continue;
-    }
-    const cv::Point2f uv = from.points[i].uv;
-    cv::Point2f motion;
-    float nearest = std::numeric_limits<float>::infinity();
-    for (std::size_t j = 0; j < found.size(); ++j) {
-      const cv::Point2f to = from.points[j].uv - uv;
-      if (found[j].has_value() && to.dot(to) < nearest) {
-        nearest = to.dot(to);
-        motion = *found[j] - from.points[j].uv;
-      }
-    }
-    ++(inside.contains(uv + motion) ? num_not_found : num_out_of_view);
-  }
-  count_tracks(TrackFate::kLookedFor, found.size());
-  count_tracks(TrackFate::kOutOfView, num_out_of_view);
-  count_tracks(TrackFate::kNotFound, num_not_found);
-}
-
 /// Appends those that are found.
 void PointFrontEnd::find_expected(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
-  std::size_t num_found = 0;
   const std::vector<Point> tracked = view.points;
   for (const TrackPoint& expected : std::exchange(expected_, {})) {
     if (std::ranges::binary_search(tracked, expected.track_id, {}, &Point::id) ||
@@ -160,10 +127,8 @@ void PointFrontEnd::find_expected(View& view) {
     }
     if (const auto found = find_again(*view.image, {start, expected.track_id})) {
       view.points.push_back({*found, expected.track_id});
-      ++num_found;
     }
   }
-  count_tracks(TrackFate::kFoundAgain, num_found);
 }
 
 /// Corners are looked for at half the size where that is at hand: the patch that is tracked is
@@ -195,7 +160,6 @@ void PointFrontEnd::replenish(View& view) {
     quota.take(point.uv);
     kept.push_back(point);
   }
-  count_tracks(TrackFate::kMerged, view.points.size() - kept.size());
   std::ranges::sort(kept, {}, &Point::id);
   view.points = std::move(kept);
 

@@ -63,7 +63,6 @@ class PointFrontEnd : public FrontEnd {
                                 const TrackPoints& expected) = 0;
 
   [[nodiscard]] Matches track(const View& from, View& to);
-  static void count_lost(const View& from, const std::vector<std::optional<cv::Point2f>>& found);
   void track_from_last_good(View& now, Matches& matches);
   [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
   void replenish(View& view);

@@ -217,20 +217,13 @@ void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& m
         epipolar_inliers(camera_from_world * last_.world_from_camera,
                          {matches.prev_uv, matches.cur_uv}, camera_, localization_.inlier_bound_px);
   }
-  std::size_t num_off_epipolar = 0;
-  std::size_t num_off_projection = 0;
   for (std::size_t i = 0; i < mask.size(); ++i) {
     const auto landmark = window_.landmarks.find(matches.track_ids[i]);
     if (landmark != window_.landmarks.end()) {
       mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera_,
                         localization_.inlier_bound_px);
-      num_off_projection += mask[i] == 0 ? 1 : 0;
-    } else {
-      num_off_epipolar += mask[i] == 0 ? 1 : 0;
     }
   }
-  count_tracks(TrackFate::kOffEpipolar, num_off_epipolar);
-  count_tracks(TrackFate::kOffProjection, num_off_projection);
 }
 
 void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "internal_check.hpp"
-#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -110,9 +109,6 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
     keep_motions(keyframe, window.keyframes.size() > 1 ? window.keyframes[1] : coming);
   }
   for (const int track_id : lost_tracks(window, leaving, coming)) {
-    if (window.landmarks.contains(track_id)) {
-      count_landmark(tracks_[track_id].num_keyframes);
-    }
     keep(window, keyframe, track_id);
   }
 }

@@ -52,10 +52,6 @@ void to_json(Json& json, const TimingReport& report) {
   json["cpu_s"] = report.cpu_s;
   json["start_cpu_s"] = report.start_cpu_s;
   json["other_cpu_s"] = report.rest_cpu_s;
-  for (const TrackCount& track : report.tracks) {
-    json["tracks"][track.name] = track.count;
-  }
-  json["landmark_life_keyframes"] = report.landmark_life_keyframes;
   json["stages"] = Json::object();
   for (const StageTiming& stage : report.stages) {
     json["stages"][stage.name] = {{"calls", stage.calls},

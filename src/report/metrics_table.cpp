@@ -97,25 +97,6 @@ std::string error_table(const MetricsReport& report) {
   return table.str();
 }
 
-/// The first count is of all tracks.
-std::string format_tracks(const TimingReport& report) {
-  if (report.tracks.empty()) {
-    return "";
-  }
-  TextTable table("lrr");
-  table.add({"tracks, frame to frame", "a frame", "share %"});
-  table.rule();
-  for (const TrackCount& track : report.tracks) {
-    const auto count = static_cast<double>(track.count);
-    table.add(
-        {track.name, fmt::format("{:.1f}", count / static_cast<double>(report.num_frames)),
-         fmt::format("{:.1f}", 100.0 * count / static_cast<double>(report.tracks.front().count))});
-  }
-  return '\n' + table.str() +
-         fmt::format("\nlandmarks: half are seen from {} keyframes or more\n",
-                     report.landmark_life_keyframes);
-}
-
 }  // namespace
 
 std::string format_metrics_table(const MetricsReport& report) {
@@ -160,7 +141,7 @@ std::string format_timing_table(const TimingReport& report) {
   whole.add(
       {"speed, loop over frames", fmt::format("{:.1f} frames/s", num_frames / report.loop_s)});
   whole.add({"peak memory", fmt::format("{:.0f} MiB", report.peak_memory_mib)});
-  return table.str() + '\n' + whole.str() + format_tracks(report);
+  return table.str() + '\n' + whole.str();
 }
 
 }  // namespace stemvo

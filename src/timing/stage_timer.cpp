@@ -21,10 +21,6 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "two-view refinement", "localization", "window refinement", "camera",     "road scale",
     "frame files",         "result files"};
 
-constexpr std::array<std::string_view, kNumFates> kFates = {
-    "looked for",         "out of view", "not found", "merged", "off the epipolar line",
-    "off the projection", "found again"};
-
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double read_ms(clockid_t clock) {
@@ -95,28 +91,6 @@ void StageRecorder::add_frame(std::chrono::steady_clock::time_point started) {
   last_frame_ = now;
 }
 
-void StageRecorder::add_tracks(TrackFate fate, std::size_t count) {
-  const std::lock_guard lock(mutex_);
-  tracks_[static_cast<std::size_t>(fate)] += count;
-}
-
-void count_tracks(TrackFate fate, std::size_t count) {
-  if (StageRecorder* recorder = StageRecorder::active(); recorder != nullptr && count > 0) {
-    recorder->add_tracks(fate, count);
-  }
-}
-
-void StageRecorder::add_landmark(int num_keyframes) {
-  const std::lock_guard lock(mutex_);
-  landmarks_.push_back(num_keyframes);
-}
-
-void count_landmark(int num_keyframes) {
-  if (StageRecorder* recorder = StageRecorder::active()) {
-    recorder->add_landmark(num_keyframes);
-  }
-}
-
 double StageRecorder::cpu_ms(Stage stage) const {
   const std::lock_guard lock(mutex_);
   return stages_[static_cast<std::size_t>(stage)].cpu_ms;
@@ -145,14 +119,6 @@ TimingReport StageRecorder::report() const {
   report.interval = summarize_ms(intervals_ms_);
   report.latency = summarize_ms(latencies_ms_);
   report.peak_memory_mib = peak_memory_mib();
-  for (std::size_t i = 0; tracks_.front() > 0 && i < tracks_.size(); ++i) {
-    report.tracks.push_back({std::string(kFates[i]), tracks_[i]});
-  }
-  if (std::vector<int> lives = landmarks_; !lives.empty()) {
-    const auto middle = lives.begin() + std::ssize(lives) / 2;
-    std::ranges::nth_element(lives, middle);
-    report.landmark_life_keyframes = *middle;
-  }
   return report;
 }
 

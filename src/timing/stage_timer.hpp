@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -35,18 +34,6 @@ enum class Stage {
 };
 inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;
 
-/// What becomes of a track from one frame to the next.
-enum class TrackFate {
-  kLookedFor,      ///< all of them; again, where the last good image is tried
-  kOutOfView,      ///< its nearest neighbour's motion takes it out of the image
-  kNotFound,       ///< the image is not like the patch
-  kMerged,         ///< ran into an older one
-  kOffEpipolar,    ///< a point that is no landmark yet, off its epipolar line
-  kOffProjection,  ///< off the projection of its landmark
-  kFoundAgain,     ///< looked for where the map has it: goes on, counted in the frame it ended in
-};
-inline constexpr int kNumFates = static_cast<int>(TrackFate::kFoundAgain) + 1;
-
 /// Collects what StageTimers measure, in any thread, while it lives. One at a time (checked).
 class StageRecorder {
  public:
@@ -62,8 +49,6 @@ class StageRecorder {
   void add(Stage stage, double wall_ms, double cpu_ms);
   /// A frame's result is there; `started`: when it was asked for.
   void add_frame(std::chrono::steady_clock::time_point started);
-  void add_tracks(TrackFate fate, std::size_t count);
-  void add_landmark(int num_keyframes);
   /// Processor time of all calls of a stage so far.
   [[nodiscard]] double cpu_ms(Stage stage) const;
   /// Of everything so far.
@@ -84,15 +69,7 @@ class StageRecorder {
   std::vector<Samples> stages_;
   std::vector<double> intervals_ms_;
   std::vector<double> latencies_ms_;
-  std::array<std::size_t, kNumFates> tracks_{};
-  std::vector<int> landmarks_;
 };
-
-/// Counts tracks; without a StageRecorder it does nothing.
-void count_tracks(TrackFate fate, std::size_t count);
-
-/// A landmark that so many keyframes saw has left the window; the same.
-void count_landmark(int num_keyframes);
 
 /// Measures a stage from here to the end of the block; without a StageRecorder it does nothing. It
 /// sees the calling thread only, not what OpenCV hands to other threads.

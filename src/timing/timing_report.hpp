@@ -25,12 +25,6 @@ struct StageTiming {
   double share_percent = 0.0;  ///< of the program's processor time
 };
 
-/// How many tracks met a fate, all frames together.
-struct TrackCount {
-  std::string name;
-  std::size_t count = 0;
-};
-
 /// Where a run's time went. A stage's processor time is that of the thread that called it: what
 /// OpenCV gave to other threads is in `rest_cpu_s` (with one thread it gives nothing away).
 struct TimingReport {
@@ -44,10 +38,6 @@ struct TimingReport {
   TimeSummary latency;   ///< wall time from asking for a frame to its result
   double fps = 0.0;      ///< frames over wall time, process start to trajectory written
   int num_threads = 0;
-  std::vector<TrackCount> tracks;  ///< looked for, and why some were lost; empty: none were
-  /// Median, over landmarks that no keyframe of the window sees any more, of the keyframes that
-  /// did; 0: there are none.
-  int landmark_life_keyframes = 0;
   double peak_memory_mib = 0.0;  ///< most the program has held at once; NaN: not told
 };
 

@@ -9,7 +9,6 @@
 
 #include "features/front_end.hpp"
 #include "features/grid_quota.hpp"
-#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
@@ -186,32 +185,6 @@ TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
   const Matches after = show(textured_image(size, {2.0, 0.0}));
   EXPECT_GT(after.track_ids.size(), before.track_ids.size() / 2);
   EXPECT_LT(median_error_px(after, {-1.0, 0.0}), 0.05);
-}
-
-TEST(PatchFrontEnd, WhatLeavesTheImageIsCountedAsOutOfView) {
-  const auto front_end = create_front_end({});
-  const cv::Size size(480, 200);
-  const StageRecorder recorder;
-  const auto show = [&](const cv::Mat& image) { return front_end->process(image_of(image)); };
-  const auto counted = [&] {
-    const std::vector<TrackCount> tracks = recorder.report().tracks;
-    return tracks.empty()
-               ? std::vector<std::size_t>{0, 0, 0}
-               : std::vector<std::size_t>{tracks[0].count, tracks[1].count, tracks[2].count};
-  };
-  EXPECT_EQ(show(textured_image(size, {0.0, 0.0})).cur_uv.size(), 0U);
-  EXPECT_GT(show(textured_image(size, {1.0, 0.0})).cur_uv.size(), 200U);
-  const auto slow = counted();
-  EXPECT_GT(slow[0], 200U);
-  EXPECT_LT(slow[1], slow[0] / 50);
-  EXPECT_GT(show(textured_image(size, {25.0, 0.0})).cur_uv.size(),
-            200U);  // by a twentieth of the image
-  const auto fast = counted();
-  const std::size_t looked_for = fast[0] - slow[0];
-  EXPECT_GT(fast[1] - slow[1], looked_for / 60);
-  EXPECT_LT(fast[1] - slow[1], looked_for / 12);
-  EXPECT_EQ(show(cv::Mat(size, CV_8U, cv::Scalar(90))).cur_uv.size(), 0U);  // a wall
-  EXPECT_GT(counted()[2] - fast[2], looked_for / 2);
 }
 
 /// Texture of several sizes, seen from `shift_px` further to the right.

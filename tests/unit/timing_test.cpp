@@ -116,27 +116,6 @@ TEST(Timing, FramesHaveIntervalsAndLatencies) {
   EXPECT_LE(report.interval.median_ms, report.interval.p95_ms);
 }
 
-TEST(Timing, TracksAreCountedByWhatBecameOfThem) {
-  count_tracks(TrackFate::kLookedFor, 5);  // nobody listens
-  const StageRecorder recorder;
-  EXPECT_TRUE(recorder.report().tracks.empty());
-  EXPECT_EQ(recorder.report().landmark_life_keyframes, 0);
-  for (const int life : {9, 2, 3}) {
-    count_landmark(life);
-  }
-  EXPECT_EQ(recorder.report().landmark_life_keyframes, 3);
-  count_tracks(TrackFate::kLookedFor, 200);
-  count_tracks(TrackFate::kLookedFor, 180);
-  count_tracks(TrackFate::kNotFound, 30);
-  const std::vector<TrackCount> tracks = recorder.report().tracks;
-  ASSERT_EQ(tracks.size(), static_cast<std::size_t>(kNumFates));
-  EXPECT_EQ(tracks[0].name, "looked for");
-  EXPECT_EQ(tracks[0].count, 380U);
-  EXPECT_EQ(tracks[1].count, 0U);
-  EXPECT_EQ(tracks[2].name, "not found");
-  EXPECT_EQ(tracks[2].count, 30U);
-}
-
 TEST(Timing, OneRecorderAtATime) {
   const StageRecorder first;
   EXPECT_ANY_THROW(StageRecorder());
@@ -165,8 +144,6 @@ TimingReport example() {
   report.latency = {20.0, 30.0};
   report.fps = 180.0;
   report.num_threads = 2;
-  report.tracks = {{"looked for", 160000}, {"not found", 40000}};
-  report.landmark_life_keyframes = 5;
   report.peak_memory_mib = 222.4;
   return report;
 }
@@ -179,9 +156,6 @@ TEST(Timing, TableHasARowPerStageAndTheWhole) {
   EXPECT_THAT(table, ContainsRegex("whole program +180\\.0 frames/s +400 frames, 2 threads"));
   EXPECT_THAT(table, ContainsRegex("loop over frames +200\\.0 frames/s"));
   EXPECT_THAT(table, ContainsRegex("peak memory +222 MiB"));
-  EXPECT_THAT(table, ContainsRegex("looked for +400\\.0 +100\\.0\n"));
-  EXPECT_THAT(table, ContainsRegex("not found +100\\.0 +25\\.0\n"));
-  EXPECT_THAT(table, HasSubstr("half are seen from 5 keyframes or more\n"));
   EXPECT_THAT(table, Not(HasSubstr(" \n"))) << "blanks at the end of a line";
 }
 
@@ -205,8 +179,6 @@ TEST(Timing, JsonHasTheSameNumbers) {
   EXPECT_EQ(json["start_cpu_s"], 0.2);
   EXPECT_EQ(json["other_cpu_s"], 0.3);
   EXPECT_EQ(json["cpu_s"], 4.0);
-  EXPECT_EQ(json["tracks"]["not found"], 40000);
-  EXPECT_EQ(json["landmark_life_keyframes"], 5);
 }
 
 }  // namespace
