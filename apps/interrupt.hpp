@@ -3,9 +3,8 @@
 
 namespace stemvo::apps {
 
-/// From here on the first SIGINT, SIGTERM or SIGHUP asks the program to stop and write what it has;
-/// the second ends it at once. A division in a model that the processor refuses ends it with one
-/// line.
+/// From here on the first SIGINT or SIGTERM asks the program to stop and write what it has; the
+/// second ends it at once.
 void catch_interrupts();
 
 /// True once an interrupt came.

@@ -69,7 +69,7 @@ TEST_F(Search, InterruptedLeavesAPartOfTheTableAndGoesOn) {
   Words resumed = asked;
   resumed.emplace_back("--resume");
   const fs::path records = folder_ / "stopped/records.jsonl";
-  for (const int signal : {SIGINT, SIGHUP}) {
+  for (const int signal : {SIGINT, SIGTERM}) {
     const std::size_t before = count_lines(records);
     test::RunningProgram program(STEMVO_PROGRAM, command("stopped", resumed));
     for (int i = 0; i < 15000 && count_lines(records) < std::max<std::size_t>(before + 1, 3); ++i) {
