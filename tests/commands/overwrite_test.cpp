@@ -53,8 +53,8 @@ TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
 
 TEST_F(Overwrite, ARunIsRepeatedWithItsOwnConfiguration) {
   ASSERT_EQ(run_stemvo({"run", sequence_, "--quiet", "--out", out_}).exit_code, 0);
-  const ProgramResult again = run_stemvo(
-      {"run", sequence_, "--quiet", "--out", out_, "--config", out_ + "/config.yaml"});
+  const ProgramResult again =
+      run_stemvo({"run", sequence_, "--quiet", "--out", out_, "--config", out_ + "/config.yaml"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
 }
 

@@ -47,8 +47,8 @@ TEST_F(Benchmark, InterruptedAndResumedGivesTheSameBytes) {
   EXPECT_THAT(
       read_file(folder_ / "whole/report.html"),
       AllOf(HasSubstr("stemvo benchmark "), HasSubstr("# paper"), HasSubstr("max_features: ")));
-  for (const auto& [signal, in] :
-       {std::pair(SIGINT, "00/default_ground_truth"), std::pair(SIGTERM, "00/paper_ground_truth")}) {
+  for (const auto& [signal, in] : {std::pair(SIGINT, "00/default_ground_truth"),
+                                   std::pair(SIGTERM, "00/paper_ground_truth")}) {
     test::RunningProgram program(STEMVO_PROGRAM, command("resumed"));
     const std::string begun = folder_ / ("resumed/runs/" + std::string(in) + "/frames.csv");
     for (int i = 0; i < 6000 && !fs::exists(begun); ++i) {
