@@ -8,7 +8,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "models/manifest.hpp"
-#include "pipeline/frame_scheduler.hpp"
+#include "odometry/frame_loops.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
@@ -59,7 +59,7 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
             }
             return goes_on;
           }};
-  run_stages(stages, sequence.size(), cv::getNumThreads());
+  run_frame_loops(stages, sequence.size(), cv::getNumThreads());
 }
 
 }  // namespace stemvo::pipeline

@@ -27,11 +27,9 @@ using FrameVisitor =
                                                        const std::filesystem::path& models_dir,
                                                        const cv::Mat& mask = {});
 
-/// Takes the frames of a sequence through an odometry. Reading, the stem and the rest work on
-/// different frames at the same time, on as many threads as ThreadScope allows (without one: a
-/// thread per core), OpenCV's loops included, a few frames ahead at most; the poses do not depend
-/// on it. What a stage or the visitor throws leaves this function; frames behind the last one
-/// visited are dropped then.
+/// Takes the frames of a sequence through an odometry, in three loops beside each other where
+/// ThreadScope allows more than one thread; the poses do not depend on it. What a stage or the
+/// visitor throws leaves this function; frames behind the last one visited are dropped then.
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

@@ -240,9 +240,10 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
   EXPECT_THAT(error_of("stem=1"), StartsWith("--set stem: unknown key; known keys of stem: "));
   EXPECT_THAT(error_of("stem.filter"), HasSubstr("expected key=value"));
   EXPECT_EQ(error_of("stem.filter=a"), "--set stem.filter: expected a whole number, found 'a'");
-  EXPECT_EQ(error_of("scale.source=gps"),
-            "--set scale.source: expected one of none, constant_speed, camera_height, ground_truth, "
-            "found 'gps'");
+  EXPECT_EQ(
+      error_of("scale.source=gps"),
+      "--set scale.source: expected one of none, constant_speed, camera_height, ground_truth, "
+      "found 'gps'");
   EXPECT_EQ(error_of("stem.model="), "--set stem.model: expected a text, found nothing");
   EXPECT_EQ(
       error_of("evaluation.segment_lengths_m=[10,-20]"),
