@@ -74,14 +74,14 @@ std::string describe_frames(const FrameSource& sequence, std::size_t num_frames)
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name()));
 }
 
-/// Those of the frames with a road, or a pose, that was measured: of all of them.
+/// The share of frames for which the predicate holds.
 template <typename Predicate>
 double share_of(const std::vector<FrameResult>& frames, const Predicate& is_one) {
   return static_cast<double>(std::ranges::count_if(frames, is_one)) /
          static_cast<double>(frames.size());
 }
 
-/// Of the frames behind the first: those that measured no translation.
+/// The share of frames behind the first that measured no translation.
 double share_in_place(const std::vector<FrameResult>& frames) {
   const auto count = std::ranges::count_if(frames, [](const FrameResult& frame) {
     return frame.state == FrameState::kStationary || frame.state == FrameState::kRotating ||

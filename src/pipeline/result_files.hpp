@@ -27,14 +27,14 @@ inline constexpr std::array kResultNames = {"config.yaml",
                                             "trajectory_refined_tum.txt",
                                             "map.ply"};
 
-/// What works together while a sequence is run.
+/// A run refers to its request, its frames and its odometry.
 struct Run {
   const RunRequest& request;
   const FrameSource& sequence;
   PhasedOdometry& odometry;
 };
 
-/// What the loop over the frames leaves behind.
+/// The loop over the frames leaves this behind.
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
@@ -51,7 +51,7 @@ struct Drive {
 /// The first thing that went wrong while writing; the rest is written all the same.
 void keep_first(Status& first, Status next);
 
-/// What config.yaml holds: the effective configuration under comments that say which program,
+/// The text of config.yaml: the effective configuration under comments that say which program,
 /// frames and model made the results. `num_frames`: of a stream, those read; 0: not yet known.
 [[nodiscard]] std::string config_text(const Run& run, std::size_t num_frames);
 

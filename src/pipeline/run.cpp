@@ -45,7 +45,7 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// What an earlier run left in the folder is removed. Whenever this one is killed, all under final
+/// Removes an earlier run's results. Whenever this one is killed, all under final
 /// names is of one run: config.yaml comes before frames and results.
 Status prepare_out_folder(const Run& run) {
   const std::filesystem::path& out = run.request.out_dir;
@@ -86,7 +86,7 @@ std::string describe_size(const FrameSource& sequence) {
   return fmt::format("{} of {}x{} pixels{}", count, full.width, full.height, worked_on);
 }
 
-/// What the input was taken for, and what is lost.
+/// Says what the input was taken for, and what is lost.
 void note_start(const Run& run, bool is_replacing) {
   const auto& [request, sequence, odometry] = run;
   if (!request.note) {

@@ -26,14 +26,14 @@ struct RunRequest : FrameSourceRequest {
   bool write_map = false;      ///< map.ply; needs odometry.mode map
   bool measure_times = false;  ///< RunSummary::report.timing
   std::string command;         ///< that repeats the run, for report.html; may be empty
-  /// Told before work starts, and of a stream's ground truth after it: what the input was taken
+  /// Called before work starts, and of a stream's ground truth after it: what the input was taken
   /// for, a line each.
   std::function<void(const std::string&)> note;
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };
 
-/// What became of a run. Every file is written, also after an interrupt.
+/// A run's outcome. Every file is written, also after an interrupt.
 struct RunSummary {
   MetricsReport report;               ///< what metrics.json holds
   std::filesystem::path out_dir;      ///< where all of it is
@@ -47,16 +47,12 @@ struct RunSummary {
 using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Opens the sequence, runs the odometry over it and writes every result file into out_dir
-/// (trajectory_kitti.txt, trajectory_tum.txt, with odometry.mode map both of trajectory_refined_*,
-/// frames.csv, config.yaml, metrics.json, report.html, trajectory.png, map.ply, pictures/%06d.png;
-/// an earlier run's are removed when this one starts, config.yaml is
-/// written then). A wrong
+/// (kResultNames, pictures/%06d.png); an earlier run's are removed when this one starts. A wrong
 /// request (configuration, sequence, ground truth that scale.source needs, model, out_dir that
 /// cannot be written) is an error before work starts. A frame that cannot be read is a warning and
 /// gets a pose. When a result cannot be written the others still are; `written` says so. One run
 /// with measure_times at a time in a process. OpenCV is told, for the whole process, how many
-/// threads it may use, and by whom its loops are run: call nothing of it in another thread while a
-/// run begins or ends.
+/// threads it may use.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

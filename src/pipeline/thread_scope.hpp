@@ -22,7 +22,7 @@ class ThreadScope {
  private:
   int num_threads_;
   int opencv_before_ = cv::getNumThreads();
-  /// Of OpenCV's threads where it is built with TBB.
+  /// Limits OpenCV's threads where it is built with TBB.
   tbb::global_control limit_{tbb::global_control::max_allowed_parallelism,
                              static_cast<std::size_t>(num_threads_)};
 };

@@ -11,7 +11,7 @@
 /// Hashes of what a result depends on, so that kept results can be told from outdated ones.
 namespace stemvo::search {
 
-/// What tells whether the frames are those of before.
+/// How frames are compared with those of before.
 enum class FrameIdentity {
   kNamesAndSizes,  ///< at once; a frame replaced by another one of the same size is not noticed
   kContents,       ///< reads every frame: some 0.3 s per GB that is in memory
@@ -28,10 +28,10 @@ struct SequenceHashes {
 [[nodiscard]] Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
                                                      const std::filesystem::path& sequence_dir,
                                                      FrameIdentity frames);
-/// Of the model's file and entry. Error: a model that is not there.
+/// Hashes the model's file and entry. Error: a model that is not there.
 [[nodiscard]] Expected<std::string> hash_model(const Config& config,
                                                const std::filesystem::path& models_dir);
-/// Of the version; of a build without a clean commit the file as well.
+/// Hashes the version; for a build without a clean commit the file as well.
 [[nodiscard]] Expected<std::string> hash_program();
 
 }  // namespace stemvo::search

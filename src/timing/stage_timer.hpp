@@ -12,7 +12,7 @@
 
 namespace stemvo {
 
-/// What a frame goes through, in this order. Each is done at most once per frame.
+/// A frame goes through these, in this order. Each is done at most once per frame.
 enum class Stage {
   kRead,         ///< file and PNG decoder
   kStem,         ///< the filter
@@ -51,7 +51,7 @@ class StageRecorder {
   void add_frame(std::chrono::steady_clock::time_point started);
   /// Processor time of all calls of a stage so far.
   [[nodiscard]] double cpu_ms(Stage stage) const;
-  /// Of everything so far.
+  /// The report covers everything so far.
   [[nodiscard]] TimingReport report() const;
 
  private:
@@ -87,7 +87,7 @@ class StageTimer {
   double cpu_ms_ = 0.0;
 };
 
-/// What `work` returns, measured.
+/// Measures `work` and returns what it returns.
 template <typename Work>
 decltype(auto) timed(Stage stage, Work&& work) {
   const StageTimer timer(stage);
