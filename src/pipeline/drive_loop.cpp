@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <chrono>
 #include <fstream>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -64,7 +65,8 @@ std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
 class DriveLoop {
  public:
   DriveLoop(const Run& run, const RunProgress& progress) : run_(run), progress_(progress) {
-    rows_.add(frames_csv_header());
+    drive_.csv = frames_csv_header();
+    rows_.add(drive_.csv);
     write_rows();
   }
 
@@ -96,7 +98,9 @@ class DriveLoop {
     drive_.frames.push_back(pose);
     const StageTimer timer(Stage::kFrameFiles);
     const double time_s = run_.sequence.time_s(i);
-    rows_.add(frames_csv_row(number, time_s, pose));
+    const std::string row = frames_csv_row(number, time_s, pose);
+    drive_.csv += row;
+    rows_.add(row);
     kitti_.add(kitti_row(pose.world_from_camera));
     tum_.add(tum_row(time_s, pose.world_from_camera));
     if (Clock::now() - last_written_ > std::chrono::seconds(1)) {

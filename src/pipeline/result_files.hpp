@@ -37,6 +37,7 @@ struct Run {
 /// The loop over the frames leaves this behind.
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
+  std::string csv;                           ///< frames.csv of them
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
   bool interrupted = false;
