@@ -39,19 +39,19 @@ void essential(State& state) {
 
 void two_view_refinement(State& state) {
   const Chain& c = chain();
-  const TwoViewEstimator estimator(c.config, c.camera);
+  const TwoViewEstimator estimator(c.config);
   run_stage(state, Stage::kTwoViewRefinement, [&] {
-    benchmark::DoNotOptimize(
-        estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, /*is_initializing=*/false));
+    benchmark::DoNotOptimize(estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, c.camera,
+                                               /*is_initializing=*/false));
   });
 }
 
 void two_view(State& state, bool is_initializing) {
   const Chain& c = chain();
-  const TwoViewEstimator estimator(c.config, c.camera);
+  const TwoViewEstimator estimator(c.config);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
-        estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, is_initializing));
+        estimator.measure({c.matches.prev_uv, c.matches.cur_uv}, c.camera, is_initializing));
   }
 }
 

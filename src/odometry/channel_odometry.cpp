@@ -23,7 +23,7 @@ StemOptions stretch_options(const Options& options, const Camera& camera) {
 }  // namespace
 
 ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask)
-    : camera_(camera),
+    : given_camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
       stretch_(stretch_options(options, camera)),
       front_end_(create_front_end(options.features)) {
@@ -50,7 +50,7 @@ PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& fr
   prepared.image = front_end_->prepare(image);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    prepared.road = std::make_shared<RoadImage>(make_road_image(image, camera_));
+    prepared.road = std::make_shared<RoadImage>(make_road_image(image, given_camera_));
   }
   return prepared;
 }
@@ -91,7 +91,6 @@ FrameResult ChannelOdometry::optimize() {
   STEMVO_CHECK(localized_.has_value(), "a frame was localized");
   FrameInWork work = *std::exchange(localized_, std::nullopt);
   Stopwatch watch;
-  work.localized.result.camera = camera_;
   estimator_->optimize(work.tracked, work.localized);
   if (work.tracked.has_image) {
     work.times.pose_ms += watch.lap_ms();

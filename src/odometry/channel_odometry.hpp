@@ -46,6 +46,7 @@ class ChannelOdometry {
   /// the last motion goes on.
   FrameResult process(PreparedFrame frame);
 
+  [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
   /// Of all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
 
@@ -66,7 +67,7 @@ class ChannelOdometry {
     LocalizedFrame localized;
   };
 
-  Camera camera_;
+  Camera given_camera_;  ///< the estimator owns the one in use
   bool asks_road_;
   ChannelStretch stretch_;
   std::unique_ptr<FrontEnd> front_end_;

@@ -89,8 +89,8 @@ void refine(std::vector<Hypothesis>& hypotheses,
 
 }  // namespace
 
-Initializer::Initializer(const Options& config, const Camera& camera)
-    : camera_(camera), loss_px_(config.two_view.refine_loss_px), two_view_(config, camera) {}
+Initializer::Initializer(const Options& config)
+    : loss_px_(config.two_view.refine_loss_px), two_view_(config) {}
 
 void Initializer::start(View reference) {
   reference_ = std::move(reference);
@@ -102,16 +102,18 @@ bool Initializer::is_worn_out(const TrackPoints& now) const {
   return living < kMinLiving * static_cast<double>(reference_.points.size());
 }
 
-MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& now) {
+MeasuredMotion Initializer::measure(const Matches& matches,
+                                    const TrackPoints& now,
+                                    const Camera& camera) {
   const std::vector<char> all(matches.cur_uv.size(), 1);
   if (matches.prev_frame == reference_.frame) {
     add_begun_points(matches, all, reference_.points);
   }
   const PointPairs pairs = common_points(reference_.points, now);
   const PixelPairs pixels(pairs.prev_uv, pairs.cur_uv);
-  MeasuredMotion motion = two_view_.measure(pixels, /*is_initializing=*/true);
+  MeasuredMotion motion = two_view_.measure(pixels, camera, /*is_initializing=*/true);
   if (motion.state == FrameState::kTracking) {
-    choose_motion(pixels, motion);
+    choose_motion(pixels, camera, motion);
   }
   std::vector<char> mask = all;
   for (std::size_t i = 0; i < mask.size(); ++i) {
@@ -125,17 +127,19 @@ MeasuredMotion Initializer::measure(const Matches& matches, const TrackPoints& n
   return motion;
 }
 
-void Initializer::choose_motion(const PixelPairs& pairs, MeasuredMotion& motion) const {
+void Initializer::choose_motion(const PixelPairs& pairs,
+                                const Camera& camera,
+                                MeasuredMotion& motion) const {
   motion.is_decisive = false;
-  std::vector<Hypothesis> hypotheses = plausible_hypotheses(motion, pairs, camera_);
-  refine(hypotheses, pairs, camera_, loss_px_);
+  std::vector<Hypothesis> hypotheses = plausible_hypotheses(motion, pairs, camera);
+  refine(hypotheses, pairs, camera, loss_px_);
   if (hypotheses.empty()) {
     return;
   }
   // Wrong matches cost every hypothesis the same: they are compared on what the best one explains.
   const std::vector<char> explained =
-      test_points(hypotheses.front().cur_from_prev, pairs, camera_).good_mask;
-  refine(hypotheses, {select(pairs.prev_uv, explained), select(pairs.cur_uv, explained)}, camera_,
+      test_points(hypotheses.front().cur_from_prev, pairs, camera).good_mask;
+  refine(hypotheses, {select(pairs.prev_uv, explained), select(pairs.cur_uv, explained)}, camera,
          loss_px_);
   const Hypothesis& best = hypotheses.front();
   const auto rival = std::find_if(
@@ -144,31 +148,32 @@ void Initializer::choose_motion(const PixelPairs& pairs, MeasuredMotion& motion)
   // Of few tracks a quarter must do.
   const int num_pairs = static_cast<int>(pairs.size());
   const TwoViewMotion chosen{best.model, best.cur_from_prev,
-                             test_points(best.cur_from_prev, pairs, camera_,
+                             test_points(best.cur_from_prev, pairs, camera,
                                          {.parallax_rank = std::clamp(num_pairs / 4, 1, 51)})};
   motion.model = best.model;
   motion.cur_from_prev = best.cur_from_prev;
   motion.inlier_mask = chosen.test.good_mask;
-  two_view_.refine(pairs, motion);
+  two_view_.refine(pairs, camera, motion);
   motion.is_decisive = is_decisive(chosen, num_pairs, kAcceptance) &&
                        (rival == hypotheses.end() || rival->cost > kMinMargin * best.cost);
 }
 
 std::optional<Window> Initializer::open_window(const View& now,
+                                               const Camera& camera,
                                                const WindowOptions& window_options,
                                                const LocalizationOptions& localization) const {
   Window window;
   add_keyframe(window, {reference_.frame, reference_.world_from_camera, reference_.points, {}},
                window_options);
   add_keyframe(window, {now.frame, now.world_from_camera, now.points, {}}, window_options);
-  triangulate_landmarks(window, camera_, window_options);
+  triangulate_landmarks(window, camera, window_options);
   if (static_cast<int>(window.landmarks.size()) < kMinLandmarks) {
     return std::nullopt;
   }
   Rigid3 predicted = reference_.world_from_camera;
   for (const View& view : waiting_) {
     const auto found =
-        localize(find_seen_landmarks(window, view.points), predicted, camera_, localization);
+        localize(find_seen_landmarks(window, view.points), predicted, camera, localization);
     if (found.has_value()) {
       predicted = found->world_from_camera;
     }

@@ -28,7 +28,7 @@ struct View {
 /// one, once there is parallax to decide (paper section 3.5-3.6).
 class Initializer {
  public:
-  Initializer(const Options& config, const Camera& camera);
+  explicit Initializer(const Options& config);
 
   /// The frame that the next ones are compared with. Its points may lack those that begin there.
   void start(View reference);
@@ -38,11 +38,14 @@ class Initializer {
 
   /// The motion from the reference to a frame. `inlier_mask` is one per match of the frame; a match
   /// that the reference does not see is kept.
-  [[nodiscard]] MeasuredMotion measure(const Matches& matches, const TrackPoints& now);
+  [[nodiscard]] MeasuredMotion measure(const Matches& matches,
+                                       const TrackPoints& now,
+                                       const Camera& camera);
 
   /// The window of the reference, `now` and the landmarks between them, the frames between them
   /// localized. `now.world_from_camera` says where it is. nullopt: too few landmarks.
   [[nodiscard]] std::optional<Window> open_window(const View& now,
+                                                  const Camera& camera,
                                                   const WindowOptions& window_options,
                                                   const LocalizationOptions& localization) const;
   /// A frame that did not decide: localized once the window is open.
@@ -51,9 +54,8 @@ class Initializer {
  private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.
-  void choose_motion(const PixelPairs& pairs, MeasuredMotion& motion) const;
+  void choose_motion(const PixelPairs& pairs, const Camera& camera, MeasuredMotion& motion) const;
 
-  Camera camera_;
   double loss_px_;
   TwoViewEstimator two_view_;
   View reference_;

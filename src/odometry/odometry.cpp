@@ -46,7 +46,6 @@ Status check_mask(const cv::Mat& mask, const Camera& camera) {
 }  // namespace
 
 struct Odometry::Impl {
-  Camera camera;
   PhasedOdometry odometry;
 };
 
@@ -63,7 +62,7 @@ Expected<Odometry> Odometry::create(const Camera& camera,
   if (!odometry) {
     return odometry.error();
   }
-  return Odometry(std::make_unique<Impl>(Impl{camera, *std::move(odometry)}));
+  return Odometry(std::make_unique<Impl>(Impl{*std::move(odometry)}));
 }
 
 Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -72,7 +71,8 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) {
-  if (Status status = check_image(image, order, impl_->camera); !status) {
+  const Camera& camera = impl_->odometry.frames().given_camera();
+  if (Status status = check_image(image, order, camera); !status) {
     return status.error();
   }
   if (order != PixelOrder::kBgr) {

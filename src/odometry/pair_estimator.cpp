@@ -111,7 +111,8 @@ void MotionChain::extrapolate(bool has_image) {
 }
 
 PairEstimator::PairEstimator(const Options& config, const Camera& camera)
-    : two_view_(config, camera),
+    : camera_(camera),
+      two_view_(config),
       chain_(config.odometry, config.scale),
       scale_(config, kSpeedSigma),
       last_step_(assumed_step(config.scale)) {}
@@ -129,7 +130,8 @@ LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
       chain_.go_back(trajectory_[static_cast<std::size_t>(matches.prev_frame)],
                      frame.number - matches.prev_frame);
     }
-    motion_ = two_view_.measure({matches.prev_uv, matches.cur_uv}, chain_.is_initializing());
+    motion_ =
+        two_view_.measure({matches.prev_uv, matches.cur_uv}, camera_, chain_.is_initializing());
   }
   localized.inlier_mask = motion_.inlier_mask;
   localized.result.num_matches = static_cast<int>(matches.cur_uv.size());
@@ -151,6 +153,7 @@ void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localize
   }
   last_image_ = frame.has_image ? frame.number : last_image_;
   scale_.report(result);
+  result.camera = camera_;
   result.world_from_camera = chain_.world_from_camera();
   trajectory_.push_back(result.world_from_camera);
 }

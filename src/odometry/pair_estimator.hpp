@@ -65,6 +65,7 @@ class PairEstimator final : public Estimator {
  private:
   [[nodiscard]] double measure_length(const TrackedFrame& frame);
 
+  Camera camera_;
   TwoViewEstimator two_view_;
   MotionChain chain_;
   MetricScale scale_;

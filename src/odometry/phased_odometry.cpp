@@ -28,13 +28,11 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
 
 PhasedOdometry::PhasedOdometry(
     const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
-    : camera_(camera),
-      stem_(std::move(stem)),
-      zoom_(zoom),
-      channel_odometry_(options, camera, mask) {}
+    : stem_(std::move(stem)), zoom_(zoom), channel_odometry_(options, camera, mask) {}
 
 PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
-  STEMVO_CHECK(image.cols == camera_.width_px && image.rows == camera_.height_px,
+  const Camera& camera = channel_odometry_.given_camera();
+  STEMVO_CHECK(image.cols == camera.width_px && image.rows == camera.height_px,
                "the image has the camera's size");
   Stopwatch watch;
   const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image, zoom_); });

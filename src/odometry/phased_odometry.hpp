@@ -47,7 +47,6 @@ class PhasedOdometry {
   PhasedOdometry(
       const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom);
 
-  Camera camera_;
   Stem stem_;
   int zoom_;  ///< Stem::frame_zoom
   ChannelOdometry channel_odometry_;

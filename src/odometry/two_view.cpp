@@ -42,7 +42,7 @@ Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_
     return status.error();
   }
   MeasuredMotion motion =
-      TwoViewEstimator(options, camera).measure({prev_uv, cur_uv}, /*is_initializing=*/true);
+      TwoViewEstimator(options).measure({prev_uv, cur_uv}, camera, /*is_initializing=*/true);
   return TwoViewResult{motion.state,
                        motion.cur_from_prev,
                        motion.model,

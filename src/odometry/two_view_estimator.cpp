@@ -40,13 +40,15 @@ void add_scores(const MeasuredMotion& motion, FrameResult& result) {
   result.model = motion.model;
 }
 
-MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs, bool is_initializing) const {
+MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs,
+                                         const Camera& camera,
+                                         bool is_initializing) const {
   MeasuredMotion result;
   result.inlier_mask.assign(pairs.size(), 0);
   if (static_cast<int>(pairs.size()) < odometry_.min_inliers) {
     return result;
   }
-  score_models(pairs, is_initializing, result);
+  score_models(pairs, camera, is_initializing, result);
   if (median_flow_px(pairs) < odometry_.stationary_flow_px) {
     result.state = FrameState::kStationary;
     result.inlier_mask.assign(pairs.size(), 1);
@@ -58,11 +60,11 @@ MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs, bool is_initia
   if (is_initializing && result.homography.has_value() &&
       result.homography_ratio > options_.homography_ratio) {
     motion = best_motion(TwoViewModel::kHomography,
-                         decompose_homography(*result.homography, camera_), pairs, camera_, test);
+                         decompose_homography(*result.homography, camera), pairs, camera, test);
   }
   if (!motion.has_value() && result.essential.has_value()) {
     motion = best_motion(TwoViewModel::kEssential, decompose_essential(*result.essential), pairs,
-                         camera_, test);
+                         camera, test);
   }
   if (!motion.has_value()) {
     return result;
@@ -72,11 +74,12 @@ MeasuredMotion TwoViewEstimator::measure(const PixelPairs& pairs, bool is_initia
   result.runner_up_ratio = motion->runner_up_ratio;
   result.is_decisive = is_decisive(*motion, static_cast<int>(pairs.size()), kPairAcceptance);
   result.inlier_mask = std::move(motion->test.good_mask);
-  refine(pairs, result);
+  refine(pairs, camera, result);
   return result;
 }
 
 void TwoViewEstimator::score_models(const PixelPairs& pairs,
+                                    const Camera& camera,
                                     bool is_initializing,
                                     MeasuredMotion& result) const {
   TwoViewOptions homography_options = options_;
@@ -84,14 +87,14 @@ void TwoViewEstimator::score_models(const PixelPairs& pairs,
   if (is_initializing) {
     fundamental = estimate_fundamental(pairs, options_, seed_);
     if (fundamental.has_value()) {
-      result.essential = essential_from_fundamental(*fundamental, camera_);
+      result.essential = essential_from_fundamental(*fundamental, camera);
     }
   } else {
     homography_options.max_iterations = std::min(options_.max_iterations, kRecordIterations);
     homography_options.estimator = kRecordEstimator;
-    result.essential = estimate_essential(pairs, camera_, options_, seed_);
+    result.essential = estimate_essential(pairs, camera, options_, seed_);
     if (result.essential.has_value()) {
-      fundamental = fundamental_from_essential(*result.essential, camera_);
+      fundamental = fundamental_from_essential(*result.essential, camera);
     }
   }
   result.homography = estimate_homography(pairs, homography_options, seed_);
@@ -104,16 +107,18 @@ void TwoViewEstimator::score_models(const PixelPairs& pairs,
   result.homography_ratio = homography_ratio(result.homography_score, result.fundamental_score);
 }
 
-void TwoViewEstimator::refine(const PixelPairs& pairs, MeasuredMotion& result) const {
+void TwoViewEstimator::refine(const PixelPairs& pairs,
+                              const Camera& camera,
+                              MeasuredMotion& result) const {
   const StageTimer timer(Stage::kTwoViewRefinement);
   const RefinementOptions refinement{.loss_scale_px = options_.refine_loss_px};
   auto prev = select(pairs.prev_uv, result.inlier_mask);
   auto cur = select(pairs.cur_uv, result.inlier_mask);
   for (int round = 0; options_.refine && round < 2; ++round) {
     result.cur_from_prev =
-        refine_relative_pose(result.cur_from_prev, {prev, cur}, camera_, refinement).cur_from_prev;
+        refine_relative_pose(result.cur_from_prev, {prev, cur}, camera, refinement).cur_from_prev;
     result.inlier_mask =
-        epipolar_inliers(result.cur_from_prev, pairs, camera_, 2.0 * options_.inlier_threshold_px);
+        epipolar_inliers(result.cur_from_prev, pairs, camera, 2.0 * options_.inlier_threshold_px);
     prev = select(pairs.prev_uv, result.inlier_mask);
     cur = select(pairs.cur_uv, result.inlier_mask);
   }
@@ -126,10 +131,10 @@ void TwoViewEstimator::refine(const PixelPairs& pairs, MeasuredMotion& result) c
   }
   const PixelPairs inliers(prev, cur);
   const Eigen::Quaterniond rotation =
-      refine_rotation(result.cur_from_prev.rotation, inliers, camera_, refinement);
-  result.parallax_px = median_parallax_px(rotation, inliers, camera_);
+      refine_rotation(result.cur_from_prev.rotation, inliers, camera, refinement);
+  result.parallax_px = median_parallax_px(rotation, inliers, camera);
   // What the rotation leaves may be nothing but the tracks' noise, which grows with their length.
-  const double noise_px = median_epipolar_px(result.cur_from_prev, inliers, camera_);
+  const double noise_px = median_epipolar_px(result.cur_from_prev, inliers, camera);
   const bool is_noise = result.parallax_px < std::min(kNoiseParallax * noise_px,  //
                                                       odometry_.min_parallax_px);
   if (result.parallax_px < odometry_.stationary_flow_px || is_noise) {

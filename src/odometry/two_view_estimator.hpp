@@ -37,23 +37,24 @@ struct MeasuredMotion {
 /// matrix afterwards, the point test, then refinement of R and t on the inliers.
 class TwoViewEstimator {
  public:
-  TwoViewEstimator(const Options& config, const Camera& camera)
-      : options_(config.two_view),
-        odometry_(config.odometry),
-        camera_(camera),
-        seed_(config.seed) {}
+  explicit TwoViewEstimator(const Options& config)
+      : options_(config.two_view), odometry_(config.odometry), seed_(config.seed) {}
 
   /// `is_initializing`: let R_H choose the model.
-  [[nodiscard]] MeasuredMotion measure(const PixelPairs& pairs, bool is_initializing) const;
+  [[nodiscard]] MeasuredMotion measure(const PixelPairs& pairs,
+                                       const Camera& camera,
+                                       bool is_initializing) const;
   /// Refines a motion on its inliers, and finds inliers, parallax and state anew.
-  void refine(const PixelPairs& pairs, MeasuredMotion& result) const;
+  void refine(const PixelPairs& pairs, const Camera& camera, MeasuredMotion& result) const;
 
  private:
-  void score_models(const PixelPairs& pairs, bool is_initializing, MeasuredMotion& result) const;
+  void score_models(const PixelPairs& pairs,
+                    const Camera& camera,
+                    bool is_initializing,
+                    MeasuredMotion& result) const;
 
   TwoViewOptions options_;
   OdometryOptions odometry_;
-  Camera camera_;
   std::uint64_t seed_;
 };
 

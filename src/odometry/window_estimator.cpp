@@ -30,11 +30,10 @@ constexpr double kTurnFlow = 3.0;
 }  // namespace
 
 WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
-    : camera_(camera),
-      options_(config.odometry),
+    : options_(config.odometry),
       refine_every_(config.ba.every_n_keyframes),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
-      initializer_(config, camera),
+      initializer_(config),
       scale_(config),
       calibration_(camera, config.camera.refine),
       step_(assumed_step(config.scale)) {
@@ -56,7 +55,7 @@ LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   if (frame.has_image && !is_initializing_) {
     localized.lost_landmarks =
-        find_lost_landmarks(window_, world_from_camera_, anchor_.points, camera_);
+        find_lost_landmarks(window_, world_from_camera_, anchor_.points, camera());
   }
   return localized;
 }
@@ -85,7 +84,7 @@ FrameState WindowEstimator::find_pose(const TrackedFrame& frame, LocalizedFrame&
   }
   const std::optional<Localization> found =
       stemvo::localize(find_seen_landmarks(window_, now), world_from_camera_ * prev_from_cur_,
-                       camera_, localization_);
+                       camera(), localization_);
   return found.has_value() ? accept_localization(frame, *found, localized)
                            : measure_since_reference(frame, now, localized);
 }
@@ -102,7 +101,7 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
   std::optional<Rigid3> turned;
   if (is_last_localized_) {
     turned = turned_pose(world_from_camera_, before.translation, find_seen_landmarks(window_, now),
-                         camera_, bound_px, localization_.inlier_bound_px);
+                         camera(), bound_px, localization_.inlier_bound_px);
   }
   world_from_camera_ = turned.value_or(world_from_camera_);
   anchor_ = {frame.number, world_from_camera_, std::move(now)};
@@ -110,7 +109,7 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
     return FrameState::kTracking;
   }
   const double turn_px =
-      camera_.mean_focal_px() * before.rotation.angularDistance(turned->rotation);
+      camera().mean_focal_px() * before.rotation.angularDistance(turned->rotation);
   return turn_px < bound_px ? FrameState::kLowParallax : FrameState::kRotating;
 }
 
@@ -125,7 +124,7 @@ FrameState WindowEstimator::measure_since_reference(const TrackedFrame& frame,
   if (had_map || starts_elsewhere || initializer_.is_worn_out(now)) {
     start_reference_before(frame.matches);
   }
-  MeasuredMotion motion = initializer_.measure(frame.matches, now);
+  MeasuredMotion motion = initializer_.measure(frame.matches, now, camera());
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
   if (had_map && motion.num_inliers < kMinExplained * num_matches) {
     motion.state = FrameState::kLost;
@@ -186,7 +185,8 @@ void WindowEstimator::start_reference_before(const Matches& matches) {
 
 bool WindowEstimator::open_window(View view) {
   const View& reference = initializer_.reference();
-  std::optional<Window> window = initializer_.open_window(view, window_options_, localization_);
+  std::optional<Window> window =
+      initializer_.open_window(view, camera(), window_options_, localization_);
   if (!window.has_value()) {
     return false;
   }
@@ -213,14 +213,14 @@ double WindowEstimator::min_flow_px() const {
 void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
   if (is_last_localized_ && matches.prev_frame == last_.frame) {
-    mask =
-        epipolar_inliers(camera_from_world * last_.world_from_camera,
-                         {matches.prev_uv, matches.cur_uv}, camera_, localization_.inlier_bound_px);
+    mask = epipolar_inliers(camera_from_world * last_.world_from_camera,
+                            {matches.prev_uv, matches.cur_uv}, camera(),
+                            localization_.inlier_bound_px);
   }
   for (std::size_t i = 0; i < mask.size(); ++i) {
     const auto landmark = window_.landmarks.find(matches.track_ids[i]);
     if (landmark != window_.landmarks.end()) {
-      mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera_,
+      mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera(),
                         localization_.inlier_bound_px);
     }
   }
@@ -240,7 +240,7 @@ void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& locali
   measure_scale(frame, result.state);
   remember(frame, result.state);
   scale_.report(result);
-  result.camera = camera_;
+  result.camera = camera();
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
 }
@@ -256,7 +256,7 @@ bool WindowEstimator::is_keyframe(const View& view) const {
     return true;
   }
   const Rigid3 cur_from_newest = view.world_from_camera.inverse() * newest.world_from_camera;
-  return median_parallax_px(cur_from_newest.rotation, {pairs.prev_uv, pairs.cur_uv}, camera_) >
+  return median_parallax_px(cur_from_newest.rotation, {pairs.prev_uv, pairs.cur_uv}, camera()) >
          keyframe_parallax_px_;
 }
 
@@ -267,19 +267,18 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
     history_.leave(window_, leaving_keyframe(window_, keyframe), keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
-  triangulate_landmarks(window_, camera_, window_options_);
+  triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
     refinement_.num_fixed_keyframes =
         window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
-    refine_window(window_, camera_, refinement_);
+    refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     anchor_.world_from_camera = world_from_camera_;
   }
-  cull_landmarks(window_, camera_, window_options_);
+  cull_landmarks(window_, camera(), window_options_);
   // The newest keyframe but one: it has its new corners.
   calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
-  camera_ = calibration_.camera();
   history_.observe(window_, frame.image);
 }
 
@@ -294,7 +293,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
     }
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
-    const RoadImage road = frame.road ? seen_by(*frame.road, camera_) : RoadImage{};
+    const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
     const bool is_first = !scale_.has_scale();
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);

@@ -55,6 +55,8 @@ class WindowEstimator final : public Estimator {
   void start_reference(View reference);
   void start_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
+  /// The one in use, which everything but the camera's own refinement is given.
+  [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
   /// What counts as motion in the image.
   [[nodiscard]] double min_flow_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
@@ -67,7 +69,6 @@ class WindowEstimator final : public Estimator {
   void remember(const TrackedFrame& frame, FrameState state);
   [[nodiscard]] WindowHistory closed_history() const;
 
-  Camera camera_;
   OdometryOptions options_;
   WindowOptions window_options_;
   BundleAdjustmentOptions refinement_;

@@ -24,18 +24,18 @@ View view_of(const Matches& matches, const Rigid3& pose, int frame) {
 }
 
 Decided initialize(const DriveTracks& drive, const Options& config = {}) {
-  Initializer initializer(config, drive.camera);
+  Initializer initializer(config);
   initializer.start({0, Rigid3(), {}});
   Decided result;
   for (int i = 1; i < drive.num_frames(); ++i) {
     const Matches matches = drive.matches(i);
     View now = view_of(matches, Rigid3(), i);
-    result.motion = initializer.measure(matches, now.points);
+    result.motion = initializer.measure(matches, now.points, drive.camera);
     result.states.push_back(result.motion.state);
     if (result.motion.state == FrameState::kTracking && result.motion.is_decisive) {
       result.frame = i;
       now.world_from_camera = result.motion.cur_from_prev.inverse();
-      result.window = initializer.open_window(now, {}, {});
+      result.window = initializer.open_window(now, drive.camera, {}, {});
       return result;
     }
     initializer.wait(std::move(now));
@@ -134,22 +134,22 @@ TEST(Initializer, WaitsWhileNothingMoves) {
 TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   const DriveTracks walk = sideways_walk(0.0, 9);
   Matches matches = walk.matches(1);
-  Initializer initializer({}, walk.camera);
+  Initializer initializer(Options{});
   initializer.start({0, Rigid3(), {}});
   testing::SceneRandom random(9);
   for (Eigen::Vector2d& uv : matches.cur_uv) {
     uv = random.pixel(walk.camera);
   }
   const TrackPoints now = view_of(matches, Rigid3(), 1).points;
-  const MeasuredMotion motion = initializer.measure(matches, now);
+  const MeasuredMotion motion = initializer.measure(matches, now, walk.camera);
   EXPECT_FALSE(motion.state == FrameState::kTracking && motion.is_decisive);
   initializer.start({0, Rigid3(), {}});
-  EXPECT_EQ(initializer.measure({}, {}).state, FrameState::kLost);
+  EXPECT_EQ(initializer.measure({}, {}, walk.camera).state, FrameState::kLost);
 }
 
 TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
   const DriveTracks walk = sideways_walk(0.0, 10);
-  Initializer initializer({}, walk.camera);
+  Initializer initializer(Options{});
   TrackPoints points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
   initializer.start({0, Rigid3(), points});
   EXPECT_FALSE(initializer.is_worn_out(points));
@@ -161,15 +161,17 @@ TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
 
 TEST(Initializer, TheMaskIsOfAllMatchesAndKeepsThoseTheReferenceDoesNotSee) {
   const DriveTracks walk = sideways_walk(0.05, 11);
-  Initializer initializer({}, walk.camera);
+  Initializer initializer(Options{});
   initializer.start({0, Rigid3(), {}});
-  static_cast<void>(initializer.measure(walk.matches(1), view_of(walk.matches(1), {}, 1).points));
+  static_cast<void>(
+      initializer.measure(walk.matches(1), view_of(walk.matches(1), {}, 1).points, walk.camera));
   Matches matches = walk.matches(20);
   matches.track_ids[0] += 100000;  // begun since
   const Eigen::Vector2d away(40.0, 60.0);
   matches.cur_uv[1] += away;
   const std::size_t num_matches = matches.cur_uv.size();
-  const MeasuredMotion motion = initializer.measure(matches, view_of(matches, Rigid3(), 20).points);
+  const MeasuredMotion motion =
+      initializer.measure(matches, view_of(matches, Rigid3(), 20).points, walk.camera);
   ASSERT_EQ(motion.inlier_mask.size(), num_matches);
   EXPECT_EQ(motion.state, FrameState::kTracking);
   EXPECT_EQ(motion.inlier_mask[0], 1);

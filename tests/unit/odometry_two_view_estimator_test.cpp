@@ -33,8 +33,8 @@ Scene drive_scene(const Rigid3& prev_from_cur,
 }
 
 MeasuredMotion measure(const Scene& scene, bool is_initializing = false) {
-  const TwoViewEstimator estimator({}, scene.camera);
-  return estimator.measure({scene.prev_uv, scene.cur_uv}, is_initializing);
+  const TwoViewEstimator estimator(Options{});
+  return estimator.measure({scene.prev_uv, scene.cur_uv}, scene.camera, is_initializing);
 }
 
 TEST(TwoViewEstimator, ExactForwardDriveTurningRight) {
@@ -149,21 +149,22 @@ TEST(TwoViewEstimator, StationaryRotatingAndLowParallaxAreStates) {
 
 TEST(TwoViewEstimator, TooFewRandomOrNotFiniteMatchesAreLostNotWrong) {
   const Scene scene = drive_scene({{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}, 0.2, 0.0, 8);
-  const TwoViewEstimator estimator({}, scene.camera);
+  const TwoViewEstimator estimator(Options{});
   const auto few = std::span(scene.prev_uv).first(5);
-  EXPECT_EQ(estimator.measure({few, std::span(scene.cur_uv).first(5)}, false).state,
+  EXPECT_EQ(estimator.measure({few, std::span(scene.cur_uv).first(5)}, scene.camera, false).state,
             FrameState::kLost);
-  EXPECT_EQ(estimator.measure({{}, {}}, true).state, FrameState::kLost);
+  EXPECT_EQ(estimator.measure({{}, {}}, scene.camera, true).state, FrameState::kLost);
 
   const MeasuredMotion random = measure(drive_scene({}, 0.0, 1.0, 9));
   EXPECT_TRUE(random.cur_from_prev.translation.allFinite());
 
   const std::vector<Eigen::Vector2d> same(100, Eigen::Vector2d(10.0, 20.0));
   const std::vector<Eigen::Vector2d> moved(100, Eigen::Vector2d(15.0, 20.0));
-  EXPECT_TRUE(estimator.measure({same, moved}, true).cur_from_prev.translation.allFinite());
+  EXPECT_TRUE(
+      estimator.measure({same, moved}, scene.camera, true).cur_from_prev.translation.allFinite());
   const std::vector<Eigen::Vector2d> broken(
       100, Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  EXPECT_EQ(estimator.measure({same, broken}, false).state, FrameState::kLost);
+  EXPECT_EQ(estimator.measure({same, broken}, scene.camera, false).state, FrameState::kLost);
 }
 
 }  // namespace

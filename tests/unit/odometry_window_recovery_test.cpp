@@ -169,5 +169,53 @@ TEST(WindowRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewWithoutAGap) {
   d.expect_true_step(kBadFrame, kBadFrame + 1);
 }
 
+/// Mean over the landmarks and the keyframes that see them.
+double reprojection_error_px(const Window& window, const Camera& camera) {
+  double sum = 0.0;
+  int count = 0;
+  for (const Keyframe& keyframe : window.keyframes) {
+    const Rigid3 camera_from_world = keyframe.world_from_camera.inverse();
+    for (const auto& [track_id, point] : window.landmarks) {
+      if (const TrackPoint* seen = find_point(keyframe.points, track_id)) {
+        sum += (camera.project(camera_from_world * point) - seen->uv).norm();
+        ++count;
+      }
+    }
+  }
+  return sum / count;
+}
+
+TEST(WindowRecovery, ANewMapIsMadeByTheCameraThatWasLearnt) {
+  constexpr int kCut = 110;
+  const std::vector<Rigid3> path =
+      DriveTracks::repeat({so3_exp({0.002, 0.02, 0.0}), {0.0, 0.0, 0.9}}, kCut + 10);
+  const Camera truth = testing::kitti_camera();
+  const DriveTracks drive(path, testing::points_along(path, 3000, 41), 0.05, 41);
+  Camera given = truth;
+  given.cx_px += 4.0;
+  given.cy_px -= 3.0;
+  Options config = testing::config_without_scale();
+  config.camera.refine = CameraRefinement::kPrincipalPoint;
+  WindowEstimator estimator(config, given);
+  EstimatorRun run(estimator, drive);
+  run.add_range(0, kCut);
+  const Camera learnt = run.results.back().camera;
+  ASSERT_NEAR(learnt.cx_px, truth.cx_px, 0.7);
+  ASSERT_NEAR(learnt.cy_px, truth.cy_px, 0.7);
+  EXPECT_EQ(run.add_matches({}, kCut).state, FrameState::kLost);
+  for (int i = kCut + 1; estimator.window().keyframes.front().frame < kCut; ++i) {
+    ASSERT_LT(i, drive.num_frames());
+    run.add_matches(of_other_things(drive, i), i);
+  }
+  EXPECT_LT(reprojection_error_px(estimator.window(), learnt), 0.2);
+  const Keyframe& first = estimator.window().keyframes.front();
+  const Keyframe& last = estimator.window().keyframes.back();
+  const Eigen::Vector3d travelled =
+      (first.world_from_camera.inverse() * last.world_from_camera).translation.normalized();
+  const Eigen::Vector3d travelled_in_truth =
+      (drive.pose(first.frame).inverse() * drive.pose(last.frame)).translation.normalized();
+  EXPECT_LT((travelled - travelled_in_truth).norm(), 3e-3);  // 4 px are 5.5e-3
+}
+
 }  // namespace
 }  // namespace stemvo
