@@ -106,8 +106,8 @@ MeasuredMotion Initializer::measure(const Matches& matches,
                                     const TrackPoints& now,
                                     const Camera& camera) {
   const std::vector<char> all(matches.cur_uv.size(), 1);
-  if (matches.prev_frame == reference_.frame) {
-    add_begun_points(matches, all, reference_.points);
+  if (reference_.points.empty()) {
+    reference_.points = previous_points(matches, all);
   }
   const PointPairs pairs = common_points(reference_.points, now);
   const PixelPairs pixels(pairs.prev_uv, pairs.cur_uv);

@@ -30,7 +30,8 @@ class Initializer {
  public:
   explicit Initializer(const Options& config);
 
-  /// The frame that the next ones are compared with. Its points may lack those that begin there.
+  /// The frame that the next ones are compared with. Without points: the matches of the next frame
+  /// start there and say them.
   void start(View reference);
   [[nodiscard]] const View& reference() const { return reference_; }
   /// Too few of its tracks live: it will not decide any more.

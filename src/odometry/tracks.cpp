@@ -20,6 +20,20 @@ void sort_by_id(TrackPoints& points) {
   }
 }
 
+TrackPoints kept_points(const std::vector<int>& track_ids,
+                        const std::vector<Eigen::Vector2d>& uv,
+                        const std::vector<char>& is_kept) {
+  TrackPoints points;
+  points.reserve(uv.size());
+  for (std::size_t i = 0; i < uv.size(); ++i) {
+    if (is_kept[i] != 0) {
+      points.push_back({track_ids[i], uv[i]});
+    }
+  }
+  sort_by_id(points);
+  return points;
+}
+
 /// What is left of the flow once the rotation is taken out, of each match.
 std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
                                   const PixelPairs& pairs,
@@ -39,27 +53,21 @@ Eigen::Matrix3d fundamental_of(const Rigid3& cur_from_prev, const Camera& camera
 
 }  // namespace
 
+TrackPoints previous_points(const Matches& matches, const std::vector<char>& is_kept) {
+  return kept_points(matches.track_ids, matches.prev_uv, is_kept);
+}
+
 TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept) {
-  TrackPoints points;
-  points.reserve(matches.cur_uv.size());
-  for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
-    if (is_kept[i] != 0) {
-      points.push_back({matches.track_ids[i], matches.cur_uv[i]});
-    }
-  }
-  sort_by_id(points);
-  return points;
+  return kept_points(matches.track_ids, matches.cur_uv, is_kept);
 }
 
 void add_begun_points(const Matches& matches,
                       const std::vector<char>& is_kept,
                       TrackPoints& points) {
-  TrackPoints begun;
-  for (std::size_t i = 0; i < matches.prev_uv.size(); ++i) {
-    if (is_kept[i] != 0 && find_point(points, matches.track_ids[i]) == nullptr) {
-      begun.push_back({matches.track_ids[i], matches.prev_uv[i]});
-    }
-  }
+  TrackPoints begun = previous_points(matches, is_kept);
+  std::erase_if(begun, [&](const TrackPoint& point) {
+    return find_point(points, point.track_id) != nullptr;
+  });
   points.insert(points.end(), begun.begin(), begun.end());
   sort_by_id(points);
 }

@@ -15,7 +15,8 @@
 
 namespace stemvo {
 
-/// Where the matches end, of those kept (one flag per match).
+/// Where the kept matches (one flag per match) start and end.
+[[nodiscard]] TrackPoints previous_points(const Matches& matches, const std::vector<char>& is_kept);
 [[nodiscard]] TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept);
 
 /// Adds where kept matches start that `points`, of the frame they start at, lacks: new corners are

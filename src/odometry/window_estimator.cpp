@@ -74,9 +74,6 @@ FrameState WindowEstimator::find_pose(const TrackedFrame& frame, LocalizedFrame&
   const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
-    if (frame.matches.prev_frame == anchor_.frame) {
-      add_begun_points(frame.matches, localized.inlier_mask, anchor_.points);
-    }
     if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
       world_from_camera_ = anchor_.world_from_camera;
       return FrameState::kStationary;

@@ -24,6 +24,7 @@ TEST(TrackPoints, AreOrderedAndWithoutWhatIsNotKept) {
   EXPECT_EQ(points[1].track_id, 4);
   EXPECT_EQ(points[2].track_id, 7);
   EXPECT_EQ(points[2].uv, Eigen::Vector2d(7.0, 1.0));
+  EXPECT_EQ(previous_points(make_matches(), {1, 1, 0, 1})[2].uv, Eigen::Vector2d(7.0, 0.0));
 }
 
 TEST(TrackPoints, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
