@@ -42,10 +42,10 @@ Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_
 undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
 (scale.source=none).
 
---out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and trajectory_tum.txt (the
-poses), trajectory_refined_*.txt (odometry.mode map: the same with look-ahead), report.html (all
-there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the
-numbers), frames.csv (a row per frame), config.yaml (what was run) and, with --map, map.ply.
+--out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and
+trajectory_tum.txt (the poses), report.html (all there is to look at, for a browser),
+trajectory.png (the path drawn), metrics.json (the numbers), frames.csv (a row per frame),
+config.yaml (what was run) and, with --map, map.ply.
 
 Examples:
   stemvo run kitti/sequences/03 --out result

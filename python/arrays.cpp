@@ -177,15 +177,13 @@ IndexArray array_of(std::span<const std::size_t> indices) {
   return owned(std::move(data), {indices.size()});
 }
 
-std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
-                                            std::span<const Rigid3> trajectory) {
+std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks) {
   const std::size_t n = landmarks.size();
   auto positions = std::make_unique<double[]>(3 * n);
   auto colors = std::make_unique<std::uint8_t[]>(3 * n);
   for (std::size_t i = 0; i < n; ++i) {
     const MapLandmark& landmark = landmarks[i];
-    Eigen::Map<Eigen::Vector3d>(positions.get() + 3 * i) =
-        trajectory[static_cast<std::size_t>(landmark.frame)] * landmark.position.cast<double>();
+    Eigen::Map<Eigen::Vector3d>(positions.get() + 3 * i) = landmark.position;
     std::ranges::copy(landmark.rgb, colors.get() + 3 * i);
   }
   return {owned(std::move(positions), {n, 3}), owned(std::move(colors), {n, 3})};

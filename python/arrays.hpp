@@ -53,9 +53,8 @@ struct ImageView {
 [[nodiscard]] DoubleArray array_of(std::span<const Rigid3> trajectory);  ///< Nx4x4
 [[nodiscard]] DoubleArray array_of(std::span<const double> numbers);
 [[nodiscard]] IndexArray array_of(std::span<const std::size_t> indices);
-/// In the world, Nx3, and their colours, Nx3. `trajectory` is the one they refer to.
-[[nodiscard]] std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks,
-                                                          std::span<const Rigid3> trajectory);
+/// In the world, Nx3, and their colours, Nx3.
+[[nodiscard]] std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks);
 /// Last and present place in the image, Nx4 (u, v, u, v), and whether they fit the motion, N.
 [[nodiscard]] std::pair<DoubleArray, BoolArray> arrays_of(std::span<const TrackedPoint> points);
 

@@ -74,13 +74,8 @@ class SafeOdometry {
     auto frame = call([&](Odometry& o) { return o.process(view.pixels, view.order); });
     return {value_or_raise(std::move(frame)), timestamp};
   }
-  DoubleArray refined_trajectory() {
-    return array_of(call([](Odometry& o) { return o.refined_trajectory(); }));
-  }
   std::pair<DoubleArray, ByteArray> landmarks() {
-    const auto [landmarks, poses] =
-        call([](Odometry& o) { return std::pair(o.landmarks(), o.refined_trajectory()); });
-    return arrays_of(landmarks, poses);
+    return arrays_of(call([](Odometry& o) { return o.landmarks(); }));
   }
   std::pair<DoubleArray, BoolArray> tracked_points() {
     return arrays_of(call([](Odometry& o) { return o.tracked_points(); }));
@@ -228,7 +223,6 @@ void bind_odometry(nb::module_& module) {
       .def("process", &SafeOdometry::process, "image"_a.noconvert().none(),
            "timestamp"_a = nb::none(),
            "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")
-      .def("refined_trajectory", &SafeOdometry::refined_trajectory, "Nx4x4, with look-ahead")
       .def("landmarks", &SafeOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, with look-ahead")
       .def("tracked_points", &SafeOdometry::tracked_points,

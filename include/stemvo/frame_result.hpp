@@ -76,12 +76,10 @@ struct FrameResult {
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty
 };
 
-/// A landmark that a window of keyframes held, in the camera of one of them that saw it, in units
-/// of the trajectory. refined_trajectory()[frame] * position is its place in the world.
+/// A landmark that a window of keyframes held.
 struct MapLandmark {
-  int frame = 0;  ///< counted from the first one given
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();
-  std::array<std::uint8_t, 3> rgb{};  ///< of the frame's pixel; gray where the camera is gray
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world, in the trajectory's units
+  std::array<std::uint8_t, 3> rgb{};  ///< of the last view; gray where the camera is gray
 };
 
 /// A point of the image, tracked from an earlier frame.

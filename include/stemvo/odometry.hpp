@@ -37,11 +37,8 @@ class Odometry {
   /// In place of an image that never came: keeps the clock running.
   FrameResult process_missing();
 
-  /// world_from_camera of every frame so far, as the window of keyframes last knew it: with its
-  /// look-ahead. Mode two_frame refines nothing: the poses as they came.
-  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const;
   /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
-  /// when they left the window, or are now.
+  /// when they left the window, or are now. Mode two_frame has none.
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
   /// Of the last image: the points tracked on it.

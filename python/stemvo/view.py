@@ -123,8 +123,6 @@ def show_live(rr, recording, options):
         if frame % MAP_EVERY == MAP_EVERY - 1 or frame == len(recording) - 1:
             view.landmarks(*odometry.landmarks())
             view.fit(view.path)
-    refined = odometry.refined_trajectory()
-    rr.log("world/estimate/path_refined", rr.LineStrips3D([refined[:, :3, 3]]))
 
 
 def show_result(rr, folder, open_recording):

@@ -9,6 +9,7 @@
 
 #include "features/front_end.hpp"
 #include "geometry/bundle.hpp"
+#include "odometry/landmark_map.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
@@ -45,14 +46,12 @@ class Estimator {
 
   /// One pose per frame so far, world_from_camera, as they came.
   [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;
-  /// The same with look-ahead, where something is refined.
-  [[nodiscard]] virtual std::vector<Rigid3> refined_trajectory() const = 0;
   /// What was learnt of the camera; less the given one. nullopt: nothing is learnt.
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }
-  /// See Odometry::landmarks().
-  [[nodiscard]] virtual std::vector<MapLandmark> landmarks() const = 0;
+  /// Landmarks as Odometry::landmarks() has them; none where there is no window.
+  [[nodiscard]] virtual LandmarkMap map() const { return {}; }
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.

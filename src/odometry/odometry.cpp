@@ -85,12 +85,15 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) 
 
 FrameResult Odometry::process_missing() { return impl_->odometry.process({}); }
 
-std::vector<Rigid3> Odometry::refined_trajectory() const {
-  return impl_->odometry.frames().estimator().refined_trajectory();
-}
-
 std::vector<MapLandmark> Odometry::landmarks() const {
-  return impl_->odometry.frames().estimator().landmarks();
+  const LandmarkMap map = impl_->odometry.frames().estimator().map();
+  std::vector<MapLandmark> landmarks;
+  landmarks.reserve(map.landmarks.size());
+  for (const KeptLandmark& kept : map.landmarks) {
+    const Rigid3& world_from_camera = map.world_from_camera[static_cast<std::size_t>(kept.frame)];
+    landmarks.push_back({world_from_camera * kept.in_camera.cast<double>(), kept.rgb});
+  }
+  return landmarks;
 }
 
 std::vector<TrackedPoint> Odometry::tracked_points() const {

@@ -59,8 +59,6 @@ class PairEstimator final : public Estimator {
   void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
-  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override { return trajectory_; }
-  [[nodiscard]] std::vector<MapLandmark> landmarks() const override { return {}; }
 
  private:
   [[nodiscard]] double measure_length(const TrackedFrame& frame);

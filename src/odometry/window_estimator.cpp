@@ -306,7 +306,7 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
   }
 }
 
-/// The pose is final, but for the refined trajectory.
+/// The pose is final.
 void WindowEstimator::remember(const TrackedFrame& frame, FrameState state) {
   if (frame.has_image) {
     const bool is_localized = !is_initializing_;
@@ -330,16 +330,10 @@ void WindowEstimator::remember(const TrackedFrame& frame, FrameState state) {
   history_.end_frame();
 }
 
-std::vector<Rigid3> WindowEstimator::refined_trajectory() const {
-  return refined_poses(trajectory_, closed_history().motions());
-}
-
-std::vector<MapLandmark> WindowEstimator::landmarks() const { return closed_history().landmarks(); }
-
-WindowHistory WindowEstimator::closed_history() const {
+LandmarkMap WindowEstimator::map() const {
   WindowHistory history = history_;
   history.close(window_);
-  return history;
+  return {history.landmarks(), refined_poses(trajectory_, history.motions())};
 }
 
 }  // namespace stemvo

@@ -30,8 +30,7 @@ class WindowEstimator final : public Estimator {
   void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
-  [[nodiscard]] std::vector<Rigid3> refined_trajectory() const override;
-  [[nodiscard]] std::vector<MapLandmark> landmarks() const override;
+  [[nodiscard]] LandmarkMap map() const override;
 
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();
@@ -67,7 +66,6 @@ class WindowEstimator final : public Estimator {
   void add_keyframe(const TrackedFrame& frame);
   void measure_scale(const TrackedFrame& frame, FrameState state);
   void remember(const TrackedFrame& frame, FrameState state);
-  [[nodiscard]] WindowHistory closed_history() const;
 
   OdometryOptions options_;
   WindowOptions window_options_;

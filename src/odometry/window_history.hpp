@@ -9,8 +9,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "odometry/landmark_map.hpp"
 #include "odometry/window.hpp"
-#include "stemvo/frame_result.hpp"
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo {
@@ -47,7 +47,7 @@ class WindowHistory {
   /// Ordered by `cur`.
   [[nodiscard]] const std::vector<WindowMotion>& motions() const { return motions_; }
   /// Well-constrained landmarks that have left.
-  [[nodiscard]] const std::vector<MapLandmark>& landmarks() const { return landmarks_; }
+  [[nodiscard]] const std::vector<KeptLandmark>& landmarks() const { return landmarks_; }
 
  private:
   /// What is known of a track that the window sees.
@@ -65,7 +65,7 @@ class WindowHistory {
   void keep_followers(const Keyframe& keyframe);
 
   std::vector<WindowMotion> motions_;
-  std::vector<MapLandmark> landmarks_;
+  std::vector<KeptLandmark> landmarks_;
   std::map<int, Track> tracks_;
   double scale_ = 1.0;  ///< of the window, by all that rescaled it
   std::vector<double> scale_of_frame_;

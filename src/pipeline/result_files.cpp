@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "internal_check.hpp"
 #include "options/option_fields.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
@@ -58,12 +57,12 @@ double path_length(std::span<const Rigid3> poses, std::size_t begin, std::size_t
 }
 
 /// Written units per unit of the landmarks, around a frame.
-double stretch_at(std::span<const Rigid3> refined,
+double stretch_at(std::span<const Rigid3> estimated,
                   std::span<const Rigid3> written,
                   std::size_t frame) {
   const std::size_t begin = frame - std::min(frame, kStepsAround);
-  const std::size_t end = std::min(frame + kStepsAround + 1, refined.size());
-  const double before = path_length(refined, begin, end);
+  const std::size_t end = std::min(frame + kStepsAround + 1, estimated.size());
+  const double before = path_length(estimated, begin, end);
   return before > 0.0 ? path_length(written, begin, end) / before : 1.0;
 }
 
@@ -121,9 +120,6 @@ class ResultWriter {
     if (truth && *truth && !(*truth)->frames.empty()) {
       truth_ = **truth;
     }
-    if (request_.config.odometry.mode == OdometryMode::kMap) {
-      refined_ = as_written(run, estimator().refined_trajectory());
-    }
   }
 
   /// All but metrics.json and report.html.
@@ -134,7 +130,7 @@ class ResultWriter {
     keep_first(written, drive_.written);
     keep_first(written, write_text_file(folder / "config.yaml", config_text_));
     if (request_.write_map) {
-      keep_first(written, write_map_ply(folder / "map.ply", map_points(), *refined_));
+      keep_first(written, write_map());
     }
     keep_first(written, write_image(folder / "trajectory.png", draw_trajectory(make_plot(report))));
     keep_first(written, matched_);
@@ -161,12 +157,6 @@ class ResultWriter {
     }
     Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
     keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
-    if (refined_) {
-      keep_first(written,
-                 write_kitti_trajectory(folder / "trajectory_refined_kitti.txt", *refined_));
-      keep_first(written,
-                 write_tum_trajectory(folder / "trajectory_refined_tum.txt", times_s, *refined_));
-    }
     return written;
   }
 
@@ -196,34 +186,24 @@ class ResultWriter {
       // A trajectory without a scale has no error in metres until one is fitted.
       const Alignment alignment =
           config.scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
-      const auto compare = [&](const Trajectory& trajectory) {
-        return evaluate_aligned(take_poses(trajectory, truth_->frames), truth_->poses, alignment,
-                                config.evaluation);
-      };
-      report.metrics = compare(trajectory_);
-      if (refined_) {
-        report.refined = compare(*refined_);
-      }
+      report.metrics = evaluate_aligned(take_poses(trajectory_, truth_->frames), truth_->poses,
+                                        alignment, config.evaluation);
     }
     return report;
   }
 
-  [[nodiscard]] const Estimator& estimator() const { return run_.odometry.frames().estimator(); }
-
-  /// The landmarks in the world of trajectory_refined_kitti.txt: where steps were rescaled, they
-  /// are with them.
-  [[nodiscard]] std::vector<ColoredPoint> map_points() const {
-    const Trajectory refined = estimator().refined_trajectory();
-    STEMVO_CHECK(refined.size() == refined_->size(), "the same poses, before and after rescaling");
+  /// Landmarks and the camera's path among them. Where steps are rescaled, both are.
+  [[nodiscard]] Status write_map() const {
+    const LandmarkMap map = run_.odometry.frames().estimator().map();
+    const Trajectory path = as_written(run_, map.world_from_camera);
     std::vector<ColoredPoint> points;
-    for (const MapLandmark& landmark : estimator().landmarks()) {
+    for (const KeptLandmark& landmark : map.landmarks) {
       const auto frame = static_cast<std::size_t>(landmark.frame);
-      STEMVO_CHECK(frame < refined.size(), "landmarks belong to frames");
       const Eigen::Vector3d in_camera =
-          stretch_at(refined, *refined_, frame) * landmark.position.cast<double>();
-      points.push_back({((*refined_)[frame] * in_camera).cast<float>(), landmark.rgb});
+          stretch_at(map.world_from_camera, path, frame) * landmark.in_camera.cast<double>();
+      points.push_back({(path[frame] * in_camera).cast<float>(), landmark.rgb});
     }
-    return points;
+    return write_map_ply(request_.out_dir / "map.ply", points, path);
   }
 
   /// All frames, in the world of the ground truth where some have one.
@@ -252,7 +232,6 @@ class ResultWriter {
   const Drive& drive_;
   Trajectory trajectory_;
   std::string config_text_;
-  std::optional<Trajectory> refined_;  ///< the same with look-ahead; mode map only
   std::optional<GroundTruth> truth_;
   Status matched_;  ///< the ground truth of a stream
 };

@@ -21,10 +21,8 @@ inline constexpr std::array kResultNames = {"config.yaml",
                                             "metrics.json",
                                             "trajectory_kitti.txt",
                                             "report.html",
-                                            "trajectory_refined_kitti.txt",
                                             "trajectory_tum.txt",
                                             "trajectory.png",
-                                            "trajectory_refined_tum.txt",
                                             "map.ply"};
 
 /// A run refers to its request, its frames and its odometry.
@@ -57,9 +55,8 @@ void keep_first(Status& first, Status next);
 [[nodiscard]] std::string config_text(const Run& run, std::size_t num_frames);
 
 /// Everything that is written at the end; `report` becomes what metrics.json holds:
-/// trajectory_kitti.txt, trajectory_tum.txt, trajectory_refined_kitti.txt (without a refined
-/// trajectory, what an earlier run left there is removed), config.yaml (`stemvo run --config` takes
-/// it as it is), map.ply where it is asked for, trajectory.png, metrics.json, report.html.
+/// trajectory_kitti.txt, trajectory_tum.txt, config.yaml (`stemvo run --config` takes it as it is),
+/// map.ply where it is asked for, trajectory.png, metrics.json, report.html.
 [[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
 
 }  // namespace stemvo::pipeline

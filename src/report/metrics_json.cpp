@@ -8,20 +8,8 @@
 #include "text/text_file.hpp"
 
 namespace stemvo {
-namespace {
 
 using Json = nlohmann::ordered_json;
-
-/// What is kept of a refined trajectory.
-Json refined_json(const Metrics& metrics) {
-  return {{"average_offset_m", metrics.average_offset_m},
-          {"t_rel_percent", metrics.t_rel_percent},
-          {"r_rel_deg_per_100m", metrics.r_rel_deg_per_100m},
-          {"rpe_translation_m", metrics.rpe_translation_m},
-          {"rpe_rotation_deg", metrics.rpe_rotation_deg}};
-}
-
-}  // namespace
 
 // Found by nlohmann's library.
 void to_json(Json& json, const CameraReport& report) {
@@ -98,7 +86,6 @@ Json metrics_document(const MetricsReport& report) {
                {"road_measured_fraction", report.road_measured_fraction},
                {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
   add_metrics(json, report.metrics);
-  json["refined"] = report.refined ? refined_json(*report.refined) : Json();
   if (report.timing) {
     json["timing"] = *report.timing;
   }

@@ -35,7 +35,6 @@ struct MetricsReport {
   CameraReport camera;
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
   std::optional<Metrics> metrics;
-  std::optional<Metrics> refined;      ///< of trajectory_refined_kitti.txt
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
 };
 
@@ -45,9 +44,7 @@ struct MetricsReport {
 /// frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent,
 /// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
 /// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
-/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
-/// refined{average_offset_m,t_rel_percent,r_rel_deg_per_100m,rpe_rotation_deg} (null where no
-/// refined trajectory is written) and, only where it was asked for, timing{threads fps loop_fps
+/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg and, only where it was asked for, timing{threads fps loop_fps
 /// interval{median_ms,p95_ms} latency{median_ms,p95_ms} peak_memory_mib cpu_s start_cpu_s
 /// other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s,share_percent}}}. Numbers round-trip; a
 /// number that is not finite becomes null. Error: the file cannot be written.

@@ -68,10 +68,6 @@ std::string error_table(const MetricsReport& report) {
   table.add({"error", "value", "unit", "alignment", ""});
   table.rule();
   table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
-  if (report.refined) {
-    table.add({"  with look-ahead", number_or_dash(report.refined->t_rel_percent, 2), "%",
-               std::string(to_string(report.refined->alignment)), "trajectory_refined_kitti.txt"});
-  }
   table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
              "the same segments"});
   table.add(

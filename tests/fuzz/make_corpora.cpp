@@ -117,7 +117,6 @@ void metrics(const fs::path& out) {
   Corpus::done(stemvo::write_metrics_json(corpus / "without_truth", report));
   report.metrics = stemvo::Metrics{};
   report.metrics->segment_lengths_m = {100.0, 200.0};
-  report.refined = stemvo::Metrics{};
   report.camera.sigma = {2.0, 0.5, 0.25};
   Corpus::done(stemvo::write_metrics_json(corpus / "with_truth", report));
 }

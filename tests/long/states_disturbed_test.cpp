@@ -102,12 +102,10 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   for (int i = begin; i < end; ++i) {
     EXPECT_NE(result.roads[static_cast<std::size_t>(i)], "measured") << i;
   }
-  for (const Trajectory* poses : result.trajectories()) {
-    test::expect_accurate(*poses, drive, 10, begin, 0.05, 0.3 * kDeg);
-    test::expect_accurate(*poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
-    // Over the dark too, by what was known before and after.
-    test::expect_accurate(*poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
-  }
+  test::expect_accurate(result.poses, drive, 10, begin, 0.05, 0.3 * kDeg);
+  test::expect_accurate(result.poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
+  // Over the dark too, by what was known before and after.
+  test::expect_accurate(result.poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
 }
 
 // Five gray levels of contrast under noise of one: the stretch makes an image of them.
@@ -118,9 +116,7 @@ TEST_F(Disturbed, AFewDimFramesAreFollowed) {
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(30, 60, {"tracking"});
-  for (const Trajectory* poses : result.trajectories()) {
-    test::expect_accurate(*poses, drive, 10, 60, 0.05, 0.3 * kDeg);
-  }
+  test::expect_accurate(result.poses, drive, 10, 60, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, MissingImagesAreBridged) {
@@ -139,9 +135,7 @@ TEST_F(Disturbed, MissingImagesAreBridged) {
   for (int i = begin; i < end; ++i) {
     EXPECT_EQ(result.roads[static_cast<std::size_t>(i)], "held") << i;
   }
-  for (const Trajectory* poses : result.trajectories()) {
-    test::expect_accurate(*poses, drive, 10, 60, 0.05, 0.3 * kDeg);
-  }
+  test::expect_accurate(result.poses, drive, 10, 60, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
@@ -158,10 +152,8 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
   const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
   EXPECT_LE(moved.translation.norm(), 1e-6);
   const int num_frames = static_cast<int>(result.poses.size());
-  for (const Trajectory* poses : result.trajectories()) {
-    test::expect_accurate(*poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
-    test::expect_accurate(*poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
-  }
+  test::expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  test::expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
@@ -174,9 +166,7 @@ TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(begin, 60, {"tracking"});
-  for (const Trajectory* poses : result.trajectories()) {
-    test::expect_accurate(*poses, drive, 10, 60, 0.1, 0.6 * kDeg);
-  }
+  test::expect_accurate(result.poses, drive, 10, 60, 0.1, 0.6 * kDeg);
   EXPECT_NEAR((result.poses[40].translation - result.poses[20].translation).norm(), 20 * kStep_m,
               0.05 * 20 * kStep_m);
 }

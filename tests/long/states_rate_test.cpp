@@ -48,13 +48,9 @@ void expect_event(const StateRun& result, const StateDrive& drive, const std::st
 /// Before the event and after it, as at ten frames a second.
 void expect_accurate_drive(const StateRun& result, const StateDrive& drive, int after) {
   const int num_frames = static_cast<int>(result.poses.size());
-  for (const Trajectory* poses : result.trajectories()) {
-    // With look-ahead the lengths are those of the single frames, whose noise the rate multiplies.
-    const double share = poses == &result.poses ? 0.05 : 0.07;
-    test::expect_accurate(*poses, drive, 10 * kRate, drive.event_begin, share, 0.3 * kDeg,
-                          10 * kRate);
-    test::expect_accurate(*poses, drive, after, num_frames, share, 0.3 * kDeg, 10 * kRate);
-  }
+  test::expect_accurate(result.poses, drive, 10 * kRate, drive.event_begin, 0.05, 0.3 * kDeg,
+                        10 * kRate);
+  test::expect_accurate(result.poses, drive, after, num_frames, 0.05, 0.3 * kDeg, 10 * kRate);
 }
 
 StateRun run_event(const std::string& name, const StateDrive& drive, const std::string& event) {
@@ -124,8 +120,7 @@ TEST(Walk, ACameraInTheHandIsFollowed) {
     path_m += step_m(*truth, i);
   }
   EXPECT_GT(path_m, 3.0);
-  EXPECT_LE(evaluate(result.refined, *truth).ate_rmse.sim3_m, 0.01 * path_m);
-  // As they came: from the first one with a map on.
+  // From the first one with a map on.
   std::size_t begin = 1;
   while (begin < truth->size() && result.states[begin] != "tracking") {
     ++begin;

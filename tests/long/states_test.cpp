@@ -78,10 +78,8 @@ TEST_P(States, StandingInTheMiddle) {
   EXPECT_LE(moved.translation.norm(), 1e-6);
   EXPECT_LE(moved.angle_rad(), 1e-6);
   const int num_frames = static_cast<int>(result.poses.size());
-  for (const Trajectory* poses : result.trajectories()) {
-    expect_accurate(*poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
-    expect_accurate(*poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
-  }
+  expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
 }
 
 TEST_P(States, TurningOnTheSpot) {
@@ -97,10 +95,8 @@ TEST_P(States, TurningOnTheSpot) {
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
   EXPECT_LE(turned.translation.norm(), 1e-6);
   const int num_frames = static_cast<int>(result.poses.size());
-  for (const Trajectory* poses : result.trajectories()) {
-    expect_accurate(*poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
-    expect_accurate(*poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
-  }
+  expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
 }
 
 TEST_P(States, CutToAnotherPlace) {
@@ -119,10 +115,8 @@ TEST_P(States, CutToAnotherPlace) {
     EXPECT_NEAR(step, test::kDriveStep_m, 0.1 * test::kDriveStep_m);
   }
   const int num_frames = static_cast<int>(result.poses.size());
-  for (const Trajectory* poses : result.trajectories()) {
-    expect_accurate(*poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
-    expect_accurate(*poses, drive, drive.event_begin + 3, num_frames, 0.05, 0.3 * kDeg);
-  }
+  expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, drive.event_begin + 3, num_frames, 0.05, 0.3 * kDeg);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes,

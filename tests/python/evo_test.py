@@ -56,7 +56,7 @@ class Evo(unittest.TestCase):
             self.assertAlmostEqual(theirs["rpe_rotation_deg"], numbers["rpe_rotation_deg"], delta=1e-6, msg=f"{name}, {kind}, {align}")
 
     def test_every_file(self):
-        for name in ("kitti", "refined_kitti", "tum", "refined_tum"):
+        for name in ("kitti", "tum"):
             self.check(f"trajectory_{name}.txt", "kitti", self.truth, FRAMES)
 
     @unittest.skipUnless("STEMVO_SHARED_DATA" in os.environ, "STEMVO_SHARED_DATA is not set")
@@ -65,14 +65,13 @@ class Evo(unittest.TestCase):
         output_of(PROGRAM, "run", kitti / "sequences/03", "--frames", f"0:{frames}", "--out", self.folder / "real", "--quiet")
         truth = self.folder / "03.txt"
         truth.write_text("".join((kitti / "poses/03.txt").read_text().splitlines(True)[:frames]))
-        for name in ("kitti", "refined_kitti", "tum", "refined_tum"):
+        for name in ("kitti", "tum"):
             self.check(f"trajectory_{name}.txt", "kitti", truth, frames, result="real")
 
     def test_truth_of_tum(self):
         truth = self.folder / "groundtruth.txt"
         truth.write_text("".join(" ".join(f"{number:.12f}" for number in (time, *place, *turn)) + "\n" for time, place, turn in self.timed))
-        for name in ("tum", "refined_tum"):
-            self.check(f"trajectory_{name}.txt", "tum", truth, FRAMES - 2)
+        self.check("trajectory_tum.txt", "tum", truth, FRAMES - 2)
 
     def test_truth_of_euroc(self):
         truth, camera = self.folder / "data.csv", self.folder / "sensor.yaml"

@@ -34,7 +34,6 @@ def write(name, poses):  # as KITTI's file is written
     (out / name).write_text("\\n".join(lines) + "\\n")
 poses = np.stack([result.world_from_camera for result in results])
 write("trajectory_kitti.txt", poses)
-write("trajectory_refined_kitti.txt", odometry.refined_trajectory())
 truth, frames, scale = recording.ground_truth, recording.ground_truth_frames, odometry.scale_source
 assert (truth is None) == (frames is None) and (truth is None or len(truth) == len(frames))
 errors = truth is not None and stemvo.evaluate(poses[frames], truth, "sim3" if scale == "none" else "none")
@@ -191,8 +190,8 @@ class Package(unittest.TestCase):
         options = [text for key, value in more.items() for one in (value if isinstance(value, list) else [value]) for text in (OPTIONS[key], one)]
         call(PROGRAM, "run", recording, "--out", program, "--quiet", *options)
         done = json.loads(self.run_python(TRACK, python, recording, json.dumps(more, default=str)))
-        for name in ("trajectory_kitti.txt", "trajectory_refined_kitti.txt"):
-            self.assertEqual((python / name).read_text(), (program / name).read_text(), f"{recording}: {name}")
+        name = "trajectory_kitti.txt"
+        self.assertEqual((python / name).read_text(), (program / name).read_text(), f"{recording}: {name}")
         rows = list(csv.DictReader((program / "frames.csv").read_text().splitlines()))
         states = [[row["state"], int(row["matches"]), int(row["inliers"]), row["scale_state"], float(row["timestamp_s"]), *(row[f"{key}_px"] for key in CAMERA)] for row in rows]
         self.assertEqual(done["states"], states, recording)

@@ -46,12 +46,7 @@ struct StateRun {
   std::vector<std::string> roads;
   std::vector<std::string> sigmas;
   Trajectory poses;
-  Trajectory refined;  ///< empty in mode two_frame
 
-  /// Those there are.
-  [[nodiscard]] std::vector<const Trajectory*> trajectories() const {
-    return refined.empty() ? std::vector{&poses} : std::vector{&poses, &refined};
-  }
   void expect_states(int from, int to, const std::vector<std::string>& allowed) const {
     for (int i = from; i < to; ++i) {
       const std::string& state = states.at(static_cast<std::size_t>(i));
@@ -73,15 +68,10 @@ inline StateRun run_states(const std::filesystem::path& sequence,
   EXPECT_EQ(done.exit_code, 0) << done.err;
   const std::string csv = read_file(out + "/frames.csv");
   StateRun result{
-      column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}, {}};
+      column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}};
   const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");  // refuses NaN
   EXPECT_TRUE(poses) << (poses ? "" : poses.error().message);
   result.poses = poses.value_or(Trajectory());
-  if (mode == "map") {
-    const auto refined = read_kitti_trajectory(out + "/trajectory_refined_kitti.txt");
-    EXPECT_TRUE(refined) << (refined ? "" : refined.error().message);
-    result.refined = refined.value_or(Trajectory());
-  }
   return result;
 }
 

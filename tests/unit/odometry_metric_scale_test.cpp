@@ -126,7 +126,7 @@ TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
   run.add_range(first_road, num_frames);
   EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured);
   EXPECT_NEAR(step_m(run, num_frames - 1), kStep_m, 0.02 * kStep_m);
-  const std::vector<Rigid3> refined = estimator.refined_trajectory();
+  const std::vector<Rigid3> refined = estimator.map().world_from_camera;
   ASSERT_EQ(refined.size(), static_cast<std::size_t>(num_frames));
   for (int i = 1; i < num_frames; ++i) {
     const double ratio = testing::length_ratio(refined, drive.tracks.world_from_camera, i - 1, i);

@@ -87,7 +87,7 @@ void expect_accurate(const Driven& d, double max_share, double max_rad) {
   };
   EXPECT_LT(testing::fitted_error_share(since_open(online), since_open(truth)), max_share);
   EXPECT_LT(testing::rotation_error_rad(since_open(online), since_open(truth)), max_rad);
-  const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
+  const std::vector<Rigid3> refined = d.estimator.map().world_from_camera;
   ASSERT_EQ(refined.size(), truth.size());
   EXPECT_LT(testing::fitted_error_share(refined, truth), max_share);
   EXPECT_LT(testing::rotation_error_rad(refined, truth), max_rad);
@@ -163,7 +163,7 @@ TEST(WindowEstimator, FramesThatWaitedForParallaxAreSetRightAfterwards) {
   }
   ASSERT_GT(open, 2);
   ASSERT_LT(open, 50);
-  const std::vector<Rigid3> refined = d.estimator.refined_trajectory();
+  const std::vector<Rigid3> refined = d.estimator.map().world_from_camera;
   const std::vector<Rigid3>& truth = d.drive.world_from_camera;
   const double unit_m = 1.0 / testing::length_ratio(refined, truth, 0, open);
   for (std::size_t i = 1; i < static_cast<std::size_t>(open); ++i) {
@@ -309,7 +309,7 @@ TEST(WindowEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
   EXPECT_EQ(d.run.add(1).state, FrameState::kInitializing);
   d.add_range(2, 8);
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
-  EXPECT_EQ(d.estimator.refined_trajectory().size(), 9U);
+  EXPECT_EQ(d.estimator.map().world_from_camera.size(), 9U);
 }
 
 TEST(WindowEstimator, AMissingImageWhileInitializingIsNoEnd) {

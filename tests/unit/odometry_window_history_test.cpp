@@ -89,8 +89,8 @@ TEST(WindowHistory, ALandmarkThatHasLeftTheMiddleIsNotRescaledWithTheWindow) {
   ASSERT_EQ(history.landmarks().size(), 1U);
   rescale(window, 2.0, Eigen::Vector3d::Zero());
   history.rescale(window, 2.0, false);
-  EXPECT_NEAR(history.landmarks().front().position.z(), 4.0, 1e-6);
-  EXPECT_NEAR(history.landmarks().front().position.x(), -1.0, 1e-6);
+  EXPECT_NEAR(history.landmarks().front().in_camera.z(), 4.0, 1e-6);
+  EXPECT_NEAR(history.landmarks().front().in_camera.x(), -1.0, 1e-6);
 }
 
 TEST(WindowHistory, LengthsAreThoseOfTheTimeWhenTheFrameCame) {
@@ -135,7 +135,7 @@ TEST(WindowHistory, LookAheadMakesTheStepsBetter) {
   EstimatorRun run(estimator, drive);
   run.add_all();
   const std::vector<Rigid3>& online = estimator.trajectory();
-  const std::vector<Rigid3> refined = estimator.refined_trajectory();
+  const std::vector<Rigid3> refined = estimator.map().world_from_camera;
   ASSERT_EQ(refined.size(), online.size());
   const double unit_m = 1.0 / testing::length_ratio(online, drive.world_from_camera, 5, 39);
   EXPECT_LT(rms_step_error(refined, drive, unit_m), 0.9 * rms_step_error(online, drive, unit_m));
@@ -151,15 +151,15 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
                         cv::Scalar(i, 2 * i, 3 * i));
     run.add(i);
   }
-  const std::vector<Rigid3> refined = estimator.refined_trajectory();
+  const std::vector<Rigid3> refined = estimator.map().world_from_camera;
   const double unit_m = 1.0 / testing::length_ratio(refined, drive.world_from_camera, 0, 39);
   std::vector<double> errors;
-  for (const MapLandmark& landmark : estimator.landmarks()) {
+  for (const KeptLandmark& landmark : estimator.map().landmarks) {
     ASSERT_GE(landmark.frame, 0);
     ASSERT_LT(landmark.frame, drive.num_frames());
     // In the camera: where the trajectory went is not asked here.
     const Eigen::Vector3d place =
-        drive.pose(landmark.frame) * (unit_m * landmark.position.cast<double>());
+        drive.pose(landmark.frame) * (unit_m * landmark.in_camera.cast<double>());
     double nearest = 1e9;  // landmarks do not tell their number; true points are metres apart
     for (const Eigen::Vector3d& point : drive.points) {
       nearest = std::min(nearest, (point - place).norm());

@@ -29,8 +29,6 @@ MetricsReport example() {
   metrics.ate_rmse = {4.0, 3.0, 2.0, 1.0};
   metrics.rpe_translation_m = 0.0123;
   metrics.rpe_rotation_deg = 0.0456;
-  Metrics refined = metrics;
-  refined.average_offset_m = 0.25;
   return {.stemvo_version = "0.1.0",
           .sequence = "00",
           .first_frame = 20,
@@ -43,7 +41,6 @@ MetricsReport example() {
           .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, CameraSigma{3.5, 0.5, 0.75}},
           .road_measured_fraction = 0.75,
           .metrics = metrics,
-          .refined = refined,
           .timing = {}};
 }
 
@@ -81,25 +78,20 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["rpe_translation_m"], 0.0123);
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["alignment"], "none");
-  EXPECT_EQ(json["refined"]["t_rel_percent"], 0.97);
-  EXPECT_EQ(json["refined"]["r_rel_deg_per_100m"], 1.72);
-  EXPECT_EQ(json["refined"]["average_offset_m"], 0.25);
-  EXPECT_EQ(json["refined"]["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
       "cx_px": 600.5, "cy_px": 180.25,
       "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_EQ(json.size(), 24U);
+  EXPECT_EQ(json.size(), 23U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
   MetricsReport report = example();
   report.metrics.reset();
-  report.refined.reset();
   const nlohmann::json json = written(report);
   for (const char* key : {"alignment", "path_length_m", "average_offset_m", "null_offset_m",
                           "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments",
-                          "ate_rmse_m", "rpe_translation_m", "rpe_rotation_deg", "refined"}) {
+                          "ate_rmse_m", "rpe_translation_m", "rpe_rotation_deg"}) {
     ASSERT_TRUE(json.contains(key)) << key;
     EXPECT_TRUE(json[key].is_null()) << key;
   }
@@ -136,8 +128,6 @@ TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {
   const std::string table = format_metrics_table(example());
   EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97  % +none"));
   EXPECT_THAT(table, ContainsRegex("r_rel +1\\.720  deg/100 m +none"));
-  EXPECT_THAT(table,
-              ContainsRegex("with look-ahead +0\\.97  % +none +trajectory_refined_kitti.txt"));
   EXPECT_THAT(table, ContainsRegex("average offset +0\\.333  m +none"));
   EXPECT_THAT(table, ContainsRegex("of zero motion +79\\.25  m +none"));
   EXPECT_THAT(table, ContainsRegex("ATE +4\\.00  m +none"));
