@@ -5,7 +5,7 @@
 
 namespace stemvo {
 
-/// What OpenCV's maps of pixels hold.
+/// OpenCV's maps of pixels hold no larger coordinate.
 inline constexpr int kMaxImageSide_px = 32767;
 
 /// Pinhole camera without distortion (KITTI is rectified). Pixels: the centre of the top-left pixel

@@ -67,7 +67,7 @@ class [[nodiscard]] Expected {
   }
   [[nodiscard]] const Error& error() const { return std::get<1>(result_); }
 
-  /// What `f`, which can fail itself, makes of the value (of nothing, if T is void); an error
+  /// Hands the value (nothing, if T is void) to `f`, which can fail itself; an error
   /// stays.
   template <typename F>
   [[nodiscard]] auto and_then(F&& f) const {

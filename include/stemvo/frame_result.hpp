@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// What became of a frame. Every frame has a pose whatever its state.
+/// The fate of a frame. Every frame has a pose whatever its state.
 enum class FrameState {
   kFirst,         ///< the world's origin
   kInitializing,  ///< no landmarks yet: the initial H/F selection waits for parallax, or decided
@@ -28,7 +28,7 @@ enum class FrameState {
   kNoImage,       ///< nothing to be seen: the last motion is continued
 };
 [[nodiscard]] std::string_view to_string(FrameState state);
-/// All count as measured but gated, lost and no_image.
+/// True except for kGated, kLost and kNoImage.
 [[nodiscard]] bool is_measured(FrameState state);
 
 /// How a frame's scale was measured from the road (`scale.source: camera_height`).

@@ -13,7 +13,7 @@
 
 namespace stemvo {
 
-/// What the values of a pixel stand for. OpenCV's own imread and VideoCapture give kBgr.
+/// The order of a pixel's values. OpenCV's own imread and VideoCapture give kBgr.
 enum class PixelOrder { kGray, kRgb, kBgr };
 
 /// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
@@ -34,14 +34,14 @@ class Odometry {
   /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size, without distortion.
   /// The pixels are read before it returns. Error: another type or size; nothing changes then.
   [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image, PixelOrder order);
-  /// In place of an image that never came: keeps the clock running.
+  /// Call for a dropped frame; advances the motion model by one frame.
   FrameResult process_missing();
 
   /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
   /// when they left the window, or are now. Mode two_frame has none.
   [[nodiscard]] std::vector<MapLandmark> landmarks() const;
 
-  /// Of the last image: the points tracked on it.
+  /// The points tracked on the last image.
   [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
   /// The filter's channel of the last image as points are tracked on it: CV_8UC1, own size.
   [[nodiscard]] cv::Mat channel_image() const;

@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// What matched points of two images tell about the motion between them.
+/// The motion between two images as their matched points tell it.
 struct TwoViewResult {
   /// kTracking, or kStationary, kLowParallax, kRotating; kLost: no motion fits the points.
   FrameState state = FrameState::kLost;

@@ -17,7 +17,7 @@ struct TrackPoint {
   int track_id = -1;
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
 };
-/// Of one frame, ordered by track id.
+/// All of one frame, ordered by track id.
 using TrackPoints = std::vector<TrackPoint>;
 
 /// Correspondences of two frames, in input pixels.
@@ -29,7 +29,7 @@ struct Matches {
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
-/// What a front end makes of an image on its own, without those before it.
+/// An image as a front end prepares it, without those before it.
 struct PreparedImage {
   explicit PreparedImage(ChannelImage seen) : channel(std::move(seen)) {}
   virtual ~PreparedImage() = default;

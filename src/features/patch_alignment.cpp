@@ -23,9 +23,10 @@ constexpr float kMinGain = 0.1F;
 /// The finest level may not leave what the coarser ones found by more.
 constexpr float kMaxFineMove_px = 4.0F;
 constexpr float kMaxWarpScale = 1.7F;
-/// Of the surroundings, one level up: in another scene the best of a few pixels often looks right.
+/// Minimum correlation of the surroundings, one level up: in another scene the best of a few pixels
+/// often looks right.
 constexpr float kMinCoarseCorrelation = 0.5F;
-/// Of a patch about its mean, gray values squared.
+/// Minimum sum of squares of a patch about its mean, gray values: a plain one cannot be aligned.
 constexpr float kMinNormSq = 64.0F;
 /// Hessians worse conditioned than this have no inverse.
 constexpr float kMinDeterminant = 1e-3F;

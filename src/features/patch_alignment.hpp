@@ -26,7 +26,7 @@ struct Patch {
 
 /// Pyramid: level k + 1 has half the size of level k, pixel (x, y) of it lies at (2x, 2y).
 using Pyramid = std::span<const BorderedImage>;
-/// What the images of a pyramid are read beyond their borders.
+/// Alignment reads the images of a pyramid so far beyond their borders.
 inline constexpr int kPatchBorder_px = 24;
 
 /// False: too little texture to be aligned.

@@ -15,9 +15,9 @@
 namespace stemvo {
 namespace {
 
-/// Of a patch with the image where it was found; less: it was not.
+/// Minimum correlation of a patch with the image; below it the track is lost.
 constexpr float kMinCorrelation = 0.7F;
-/// Less, or a scale beyond this: it is cut out anew.
+/// Below this, or beyond this scale, the patch is cut out anew.
 constexpr float kGoodCorrelation = 0.85F;
 constexpr float kMaxScale = 1.4F;
 /// A track that ended is where the map has it, within so many pixels, or nowhere.

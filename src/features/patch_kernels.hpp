@@ -36,7 +36,7 @@ struct CoarsePatch {
   CoarseValues gy;
 };
 
-/// What the inner loops of alignment are made of, for one instruction set. The values of two sets
+/// The inner loops of alignment for one instruction set. The values of two sets
 /// differ in their last digits.
 struct PatchKernels {
   /// Bilinear samples at (x + i, y + j), i and j from 0 to 7.

@@ -154,7 +154,7 @@ void PointFrontEnd::replenish(View& view) {
     const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
                            std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
     if (mask.at<unsigned char>(center) == 0) {
-      continue;  // ran into another one: the older stays, found again none; or behind the mask
+      continue;  // collides with another point, the older one is kept; or is behind the mask
     }
     cv::circle(mask, center, std::max(1, cvRound(min_distance)), cv::Scalar(0), cv::FILLED);
     quota.take(point.uv);

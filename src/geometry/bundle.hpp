@@ -11,12 +11,12 @@
 
 namespace stemvo {
 
-/// What a bundle adjustment moves, in any one unit of length.
+/// The unknowns of a bundle adjustment, in any one unit of length.
 struct BundleState {
   std::vector<Rigid3> camera_from_world;
   std::vector<Eigen::Vector3d> points;
   Camera camera;
-  /// What the camera lacks: x' = x (1 + k1 r^2 + k2 r^4) of normalized coordinates.
+  /// The distortion that the camera lacks: x' = x (1 + k1 r^2 + k2 r^4) of normalized coordinates.
   Eigen::Vector2d radial = Eigen::Vector2d::Zero();
 };
 
@@ -38,7 +38,7 @@ using CameraChange = Eigen::Matrix<double, 5, 1>;
   total[2] += first[2] * then[2];
   return total;
 }
-/// What is left of a change after its first part.
+/// The change that completes `first` to `total`.
 [[nodiscard]] inline CameraChange rest_of(const CameraChange& total, const CameraChange& first) {
   CameraChange rest = total - first;
   rest[2] /= 1.0 + first[2];
@@ -46,16 +46,16 @@ using CameraChange = Eigen::Matrix<double, 5, 1>;
 }
 using CameraInformation = Eigen::Matrix<double, 5, 5>;
 
-/// What several bundles tell of the camera they share.
+/// The camera as several bundles tell it.
 struct CameraEstimate {
   CameraChange change = CameraChange::Zero();
   CameraChange sigma = CameraChange::Zero();  ///< standard deviations
   int num_bundles = 0;
 };
 
-/// What is known of a bundle's camera beforehand.
+/// The camera as it is known beforehand.
 struct CameraPrior {
-  CameraChange mean;              ///< less the bundle's camera
+  CameraChange mean;              ///< relative to the bundle's camera
   CameraInformation information;  ///< for observations of a noise of 1 px
 };
 
@@ -71,8 +71,8 @@ struct BundleResult {
   bool is_usable = false;  ///< the cost fell; else the bundle is unchanged
   double cost = 0.0;       ///< sum of the robust loss, px^2
   CameraChange camera_change = CameraChange::Zero();
-  /// Of the camera without its prior, all else left free: inverse of its covariance for
-  /// observations of a noise of 1 px.
+  /// Inverse covariance of the camera without its prior, all else left free, for observations of
+  /// a noise of 1 px.
   CameraInformation information = CameraInformation::Zero();
 };
 

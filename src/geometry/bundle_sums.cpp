@@ -15,7 +15,7 @@ using Column = BundleSums::Column;
 template <std::size_t kColumns>
 using Block = BundleSums::Block<kColumns>;
 
-/// Of an observation: columns of J^T, one for each of its two coordinates.
+/// Columns of J^T, one for each of an observation's two coordinates.
 struct Jacobian {
   Column columns[2];
 };

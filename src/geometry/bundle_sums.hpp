@@ -66,7 +66,7 @@ struct BundleSums {
   /// process's instruction set.
   void add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
 
-  /// Of free poses i <= j.
+  /// The place of the block of the free poses i <= j.
   [[nodiscard]] std::size_t index_of(int i, int j) const {
     return static_cast<std::size_t>(j * (j + 1) / 2 + i);
   }

@@ -17,7 +17,7 @@ constexpr double kMinRatio = 1.00001;
 /// Beyond, d2 is rounding and the matrix has rank 1.
 constexpr double kMaxRatio = 1e9;
 
-/// What the 8 hypotheses share: A = K^-1 H K = U diag(d1, d2, d3) V^T.
+/// The 8 hypotheses share A = K^-1 H K = U diag(d1, d2, d3) V^T.
 struct FaugerasTerms {
   Eigen::Matrix3d u;
   Eigen::Matrix3d v;

@@ -19,7 +19,7 @@ namespace {
 constexpr double kMotionTolerance = 1e-10;
 constexpr double kPoseTolerance = 1e-7;
 constexpr double kMinDepth = 1e-6;
-/// What a point behind the camera costs, so that no step gains by pushing points behind it.
+/// Error of a point behind the camera, so that no step gains by pushing points behind it.
 constexpr double kBehindErrorPx = 1e3;
 
 /// Second-order model of a cost around a state; the constant factor 1/2 is left out.

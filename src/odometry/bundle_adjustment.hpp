@@ -29,7 +29,7 @@ struct BundleAdjustmentOptions {
 /// little to do, or not solved; the window is unchanged.
 bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentOptions& options);
 
-/// What a window tells of the camera, all else left free.
+/// The camera as a window tells it, all else left free.
 struct CameraMeasurement {
   CameraChange change;            ///< of `camera`
   CameraInformation information;  ///< of it alone, without the prior

@@ -28,7 +28,7 @@ struct PreparedFrame {
   double stem_ms = 0.0;
 };
 
-/// What the odometry does with one channel after the stem: several of them can share one stem.
+/// The odometry of one channel, after the stem: several of them can share one stem.
 /// Movable. The same channels give the same poses, whatever runs beside it.
 class ChannelOdometry {
  public:
@@ -47,10 +47,10 @@ class ChannelOdometry {
   FrameResult process(PreparedFrame frame);
 
   [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
-  /// Of all frames optimized.
+  /// It holds all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
 
-  /// Of the last frame optimized; the image of the last one that had one.
+  /// These belong to the last frame optimized; the image to the last one that had one.
   [[nodiscard]] const ChannelImage& image() const;
   [[nodiscard]] const Matches& matches() const { return optimized_.tracked.matches; }
   [[nodiscard]] const std::vector<char>& inlier_mask() const {

@@ -46,7 +46,7 @@ class Estimator {
 
   /// One pose per frame so far, world_from_camera, as they came.
   [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;
-  /// What was learnt of the camera; less the given one. nullopt: nothing is learnt.
+  /// The camera as it was learnt, relative to the given one. nullopt: nothing is learnt.
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }

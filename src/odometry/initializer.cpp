@@ -47,7 +47,7 @@ bool is_same(const Rigid3& a, const Rigid3& b) {
          a.translation.dot(b.translation) > std::cos(kSameAngle_rad);
 }
 
-/// Those with nearly the most good points.
+/// The hypotheses with nearly the most good points.
 std::vector<Hypothesis> plausible_hypotheses(const MeasuredMotion& motion,
                                              const PixelPairs& pairs,
                                              const Camera& camera) {
@@ -145,7 +145,7 @@ void Initializer::choose_motion(const PixelPairs& pairs,
   const auto rival = std::find_if(
       hypotheses.begin(), hypotheses.end(),
       [&](const Hypothesis& other) { return !is_same(other.cur_from_prev, best.cur_from_prev); });
-  // Of few tracks a quarter must do.
+  // With few tracks, require a quarter of them.
   const int num_pairs = static_cast<int>(pairs.size());
   const TwoViewMotion chosen{best.model, best.cur_from_prev,
                              test_points(best.cur_from_prev, pairs, camera,

@@ -21,7 +21,7 @@ class MetricScale {
 
   [[nodiscard]] bool is_enabled() const { return road_.has_value(); }
 
-  /// Of the last frame given: its lengths are metres.
+  /// The lengths of the last frame given are metres.
   [[nodiscard]] bool has_scale() const {
     return state_ == ScaleState::kMeasured || state_ == ScaleState::kHeld;
   }

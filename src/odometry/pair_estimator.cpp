@@ -158,7 +158,7 @@ void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localize
   trajectory_.push_back(result.world_from_camera);
 }
 
-/// Of the motion; 0 where it is not measured.
+/// The motion's length; 0 where it is not measured.
 double PairEstimator::measure_length(const TrackedFrame& frame) {
   if (!scale_.is_enabled()) {
     return 0.0;

@@ -14,8 +14,8 @@
 
 namespace stemvo {
 
-/// What Odometry::process does, in four phases that can work on three frames at a time; the results
-/// are the same.
+/// Odometry::process in four phases that can work on three frames at a time; the results are the
+/// same.
 class PhasedOdometry {
  public:
   /// As Odometry::create, for options and a camera that are valid. `mask`: as FrontEnd::set_mask.
@@ -39,7 +39,7 @@ class PhasedOdometry {
     return channel_odometry_.process(std::move(frame));
   }
 
-  /// Of the frames optimized.
+  /// It holds the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 

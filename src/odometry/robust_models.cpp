@@ -62,7 +62,7 @@ std::optional<Eigen::Matrix3d> to_model(const cv::Mat& matrix) {
   return model;
 }
 
-/// What OpenCV throws of degenerate input is no news here; of memory it is.
+/// OpenCV throws on degenerate input, which here means no model; running out of memory goes on.
 void throw_if_memory_ended(const cv::Exception& exception) {
   if (exception.code == cv::Error::StsNoMem) {
     throw std::bad_alloc();

@@ -14,14 +14,14 @@
 namespace stemvo {
 namespace {
 
-/// Of the given camera: principal point (px), focal length (share), k1, k2.
+/// Prior of the given camera: principal point (px), focal length (share), k1, k2.
 constexpr double kPriorSigma[] = {10.0, 10.0, 0.003, 0.01, 0.005};
-/// Of one whose focal length is asked for as well: it may be another camera's.
+/// Prior where the focal length is asked for as well: the given one may be another camera's.
 constexpr double kWeakPriorSigma[] = {30.0, 30.0, 0.03, 0.02, 0.01};
 /// Errors of a track's points are alike: a run tells less than as many independent ones would.
 constexpr double kSigmaFactorSq = 2.0 * 2.0;
-/// Who drives forward bends all tracks alike: without this factor focal lengths that are known were
-/// missed by 3.3 sigmas on drives (03, a rendered one), by 0.8 with the camera in the hand.
+/// Forward motion biases all tracks the same way: without this factor focal lengths that are known
+/// were missed by 3.3 sigmas on drives (03, a rendered one), by 0.8 with the camera in the hand.
 constexpr double kFocalSigmaFactor = 3.0;
 /// An unknown is believed under this sigma, px, ..
 constexpr double kMaxSigma_px = 1.5;

@@ -16,12 +16,12 @@
 namespace stemvo {
 
 /// Learns the camera from runs of keyframes, one after the other: principal point, focal length and
-/// the radial distortion that is left, each with a prior. The given camera is left only where the
-/// data insist.
+/// the radial distortion that is left, each with a prior. The given camera is changed only
+/// where the data are significant (> 2 sigma).
 class SelfCalibration {
  public:
-  /// Of a run. Fewer do not tell the principal point from the distortion: 6 find -8 px on a clip
-  /// where 8 and 12 find -3 px +- 1.1, and 16 -2.8 +- 0.8.
+  /// Keyframes of a run. Fewer do not tell the principal point from the distortion: 6 find -8 px on
+  /// a clip where 8 and 12 find -3 px +- 1.1, and 16 -2.8 +- 0.8.
   static constexpr int kNumKeyframes = 16;
 
   SelfCalibration(const Camera& given, CameraRefinement refinement);
@@ -34,15 +34,15 @@ class SelfCalibration {
   void rescale(double factor, const Eigen::Vector3d& center) {
     stemvo::rescale(run_, factor, center);
   }
-  /// The keyframes that come are of another map.
+  /// The following keyframes belong to a new map.
   void restart() { run_ = {}; }
 
-  /// The given one, or on its way to what the data insist on.
+  /// The given one, or on its way to the target.
   [[nodiscard]] const Camera& camera() const { return camera_; }
-  /// What all runs say, whether the data insist on it or not, after one that is still measured;
+  /// The estimate of all runs, whether it is significant or not, after one that is still measured;
   /// nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraEstimate> estimate() const;
-  /// Of the runs that were taken in; nullopt: nothing is refined.
+  /// It counts the runs that were fused; nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraSigma> camera_sigma() const;
 
  private:
@@ -59,8 +59,8 @@ class SelfCalibration {
   Camera given_;
   Camera camera_;
   CameraRefinement refinement_;
-  CameraChange believed_ = CameraChange::Zero();  ///< what the data insist on; camera_ goes there
-  CameraChange mean_ = CameraChange::Zero();      ///< less the given camera
+  CameraChange believed_ = CameraChange::Zero();  ///< significant part of mean_; camera_ goes there
+  CameraChange mean_ = CameraChange::Zero();      ///< relative to the given camera
   CameraInformation information_;
   int num_runs_ = 0;   ///< measured
   Window run_;         ///< the keyframes since the last one that was measured

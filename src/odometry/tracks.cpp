@@ -34,7 +34,7 @@ TrackPoints kept_points(const std::vector<int>& track_ids,
   return points;
 }
 
-/// What is left of the flow once the rotation is taken out, of each match.
+/// The flow of each match that the rotation does not explain.
 std::vector<double> parallaxes_px(const Eigen::Quaterniond& rotation,
                                   const PixelPairs& pairs,
                                   const Camera& camera) {

@@ -38,7 +38,7 @@ struct PointPairs {
 };
 [[nodiscard]] PointPairs common_points(const TrackPoints& prev, const TrackPoints& cur);
 
-/// Those that the mask keeps.
+/// The values that the mask keeps.
 template <typename T>
 [[nodiscard]] std::vector<T> select(std::span<const T> values, const std::vector<char>& mask) {
   std::vector<T> selected;
@@ -63,7 +63,7 @@ template <typename T>
                                  double min_flow_px,
                                  int min_tracks);
 
-/// What is left of the flow once the rotation, cur_from_prev, is taken out.
+/// Flow that the rotation, cur_from_prev, does not explain.
 [[nodiscard]] double median_parallax_px(const Eigen::Quaterniond& rotation,
                                         const PixelPairs& pairs,
                                         const Camera& camera);

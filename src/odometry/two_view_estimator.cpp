@@ -133,7 +133,7 @@ void TwoViewEstimator::refine(const PixelPairs& pairs,
   const Eigen::Quaterniond rotation =
       refine_rotation(result.cur_from_prev.rotation, inliers, camera, refinement);
   result.parallax_px = median_parallax_px(rotation, inliers, camera);
-  // What the rotation leaves may be nothing but the tracks' noise, which grows with their length.
+  // The parallax may be nothing but the tracks' noise, which grows with their length.
   const double noise_px = median_epipolar_px(result.cur_from_prev, inliers, camera);
   const bool is_noise = result.parallax_px < std::min(kNoiseParallax * noise_px,  //
                                                       odometry_.min_parallax_px);

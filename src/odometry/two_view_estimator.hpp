@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// What two frames tell about the motion between them.
+/// The motion between two frames as they tell it.
 struct MeasuredMotion {
   FrameState state = FrameState::kLost;
   Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (stationary, rotating, lost)

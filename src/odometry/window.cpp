@@ -53,7 +53,7 @@ std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
              : std::nullopt;
 }
 
-/// Frames that a keyframe between others leaves behind are told from the one before it.
+/// The keyframe before takes over the frames that a keyframe between others leaves behind.
 void drop(Window& window, std::size_t i) {
   if (i > 0) {
     Keyframe& before = window.keyframes[i - 1];

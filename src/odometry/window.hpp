@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// A frame between two keyframes, told from the earlier one.
+/// A frame between two keyframes, stored relative to the earlier one.
 struct FrameBetween {
   int frame = 0;
   Rigid3 keyframe_from_camera;
@@ -38,8 +38,8 @@ struct Window {
 
 struct WindowOptions {
   int num_keyframes = 8;  ///< length of the window
-  /// Of a new landmark, between its first and last keyframe: only the direction of distant ones is
-  /// known, but that holds the rotation.
+  /// Parallax of a new landmark between its first and last keyframe: only the direction of distant
+  /// ones is known, but that holds the rotation.
   double min_parallax_deg = 0.1;
   double max_reprojection_error_px = 4.0;  ///< of a landmark in any keyframe
 };

@@ -131,7 +131,7 @@ FrameState WindowEstimator::measure_since_reference(const TrackedFrame& frame,
   return accept_motion(frame, motion, localized);
 }
 
-/// What the motion since the reference makes of the frame.
+/// Turns the motion since the reference into the frame's pose and state.
 FrameState WindowEstimator::accept_motion(const TrackedFrame& frame,
                                           const MeasuredMotion& motion,
                                           LocalizedFrame& localized) {

@@ -56,7 +56,7 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] bool open_window(View view);
   /// The one in use, which everything but the camera's own refinement is given.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
-  /// What counts as motion in the image.
+  /// Least flow that counts as motion.
   [[nodiscard]] double min_flow_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
   void mark_outliers(const Matches& matches, std::vector<char>& mask) const;

@@ -22,9 +22,9 @@ struct WindowMotion {
   Rigid3 prev_from_cur;
 };
 
-/// What the window leaves behind. Motions are kept, not poses: the window is rescaled and moved as
-/// a whole later on, and what has left must not be torn from it. For the same reason a landmark is
-/// kept in the camera of the last keyframe that saw it.
+/// Keeps landmarks and motions that have left the window. Motions are kept, not poses: the window
+/// is rescaled and moved as a whole later on, and what has left must not be torn from it. For the
+/// same reason a landmark is kept in the camera of the last keyframe that saw it.
 ///
 /// Lengths are those of the time when the frame came, give or take a few frames: the map's scale
 /// drifts from frame to frame, and what puts the newest frames right would stretch the older ones,
@@ -50,7 +50,7 @@ class WindowHistory {
   [[nodiscard]] const std::vector<KeptLandmark>& landmarks() const { return landmarks_; }
 
  private:
-  /// What is known of a track that the window sees.
+  /// A track that the window sees.
   struct Track {
     int num_keyframes = 0;
     double max_parallax_rad = 0.0;

@@ -25,7 +25,7 @@ using test::kViewWidth;
 using test::TestPyramid;
 using test::View;
 
-/// Of the points that were found.
+/// Errors of the points that were found.
 class Distances {
  public:
   Distances(std::vector<double> px, std::size_t num_asked)
@@ -113,7 +113,7 @@ Distances errors_of_patches(const PlantedPoints& points) {
   return {errors_px, points.from.size()};
 }
 
-/// Of OpenCV, called as KltFrontEnd calls it, from the same starts.
+/// OpenCV's errors, called as KltFrontEnd calls it, from the same starts.
 Distances errors_of_lucas_kanade(const PlantedPoints& points) {
   const int side = FeatureOptions().klt_window;
   std::vector<cv::Point2f> found = points.start;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a bad frame does to a window that was fine before.
+// A bad frame must not spoil a window that was fine before.
 #include <algorithm>
 
 #include <gtest/gtest.h>

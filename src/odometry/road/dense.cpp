@@ -23,7 +23,7 @@ constexpr std::size_t kMinSamples = 600;
 constexpr std::size_t kFewSamples = 2400;
 constexpr int kMaxIterations = 5;     ///< per grid
 constexpr double kCoarseBound = 5.0;  ///< times the last grid's bound of convergence
-/// Of a tile's mean square residual, in normalised images.
+/// Floor of a tile's mean square residual, in normalised images: no tile is nearly certain.
 constexpr double kNoiseFloor = 0.05;
 constexpr double kSearchScaleSigma =
     0.05;  ///< prior knowledge of log_scale worse than this: search

@@ -54,7 +54,7 @@ class RoadPath {
   void restart() { positions_.clear(); }
 
   /// Fills slope, drop and their information: y = y0 + slope z + drop / height z^2 through the
-  /// positions, y0 being the bounce of the present moment.
+  /// positions, y0: the current vertical bounce.
   void predict(double metres_per_unit, RoadPrior& prior) const;
 
  private:

@@ -10,7 +10,7 @@
 
 namespace stemvo {
 
-/// What the road scale assumes of the car and of the road. Lengths are metres on the road.
+/// Assumptions of the road scale about the car and the road. Lengths are metres on the road.
 struct RoadOptions {
   double camera_height_m = 1.65;
   double half_width_m = 1.6;         ///< of the strip of road that is looked at
@@ -33,7 +33,7 @@ struct RoadOptions {
   // Joining over time.
   bool join_frames = true;       ///< false: every measurement is believed as it comes
   double flatness_sigma = 0.03;  ///< error of log_scale that both estimators and neighbours share
-  /// Of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips,
+  /// Drift of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips,
   /// steadily; a random walk must be loose enough to follow without lagging behind.
   double drift_sigma = 0.006;
 
@@ -46,7 +46,7 @@ struct RoadOptions {
   double max_off_line_px = 0.7;  ///< from the epipolar line of the given motion
 };
 
-/// What is believed of the road before a pair of frames is looked at, in the *current* camera:
+/// The road as it is predicted before a pair of frames is looked at, in the *current* camera:
 /// y = height + slope * z + roll * x + drop * z^2 / height, metres.
 struct RoadPrior {
   double log_scale = 0.0;        ///< see RoadMeasurement
@@ -59,7 +59,7 @@ struct RoadPrior {
   double roll_sigma = 0.03;
 };
 
-/// What one pair of frames tells about the road.
+/// The road as one pair of frames tells it.
 struct RoadMeasurement {
   bool is_valid = false;
   double log_scale = 0.0;  ///< log(metres / unit of the given translation)
@@ -120,7 +120,7 @@ struct RoadNormal {
   double relative_change = 0.0;                ///< of the plane in the last step
 };
 
-/// What a warp and its covariance say, without the judgement.
+/// Reads a warp and its covariance, without the judgement.
 [[nodiscard]] RoadMeasurement read_road(const RoadWarp& warp,
                                         const RoadMatrix& covariance,
                                         double camera_height_m);

@@ -27,7 +27,8 @@ constexpr int kCellsAcross = 1000;
 constexpr int kPyramidLevel = 0;  ///< the predicted plane has taken most of the motion away
 constexpr double kMinEigenvalue = 1e-5;
 constexpr double kMinInlierShare = 0.3;
-/// Of the corners. One in eight finds its way back on nothing but the sensor's noise.
+/// Minimum share of the corners that are tracked. One in eight finds its way back on nothing but
+/// the sensor's noise.
 constexpr double kMinTrackedShare = 0.25;
 constexpr double kMaxSigma = 0.2;
 constexpr int kTrackingBorder_px = 24;  ///< room for the tracker's window around the strip

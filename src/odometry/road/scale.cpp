@@ -95,7 +95,8 @@ std::string_view RoadScale::measure(const Past& past, const RoadImage& image) {
     }
     points = measure_points(step);
   }
-  // What they share (the same road, not quite as the model) is the filter's flatness_sigma.
+  // The filter's flatness_sigma is the error that they share: the same road, not quite as the
+  // model.
   double weight = 0.0;
   double sum = 0.0;
   for (const RoadMeasurement* road : {&dense, &points}) {

@@ -12,7 +12,7 @@
 
 namespace stemvo {
 
-/// What is known of the scale after a frame; nothing of it looks ahead.
+/// The scale as it is known after a frame; nothing of it looks ahead.
 struct RoadScaleEstimate {
   double metres_per_unit = 1.0;  ///< metres = metres_per_unit * units of the given motions
   double sigma = 0.0;            ///< of log(metres_per_unit)
