@@ -83,9 +83,8 @@ Chain run_chain() {
     const cv::Mat& pixels = frames().pixels[static_cast<std::size_t>(i)];
     result.channel = value_of(stem.apply(pixels));
     result.images.push_back(stretch.apply(result.channel));
-    TrackedFrame frame;
+    Frame frame;
     frame.number = i;
-    frame.has_image = true;
     frame.image = pixels;
     frame.road = std::make_shared<RoadImage>(make_road_image(result.images.back(), result.camera));
     frame.matches = front_end->process(result.images.back(), i);

@@ -32,7 +32,7 @@ struct Chain {
   Camera camera;
   Channel channel;                             ///< of the last frame
   std::vector<ChannelImage> images;            ///< of all frames
-  TrackedFrame last;                           ///< the last frame
+  Frame last;                                  ///< the last frame
   Matches matches;                             ///< to the last frame
   std::unique_ptr<WindowEstimator> estimator;  ///< after the frame before
 };

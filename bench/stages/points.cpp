@@ -14,7 +14,7 @@ namespace stemvo::bench {
 namespace {
 
 using benchmark::State;
-using Prepared = std::shared_ptr<const PreparedImage>;
+using Prepared = std::shared_ptr<const ImagePyramid>;
 
 FeatureOptions options_of(FeatureMethod method) {
   FeatureOptions options = chain().config.features;

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "features/grid_quota.hpp"
-#include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -36,7 +35,7 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 DescriptorFrontEnd::DescriptorFrontEnd(const FeatureOptions& options)
     : options_(options), feature_(create_feature(options)) {}
 
-std::shared_ptr<const PreparedImage> DescriptorFrontEnd::prepare(
+std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(
     const ChannelImage& channel) const {
   auto described = std::make_shared<Described>(channel);
   std::vector<cv::KeyPoint> found;
@@ -63,9 +62,8 @@ std::shared_ptr<const PreparedImage> DescriptorFrontEnd::prepare(
   return described;
 }
 
-Matches DescriptorFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, int frame) {
-  auto current = std::dynamic_pointer_cast<const Described>(std::move(prepared));
-  STEMVO_CHECK(current != nullptr, "an image prepared by this front end");
+Matches DescriptorFrontEnd::process(std::shared_ptr<const ImagePyramid> prepared, int frame) {
+  auto current = std::static_pointer_cast<const Described>(std::move(prepared));
   Matches matches;
   matches.num_keypoints = static_cast<int>(current->uv.size());
   std::vector<int> track_ids(current->uv.size(), -1);

@@ -17,14 +17,14 @@ class DescriptorFrontEnd : public FrontEnd {
   explicit DescriptorFrontEnd(const FeatureOptions& options);
 
   using FrontEnd::process;
-  [[nodiscard]] std::shared_ptr<const PreparedImage> prepare(
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
       const ChannelImage& channel) const override;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
 
  private:
-  struct Described : PreparedImage {
-    using PreparedImage::PreparedImage;
+  struct Described : ImagePyramid {
+    using ImagePyramid::ImagePyramid;
     std::vector<Eigen::Vector2d> uv;  ///< input pixels
     cv::Mat descriptors;              ///< one row per keypoint
   };

@@ -29,11 +29,13 @@ struct Matches {
   int num_keypoints = 0;       ///< found or asked for, before matching
 };
 
-/// An image as a front end prepares it, without those before it.
-struct PreparedImage {
-  explicit PreparedImage(ChannelImage seen) : channel(std::move(seen)) {}
-  virtual ~PreparedImage() = default;
+/// An image as a front end prepares it, without those before it; each derives what it adds.
+struct ImagePyramid {
+  explicit ImagePyramid(ChannelImage seen) : channel(std::move(seen)), levels{channel.pixels} {}
+  virtual ~ImagePyramid() = default;
+
   ChannelImage channel;
+  std::vector<cv::Mat> levels;  ///< the channel, then each half the size of the one before
 };
 
 /// Finds correspondences between the last image it was given and the next one. Stateful (it holds
@@ -46,12 +48,12 @@ class FrontEnd {
   void set_mask(const cv::Mat& mask) { mask_ = mask; }
   /// The part of process() that needs only the image: it may run ahead, in another thread than
   /// the rest, one call at a time.
-  [[nodiscard]] virtual std::shared_ptr<const PreparedImage> prepare(
+  [[nodiscard]] virtual std::shared_ptr<const ImagePyramid> prepare(
       const ChannelImage& channel) const = 0;
   /// Matches from the previous image (none on the first). An image of another size starts over.
-  /// `image` was prepared by this front end.
+  /// `image` was prepared by this front end (not checked).
   /// `frame` is the image's number for Matches::prev_frame.
-  [[nodiscard]] virtual Matches process(std::shared_ptr<const PreparedImage> image, int frame) = 0;
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const ImagePyramid> image, int frame) = 0;
   [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
     return process(prepare(image), frame);
   }

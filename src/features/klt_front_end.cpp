@@ -32,32 +32,32 @@ bool is_inside(const cv::Point2f& uv, cv::Size size) {
 
 }  // namespace
 
-struct KltFrontEnd::KltImage : TrackingImage {
-  using TrackingImage::TrackingImage;
-  [[nodiscard]] int last_level() const { return static_cast<int>(pyramid.size() / kNextLevel) - 1; }
-  std::vector<cv::Mat> pyramid;
+struct KltFrontEnd::KltPyramid : ImagePyramid {
+  using ImagePyramid::ImagePyramid;
+  [[nodiscard]] int last_level() const { return static_cast<int>(levels.size()) - 1; }
+  std::vector<cv::Mat> with_derivatives;
   cv::Size window;
 };
 
-std::shared_ptr<const PreparedImage> KltFrontEnd::prepare(const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> KltFrontEnd::prepare(const ChannelImage& channel) const {
   const StageTimer timer(Stage::kPyramid);
-  auto image = std::make_shared<KltImage>(channel);
+  auto image = std::make_shared<KltPyramid>(channel);
   const double scale = channel.map.scale.minCoeff();
   const int half = options().klt_window / 2;
   const int reach = std::max(kMinReach_px, static_cast<int>(half / scale));
   image->window = cv::Size(2 * reach + 1, 2 * reach + 1);
-  cv::buildOpticalFlowPyramid(channel.pixels, image->pyramid, image->window, num_levels(scale) - 1,
-                              /*withDerivatives=*/true);
-  const bool is_halved = image->last_level() > 0;
-  image->corner_pixels = image->pyramid[is_halved ? kNextLevel : 0];
-  image->corner_scale = is_halved ? 2.0F : 1.0F;
+  cv::buildOpticalFlowPyramid(channel.pixels, image->with_derivatives, image->window,
+                              num_levels(scale) - 1, /*withDerivatives=*/true);
+  for (std::size_t i = kNextLevel; i < image->with_derivatives.size(); i += kNextLevel) {
+    image->levels.push_back(image->with_derivatives[i]);
+  }
   return image;
 }
 
 std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& from,
                                                                   const View& to) {
-  const auto& prev = static_cast<const KltImage&>(*from.image);
-  const auto& cur = static_cast<const KltImage&>(*to.image);
+  const auto& prev = static_cast<const KltPyramid&>(*from.image);
+  const auto& cur = static_cast<const KltPyramid&>(*to.image);
   std::vector<std::optional<cv::Point2f>> result(from.points.size());
   if (from.points.empty()) {
     return result;
@@ -73,10 +73,10 @@ std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& fr
   std::vector<cv::Point2f> back_uv = prev_uv;
   std::vector<unsigned char> found;
   std::vector<unsigned char> found_back;
-  cv::calcOpticalFlowPyrLK(prev.pyramid, cur.pyramid, prev_uv, cur_uv, found, cv::noArray(),
+  cv::calcOpticalFlowPyrLK(prev.with_derivatives, cur.with_derivatives, prev_uv, cur_uv, found, cv::noArray(),
                            cur.window, cur.last_level(), criteria);
   // The way back starts where the way there started: two levels are enough to leave a wrong place.
-  cv::calcOpticalFlowPyrLK(cur.pyramid, prev.pyramid, cur_uv, back_uv, found_back, cv::noArray(),
+  cv::calcOpticalFlowPyrLK(cur.with_derivatives, prev.with_derivatives, cur_uv, back_uv, found_back, cv::noArray(),
                            cur.window, std::min(cur.last_level(), kBackLevels - 1), criteria,
                            cv::OPTFLOW_USE_INITIAL_FLOW);
 

@@ -14,14 +14,14 @@ class KltFrontEnd final : public PointFrontEnd {
  public:
   explicit KltFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
 
-  [[nodiscard]] std::shared_ptr<const PreparedImage> prepare(
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
       const ChannelImage& channel) const override;
 
  private:
   /// With its pyramid and the derivatives of every level, which both directions use.
-  struct KltImage;
+  struct KltPyramid;
 
-  [[nodiscard]] bool begin_track(const TrackingImage&, const Point&) override { return true; }
+  [[nodiscard]] bool begin_track(const ImagePyramid&, const Point&) override { return true; }
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
   void end_other_tracks(const std::vector<Point>&,

@@ -80,15 +80,15 @@ cv::Point2f Motions::near(const cv::Point2f& uv) const {
 
 }  // namespace
 
-struct PatchFrontEnd::PatchImage : TrackingImage {
-  using TrackingImage::TrackingImage;
-  std::vector<cv::Mat> bordered;  ///< what the pyramid's levels are part of
-  std::vector<BorderedImage> pyramid;
+struct PatchFrontEnd::PatchPyramid : ImagePyramid {
+  using ImagePyramid::ImagePyramid;
+  std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
 };
 
-std::shared_ptr<const PreparedImage> PatchFrontEnd::prepare(const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& channel) const {
   const StageTimer timer(Stage::kPyramid);
-  auto image = std::make_shared<PatchImage>(channel);
+  auto image = std::make_shared<PatchPyramid>(channel);
+  image->levels.clear();
   cv::Mat level = channel.pixels;
   const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
   for (int i = 0; i < num; ++i) {
@@ -101,21 +101,17 @@ std::shared_ptr<const PreparedImage> PatchFrontEnd::prepare(const ChannelImage& 
     cv::Mat bordered;
     cv::copyMakeBorder(level, bordered, kBorder, kBorder, kBorder, kBorder, cv::BORDER_REFLECT_101);
     level = bordered(cv::Rect(kBorder, kBorder, level.cols, level.rows));
-    if (i < std::min(2, num - 1)) {
-      image->corner_pixels = level;
-      image->corner_scale = static_cast<float>(i + 1);
-    }
-    image->pyramid.push_back(
+    image->levels.push_back(level);
+    image->bordered.push_back(
         {level.data, static_cast<std::ptrdiff_t>(level.step), level.cols, level.rows});
-    image->bordered.push_back(std::move(bordered));
   }
   return image;
 }
 
-bool PatchFrontEnd::begin_track(const TrackingImage& image, const Point& point) {
+bool PatchFrontEnd::begin_track(const ImagePyramid& image, const Point& point) {
   Track track;
   track.warp = {point.uv.x, point.uv.y};
-  const Pyramid pyramid = static_cast<const PatchImage&>(image).pyramid;
+  const Pyramid pyramid = static_cast<const PatchPyramid&>(image).bordered;
   if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
     return false;
   }
@@ -131,8 +127,8 @@ bool PatchFrontEnd::begin_track(const TrackingImage& image, const Point& point) 
 
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
                                                                     const View& to) {
-  const auto& image = static_cast<const PatchImage&>(*to.image);
-  const Pyramid pyramid = image.pyramid;
+  const auto& image = static_cast<const PatchPyramid&>(*to.image);
+  const Pyramid pyramid = image.bordered;
   const int coarsest = static_cast<int>(pyramid.size()) - 1;
   const int top = coarsest - 1;
   const int predicted = std::min(kPredictedLevel, top);
@@ -189,7 +185,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
 }
 
 bool PatchFrontEnd::accept(
-    const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track) {
+    const PatchMatch& found, const PatchPyramid& image, int frame, const Point& from, Track& track) {
   if (found.correlation < kMinCorrelation) {
     return false;
   }
@@ -202,10 +198,10 @@ bool PatchFrontEnd::accept(
     return true;
   }
   track.warp = {found.warp.x, found.warp.y};
-  return cut_patch(image.pyramid, found.warp.x, found.warp.y, track.patch);
+  return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
 }
 
-std::optional<cv::Point2f> PatchFrontEnd::find_again(const TrackingImage& image,
+std::optional<cv::Point2f> PatchFrontEnd::find_again(const ImagePyramid& image,
                                                      const Point& point) {
   const auto known = tracks_.find(point.id);
   if (known == tracks_.end()) {
@@ -213,7 +209,7 @@ std::optional<cv::Point2f> PatchFrontEnd::find_again(const TrackingImage& image,
   }
   Track& track = known->second;
   const PatchMatch found =
-      align_patch(track.patch, static_cast<const PatchImage&>(image).pyramid,
+      align_patch(track.patch, static_cast<const PatchPyramid&>(image).bordered,
                   {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
   const cv::Point2f uv(found.warp.x, found.warp.y);
   const cv::Point2f off = uv - point.uv;

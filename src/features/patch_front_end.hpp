@@ -19,11 +19,11 @@ class PatchFrontEnd final : public PointFrontEnd {
  public:
   explicit PatchFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
 
-  [[nodiscard]] std::shared_ptr<const PreparedImage> prepare(
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
       const ChannelImage& channel) const override;
 
  private:
-  struct PatchImage;
+  struct PatchPyramid;
   struct Track {
     Patch patch;
     Similarity warp;     ///< from the patch to the last image it was found in
@@ -31,16 +31,16 @@ class PatchFrontEnd final : public PointFrontEnd {
     int frame = -1;      ///< the number of that image; -1: it is new
   };
 
-  [[nodiscard]] bool begin_track(const TrackingImage& image, const Point& point) override;
+  [[nodiscard]] bool begin_track(const ImagePyramid& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
-  [[nodiscard]] std::optional<cv::Point2f> find_again(const TrackingImage& image,
+  [[nodiscard]] std::optional<cv::Point2f> find_again(const ImagePyramid& image,
                                                       const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,
                         const std::vector<Point>& good,
                         const TrackPoints& expected) override;
   [[nodiscard]] static bool accept(
-      const PatchMatch& found, const PatchImage& image, int frame, const Point& from, Track& track);
+      const PatchMatch& found, const PatchPyramid& image, int frame, const Point& from, Track& track);
 
   std::map<int, Track> tracks_;                         ///< by id
   std::vector<std::map<int, Track>::node_type> ended_;  ///< their memory is that of new ones

@@ -9,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/grid_quota.hpp"
-#include "internal_check.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -28,9 +27,7 @@ int PointFrontEnd::num_levels(double scale) const {
   return std::max(1, options_.klt_levels - std::ilogb(scale));
 }
 
-Matches PointFrontEnd::process(std::shared_ptr<const PreparedImage> prepared, int frame) {
-  auto image = std::dynamic_pointer_cast<const TrackingImage>(std::move(prepared));
-  STEMVO_CHECK(image != nullptr, "an image prepared by this front end");
+Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, int frame) {
   if (last_.image != nullptr &&
       last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
@@ -136,9 +133,10 @@ void PointFrontEnd::find_expected(View& view) {
 void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
   find_expected(view);
-  const TrackingImage& image = *view.image;
-  const cv::Mat& pixels = image.corner_pixels;
-  const float to_pixels = image.corner_scale;
+  const ImagePyramid& image = *view.image;
+  const std::size_t level = image.levels.size() > 1 ? 1 : 0;
+  const cv::Mat& pixels = image.levels[level];
+  const float to_pixels = level > 0 ? 2.0F : 1.0F;
   const double min_distance =
       options_.min_distance_px / (image.channel.map.scale.minCoeff() * to_pixels);
   GridQuota quota(options_, image.channel.pixels.size());

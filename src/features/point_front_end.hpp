@@ -17,24 +17,18 @@ namespace stemvo {
 class PointFrontEnd : public FrontEnd {
  public:
   using FrontEnd::process;
-  [[nodiscard]] Matches process(std::shared_ptr<const PreparedImage> image, int frame) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
   void look_for(TrackPoints expected) override { expected_ = std::move(expected); }
 
  protected:
-  /// With the pyramid that the derived class tracks on.
-  struct TrackingImage : PreparedImage {
-    using PreparedImage::PreparedImage;
-    cv::Mat corner_pixels;      ///< where corners are looked for
-    float corner_scale = 1.0F;  ///< pixels of the image per pixel of it
-  };
   /// A point of an image, in that image's pixels.
   struct Point {
     cv::Point2f uv;
     int id = -1;
   };
   struct View {
-    std::shared_ptr<const TrackingImage> image;
+    std::shared_ptr<const ImagePyramid> image;
     std::vector<Point> points;  ///< ordered by id
     int frame = -1;
   };
@@ -48,12 +42,12 @@ class PointFrontEnd : public FrontEnd {
 
  private:
   /// A new corner; false: it cannot be tracked.
-  [[nodiscard]] virtual bool begin_track(const TrackingImage& image, const Point& point) = 0;
+  [[nodiscard]] virtual bool begin_track(const ImagePyramid& image, const Point& point) = 0;
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              const View& to) = 0;
   /// A track that ended, near `point` of the image; nullopt: it is not there.
-  [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const TrackingImage& /*image*/,
+  [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const ImagePyramid& /*image*/,
                                                               const Point& /*point*/) {
     return std::nullopt;
   }

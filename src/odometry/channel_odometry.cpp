@@ -35,54 +35,49 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
   }
 }
 
-FrameResult ChannelOdometry::process(PreparedFrame frame) {
+FrameResult ChannelOdometry::process(Frame frame) {
   track(std::move(frame));
   localize();
   return optimize();
 }
 
-PreparedFrame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& frame) {
-  PreparedFrame prepared;
-  prepared.pixels = frame;
+Frame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& image) {
+  Frame frame;
+  frame.image = image;
   Stopwatch watch;
-  const ChannelImage image = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
-  prepared.stem_ms = watch.lap_ms();
-  prepared.image = front_end_->prepare(image);
+  const ChannelImage seen = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
+  frame.times.stem_ms = watch.lap_ms();
+  frame.pyramid = front_end_->prepare(seen);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
-    prepared.road = std::make_shared<RoadImage>(make_road_image(image, given_camera_));
+    frame.road = std::make_shared<RoadImage>(make_road_image(seen, given_camera_));
   }
-  return prepared;
+  return frame;
 }
 
 /// Uses the front end only: the frame before may be optimized meanwhile.
-void ChannelOdometry::track(PreparedFrame frame) {
+void ChannelOdometry::track(Frame frame) {
   STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
-  FrameInWork& work = tracked_.emplace();
-  work.tracked.number = num_tracked_++;
-  work.image = std::move(frame.image);
-  work.problem = std::move(frame.problem);
-  if (work.image != nullptr) {
+  frame.number = num_tracked_++;
+  if (frame.has_image()) {
     Stopwatch watch;
-    work.tracked.has_image = true;
-    work.tracked.matches = front_end_->process(work.image, work.tracked.number);
-    work.tracked.image = std::move(frame.pixels);
-    work.tracked.road = std::move(frame.road);
-    work.times.stem_ms = frame.stem_ms;
-    work.times.features_ms = watch.lap_ms();
+    frame.matches = front_end_->process(frame.pyramid, frame.number);
+    frame.times.features_ms = watch.lap_ms();
   }
+  tracked_ = std::move(frame);
 }
 
 void ChannelOdometry::localize() {
   STEMVO_CHECK(tracked_.has_value(), "a frame was tracked");
   STEMVO_CHECK(!localized_.has_value(), "the frame before is optimized");
-  FrameInWork& work = localized_.emplace(*std::exchange(tracked_, std::nullopt));
+  FrameInWork& work =
+      localized_.emplace(FrameInWork{*std::exchange(tracked_, std::nullopt), {}});
   Stopwatch watch;
-  work.localized = estimator_->localize(work.tracked);
-  if (work.tracked.has_image) {
+  work.localized = estimator_->localize(work.frame);
+  if (work.frame.has_image()) {
     front_end_->keep(work.localized.inlier_mask);
     front_end_->look_for(std::move(work.localized.lost_landmarks));
-    work.times.pose_ms = watch.lap_ms();
+    work.frame.times.pose_ms = watch.lap_ms();
   }
 }
 
@@ -91,22 +86,22 @@ FrameResult ChannelOdometry::optimize() {
   STEMVO_CHECK(localized_.has_value(), "a frame was localized");
   FrameInWork work = *std::exchange(localized_, std::nullopt);
   Stopwatch watch;
-  estimator_->optimize(work.tracked, work.localized);
-  if (work.tracked.has_image) {
-    work.times.pose_ms += watch.lap_ms();
-  } else {  // what is drawn goes on showing the last image there was
-    work.image = optimized_.image;
+  estimator_->optimize(work.frame, work.localized);
+  if (work.frame.has_image()) {
+    work.frame.times.pose_ms += watch.lap_ms();
+  } else {  // the last image there was stays to be drawn
+    work.frame.pyramid = optimized_.frame.pyramid;
   }
   FrameResult& result = work.localized.result;
-  result.times = work.times;
-  result.problem = work.problem;
+  result.times = work.frame.times;
+  result.problem = work.frame.problem;
   optimized_ = std::move(work);
   return optimized_.localized.result;
 }
 
 const ChannelImage& ChannelOdometry::image() const {
   static const ChannelImage no_image;
-  return optimized_.image != nullptr ? optimized_.image->channel : no_image;
+  return optimized_.frame.pyramid != nullptr ? optimized_.frame.pyramid->channel : no_image;
 }
 
 }  // namespace stemvo

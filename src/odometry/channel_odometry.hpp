@@ -18,16 +18,6 @@
 
 namespace stemvo {
 
-/// A frame as far as it can be made without a pose: seen through the channel. Without an image it
-/// stands for a frame that could not be read.
-struct PreparedFrame {
-  cv::Mat pixels;                              ///< as given
-  std::shared_ptr<const PreparedImage> image;  ///< null: could not be read, or see problem
-  std::shared_ptr<const RoadImage> road;       ///< null: no road is measured
-  std::string problem;                         ///< why the stem gave no channel, else empty
-  double stem_ms = 0.0;
-};
-
 /// The odometry of one channel, after the stem: several of them can share one stem.
 /// Movable. The same channels give the same poses, whatever runs beside it.
 class ChannelOdometry {
@@ -35,16 +25,16 @@ class ChannelOdometry {
   /// For valid options; `options.stem` gives the stretch only. `mask`: as FrontEnd::set_mask.
   ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask = {});
 
-  /// The phases, as in PhasedOdometry. `frame`, of the camera's size, is where landmarks get their
-  /// colour; `stem_ms` is the stretch's alone.
-  [[nodiscard]] PreparedFrame prepare(const Channel& channel, const cv::Mat& frame);
-  void track(PreparedFrame frame);
+  /// The phases, as in PhasedOdometry. `image`, of the camera's size, is where landmarks get their
+  /// colour; `times.stem_ms` is the stretch's alone.
+  [[nodiscard]] Frame prepare(const Channel& channel, const cv::Mat& image);
+  void track(Frame frame);
   void localize();
   FrameResult optimize();
 
   /// The last three for one frame; one without an image stands for a frame that could not be read:
   /// the last motion goes on.
-  FrameResult process(PreparedFrame frame);
+  FrameResult process(Frame frame);
 
   [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
   /// It holds all frames optimized.
@@ -52,18 +42,14 @@ class ChannelOdometry {
 
   /// These belong to the last frame optimized; the image to the last one that had one.
   [[nodiscard]] const ChannelImage& image() const;
-  [[nodiscard]] const Matches& matches() const { return optimized_.tracked.matches; }
+  [[nodiscard]] const Matches& matches() const { return optimized_.frame.matches; }
   [[nodiscard]] const std::vector<char>& inlier_mask() const {
     return optimized_.localized.inlier_mask;
   }
 
  private:
-  /// A frame on its way: first tracked, then localized, at last optimized.
   struct FrameInWork {
-    std::shared_ptr<const PreparedImage> image;
-    TrackedFrame tracked;
-    StageTimes times;
-    std::string problem;
+    Frame frame;
     LocalizedFrame localized;
   };
 
@@ -74,7 +60,7 @@ class ChannelOdometry {
   std::unique_ptr<Estimator> estimator_;
 
   int num_tracked_ = 0;
-  std::optional<FrameInWork> tracked_;    ///< not localized
+  std::optional<Frame> tracked_;    ///< not localized
   std::optional<FrameInWork> localized_;  ///< not optimized
   FrameInWork optimized_;                 ///< the last one
 };

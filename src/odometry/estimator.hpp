@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -17,13 +18,18 @@
 
 namespace stemvo {
 
-/// A frame as an estimator gets it.
-struct TrackedFrame {
-  int number = 0;          ///< counted from 0, frames without an image among them
-  bool has_image = false;  ///< false: it could not be read, or not be seen through the channel
-  Matches matches;         ///< none on the first image
-  cv::Mat image;           ///< as given, gray or RGB: where landmarks get their colour
-  std::shared_ptr<const RoadImage> road;  ///< null: the road is not asked
+/// A frame on its way: prepared, tracked, localized, optimized. Without an image it stands for one
+/// that could not be read, or not be seen through the channel.
+struct Frame {
+  [[nodiscard]] bool has_image() const { return !image.empty(); }
+
+  int number = 0;  ///< counted from 0, frames without an image among them
+  cv::Mat image;   ///< as given, gray or RGB: where landmarks get their colour
+  std::shared_ptr<const ImagePyramid> pyramid;  ///< of the channel: where points are tracked
+  std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
+  Matches matches;                              ///< none on the first image
+  StageTimes times;
+  std::string problem;  ///< why the stem gave no channel, else empty
 };
 
 /// A frame whose pose may still be refined.
@@ -40,9 +46,9 @@ class Estimator {
   virtual ~Estimator() = default;
 
   /// First half: state and inliers.
-  [[nodiscard]] virtual LocalizedFrame localize(const TrackedFrame& frame) = 0;
+  [[nodiscard]] virtual LocalizedFrame localize(const Frame& frame) = 0;
   /// Second half, the slower one: completes the result with pose and scale.
-  virtual void optimize(const TrackedFrame& frame, LocalizedFrame& localized) = 0;
+  virtual void optimize(const Frame& frame, LocalizedFrame& localized) = 0;
 
   /// One pose per frame so far, world_from_camera, as they came.
   [[nodiscard]] virtual const std::vector<Rigid3>& trajectory() const = 0;

@@ -117,11 +117,11 @@ PairEstimator::PairEstimator(const Options& config, const Camera& camera)
       scale_(config, kSpeedSigma),
       last_step_(assumed_step(config.scale)) {}
 
-LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
+LocalizedFrame PairEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   const Matches& matches = frame.matches;
   motion_ = {};
-  if (!frame.has_image) {
+  if (!frame.has_image()) {
     motion_.state = FrameState::kNoImage;
   } else if (last_image_ < 0) {
     motion_.state = FrameState::kFirst;
@@ -140,7 +140,7 @@ LocalizedFrame PairEstimator::localize(const TrackedFrame& frame) {
   return localized;
 }
 
-void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
+void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
   result.state = motion_.state;
   if (motion_.state == FrameState::kNoImage) {
@@ -151,7 +151,7 @@ void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localize
   } else {
     result.state = chain_.add(motion_, measure_length(frame));
   }
-  last_image_ = frame.has_image ? frame.number : last_image_;
+  last_image_ = frame.has_image() ? frame.number : last_image_;
   scale_.report(result);
   result.camera = camera_;
   result.world_from_camera = chain_.world_from_camera();
@@ -159,7 +159,7 @@ void PairEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localize
 }
 
 /// The motion's length; 0 where it is not measured.
-double PairEstimator::measure_length(const TrackedFrame& frame) {
+double PairEstimator::measure_length(const Frame& frame) {
   if (!scale_.is_enabled()) {
     return 0.0;
   }

@@ -55,13 +55,13 @@ class PairEstimator final : public Estimator {
  public:
   PairEstimator(const Options& config, const Camera& camera);
 
-  [[nodiscard]] LocalizedFrame localize(const TrackedFrame& frame) override;
-  void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
+  [[nodiscard]] LocalizedFrame localize(const Frame& frame) override;
+  void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
 
  private:
-  [[nodiscard]] double measure_length(const TrackedFrame& frame);
+  [[nodiscard]] double measure_length(const Frame& frame);
 
   Camera camera_;
   TwoViewEstimator two_view_;

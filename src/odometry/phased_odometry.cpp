@@ -30,21 +30,21 @@ PhasedOdometry::PhasedOdometry(
     const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
     : stem_(std::move(stem)), zoom_(zoom), channel_odometry_(options, camera, mask) {}
 
-PreparedFrame PhasedOdometry::prepare(const cv::Mat& image) {
+Frame PhasedOdometry::prepare(const cv::Mat& image) {
   const Camera& camera = channel_odometry_.given_camera();
   STEMVO_CHECK(image.cols == camera.width_px && image.rows == camera.height_px,
                "the image has the camera's size");
   Stopwatch watch;
   const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image, zoom_); });
   const double stem_ms = watch.lap_ms();
-  PreparedFrame prepared;
+  Frame frame;
   if (!channel) {
-    prepared.problem = channel.error().message;
-    return prepared;
+    frame.problem = channel.error().message;
+    return frame;
   }
-  prepared = channel_odometry_.prepare(*channel, image);
-  prepared.stem_ms += stem_ms;
-  return prepared;
+  frame = channel_odometry_.prepare(*channel, image);
+  frame.times.stem_ms += stem_ms;
+  return frame;
 }
 
 }  // namespace stemvo

@@ -25,9 +25,9 @@ class PhasedOdometry {
 
   /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked). Frames are prepared in their order,
   /// one call at a time, which may run ahead of the others in another thread.
-  [[nodiscard]] PreparedFrame prepare(const cv::Mat& image);
+  [[nodiscard]] Frame prepare(const cv::Mat& image);
   /// Tracks the points to this frame, once the one before is localized.
-  void track(PreparedFrame frame) { channel_odometry_.track(std::move(frame)); }
+  void track(Frame frame) { channel_odometry_.track(std::move(frame)); }
   /// Localizes the frame tracked, once the one before is optimized.
   void localize() { channel_odometry_.localize(); }
   /// Optimizes the frame localized last, and returns its result. May run beside track() of the next
@@ -35,7 +35,7 @@ class PhasedOdometry {
   [[nodiscard]] FrameResult optimize() { return channel_odometry_.optimize(); }
 
   /// The last three for one frame, as ChannelOdometry::process.
-  [[nodiscard]] FrameResult process(PreparedFrame frame) {
+  [[nodiscard]] FrameResult process(Frame frame) {
     return channel_odometry_.process(std::move(frame));
   }
 

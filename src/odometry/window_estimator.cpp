@@ -44,24 +44,24 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
   localization_.seed = config.seed;
 }
 
-LocalizedFrame WindowEstimator::localize(const TrackedFrame& frame) {
+LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
   mask.assign(frame.matches.cur_uv.size(), 1);
   result.state = find_pose(frame, localized);
-  is_held_ = frame.has_image ? result.state != FrameState::kTracking : is_held_;
+  is_held_ = frame.has_image() ? result.state != FrameState::kTracking : is_held_;
   result.num_matches = static_cast<int>(mask.size());
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
-  if (frame.has_image && !is_initializing_) {
+  if (frame.has_image() && !is_initializing_) {
     localized.lost_landmarks =
         find_lost_landmarks(window_, world_from_camera_, anchor_.points, camera());
   }
   return localized;
 }
 
-FrameState WindowEstimator::find_pose(const TrackedFrame& frame, LocalizedFrame& localized) {
-  if (!frame.has_image) {
+FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& localized) {
+  if (!frame.has_image()) {
     world_from_camera_ = world_from_camera_ * prev_from_cur_;
     return FrameState::kNoImage;
   }
@@ -86,7 +86,7 @@ FrameState WindowEstimator::find_pose(const TrackedFrame& frame, LocalizedFrame&
                            : measure_since_reference(frame, now, localized);
 }
 
-FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
+FrameState WindowEstimator::accept_localization(const Frame& frame,
                                                 const Localization& found,
                                                 LocalizedFrame& localized) {
   is_initializing_ = false;
@@ -111,7 +111,7 @@ FrameState WindowEstimator::accept_localization(const TrackedFrame& frame,
 }
 
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
-FrameState WindowEstimator::measure_since_reference(const TrackedFrame& frame,
+FrameState WindowEstimator::measure_since_reference(const Frame& frame,
                                                     const TrackPoints& now,
                                                     LocalizedFrame& localized) {
   const bool had_map = !is_initializing_;
@@ -132,7 +132,7 @@ FrameState WindowEstimator::measure_since_reference(const TrackedFrame& frame,
 }
 
 /// Turns the motion since the reference into the frame's pose and state.
-FrameState WindowEstimator::accept_motion(const TrackedFrame& frame,
+FrameState WindowEstimator::accept_motion(const Frame& frame,
                                           const MeasuredMotion& motion,
                                           LocalizedFrame& localized) {
   if (motion.state == FrameState::kLost) {  // the last motion goes on, and no track does
@@ -223,9 +223,9 @@ void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& m
   }
 }
 
-void WindowEstimator::optimize(const TrackedFrame& frame, LocalizedFrame& localized) {
+void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
-  if (!is_initializing_ && frame.has_image) {
+  if (!is_initializing_ && frame.has_image()) {
     Keyframe& newest = window_.keyframes.back();
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
@@ -257,7 +257,7 @@ bool WindowEstimator::is_keyframe(const View& view) const {
          keyframe_parallax_px_;
 }
 
-void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
+void WindowEstimator::add_keyframe(const Frame& frame) {
   Keyframe keyframe{frame.number, world_from_camera_, anchor_.points, {}};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
@@ -279,8 +279,8 @@ void WindowEstimator::add_keyframe(const TrackedFrame& frame) {
   history_.observe(window_, frame.image);
 }
 
-void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state) {
-  if (!frame.has_image) {
+void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
+  if (!frame.has_image()) {
     scale_.hold("no image");
   } else if (state == FrameState::kLost) {
     scale_.hold("lost");
@@ -307,8 +307,8 @@ void WindowEstimator::measure_scale(const TrackedFrame& frame, FrameState state)
 }
 
 /// The pose is final.
-void WindowEstimator::remember(const TrackedFrame& frame, FrameState state) {
-  if (frame.has_image) {
+void WindowEstimator::remember(const Frame& frame, FrameState state) {
+  if (frame.has_image()) {
     const bool is_localized = !is_initializing_;
     const bool has_opened = is_localized && state == FrameState::kInitializing;
     if (has_opened || (is_localized && is_last_localized_)) {

@@ -26,8 +26,8 @@ class WindowEstimator final : public Estimator {
  public:
   WindowEstimator(const Options& config, const Camera& camera);
 
-  [[nodiscard]] LocalizedFrame localize(const TrackedFrame& frame) override;
-  void optimize(const TrackedFrame& frame, LocalizedFrame& localized) override;
+  [[nodiscard]] LocalizedFrame localize(const Frame& frame) override;
+  void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
   [[nodiscard]] LandmarkMap map() const override;
@@ -40,14 +40,14 @@ class WindowEstimator final : public Estimator {
 
  private:
   // Localization: what gives the frame its pose and its state.
-  FrameState find_pose(const TrackedFrame& frame, LocalizedFrame& localized);
-  FrameState accept_localization(const TrackedFrame& frame,
+  FrameState find_pose(const Frame& frame, LocalizedFrame& localized);
+  FrameState accept_localization(const Frame& frame,
                                  const Localization& found,
                                  LocalizedFrame& localized);
-  FrameState measure_since_reference(const TrackedFrame& frame,
+  FrameState measure_since_reference(const Frame& frame,
                                      const TrackPoints& now,
                                      LocalizedFrame& localized);
-  FrameState accept_motion(const TrackedFrame& frame,
+  FrameState accept_motion(const Frame& frame,
                            const MeasuredMotion& motion,
                            LocalizedFrame& localized);
 
@@ -63,9 +63,9 @@ class WindowEstimator final : public Estimator {
 
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
-  void add_keyframe(const TrackedFrame& frame);
-  void measure_scale(const TrackedFrame& frame, FrameState state);
-  void remember(const TrackedFrame& frame, FrameState state);
+  void add_keyframe(const Frame& frame);
+  void measure_scale(const Frame& frame, FrameState state);
+  void remember(const Frame& frame, FrameState state);
 
   OdometryOptions options_;
   WindowOptions window_options_;

@@ -30,7 +30,7 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
   struct Frame {
     std::chrono::steady_clock::time_point started;
     Expected<cv::Mat> pixels;
-    PreparedFrame prepared;
+    stemvo::Frame prepared;
   };
   std::array<Frame, kMaxInFlight> ring;
   const auto frame_at = [&](std::size_t index) -> Frame& { return ring[index % kMaxInFlight]; };

@@ -61,7 +61,7 @@ FilterDrive::FilterDrive(const Config& config, const FrameSource& sequence)
 
 void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
   const FrameResult result =
-      odometry_.process(channel == nullptr ? PreparedFrame() : odometry_.prepare(*channel, frame));
+      odometry_.process(channel == nullptr ? Frame() : odometry_.prepare(*channel, frame));
   if (num_frames() <= 1) {
     return;
   }

@@ -29,7 +29,7 @@ inline Options config_without_scale(OdometryMode mode = OdometryMode::kMap) {
 }
 
 /// Both halves of a frame.
-inline FrameResult add_frame(Estimator& estimator, const TrackedFrame& frame) {
+inline FrameResult add_frame(Estimator& estimator, const Frame& frame) {
   LocalizedFrame localized = estimator.localize(frame);
   estimator.optimize(frame, localized);
   return localized.result;
@@ -57,9 +57,8 @@ class EstimatorRun {
   void add_all() { add_range(0, drive_.num_frames()); }
   /// A frame with these matches in place of the drive's own.
   FrameResult add_matches(Matches matches, int i) {
-    TrackedFrame frame;
+    Frame frame;
     frame.number = static_cast<int>(results.size());
-    frame.has_image = true;
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.matches = std::move(matches);
@@ -81,7 +80,7 @@ class EstimatorRun {
     return results.back();
   }
   FrameResult add_missing() {
-    TrackedFrame frame;
+    Frame frame;
     frame.number = static_cast<int>(results.size());
     results.push_back(add_frame(estimator_, frame));
     return results.back();
