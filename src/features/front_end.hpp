@@ -13,12 +13,12 @@
 namespace stemvo {
 
 /// A track seen in a frame.
-struct TrackPoint {
+struct Observation {
   int track_id = -1;
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< input pixels
 };
 /// All of one frame, ordered by track id.
-using TrackPoints = std::vector<TrackPoint>;
+using Observations = std::vector<Observation>;
 
 /// Correspondences of two frames, in input pixels.
 struct Matches {
@@ -63,7 +63,7 @@ class FrontEnd {
   /// Tracks that ended but are worth finding again, where they should be in the last image (also
   /// outside of it); process() looks for them there before it looks for new corners. Called after
   /// keep(); a track that is not named is forgotten.
-  virtual void look_for(TrackPoints /*expected*/) {}  // NOLINT: an override keeps it
+  virtual void look_for(Observations /*expected*/) {}  // NOLINT: an override keeps it
 
  protected:
   /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.

@@ -26,7 +26,7 @@ class KltFrontEnd final : public PointFrontEnd {
                                                                      const View& to) override;
   void end_other_tracks(const std::vector<Point>&,
                         const std::vector<Point>&,
-                        const TrackPoints&) override {}
+                        const Observations&) override {}
 };
 
 }  // namespace stemvo

@@ -223,7 +223,7 @@ std::optional<cv::Point2f> PatchFrontEnd::find_again(const ImagePyramid& image,
 
 void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
                                      const std::vector<Point>& good,
-                                     const TrackPoints& expected) {
+                                     const Observations& expected) {
   const auto has = [](const auto& points, auto id_of, int id) {
     const auto found = std::ranges::lower_bound(points, id, {}, id_of);
     return found != points.end() && std::invoke(id_of, *found) == id;
@@ -231,7 +231,7 @@ void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     const int id = track->first;
     const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
-                         has(expected, &TrackPoint::track_id, id);
+                         has(expected, &Observation::track_id, id);
     const auto current = track++;
     if (!goes_on) {
       ended_.push_back(tracks_.extract(current));

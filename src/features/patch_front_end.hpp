@@ -38,7 +38,7 @@ class PatchFrontEnd final : public PointFrontEnd {
                                                       const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,
                         const std::vector<Point>& good,
-                        const TrackPoints& expected) override;
+                        const Observations& expected) override;
   [[nodiscard]] static bool accept(
       const PatchMatch& found, const PatchPyramid& image, int frame, const Point& from, Track& track);
 

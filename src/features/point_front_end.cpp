@@ -112,7 +112,7 @@ Matches PointFrontEnd::track(const View& from, View& to) {
 void PointFrontEnd::find_expected(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
   const std::vector<Point> tracked = view.points;
-  for (const TrackPoint& expected : std::exchange(expected_, {})) {
+  for (const Observation& expected : std::exchange(expected_, {})) {
     if (std::ranges::binary_search(tracked, expected.track_id, {}, &Point::id) ||
         std::ranges::binary_search(last_good_.points, expected.track_id, {}, &Point::id)) {
       continue;  // tracked here, or from the last good image

@@ -19,7 +19,7 @@ class PointFrontEnd : public FrontEnd {
   using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
   void keep(const std::vector<char>& is_good) override;
-  void look_for(TrackPoints expected) override { expected_ = std::move(expected); }
+  void look_for(Observations expected) override { expected_ = std::move(expected); }
 
  protected:
   /// A point of an image, in that image's pixels.
@@ -54,7 +54,7 @@ class PointFrontEnd : public FrontEnd {
   /// No track but those of these, each ordered by id, goes on.
   virtual void end_other_tracks(const std::vector<Point>& last,
                                 const std::vector<Point>& good,
-                                const TrackPoints& expected) = 0;
+                                const Observations& expected) = 0;
 
   [[nodiscard]] Matches track(const View& from, View& to);
   void track_from_last_good(View& now, Matches& matches);
@@ -65,7 +65,7 @@ class PointFrontEnd : public FrontEnd {
   FeatureOptions options_;
   View last_;
   View last_good_;        ///< the one before nearly every track ended; none otherwise
-  TrackPoints expected_;  ///< in last_; empty once they were looked for
+  Observations expected_;  ///< in last_; empty once they were looked for
   int next_id_ = 0;
 };
 

@@ -30,20 +30,20 @@ WindowBundle read_window(const Window& window,
   Bundle& bundle = read.bundle;
   bundle.camera = camera;
   bundle.camera_from_world = poses_of(window);
-  SightingWalk walk(window);
+  ObservationWalk walk(window);
   for (const auto& [track_id, point] : window.landmarks) {
-    const std::span<const Sighting> sightings = walk.seek(track_id);
+    const std::span<const KeyframeObservation> observations = walk.seek(track_id);
     const bool is_in_front =
-        std::all_of(sightings.begin(), sightings.end(), [&, &at = point](const Sighting& sighting) {
-          return (bundle.camera_from_world[sighting.keyframe] * at).z() > kMinDepth;
+        std::all_of(observations.begin(), observations.end(), [&, &at = point](const KeyframeObservation& observation) {
+          return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
         });
-    if (static_cast<int>(sightings.size()) < options.min_observations || !is_in_front ||
-        static_cast<int>(sightings.back().keyframe) < options.num_fixed_keyframes) {  // moves none
+    if (static_cast<int>(observations.size()) < options.min_observations || !is_in_front ||
+        static_cast<int>(observations.back().keyframe) < options.num_fixed_keyframes) {  // moves none
       continue;
     }
-    for (const Sighting& sighting : sightings) {
-      bundle.observations.push_back({static_cast<int>(sighting.keyframe),
-                                     static_cast<int>(bundle.points.size()), sighting.uv});
+    for (const KeyframeObservation& observation : observations) {
+      bundle.observations.push_back({static_cast<int>(observation.keyframe),
+                                     static_cast<int>(bundle.points.size()), observation.uv});
     }
     bundle.points.push_back(point);
     read.track_ids.push_back(track_id);

@@ -97,13 +97,13 @@ void Initializer::start(View reference) {
   waiting_.clear();
 }
 
-bool Initializer::is_worn_out(const TrackPoints& now) const {
+bool Initializer::is_worn_out(const Observations& now) const {
   const auto living = static_cast<double>(common_points(reference_.points, now).size());
   return living < kMinLiving * static_cast<double>(reference_.points.size());
 }
 
 MeasuredMotion Initializer::measure(const Matches& matches,
-                                    const TrackPoints& now,
+                                    const Observations& now,
                                     const Camera& camera) {
   const std::vector<char> all(matches.cur_uv.size(), 1);
   if (reference_.points.empty()) {

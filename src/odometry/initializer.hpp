@@ -20,7 +20,7 @@ namespace stemvo {
 struct View {
   int frame = -1;
   Rigid3 world_from_camera;
-  TrackPoints points;
+  Observations points;
   std::shared_ptr<const RoadImage> road = nullptr;  ///< null: the road is not asked, or not kept
 };
 
@@ -35,12 +35,12 @@ class Initializer {
   void start(View reference);
   [[nodiscard]] const View& reference() const { return reference_; }
   /// Too few of its tracks live: it will not decide any more.
-  [[nodiscard]] bool is_worn_out(const TrackPoints& now) const;
+  [[nodiscard]] bool is_worn_out(const Observations& now) const;
 
   /// The motion from the reference to a frame. `inlier_mask` is one per match of the frame; a match
   /// that the reference does not see is kept.
   [[nodiscard]] MeasuredMotion measure(const Matches& matches,
-                                       const TrackPoints& now,
+                                       const Observations& now,
                                        const Camera& camera);
 
   /// The window of the reference, `now` and the landmarks between them, the frames between them

@@ -55,10 +55,10 @@ Eigen::Quaterniond rotation_between(const PixelPairs& pairs, const Camera& camer
 
 }  // namespace
 
-SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame) {
+SeenLandmarks find_seen_landmarks(const Window& window, const Observations& frame) {
   SeenLandmarks seen;
   auto landmark = window.landmarks.begin();
-  for (const TrackPoint& point : frame) {
+  for (const Observation& point : frame) {
     while (landmark != window.landmarks.end() && landmark->first < point.track_id) {
       ++landmark;
     }
@@ -70,12 +70,12 @@ SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame
   return seen;
 }
 
-TrackPoints find_lost_landmarks(const Window& window,
+Observations find_lost_landmarks(const Window& window,
                                 const Rigid3& world_from_camera,
-                                const TrackPoints& frame,
+                                const Observations& frame,
                                 const Camera& camera) {
   const Rigid3 camera_from_world = world_from_camera.inverse();
-  TrackPoints lost;
+  Observations lost;
   auto seen = frame.begin();
   for (const auto& [track_id, point_in_world] : window.landmarks) {
     while (seen != frame.end() && seen->track_id < track_id) {

@@ -20,12 +20,12 @@ struct SeenLandmarks {
 
   [[nodiscard]] int size() const { return static_cast<int>(points.size()); }
 };
-[[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const TrackPoints& frame);
+[[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const Observations& frame);
 
 /// Landmarks in front of the camera that are not among the frame's points, where they should be.
-[[nodiscard]] TrackPoints find_lost_landmarks(const Window& window,
+[[nodiscard]] Observations find_lost_landmarks(const Window& window,
                                               const Rigid3& world_from_camera,
-                                              const TrackPoints& frame,
+                                              const Observations& frame,
                                               const Camera& camera);
 
 struct LocalizationOptions {

@@ -12,18 +12,18 @@
 namespace stemvo {
 namespace {
 
-bool is_before(const TrackPoint& a, const TrackPoint& b) { return a.track_id < b.track_id; }
+bool is_before(const Observation& a, const Observation& b) { return a.track_id < b.track_id; }
 
-void sort_by_id(TrackPoints& points) {
+void sort_by_id(Observations& points) {
   if (!std::is_sorted(points.begin(), points.end(), is_before)) {
     std::sort(points.begin(), points.end(), is_before);
   }
 }
 
-TrackPoints kept_points(const std::vector<int>& track_ids,
+Observations kept_points(const std::vector<int>& track_ids,
                         const std::vector<Eigen::Vector2d>& uv,
                         const std::vector<char>& is_kept) {
-  TrackPoints points;
+  Observations points;
   points.reserve(uv.size());
   for (std::size_t i = 0; i < uv.size(); ++i) {
     if (is_kept[i] != 0) {
@@ -53,38 +53,38 @@ Eigen::Matrix3d fundamental_of(const Rigid3& cur_from_prev, const Camera& camera
 
 }  // namespace
 
-TrackPoints previous_points(const Matches& matches, const std::vector<char>& is_kept) {
+Observations previous_points(const Matches& matches, const std::vector<char>& is_kept) {
   return kept_points(matches.track_ids, matches.prev_uv, is_kept);
 }
 
-TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept) {
+Observations current_points(const Matches& matches, const std::vector<char>& is_kept) {
   return kept_points(matches.track_ids, matches.cur_uv, is_kept);
 }
 
 void add_begun_points(const Matches& matches,
                       const std::vector<char>& is_kept,
-                      TrackPoints& points) {
-  TrackPoints begun = previous_points(matches, is_kept);
-  std::erase_if(begun, [&](const TrackPoint& point) {
+                      Observations& points) {
+  Observations begun = previous_points(matches, is_kept);
+  std::erase_if(begun, [&](const Observation& point) {
     return find_point(points, point.track_id) != nullptr;
   });
   points.insert(points.end(), begun.begin(), begun.end());
   sort_by_id(points);
 }
 
-const TrackPoint* find_point(const TrackPoints& points, int track_id) {
+const Observation* find_point(const Observations& points, int track_id) {
   if (points.empty() || track_id < points.front().track_id || track_id > points.back().track_id) {
     return nullptr;  // most are: tracks are young or old
   }
   const auto found =
-      std::lower_bound(points.begin(), points.end(), TrackPoint{track_id, {}}, is_before);
+      std::lower_bound(points.begin(), points.end(), Observation{track_id, {}}, is_before);
   return found != points.end() && found->track_id == track_id ? &*found : nullptr;
 }
 
-PointPairs common_points(const TrackPoints& prev, const TrackPoints& cur) {
+PointPairs common_points(const Observations& prev, const Observations& cur) {
   PointPairs pairs;
   auto other = prev.begin();
-  for (const TrackPoint& point : cur) {
+  for (const Observation& point : cur) {
     while (other != prev.end() && is_before(*other, point)) {
       ++other;
     }
@@ -106,8 +106,8 @@ double median_flow_px(const PixelPairs& pairs) {
   return median(std::move(lengths));
 }
 
-bool is_stationary(const TrackPoints& before,
-                   const TrackPoints& now,
+bool is_stationary(const Observations& before,
+                   const Observations& now,
                    double min_flow_px,
                    int min_tracks) {
   const PointPairs pairs = common_points(before, now);

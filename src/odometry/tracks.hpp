@@ -16,17 +16,17 @@
 namespace stemvo {
 
 /// Where the kept matches (one flag per match) start and end.
-[[nodiscard]] TrackPoints previous_points(const Matches& matches, const std::vector<char>& is_kept);
-[[nodiscard]] TrackPoints current_points(const Matches& matches, const std::vector<char>& is_kept);
+[[nodiscard]] Observations previous_points(const Matches& matches, const std::vector<char>& is_kept);
+[[nodiscard]] Observations current_points(const Matches& matches, const std::vector<char>& is_kept);
 
 /// Adds where kept matches start that `points`, of the frame they start at, lacks: new corners are
 /// looked for once a frame's other points are known.
 void add_begun_points(const Matches& matches,
                       const std::vector<char>& is_kept,
-                      TrackPoints& points);
+                      Observations& points);
 
 /// The track's point, or nullptr.
-[[nodiscard]] const TrackPoint* find_point(const TrackPoints& points, int track_id);
+[[nodiscard]] const Observation* find_point(const Observations& points, int track_id);
 
 /// Tracks that two frames share.
 struct PointPairs {
@@ -36,7 +36,7 @@ struct PointPairs {
 
   [[nodiscard]] int size() const { return static_cast<int>(track_ids.size()); }
 };
-[[nodiscard]] PointPairs common_points(const TrackPoints& prev, const TrackPoints& cur);
+[[nodiscard]] PointPairs common_points(const Observations& prev, const Observations& cur);
 
 /// The values that the mask keeps.
 template <typename T>
@@ -58,8 +58,8 @@ template <typename T>
 
 /// The tracks stay where they were: their median flow is less than `min_flow_px`. False where the
 /// two share fewer than `min_tracks`.
-[[nodiscard]] bool is_stationary(const TrackPoints& before,
-                                 const TrackPoints& now,
+[[nodiscard]] bool is_stationary(const Observations& before,
+                                 const Observations& now,
                                  double min_flow_px,
                                  int min_tracks);
 

@@ -20,25 +20,25 @@ constexpr int kMinConnection = 20;
 constexpr std::size_t kNumRecent = 4;
 
 bool is_seen_well(const Eigen::Vector3d& point_in_world,
-                  std::span<const Sighting> sightings,
+                  std::span<const KeyframeObservation> observations,
                   const std::vector<Rigid3>& poses,
                   const Camera& camera,
                   double bound_px) {
-  return std::all_of(sightings.begin(), sightings.end(), [&](const Sighting& seen) {
+  return std::all_of(observations.begin(), observations.end(), [&](const KeyframeObservation& seen) {
     return is_near(poses[seen.keyframe], point_in_world, seen.uv, camera, bound_px);
   });
 }
 
 std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
-                                                 std::span<const Sighting> sightings,
+                                                 std::span<const KeyframeObservation> observations,
                                                  const std::vector<Rigid3>& poses,
                                                  const Camera& camera,
                                                  const WindowOptions& options) {
-  if (sightings.size() < 2) {
+  if (observations.size() < 2) {
     return std::nullopt;
   }
-  const Sighting& first = sightings.front();
-  const Sighting& last = sightings.back();
+  const KeyframeObservation& first = observations.front();
+  const KeyframeObservation& last = observations.back();
   const Rigid3& world_from_first = window.keyframes[first.keyframe].world_from_camera;
   const TriangulatedPoint point =
       triangulate(poses[last.keyframe] * world_from_first, camera.normalize(first.uv),
@@ -48,7 +48,7 @@ std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
     return std::nullopt;
   }
   const Eigen::Vector3d in_world = world_from_first * point.in_prev;
-  return is_seen_well(in_world, sightings, poses, camera, options.max_reprojection_error_px)
+  return is_seen_well(in_world, observations, poses, camera, options.max_reprojection_error_px)
              ? std::optional(in_world)
              : std::nullopt;
 }
@@ -71,16 +71,16 @@ void drop(Window& window, std::size_t i) {
 
 }  // namespace
 
-SightingWalk::SightingWalk(const Window& window) : window_(window) {
+ObservationWalk::ObservationWalk(const Window& window) : window_(window) {
   for (const Keyframe& keyframe : window.keyframes) {
     next_.push_back(keyframe.points.begin());
   }
 }
 
-std::span<const Sighting> SightingWalk::seek(int track_id) {
+std::span<const KeyframeObservation> ObservationWalk::seek(int track_id) {
   found_.clear();
   for (std::size_t i = 0; i < next_.size(); ++i) {
-    const TrackPoints& points = window_.keyframes[i].points;
+    const Observations& points = window_.keyframes[i].points;
     while (next_[i] != points.end() && next_[i]->track_id < track_id) {
       ++next_[i];
     }
@@ -124,7 +124,7 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
 std::vector<int> lost_tracks(const Window& window, std::size_t leaving, const Keyframe& coming) {
   const Keyframe& keyframe = window.keyframes[leaving];
   std::vector<int> lost;
-  for (const TrackPoint& point : keyframe.points) {
+  for (const Observation& point : keyframe.points) {
     const auto sees = [&](const Keyframe& other) {
       return &other != &keyframe && find_point(other.points, point.track_id) != nullptr;
     };
@@ -151,8 +151,8 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
     return;
   }
   const std::vector<Rigid3> poses = poses_of(window);
-  SightingWalk walk(window);
-  for (const TrackPoint& point : window.keyframes.back().points) {
+  ObservationWalk walk(window);
+  for (const Observation& point : window.keyframes.back().points) {
     if (window.landmarks.contains(point.track_id)) {
       continue;
     }
@@ -165,7 +165,7 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
 
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options) {
   const std::vector<Rigid3> poses = poses_of(window);
-  SightingWalk walk(window);
+  ObservationWalk walk(window);
   std::erase_if(window.landmarks, [&](const auto& landmark) {
     const auto& [track_id, point_in_world] = landmark;
     return !is_seen_well(point_in_world, walk.seek(track_id), poses, camera,

@@ -25,7 +25,7 @@ struct FrameBetween {
 struct Keyframe {
   int frame = 0;
   Rigid3 world_from_camera;
-  TrackPoints points;
+  Observations points;
   std::vector<FrameBetween> followers;  ///< frames after it, until the next keyframe; in order
 };
 
@@ -45,23 +45,23 @@ struct WindowOptions {
 };
 
 /// A keyframe's view of a track.
-struct Sighting {
+struct KeyframeObservation {
   std::size_t keyframe;  ///< its place in the window
   Eigen::Vector2d uv;
 };
 
 /// Looks tracks up in all keyframes of a window, in the order of their ids: every keyframe's points
 /// are walked over once.
-class SightingWalk {
+class ObservationWalk {
  public:
-  explicit SightingWalk(const Window& window);
+  explicit ObservationWalk(const Window& window);
   /// Oldest keyframe first; valid until the next call, whose id is higher.
-  [[nodiscard]] std::span<const Sighting> seek(int track_id);
+  [[nodiscard]] std::span<const KeyframeObservation> seek(int track_id);
 
  private:
   const Window& window_;
-  std::vector<TrackPoints::const_iterator> next_;  ///< of each keyframe
-  std::vector<Sighting> found_;
+  std::vector<Observations::const_iterator> next_;  ///< of each keyframe
+  std::vector<KeyframeObservation> found_;
 };
 
 /// camera_from_world of the keyframes.

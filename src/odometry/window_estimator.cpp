@@ -71,7 +71,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     return FrameState::kFirst;
   }
   std::optional<StageTimer> timer;
-  const TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  const Observations now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
     if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
@@ -92,7 +92,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   is_initializing_ = false;
   world_from_camera_ = found.world_from_camera;
   mark_outliers(frame.matches, localized.inlier_mask);
-  TrackPoints now = current_points(frame.matches, localized.inlier_mask);
+  Observations now = current_points(frame.matches, localized.inlier_mask);
   const Rigid3 before = anchor_.world_from_camera;
   const double bound_px = kTurnFlow * min_flow_px();
   std::optional<Rigid3> turned;
@@ -112,7 +112,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
 
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
 FrameState WindowEstimator::measure_since_reference(const Frame& frame,
-                                                    const TrackPoints& now,
+                                                    const Observations& now,
                                                     LocalizedFrame& localized) {
   const bool had_map = !is_initializing_;
   const View& reference = initializer_.reference();
@@ -147,7 +147,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   const double length = step_ * (frame.number - reference.frame - frames_still_);
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
-  const TrackPoints points = current_points(frame.matches, motion.inlier_mask);
+  const Observations points = current_points(frame.matches, motion.inlier_mask);
   const bool is_tracking = motion.state == FrameState::kTracking;
   if (is_tracking && motion.is_decisive && open_window({frame.number, guess, points, frame.road})) {
     return FrameState::kInitializing;

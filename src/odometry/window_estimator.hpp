@@ -45,7 +45,7 @@ class WindowEstimator final : public Estimator {
                                  const Localization& found,
                                  LocalizedFrame& localized);
   FrameState measure_since_reference(const Frame& frame,
-                                     const TrackPoints& now,
+                                     const Observations& now,
                                      LocalizedFrame& localized);
   FrameState accept_motion(const Frame& frame,
                            const MeasuredMotion& motion,

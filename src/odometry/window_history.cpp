@@ -39,7 +39,7 @@ std::array<std::uint8_t, 3> color_at(const cv::Mat& image, const Eigen::Vector2d
 
 void WindowHistory::observe(const Window& window, const cv::Mat& image) {
   const Keyframe& newest = window.keyframes.back();
-  for (const TrackPoint& observation : newest.points) {
+  for (const Observation& observation : newest.points) {
     const auto sees = [&](const Keyframe& keyframe) {
       return find_point(keyframe.points, observation.track_id) != nullptr;
     };
@@ -132,7 +132,7 @@ void WindowHistory::close(const Window& window) {
     keep_followers(window.keyframes.back());
   }
   for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend(); ++keyframe) {
-    for (const TrackPoint& observation : keyframe->points) {
+    for (const Observation& observation : keyframe->points) {
       keep(window, *keyframe, observation.track_id);
     }
   }

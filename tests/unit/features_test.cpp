@@ -140,7 +140,7 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
   // Every second track ends. Of those the first and each third after it is expected where it is,
   // the next too far away, the third not at all.
   std::vector<char> is_good(n, 1);
-  TrackPoints expected;
+  Observations expected;
   for (std::size_t i = 0; i < n; i += 2) {
     is_good[i] = 0;
     const Eigen::Vector2d off(i % 6 == 0 ? 1.2 : 16.0, -0.8);
@@ -173,7 +173,7 @@ TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
   static_cast<void>(show(textured_image(size, {0.0, 0.0})));
   const Matches before = show(textured_image(size, {1.0, 0.0}));
   ASSERT_GT(before.track_ids.size(), 50U);
-  TrackPoints expected;
+  Observations expected;
   for (std::size_t i = 0; i < before.track_ids.size(); ++i) {
     expected.push_back({before.track_ids[i], before.cur_uv[i]});
   }

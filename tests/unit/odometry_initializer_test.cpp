@@ -140,7 +140,7 @@ TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   for (Eigen::Vector2d& uv : matches.cur_uv) {
     uv = random.pixel(walk.camera);
   }
-  const TrackPoints now = view_of(matches, Rigid3(), 1).points;
+  const Observations now = view_of(matches, Rigid3(), 1).points;
   const MeasuredMotion motion = initializer.measure(matches, now, walk.camera);
   EXPECT_FALSE(motion.state == FrameState::kTracking && motion.is_decisive);
   initializer.start({0, Rigid3(), {}});
@@ -150,7 +150,7 @@ TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
 TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
   const DriveTracks walk = sideways_walk(0.0, 10);
   Initializer initializer(Options{});
-  TrackPoints points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
+  Observations points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
   initializer.start({0, Rigid3(), points});
   EXPECT_FALSE(initializer.is_worn_out(points));
   points.resize(points.size() * 6 / 10);

@@ -66,7 +66,7 @@ TEST(Localization, TooFewOrContradictingLandmarksGiveNoPose) {
 TEST(Localization, SeesTheLandmarksThatTheFrameTracks) {
   Window window;
   window.landmarks = {{2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {9, {0.0, 0.0, 9.0}}};
-  const TrackPoints points{{1, {1.0, 0.0}}, {5, {5.0, 0.0}}, {7, {7.0, 0.0}}, {9, {9.0, 0.0}}};
+  const Observations points{{1, {1.0, 0.0}}, {5, {5.0, 0.0}}, {7, {7.0, 0.0}}, {9, {9.0, 0.0}}};
   const SeenLandmarks seen = find_seen_landmarks(window, points);
   ASSERT_EQ(seen.size(), 2);
   EXPECT_EQ(seen.points[0].z(), 5.0);
@@ -79,7 +79,7 @@ TEST(Localization, LostLandmarksAreThoseInFrontThatTheFrameDoesNotTrack) {
   window.landmarks = {
       {2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {6, {1.0, 0.0, -5.0}}, {9, {1.0, 2.0, 9.0}}};
   const Rigid3 world_from_camera(Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0});
-  const TrackPoints lost =
+  const Observations lost =
       find_lost_landmarks(window, world_from_camera, {{5, {50.0, 40.0}}}, camera);
   ASSERT_EQ(lost.size(), 2U);
   EXPECT_EQ(lost[0].track_id, 2);

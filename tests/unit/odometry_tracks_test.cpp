@@ -17,8 +17,8 @@ Matches make_matches() {
   return matches;
 }
 
-TEST(TrackPoints, AreOrderedAndWithoutWhatIsNotKept) {
-  const TrackPoints points = current_points(make_matches(), {1, 1, 0, 1});
+TEST(Observations, AreOrderedAndWithoutWhatIsNotKept) {
+  const Observations points = current_points(make_matches(), {1, 1, 0, 1});
   ASSERT_EQ(points.size(), 3U);
   EXPECT_EQ(points[0].track_id, 2);
   EXPECT_EQ(points[1].track_id, 4);
@@ -27,8 +27,8 @@ TEST(TrackPoints, AreOrderedAndWithoutWhatIsNotKept) {
   EXPECT_EQ(previous_points(make_matches(), {1, 1, 0, 1})[2].uv, Eigen::Vector2d(7.0, 0.0));
 }
 
-TEST(TrackPoints, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
-  TrackPoints points{{2, {-1.0, -1.0}}, {5, {-2.0, -2.0}}};
+TEST(Observations, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
+  Observations points{{2, {-1.0, -1.0}}, {5, {-2.0, -2.0}}};
   add_begun_points(make_matches(), {1, 1, 1, 0}, points);
   ASSERT_EQ(points.size(), 4U);
   EXPECT_EQ(find_point(points, 2)->uv, Eigen::Vector2d(-1.0, -1.0));
@@ -41,9 +41,9 @@ TEST(TrackPoints, BegunOnesAreAddedWhereTheyStartAndOthersStayWhereTheyAre) {
   }
 }
 
-TEST(TrackPoints, PairsAreOfTracksThatBothFramesSee) {
-  const TrackPoints prev{{1, {1.0, 1.0}}, {4, {4.0, 4.0}}, {6, {6.0, 6.0}}};
-  const TrackPoints cur{{0, {0.0, 9.0}}, {4, {5.0, 4.0}}, {6, {7.0, 6.0}}, {8, {8.0, 9.0}}};
+TEST(Observations, PairsAreOfTracksThatBothFramesSee) {
+  const Observations prev{{1, {1.0, 1.0}}, {4, {4.0, 4.0}}, {6, {6.0, 6.0}}};
+  const Observations cur{{0, {0.0, 9.0}}, {4, {5.0, 4.0}}, {6, {7.0, 6.0}}, {8, {8.0, 9.0}}};
   const PointPairs pairs = common_points(prev, cur);
   ASSERT_EQ(pairs.size(), 2);
   EXPECT_EQ(pairs.track_ids[0], 4);
@@ -71,8 +71,8 @@ TEST(Parallax, IsWhatARotationLeavesOfTheFlow) {
 }
 
 TEST(IsStationary, ByTheMedianFlowOfTwentyTracks) {
-  TrackPoints before;
-  TrackPoints now;
+  Observations before;
+  Observations now;
   for (int i = 0; i < 21; ++i) {
     const Eigen::Vector2d uv(10.0 * i, 50.0);
     before.push_back({i, uv});

@@ -176,7 +176,7 @@ double reprojection_error_px(const Window& window, const Camera& camera) {
   for (const Keyframe& keyframe : window.keyframes) {
     const Rigid3 camera_from_world = keyframe.world_from_camera.inverse();
     for (const auto& [track_id, point] : window.landmarks) {
-      if (const TrackPoint* seen = find_point(keyframe.points, track_id)) {
+      if (const Observation* seen = find_point(keyframe.points, track_id)) {
         sum += (camera.project(camera_from_world * point) - seen->uv).norm();
         ++count;
       }
