@@ -9,7 +9,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "geometry/bundle_sums.hpp"
+#include "geometry/normal_equations.hpp"
 #include "geometry/cauchy_loss.hpp"
 #include "internal_check.hpp"
 
@@ -22,7 +22,7 @@ constexpr double kMinBundleDepth = 1e-6;
 /// More keeps the first steps from where the data hardly pull: where the window bends, and the
 /// camera. With 1e-4 ten steps end half-way there.
 constexpr double kFirstDamping = 1e-7;
-constexpr int kCamera = BundleSums::kCamera;
+constexpr int kCamera = NormalEquations::kCamera;
 
 std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
   std::vector<Eigen::Matrix3d> rotations;
@@ -33,13 +33,13 @@ std::vector<Eigen::Matrix3d> rotations_of(const Bundle& bundle) {
 }
 
 /// The normal equations without the points: the camera first, then the free poses.
-class BundleEquations {
+class ReducedEquations {
  public:
-  BundleEquations(const Bundle& bundle, const BundleOptions& options)
+  ReducedEquations(const Bundle& bundle, const BundleOptions& options)
       : options_(options),
         num_camera_(options.camera ? kCamera : 0),
-        sums_(bundle, options.num_fixed_poses, options.camera.has_value()),
-        size_(num_camera_ + 6 * sums_.num_free_poses()),
+        equations_(bundle, options.num_fixed_poses, options.camera.has_value()),
+        size_(num_camera_ + 6 * equations_.num_free_poses()),
         reduced_(size_, size_),
         gradient_(size_),
         diagonal_(size_) {}
@@ -48,9 +48,9 @@ class BundleEquations {
   void linearize(const Bundle& bundle, const std::vector<Reprojection>& at, double damping);
   /// Moves `bundle` by the solution; false where there is none.
   [[nodiscard]] bool step(double damping,
-                          const CameraChange& from_prior,
+                          const IntrinsicsDelta& from_prior,
                           Bundle& bundle,
-                          CameraChange& camera_change) const;
+                          IntrinsicsDelta& camera_change) const;
   [[nodiscard]] CameraInformation camera_information() const;
 
  private:
@@ -59,7 +59,7 @@ class BundleEquations {
 
   BundleOptions options_;
   int num_camera_;
-  BundleSums sums_;
+  NormalEquations equations_;
   int size_;
   Eigen::MatrixXd reduced_;  ///< upper triangle
   Eigen::VectorXd gradient_;
@@ -67,7 +67,7 @@ class BundleEquations {
 };
 
 template <std::size_t kColumns>
-void copy(const BundleSums::Block<kColumns>& from, int num_rows, Eigen::Ref<Eigen::MatrixXd> to) {
+void copy(const NormalEquations::Block<kColumns>& from, int num_rows, Eigen::Ref<Eigen::MatrixXd> to) {
   for (std::size_t c = 0; c < kColumns; ++c) {
     for (int r = 0; r < num_rows; ++r) {
       to(r, static_cast<int>(c)) = from[c][r];
@@ -75,7 +75,7 @@ void copy(const BundleSums::Block<kColumns>& from, int num_rows, Eigen::Ref<Eige
   }
 }
 
-void move_camera(const CameraChange& change, Bundle& bundle) {
+void move_camera(const IntrinsicsDelta& change, Bundle& bundle) {
   bundle.camera.cx_px += change[0];
   bundle.camera.cy_px += change[1];
   bundle.camera.fx_px *= 1.0 + change[2];
@@ -83,30 +83,30 @@ void move_camera(const CameraChange& change, Bundle& bundle) {
   bundle.radial += change.tail<2>();
 }
 
-void BundleEquations::linearize(const Bundle& bundle,
+void ReducedEquations::linearize(const Bundle& bundle,
                                 const std::vector<Reprojection>& at,
                                 double damping) {
-  sums_.add_up(bundle, at, damping);
-  const BundleSums::Block<2> of_camera = {sums_.camera.gradient, sums_.camera.diagonal};
+  equations_.add_up(bundle, at, damping);
+  const NormalEquations::Block<2> of_camera = {equations_.camera.gradient, equations_.camera.diagonal};
   Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
   copy(of_camera, num_camera_, columns.topRows(num_camera_));
-  copy(sums_.camera.with_camera, num_camera_, reduced_.topLeftCorner(num_camera_, num_camera_));
-  for (int j = 0; j < sums_.num_free_poses(); ++j) {
-    const BundleSums::Pose& pose = sums_.poses[static_cast<std::size_t>(j)];
-    copy(BundleSums::Block<2>{pose.gradient, pose.diagonal}, 6, columns.middleRows<6>(row_of(j)));
+  copy(equations_.camera.with_camera, num_camera_, reduced_.topLeftCorner(num_camera_, num_camera_));
+  for (int j = 0; j < equations_.num_free_poses(); ++j) {
+    const NormalEquations::Pose& pose = equations_.poses[static_cast<std::size_t>(j)];
+    copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6, columns.middleRows<6>(row_of(j)));
     copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
     for (int i = 0; i <= j; ++i) {
-      copy(sums_.of_poses[sums_.index_of(i, j)], 6, reduced_.block<6, 6>(row_of(i), row_of(j)));
+      copy(equations_.H_pp[equations_.index_of(i, j)], 6, reduced_.block<6, 6>(row_of(i), row_of(j)));
     }
   }
   gradient_ = columns.col(0);
   diagonal_ = columns.col(1);
 }
 
-bool BundleEquations::step(double damping,
-                           const CameraChange& from_prior,
+bool ReducedEquations::step(double damping,
+                           const IntrinsicsDelta& from_prior,
                            Bundle& bundle,
-                           CameraChange& camera_change) const {
+                           IntrinsicsDelta& camera_change) const {
   Eigen::MatrixXd damped = reduced_;
   Eigen::VectorXd gradient = gradient_;
   damped.diagonal() += damping * diagonal_;
@@ -135,8 +135,8 @@ bool BundleEquations::step(double damping,
   return true;
 }
 
-void BundleEquations::move_points(const Eigen::VectorXd& change, Bundle& bundle) const {
-  const auto times = [](const BundleSums::Block<3>& block, const auto& by) {
+void ReducedEquations::move_points(const Eigen::VectorXd& change, Bundle& bundle) const {
+  const auto times = [](const NormalEquations::Block<3>& block, const auto& by) {
     Eigen::Vector3d result;
     for (std::size_t c = 0; c < block.size(); ++c) {
       double sum = 0.0;
@@ -150,26 +150,26 @@ void BundleEquations::move_points(const Eigen::VectorXd& change, Bundle& bundle)
   const auto& all = bundle.observations;
   for (std::size_t i = 0; i < all.size();) {
     const auto index = static_cast<std::size_t>(all[i].point);
-    const BundleSums::Point& point = sums_.points[index];
+    const NormalEquations::Point& point = equations_.points[index];
     Eigen::Vector3d rest(point.gradient[0], point.gradient[1], point.gradient[2]);
     if (num_camera_ > 0) {
       rest += times(point.with_camera, change.head<kCamera>());
     }
     for (; i < all.size() && all[i].point == static_cast<int>(index); ++i) {
       if (const int free = all[i].pose - options_.num_fixed_poses; free >= 0) {
-        rest += times(sums_.pose_with_point[i], change.segment<6>(row_of(free)));
+        rest += times(equations_.H_pl[i], change.segment<6>(row_of(free)));
       }
     }
     Eigen::Matrix3d inverse;
     for (int c = 0; c < 3; ++c) {
-      const BundleSums::Lanes4& column = point.inverse[c];
+      const NormalEquations::Lanes4& column = point.inverse[c];
       inverse.col(c) << column[0], column[1], column[2];
     }
     bundle.points[index] -= inverse * rest;
   }
 }
 
-CameraInformation BundleEquations::camera_information() const {
+CameraInformation ReducedEquations::camera_information() const {
   const int rest = size_ - num_camera_;
   Eigen::MatrixXd poses = reduced_.bottomRightCorner(rest, rest);
   poses.diagonal() += 1e-9 * diagonal_.tail(rest);  // lengths may be free
@@ -202,7 +202,7 @@ double reproject(const Bundle& bundle, double loss_scale_px, std::vector<Reproje
 
 }  // namespace
 
-BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
+BundleResult solve_bundle_adjustment(Bundle& bundle, const BundleOptions& options) {
   const auto place = [](const Bundle::Observation& observation) {
     return std::pair(observation.point, observation.pose);
   };
@@ -210,8 +210,8 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
                                           place) == bundle.observations.end(),
                "observations are ordered by point, then by pose, and none comes twice");
   BundleResult result;
-  const auto prior_cost = [&](const CameraChange& change) {
-    const CameraChange off = options.camera ? CameraChange(change - options.camera->mean) : change;
+  const auto prior_cost = [&](const IntrinsicsDelta& change) {
+    const IntrinsicsDelta off = options.camera ? IntrinsicsDelta(change - options.camera->mean) : change;
     return options.camera ? off.dot(options.camera->information * off) : 0.0;
   };
   std::vector<Reprojection> at;
@@ -221,7 +221,7 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
       !std::isfinite(result.cost)) {
     return result;
   }
-  BundleEquations equations(bundle, options);
+  ReducedEquations equations(bundle, options);
   std::vector<Reprojection> trial_at;
   trial_at.reserve(at.size());
   BundleState before;
@@ -229,11 +229,11 @@ BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options) {
   for (int i = 0; i < options.max_iterations && damping < 1e4; ++i) {
     equations.linearize(bundle, at, damping);
     before = static_cast<const BundleState&>(bundle);
-    CameraChange change = CameraChange::Zero();
-    const CameraChange from_prior =
-        options.camera ? CameraChange(result.camera_change - options.camera->mean) : change;
+    IntrinsicsDelta change = IntrinsicsDelta::Zero();
+    const IntrinsicsDelta from_prior =
+        options.camera ? IntrinsicsDelta(result.camera_change - options.camera->mean) : change;
     const bool is_solved = equations.step(damping, from_prior, bundle, change);
-    change = composed(result.camera_change, change);
+    change = compose(result.camera_change, change);
     const double cost =
         is_solved ? reproject(bundle, options.loss_scale_px, trial_at) + prior_cost(change)
                   : std::numeric_limits<double>::infinity();

@@ -31,16 +31,16 @@ struct Bundle : BundleState {
 };
 
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.
-using CameraChange = Eigen::Matrix<double, 5, 1>;
+using IntrinsicsDelta = Eigen::Matrix<double, 5, 1>;
 /// One change, then another: the focal lengths' factors multiply.
-[[nodiscard]] inline CameraChange composed(const CameraChange& first, const CameraChange& then) {
-  CameraChange total = first + then;
+[[nodiscard]] inline IntrinsicsDelta compose(const IntrinsicsDelta& first, const IntrinsicsDelta& then) {
+  IntrinsicsDelta total = first + then;
   total[2] += first[2] * then[2];
   return total;
 }
 /// The change that completes `first` to `total`.
-[[nodiscard]] inline CameraChange rest_of(const CameraChange& total, const CameraChange& first) {
-  CameraChange rest = total - first;
+[[nodiscard]] inline IntrinsicsDelta difference(const IntrinsicsDelta& total, const IntrinsicsDelta& first) {
+  IntrinsicsDelta rest = total - first;
   rest[2] /= 1.0 + first[2];
   return rest;
 }
@@ -48,14 +48,14 @@ using CameraInformation = Eigen::Matrix<double, 5, 5>;
 
 /// The camera as several bundles tell it.
 struct CameraEstimate {
-  CameraChange change = CameraChange::Zero();
-  CameraChange sigma = CameraChange::Zero();  ///< standard deviations
+  IntrinsicsDelta change = IntrinsicsDelta::Zero();
+  IntrinsicsDelta sigma = IntrinsicsDelta::Zero();  ///< standard deviations
   int num_bundles = 0;
 };
 
 /// The camera as it is known beforehand.
 struct CameraPrior {
-  CameraChange mean;              ///< relative to the bundle's camera
+  IntrinsicsDelta mean;              ///< relative to the bundle's camera
   CameraInformation information;  ///< for observations of a noise of 1 px
 };
 
@@ -70,7 +70,7 @@ struct BundleOptions {
 struct BundleResult {
   bool is_usable = false;  ///< the cost fell; else the bundle is unchanged
   double cost = 0.0;       ///< sum of the robust loss, px^2
-  CameraChange camera_change = CameraChange::Zero();
+  IntrinsicsDelta camera_change = IntrinsicsDelta::Zero();
   /// Inverse covariance of the camera without its prior, all else left free, for observations of
   /// a noise of 1 px.
   CameraInformation information = CameraInformation::Zero();
@@ -79,6 +79,6 @@ struct BundleResult {
 /// Bundle adjustment (Triggs et al., 2000): reprojection error under Cauchy's loss,
 /// Levenberg-Marquardt, the points eliminated by the Schur complement. Every point must lie in
 /// front of every pose that sees it. One thread; the same bytes on every run.
-BundleResult adjust_bundle(Bundle& bundle, const BundleOptions& options);
+BundleResult solve_bundle_adjustment(Bundle& bundle, const BundleOptions& options);
 
 }  // namespace stemvo

@@ -24,7 +24,7 @@ constexpr double kBehindErrorPx = 1e3;
 
 /// Second-order model of a cost around a state; the constant factor 1/2 is left out.
 template <int N>
-struct NormalEquations {
+struct QuadraticModel {
   Eigen::Matrix<double, N, N> hessian = Eigen::Matrix<double, N, N>::Zero();
   Eigen::Matrix<double, N, 1> gradient = Eigen::Matrix<double, N, 1>::Zero();
   double cost = 0.0;
@@ -32,14 +32,14 @@ struct NormalEquations {
 
 /// Levenberg-Marquardt with Marquardt's scaling. A step is taken only if the cost falls, so the
 /// cost never rises and a state that gives NaN is never entered. Returns the last cost.
-/// linearize(state) -> NormalEquations<N>; retract(state, step) -> state.
+/// linearize(state) -> QuadraticModel<N>; retract(state, step) -> state.
 template <int N, typename State, typename Linearize, typename Retract>
 double minimize(State& state,
                 const Linearize& linearize,
                 const Retract& retract,
                 int max_iterations,
                 double step_tolerance) {
-  NormalEquations<N> current = linearize(state);
+  QuadraticModel<N> current = linearize(state);
   double damping = 1e-4;
   for (int iteration = 0; iteration < max_iterations && damping < 1e8; ++iteration) {
     Eigen::Matrix<double, N, N> damped = current.hessian;
@@ -53,7 +53,7 @@ double minimize(State& state,
       break;
     }
     const State trial_state = retract(state, step);
-    const NormalEquations<N> trial = linearize(trial_state);
+    const QuadraticModel<N> trial = linearize(trial_state);
     if (trial.cost < current.cost) {
       state = trial_state;
       current = trial;
@@ -93,7 +93,7 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& direction) {
   return basis;
 }
 
-NormalEquations<5> linearize_motion(const Rigid3& motion,
+QuadraticModel<5> linearize_motion(const Rigid3& motion,
                                     const std::vector<RayPair>& rays,
                                     const Camera& camera,
                                     double loss_scale_px) {
@@ -101,7 +101,7 @@ NormalEquations<5> linearize_motion(const Rigid3& motion,
   const Eigen::Matrix<double, 2, 3> to_tangent = tangent_basis(motion.translation).transpose();
   const Eigen::Vector3d squared_inverse_focal(1.0 / (camera.fx_px * camera.fx_px),
                                               1.0 / (camera.fy_px * camera.fy_px), 0.0);
-  NormalEquations<5> equations;
+  QuadraticModel<5> equations;
   CauchyLoss loss(loss_scale_px);
   for (const RayPair& pair : rays) {
     const internal::SampsonTerm term = internal::sampson_term(
@@ -126,13 +126,13 @@ Rigid3 move_motion(const Rigid3& motion, const Vector5d& step) {
 
 /// Residual f (cur - R prev) of unit rays: the angle in px, without the singularity of a
 /// projection. Its Jacobian for R <- exp(w) R is f [R prev]x.
-NormalEquations<3> linearize_rotation(const Eigen::Quaterniond& rotation,
+QuadraticModel<3> linearize_rotation(const Eigen::Quaterniond& rotation,
                                       const std::vector<RayPair>& unit_rays,
                                       double focal_px,
                                       double loss_scale_px) {
   const Eigen::Matrix3d r = rotation.toRotationMatrix();
   const double squared_focal = focal_px * focal_px;
-  NormalEquations<3> equations;
+  QuadraticModel<3> equations;
   CauchyLoss loss(loss_scale_px);
   for (const RayPair& pair : unit_rays) {
     const Eigen::Vector3d y = r * pair.prev;
@@ -146,13 +146,13 @@ NormalEquations<3> linearize_rotation(const Eigen::Quaterniond& rotation,
 
 /// Residual projected - measured, px; its Jacobian by (w, v), x_in_camera <- exp(w) x_in_camera +
 /// v.
-NormalEquations<6> linearize_pose(const Rigid3& camera_from_world,
+QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const std::vector<Eigen::Vector2d>& uv,
                                   const Camera& camera,
                                   double loss_scale_px) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation_matrix();
-  NormalEquations<6> equations;
+  QuadraticModel<6> equations;
   CauchyLoss loss(loss_scale_px);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d x = rotation * points[i] + camera_from_world.translation;

@@ -16,6 +16,11 @@ namespace {
 
 /// Nearer, or behind: no start for the solver; map units.
 constexpr double kMinDepth = 1e-6;
+/// Fewer observations of a landmark hold it nowhere.
+constexpr std::size_t kMinObservations = 2;
+/// Least Cauchy scale over the median error: a lens or a shutter that the camera model does not know
+/// makes every observation worse.
+constexpr double kLossShare = 2.0;
 
 /// The part of a window that is refined.
 struct WindowBundle {
@@ -23,9 +28,7 @@ struct WindowBundle {
   std::vector<int> track_ids;  ///< of its points
 };
 
-WindowBundle read_window(const Window& window,
-                         const Camera& camera,
-                         const BundleAdjustmentOptions& options) {
+WindowBundle read_window(const Window& window, const Camera& camera, int num_fixed_poses) {
   WindowBundle read;
   Bundle& bundle = read.bundle;
   bundle.camera = camera;
@@ -37,8 +40,9 @@ WindowBundle read_window(const Window& window,
         std::all_of(observations.begin(), observations.end(), [&, &at = point](const KeyframeObservation& observation) {
           return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
         });
-    if (static_cast<int>(observations.size()) < options.min_observations || !is_in_front ||
-        static_cast<int>(observations.back().keyframe) < options.num_fixed_keyframes) {  // moves none
+    const bool moves_a_pose =
+        !observations.empty() && static_cast<int>(observations.back().keyframe) >= num_fixed_poses;
+    if (observations.size() < kMinObservations || !is_in_front || !moves_a_pose) {
       continue;
     }
     for (const KeyframeObservation& observation : observations) {
@@ -82,23 +86,20 @@ void write_back(const WindowBundle& refined, Window& window, int num_fixed) {
 
 }  // namespace
 
-bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentOptions& options) {
-  if (static_cast<int>(window.keyframes.size()) <= options.num_fixed_keyframes) {
+bool refine_window(Window& window, const Camera& camera, const BundleOptions& options) {
+  if (static_cast<int>(window.keyframes.size()) <= options.num_fixed_poses) {
     return false;
   }
-  WindowBundle read = read_window(window, camera, options);
-  BundleOptions solver;
-  solver.num_fixed_poses = options.num_fixed_keyframes;
-  solver.max_iterations = options.max_iterations;
-  solver.loss_scale_px =
-      std::max(options.loss_scale_px, options.loss_share * median_error_px(read.bundle));
-  if (!adjust_bundle(read.bundle, solver).is_usable) {
+  WindowBundle read = read_window(window, camera, options.num_fixed_poses);
+  BundleOptions solver = options;
+  solver.loss_scale_px = std::max(options.loss_scale_px, kLossShare * median_error_px(read.bundle));
+  if (!solve_bundle_adjustment(read.bundle, solver).is_usable) {
     return false;
   }
   const double length = length_of(window);
-  write_back(read, window, options.num_fixed_keyframes);
+  write_back(read, window, options.num_fixed_poses);
   const double refined_length = length_of(window);
-  if (options.num_fixed_keyframes < 2 && length > 0.0 && refined_length > 0.0) {
+  if (options.num_fixed_poses < 2 && length > 0.0 && refined_length > 0.0) {
     rescale(window, length / refined_length,
             window.keyframes.front().world_from_camera.translation);
   }
@@ -108,19 +109,17 @@ bool refine_window(Window& window, const Camera& camera, const BundleAdjustmentO
 std::optional<CameraMeasurement> measure_camera(const Window& window,
                                                 const Camera& camera,
                                                 const CameraPrior& prior,
-                                                const BundleAdjustmentOptions& options) {
-  BundleAdjustmentOptions free = options;
-  free.num_fixed_keyframes = 1;
-  WindowBundle read = read_window(window, camera, free);
+                                                const BundleOptions& options) {
+  BundleOptions solver = options;
+  solver.num_fixed_poses = 1;
+  WindowBundle read = read_window(window, camera, solver.num_fixed_poses);
   const double error_px = median_error_px(read.bundle);
   const double sigma_px = error_px / 1.1774;  // Rayleigh
-  BundleOptions solver;
-  solver.num_fixed_poses = 1;
   solver.max_iterations = 30;  // to the end: what is left of the way there is left of the error
   solver.min_relative_decrease = 1e-4;
   solver.camera = CameraPrior{prior.mean, prior.information * (sigma_px * sigma_px)};
-  solver.loss_scale_px = std::max(options.loss_scale_px, options.loss_share * error_px);
-  const BundleResult result = adjust_bundle(read.bundle, solver);
+  solver.loss_scale_px = std::max(options.loss_scale_px, kLossShare * error_px);
+  const BundleResult result = solve_bundle_adjustment(read.bundle, solver);
   if (!result.is_usable) {
     return std::nullopt;
   }

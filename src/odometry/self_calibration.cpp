@@ -37,7 +37,7 @@ constexpr double kMaxStep_px = 0.25;
 
 /// Finite, and nowhere less than nothing.
 bool is_plausible(const CameraMeasurement& found) {
-  const Eigen::Map<const CameraChange> scale(kPriorSigma);
+  const Eigen::Map<const IntrinsicsDelta> scale(kPriorSigma);
   const CameraInformation scaled = scale.asDiagonal() * found.information * scale.asDiagonal();
   return scaled.allFinite() && found.change.allFinite() &&
          Eigen::SelfAdjointEigenSolver<CameraInformation>(scaled).eigenvalues().minCoeff() > -1e-3;
@@ -47,7 +47,7 @@ bool is_plausible(const CameraMeasurement& found) {
 
 SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinement)
     : given_(given), camera_(given), refinement_(refinement) {
-  const Eigen::Map<const CameraChange> sigma(refinement == CameraRefinement::kAll ? kWeakPriorSigma
+  const Eigen::Map<const IntrinsicsDelta> sigma(refinement == CameraRefinement::kAll ? kWeakPriorSigma
                                                                                   : kPriorSigma);
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
@@ -65,25 +65,25 @@ std::optional<CameraSigma> SelfCalibration::camera_sigma() const {
   if (refinement_ == CameraRefinement::kOff) {
     return std::nullopt;
   }
-  const CameraChange sigmas = sigma();
+  const IntrinsicsDelta sigmas = sigma();
   return CameraSigma{sigmas[2] * given_.fx_px, sigmas[0], sigmas[1]};
 }
 
-CameraChange SelfCalibration::sigma() const {
-  CameraChange sigma = information_.inverse().diagonal().cwiseSqrt();
+IntrinsicsDelta SelfCalibration::sigma() const {
+  IntrinsicsDelta sigma = information_.inverse().diagonal().cwiseSqrt();
   sigma[2] *= kFocalSigmaFactor;
   return sigma;
 }
 
-CameraChange SelfCalibration::applied() const {
-  CameraChange change = CameraChange::Zero();
+IntrinsicsDelta SelfCalibration::applied() const {
+  IntrinsicsDelta change = IntrinsicsDelta::Zero();
   change[0] = camera_.cx_px - given_.cx_px;
   change[1] = camera_.cy_px - given_.cy_px;
   change[2] = camera_.fx_px / given_.fx_px - 1.0;
   return change;
 }
 
-void SelfCalibration::observe(const Keyframe& keyframe, const BundleAdjustmentOptions& options) {
+void SelfCalibration::observe(const Keyframe& keyframe, const BundleOptions& options) {
   if (refinement_ == CameraRefinement::kOff) {
     return;
   }
@@ -97,8 +97,8 @@ void SelfCalibration::observe(const Keyframe& keyframe, const BundleAdjustmentOp
   }
 }
 
-void SelfCalibration::begin_measuring(const BundleAdjustmentOptions& options) {
-  const CameraPrior prior{rest_of(mean_, applied()), kSigmaFactorSq * information_};
+void SelfCalibration::begin_measuring(const BundleOptions& options) {
+  const CameraPrior prior{difference(mean_, applied()), kSigmaFactorSq * information_};
   const auto task = [run = std::move(run_), camera = camera_, prior, options] {
     return timed(Stage::kCamera, [&] { return measure_camera(run, camera, prior, options); });
   };
@@ -114,10 +114,10 @@ void SelfCalibration::take_in() {
   if (!found.has_value() || !is_plausible(*found)) {
     return;
   }
-  mean_ = composed(applied(), found->change);
+  mean_ = compose(applied(), found->change);
   information_ += found->information / kSigmaFactorSq;
   ++num_runs_;
-  const CameraChange sigmas = sigma();
+  const IntrinsicsDelta sigmas = sigma();
   const auto insists = [&](int i, double max, double bias) {
     return sigmas[i] < max && std::abs(mean_[i]) > kMinSigmas * std::hypot(sigmas[i], bias);
   };
@@ -130,7 +130,7 @@ void SelfCalibration::take_in() {
 }
 
 void SelfCalibration::approach_believed() {
-  const CameraChange left = believed_ - applied();
+  const IntrinsicsDelta left = believed_ - applied();
   const auto step = [&](int i, double max) { return std::clamp(left[i], -max, max); };
   camera_.cx_px += step(0, kMaxStep_px);
   camera_.cy_px += step(1, kMaxStep_px);

@@ -29,7 +29,7 @@ class SelfCalibration {
   /// The next keyframe, its pose refined. A run that is long enough is measured until the next
   /// call, in another thread where there may be one beside this (cv::setNumThreads), and taken in
   /// then: the same on any number of threads.
-  void observe(const Keyframe& keyframe, const BundleAdjustmentOptions& options);
+  void observe(const Keyframe& keyframe, const BundleOptions& options);
   /// As of a window.
   void rescale(double factor, const Eigen::Vector3d& center) {
     stemvo::rescale(run_, factor, center);
@@ -48,19 +48,19 @@ class SelfCalibration {
  private:
   using Measured = std::shared_future<std::optional<CameraMeasurement>>;
 
-  void begin_measuring(const BundleAdjustmentOptions& options);
+  void begin_measuring(const BundleOptions& options);
   /// The run that is measured, if there is one; waits for it.
   void take_in();
   void approach_believed();
-  [[nodiscard]] CameraChange applied() const;
+  [[nodiscard]] IntrinsicsDelta applied() const;
   /// Standard deviations of mean_.
-  [[nodiscard]] CameraChange sigma() const;
+  [[nodiscard]] IntrinsicsDelta sigma() const;
 
   Camera given_;
   Camera camera_;
   CameraRefinement refinement_;
-  CameraChange believed_ = CameraChange::Zero();  ///< significant part of mean_; camera_ goes there
-  CameraChange mean_ = CameraChange::Zero();      ///< relative to the given camera
+  IntrinsicsDelta believed_ = IntrinsicsDelta::Zero();  ///< significant part of mean_; camera_ goes there
+  IntrinsicsDelta mean_ = IntrinsicsDelta::Zero();      ///< relative to the given camera
   CameraInformation information_;
   int num_runs_ = 0;   ///< measured
   Window run_;         ///< the keyframes since the last one that was measured

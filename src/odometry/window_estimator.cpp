@@ -267,7 +267,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
   triangulate_landmarks(window_, camera(), window_options_);
   if (refine_every_ > 0 && ++keyframes_since_refinement_ >= refine_every_) {
     keyframes_since_refinement_ = 0;
-    refinement_.num_fixed_keyframes =
+    refinement_.num_fixed_poses =
         window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;

@@ -69,7 +69,7 @@ class WindowEstimator final : public Estimator {
 
   OdometryOptions options_;
   WindowOptions window_options_;
-  BundleAdjustmentOptions refinement_;
+  BundleOptions refinement_;
   LocalizationOptions localization_;
   int refine_every_;
   double keyframe_parallax_px_;

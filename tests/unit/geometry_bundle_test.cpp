@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/bundle.hpp"
-#include "geometry/bundle_sums.hpp"
+#include "geometry/normal_equations.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -96,7 +96,7 @@ TEST(Bundle, EndsWhereCeresDoes) {
   options.min_relative_decrease = 1e-14;
   Bundle ours = bundle_of(drive, 1.0);
   Bundle judge = ours;
-  const BundleResult result = adjust_bundle(ours, options);
+  const BundleResult result = solve_bundle_adjustment(ours, options);
   ASSERT_TRUE(result.is_usable);
   const double cost = solve_by_ceres(judge, options);
   EXPECT_NEAR(result.cost, cost, 1e-6 * cost);
@@ -108,7 +108,7 @@ TEST(Bundle, EndsWhereCeresDoes) {
   }
 }
 
-constexpr int kCamera = BundleSums::kCamera;
+constexpr int kCamera = NormalEquations::kCamera;
 
 std::vector<Reprojection> reprojections_of(const Bundle& bundle) {
   std::vector<Reprojection> at;
@@ -176,34 +176,34 @@ Eigen::MatrixXd reduced(const Eigen::MatrixXd& all, Eigen::Index size, double da
   return result;
 }
 
-/// As above, of the sums: rows and columns up to the diagonal, then the gradient.
-Eigen::MatrixXd reduced(const BundleSums& sums) {
-  const int size = kCamera + 6 * sums.num_free_poses();
+/// As above, of the equations: rows and columns up to the diagonal, then the gradient.
+Eigen::MatrixXd reduced(const NormalEquations& equations) {
+  const int size = kCamera + 6 * equations.num_free_poses();
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size + 1);
-  const auto put = [&](const BundleSums::Column& column, int num_rows, int row, int col) {
+  const auto put = [&](const NormalEquations::Column& column, int num_rows, int row, int col) {
     for (int r = 0; r < num_rows; ++r) {
       result(row + r, col) = column[r];
     }
   };
-  put(sums.camera.gradient, kCamera, 0, size);
+  put(equations.camera.gradient, kCamera, 0, size);
   for (int c = 0; c < kCamera; ++c) {
-    put(sums.camera.with_camera[static_cast<std::size_t>(c)], kCamera, 0, c);
+    put(equations.camera.with_camera[static_cast<std::size_t>(c)], kCamera, 0, c);
   }
-  for (int j = 0; j < sums.num_free_poses(); ++j) {
-    const BundleSums::Pose& pose = sums.poses[static_cast<std::size_t>(j)];
+  for (int j = 0; j < equations.num_free_poses(); ++j) {
+    const NormalEquations::Pose& pose = equations.poses[static_cast<std::size_t>(j)];
     put(pose.gradient, 6, kCamera + 6 * j, size);
     for (std::size_t c = 0; c < 6; ++c) {
       const int col = kCamera + 6 * j + static_cast<int>(c);
       put(pose.with_camera[c], kCamera, 0, col);
       for (int i = 0; i <= j; ++i) {
-        put(sums.of_poses[sums.index_of(i, j)][c], 6, kCamera + 6 * i, col);
+        put(equations.H_pp[equations.index_of(i, j)][c], 6, kCamera + 6 * i, col);
       }
     }
   }
   return result;
 }
 
-TEST(BundleSums, AreTheNormalEquationsWithoutThePoints) {
+TEST(NormalEquations, AreTheNormalEquationsWithoutThePoints) {
   constexpr double kDamping = 1e-3;
   constexpr double kWeight = 0.5;
   constexpr int kFixed = 2;
@@ -216,10 +216,10 @@ TEST(BundleSums, AreTheNormalEquationsWithoutThePoints) {
   for (Reprojection& one : at) {
     one.weight = kWeight;
   }
-  BundleSums sums(bundle, kFixed, /*has_camera=*/true);
-  ASSERT_EQ(sums.num_free_poses(), 4);
-  sums.add_up(bundle, at, kDamping);
-  const Eigen::MatrixXd found = reduced(sums);
+  NormalEquations equations(bundle, kFixed, /*has_camera=*/true);
+  ASSERT_EQ(equations.num_free_poses(), 4);
+  equations.add_up(bundle, at, kDamping);
+  const Eigen::MatrixXd found = reduced(equations);
   const Eigen::MatrixXd expected = reduced(all, found.rows(), kDamping);
   for (Eigen::Index col = 0; col < found.cols(); ++col) {
     const Eigen::Index last = std::min(col, found.rows() - 1);
@@ -236,10 +236,10 @@ TEST(Bundle, ATenthOfTheStepsIsNearlyAsGood) {
   BundleOptions options;
   Bundle few = bundle_of(drive, 1.0);
   Bundle many = few;
-  const double cost_of_few = adjust_bundle(few, options).cost;
+  const double cost_of_few = solve_bundle_adjustment(few, options).cost;
   options.max_iterations = 100;
   options.min_relative_decrease = 1e-12;
-  EXPECT_LE(cost_of_few, 1.01 * adjust_bundle(many, options).cost);
+  EXPECT_LE(cost_of_few, 1.01 * solve_bundle_adjustment(many, options).cost);
 }
 
 TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
@@ -247,7 +247,7 @@ TEST(Bundle, APointBehindAPoseIsRefusedAndNothingChanges) {
   Bundle bundle = bundle_of(drive, 1.0);
   bundle.points[3].z() = -20.0;
   const Bundle before = bundle;
-  EXPECT_FALSE(adjust_bundle(bundle, {}).is_usable);
+  EXPECT_FALSE(solve_bundle_adjustment(bundle, {}).is_usable);
   EXPECT_EQ(bundle.points[0], before.points[0]);
   EXPECT_EQ(bundle.camera_from_world[4].translation, before.camera_from_world[4].translation);
 }
@@ -256,16 +256,16 @@ TEST(Bundle, ObservationsOutOfOrderAreRefused) {
   const DriveTracks drive(6, 0.0, 7);
   Bundle bundle = bundle_of(drive, 1.0);
   std::swap(bundle.observations[0], bundle.observations[1]);
-  EXPECT_ANY_THROW(adjust_bundle(bundle, {}));
+  EXPECT_ANY_THROW(solve_bundle_adjustment(bundle, {}));
 }
 
-TEST(CameraChange, ItsPartsMakeItUp) {
-  CameraChange total;
-  CameraChange first;
+TEST(IntrinsicsDelta, ItsPartsMakeItUp) {
+  IntrinsicsDelta total;
+  IntrinsicsDelta first;
   total << 3.0, -2.0, 0.1, 0.01, -0.004;
   first << 1.0, 4.0, -0.05, 0.002, 0.001;
-  const CameraChange rest = rest_of(total, first);
-  EXPECT_LT((composed(first, rest) - total).norm(), 1e-12);
+  const IntrinsicsDelta rest = difference(total, first);
+  EXPECT_LT((compose(first, rest) - total).norm(), 1e-12);
   EXPECT_NEAR((1.0 + first[2]) * (1.0 + rest[2]), 1.1, 1e-12);
 }
 
@@ -285,17 +285,17 @@ TEST(Bundle, FindsAPlantedCamera) {
   options.num_fixed_poses = 1;
   options.max_iterations = 50;
   options.min_relative_decrease = 1e-8;
-  CameraChange sigma;
+  IntrinsicsDelta sigma;
   sigma << 10.0, 10.0, 0.003, 0.01, 0.005;
   constexpr double kNoiseSq = 0.01;
   options.camera =
-      CameraPrior{CameraChange::Zero(),
+      CameraPrior{IntrinsicsDelta::Zero(),
                   kNoiseSq * sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
   Bundle soon = bundle;
-  const BundleResult result = adjust_bundle(bundle, options);
+  const BundleResult result = solve_bundle_adjustment(bundle, options);
   ASSERT_TRUE(result.is_usable);
   options.max_iterations = 6;  // enough, though the data hardly pull at the camera
-  ASSERT_TRUE(adjust_bundle(soon, options).is_usable);
+  ASSERT_TRUE(solve_bundle_adjustment(soon, options).is_usable);
   EXPECT_NEAR(soon.camera.cx_px, bundle.camera.cx_px, 0.005);
   EXPECT_NEAR(soon.camera.cy_px, bundle.camera.cy_px, 0.005);
   EXPECT_NEAR(given.cx_px + result.camera_change[0], bundle.camera.cx_px, 1e-9);
@@ -304,7 +304,7 @@ TEST(Bundle, FindsAPlantedCamera) {
   EXPECT_NEAR(bundle.camera.cy_px, drive.camera.cy_px, 0.3);
   const CameraInformation information =
       (result.information + options.camera->information) / kNoiseSq;
-  const CameraChange found_sigma = information.inverse().diagonal().cwiseSqrt();
+  const IntrinsicsDelta found_sigma = information.inverse().diagonal().cwiseSqrt();
   EXPECT_LE(found_sigma[0], 0.3);
   EXPECT_LE(std::abs(bundle.camera.cx_px - drive.camera.cx_px), 4.0 * found_sigma[0]);
   EXPECT_LE(std::abs(bundle.camera.cy_px - drive.camera.cy_px), 4.0 * found_sigma[1]);

@@ -112,7 +112,7 @@ TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
     Rigid3& pose = window.keyframes[i].world_from_camera;
     pose = pose * Rigid3(so3_exp({0.001, -0.002, 0.001}), {0.01, -0.02, 0.03});
   }
-  BundleAdjustmentOptions refinement;
+  BundleOptions refinement;
   refinement.max_iterations = 30;
   ASSERT_TRUE(refine_window(window, drive.camera, refinement));
   for (std::size_t i = 0; i < window.keyframes.size(); ++i) {

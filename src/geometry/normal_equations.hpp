@@ -29,7 +29,7 @@ struct Reprojection {
 
 /// The normal equations of a bundle, J^T W J x = -J^T W e, in blocks whose rows stand in the lanes
 /// of vectors. The points' part is damped and eliminated (Schur complement).
-struct BundleSums {
+struct NormalEquations {
   static constexpr int kCamera = 5;  ///< unknowns of the camera
 
   using Lanes2 = double __attribute__((vector_size(16)));
@@ -60,7 +60,7 @@ struct BundleSums {
     Block<kCamera> with_camera;
   };
 
-  BundleSums(const Bundle& bundle, int num_fixed_poses, bool has_camera);
+  NormalEquations(const Bundle& bundle, int num_fixed_poses, bool has_camera);
 
   /// Around the bundle; `at` is where it sees each observation. The last digits are those of this
   /// process's instruction set.
@@ -76,9 +76,9 @@ struct BundleSums {
   bool has_camera;
   Camera camera;
   std::vector<Pose> poses;         ///< the free ones
-  std::vector<Block<6>> of_poses;  ///< see index_of
+  std::vector<Block<6>> H_pp;  ///< pose by pose, without the points (see index_of)
   std::vector<Point> points;
-  std::vector<Block<3>> pose_with_point;  ///< of each observation
+  std::vector<Block<3>> H_pl;  ///< pose by landmark, one per observation
 };
 
 }  // namespace stemvo

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "geometry/bundle_sums.hpp"
+#include "geometry/normal_equations.hpp"
 
 #include <algorithm>
 
@@ -10,10 +10,10 @@
 namespace stemvo {
 namespace {
 
-using Lanes4 = BundleSums::Lanes4;
-using Column = BundleSums::Column;
+using Lanes4 = NormalEquations::Lanes4;
+using Column = NormalEquations::Column;
 template <std::size_t kColumns>
-using Block = BundleSums::Block<kColumns>;
+using Block = NormalEquations::Block<kColumns>;
 
 /// Columns of J^T, one for each of an observation's two coordinates.
 struct Jacobian {
@@ -91,7 +91,7 @@ STEMVO_INLINE void by_pose(const Reprojection& at, const Jacobian& by_x, Jacobia
     const Lanes4& by = by_x.columns[k].lo;
     result.columns[k].lo =
         Lanes4{y * by[2] - z * by[1], z * by[0] - x * by[2], x * by[1] - y * by[0], by[0]};
-    result.columns[k].hi = BundleSums::Lanes2{by[1], by[2]};
+    result.columns[k].hi = NormalEquations::Lanes2{by[1], by[2]};
   }
 }
 
@@ -100,9 +100,9 @@ STEMVO_INLINE void by_camera(const Bundle& bundle, const Reprojection& at, Jacob
   const double fv = bundle.camera.fy_px * at.v;
   const double r4 = at.r_sq * at.r_sq;
   result.columns[0].lo = Lanes4{1.0, 0.0, fu * at.stretch, fu * at.r_sq};
-  result.columns[0].hi = BundleSums::Lanes2{fu * r4, 0.0};
+  result.columns[0].hi = NormalEquations::Lanes2{fu * r4, 0.0};
   result.columns[1].lo = Lanes4{0.0, 1.0, fv * at.stretch, fv * at.r_sq};
-  result.columns[1].hi = BundleSums::Lanes2{fv * r4, 0.0};
+  result.columns[1].hi = NormalEquations::Lanes2{fv * r4, 0.0};
 }
 
 struct Rotation {
@@ -113,8 +113,8 @@ STEMVO_INLINE void add_observation(const Bundle& bundle,
                                    std::size_t i,
                                    const Reprojection& at,
                                    const Rotation* rotations,
-                                   BundleSums::Point& point,
-                                   BundleSums& sums) {
+                                   NormalEquations::Point& point,
+                                   NormalEquations& equations) {
   const int pose_index = bundle.observations.data()[i].pose;
   const Lanes4* rotation = rotations[pose_index].rows;
   const double* error = at.error.data();
@@ -133,31 +133,31 @@ STEMVO_INLINE void add_observation(const Bundle& bundle,
   }
   point.gradient += weighted[0] * error[0] + weighted[1] * error[1];
 
-  const bool is_free = pose_index >= sums.num_fixed_poses;
-  const int free = pose_index - sums.num_fixed_poses;
+  const bool is_free = pose_index >= equations.num_fixed_poses;
+  const int free = pose_index - equations.num_fixed_poses;
   Jacobian by_free;
   Jacobian weighted_free;
   if (is_free) {
     by_pose(at, in_camera, by_free);
     scale(by_free, at.weight, weighted_free);
-    BundleSums::Pose& pose = sums.poses.data()[free];
-    sums.pose_with_point.data()[i] = {};
-    add(weighted_free, by_point, sums.pose_with_point.data()[i]);
-    add(weighted_free, by_free, sums.of_poses.data()[sums.index_of(free, free)]);
+    NormalEquations::Pose& pose = equations.poses.data()[free];
+    equations.H_pl.data()[i] = {};
+    add(weighted_free, by_point, equations.H_pl.data()[i]);
+    add(weighted_free, by_free, equations.H_pp.data()[equations.index_of(free, free)]);
     add_diagonal(weighted_free, by_free, pose.diagonal);
     add(weighted_free, error[0], error[1], pose.gradient);
   }
-  if (sums.has_camera) {
+  if (equations.has_camera) {
     Jacobian by;
     Jacobian weighted_by;
     by_camera(bundle, at, by);
     scale(by, at.weight, weighted_by);
     add(weighted_by, by_point, point.with_camera);
-    add(weighted_by, by, sums.camera.with_camera);
-    add_diagonal(weighted_by, by, sums.camera.diagonal);
-    add(weighted_by, error[0], error[1], sums.camera.gradient);
+    add(weighted_by, by, equations.camera.with_camera);
+    add_diagonal(weighted_by, by, equations.camera.diagonal);
+    add(weighted_by, error[0], error[1], equations.camera.gradient);
     if (is_free) {
-      add(weighted_by, by_free, sums.poses.data()[free].with_camera);
+      add(weighted_by, by_free, equations.poses.data()[free].with_camera);
     }
   }
 }
@@ -181,32 +181,32 @@ STEMVO_INLINE void eliminate(const Bundle& bundle,
                              std::size_t begin,
                              std::size_t end,
                              double damping,
-                             BundleSums::Point& point,
-                             BundleSums& sums) {
+                             NormalEquations::Point& point,
+                             NormalEquations& equations) {
   invert(damping, point.inverse);
   const Lanes4& gradient = point.gradient;
   Block<3> scaled;
-  if (sums.has_camera) {
+  if (equations.has_camera) {
     multiply(point.with_camera, point.inverse, scaled);
-    subtract(scaled, point.with_camera, sums.camera.with_camera);
-    subtract(scaled, gradient[0], gradient[1], gradient[2], sums.camera.gradient);
+    subtract(scaled, point.with_camera, equations.camera.with_camera);
+    subtract(scaled, gradient[0], gradient[1], gradient[2], equations.camera.gradient);
   }
   const Bundle::Observation* observations = bundle.observations.data();
-  const Block<3>* with_point = sums.pose_with_point.data();
+  const Block<3>* with_point = equations.H_pl.data();
   for (std::size_t i = begin; i < end; ++i) {
-    const int free = observations[i].pose - sums.num_fixed_poses;
+    const int free = observations[i].pose - equations.num_fixed_poses;
     if (free < 0) {
       continue;
     }
-    BundleSums::Pose& pose = sums.poses.data()[free];
+    NormalEquations::Pose& pose = equations.poses.data()[free];
     multiply(with_point[i], point.inverse, scaled);
     subtract(scaled, gradient[0], gradient[1], gradient[2], pose.gradient);
-    if (sums.has_camera) {
+    if (equations.has_camera) {
       subtract(point.with_camera, scaled, pose.with_camera);
     }
     for (std::size_t j = i; j < end; ++j) {
-      const int other = observations[j].pose - sums.num_fixed_poses;
-      subtract(scaled, with_point[j], sums.of_poses.data()[sums.index_of(free, other)]);
+      const int other = observations[j].pose - equations.num_fixed_poses;
+      subtract(scaled, with_point[j], equations.H_pp.data()[equations.index_of(free, other)]);
     }
   }
 }
@@ -215,31 +215,31 @@ STEMVO_INLINE void add_up_points(const Bundle& bundle,
                                  const Reprojection* at,
                                  const Rotation* rotations,
                                  double damping,
-                                 BundleSums& sums) {
+                                 NormalEquations& equations) {
   const Bundle::Observation* observations = bundle.observations.data();
   const std::size_t size = bundle.observations.size();
   for (std::size_t begin = 0; begin < size;) {
     const int index = observations[begin].point;
-    BundleSums::Point& point = sums.points.data()[index];
+    NormalEquations::Point& point = equations.points.data()[index];
     point = {};
     std::size_t end = begin;
     for (; end < size && observations[end].point == index; ++end) {
-      add_observation(bundle, end, at[end], rotations, point, sums);
+      add_observation(bundle, end, at[end], rotations, point, equations);
     }
-    eliminate(bundle, begin, end, damping, point, sums);
+    eliminate(bundle, begin, end, damping, point, equations);
     begin = end;
   }
 }
 
 using AddUpPoints =
-    void (*)(const Bundle&, const Reprojection*, const Rotation*, double, BundleSums&);
+    void (*)(const Bundle&, const Reprojection*, const Rotation*, double, NormalEquations&);
 
 void add_up_points_portable(const Bundle& bundle,
                             const Reprojection* at,
                             const Rotation* rotations,
                             double damping,
-                            BundleSums& sums) {
-  add_up_points(bundle, at, rotations, damping, sums);
+                            NormalEquations& equations) {
+  add_up_points(bundle, at, rotations, damping, equations);
 }
 
 #if defined(__x86_64__)
@@ -247,8 +247,8 @@ STEMVO_AVX2 void add_up_points_avx2(const Bundle& bundle,
                                     const Reprojection* at,
                                     const Rotation* rotations,
                                     double damping,
-                                    BundleSums& sums) {
-  add_up_points(bundle, at, rotations, damping, sums);
+                                    NormalEquations& equations) {
+  add_up_points(bundle, at, rotations, damping, equations);
 }
 #endif
 
@@ -276,18 +276,18 @@ Reprojection::Reprojection(const Bundle& bundle,
                             bundle.camera.fy_px * v * stretch + bundle.camera.cy_px) -
             observation.uv) {}
 
-BundleSums::BundleSums(const Bundle& bundle, int fixed, bool with_camera)
+NormalEquations::NormalEquations(const Bundle& bundle, int fixed, bool with_camera)
     : num_fixed_poses(fixed),
       has_camera(with_camera),
       poses(bundle.camera_from_world.size() - static_cast<std::size_t>(fixed)),
-      of_poses(poses.size() * (poses.size() + 1) / 2),
+      H_pp(poses.size() * (poses.size() + 1) / 2),
       points(bundle.points.size()),
-      pose_with_point(bundle.observations.size()) {}
+      H_pl(bundle.observations.size()) {}
 
-void BundleSums::add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
+void NormalEquations::add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
   camera = {};
   std::ranges::fill(poses, Pose());
-  std::ranges::fill(of_poses, Block<6>());
+  std::ranges::fill(H_pp, Block<6>());
   std::vector<Rotation> rotations;
   for (const Rigid3& pose : bundle.camera_from_world) {
     const Eigen::Matrix3d r = pose.rotation_matrix();
