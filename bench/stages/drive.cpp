@@ -94,7 +94,7 @@ Chain run_chain() {
       break;
     }
     LocalizedFrame localized = result.estimator->localize(frame);
-    front_end->keep(localized.inlier_mask);
+    front_end->remove_outliers(localized.inlier_mask);
     result.estimator->optimize(frame, localized);
   }
   return result;

@@ -35,8 +35,7 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 DescriptorFrontEnd::DescriptorFrontEnd(const FeatureOptions& options)
     : options_(options), feature_(create_feature(options)) {}
 
-std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(
-    const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(const ChannelImage& channel) const {
   auto described = std::make_shared<Described>(channel);
   std::vector<cv::KeyPoint> found;
   timed(Stage::kDetection, [&] {
@@ -85,9 +84,9 @@ Matches DescriptorFrontEnd::process(std::shared_ptr<const ImagePyramid> prepared
   return matches;
 }
 
-void DescriptorFrontEnd::keep(const std::vector<char>& is_good) {
-  for (std::size_t i = 0; i < std::min(is_good.size(), matched_.size()); ++i) {
-    if (is_good[i] == 0) {
+void DescriptorFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
+  for (std::size_t i = 0; i < std::min(is_inlier.size(), matched_.size()); ++i) {
+    if (is_inlier[i] == 0) {
       track_ids_[matched_[i]] = -1;
     }
   }

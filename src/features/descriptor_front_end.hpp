@@ -20,7 +20,7 @@ class DescriptorFrontEnd : public FrontEnd {
   [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
       const ChannelImage& channel) const override;
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
-  void keep(const std::vector<char>& is_good) override;
+  void remove_outliers(const std::vector<char>& is_inlier) override;
 
  private:
   struct Described : ImagePyramid {

@@ -57,13 +57,12 @@ class FrontEnd {
   [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
     return process(prepare(image), frame);
   }
-  /// Drops the tracks of the last matches that are not good (one flag per match), so that they are
-  /// not followed further.
-  virtual void keep(const std::vector<char>& is_good) = 0;
-  /// Tracks that ended but are worth finding again, where they should be in the last image (also
-  /// outside of it); process() looks for them there before it looks for new corners. Called after
-  /// keep(); a track that is not named is forgotten.
-  virtual void look_for(Observations /*expected*/) {}  // NOLINT: an override keeps it
+  /// Ends the tracks of the last matches that are no inliers (one flag per match).
+  virtual void remove_outliers(const std::vector<char>& is_inlier) = 0;
+  /// Takes the projections of landmarks into the last image (also outside of it) whose tracks
+  /// ended; process() matches them there before it looks for new corners. Called after
+  /// remove_outliers(); a track that is not named is forgotten.
+  virtual void expect_projections(Observations /*projections*/) {}  // NOLINT: an override keeps it
 
  protected:
   /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.

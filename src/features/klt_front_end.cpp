@@ -73,12 +73,12 @@ std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& fr
   std::vector<cv::Point2f> back_uv = prev_uv;
   std::vector<unsigned char> found;
   std::vector<unsigned char> found_back;
-  cv::calcOpticalFlowPyrLK(prev.with_derivatives, cur.with_derivatives, prev_uv, cur_uv, found, cv::noArray(),
-                           cur.window, cur.last_level(), criteria);
+  cv::calcOpticalFlowPyrLK(prev.with_derivatives, cur.with_derivatives, prev_uv, cur_uv, found,
+                           cv::noArray(), cur.window, cur.last_level(), criteria);
   // The way back starts where the way there started: two levels are enough to leave a wrong place.
-  cv::calcOpticalFlowPyrLK(cur.with_derivatives, prev.with_derivatives, cur_uv, back_uv, found_back, cv::noArray(),
-                           cur.window, std::min(cur.last_level(), kBackLevels - 1), criteria,
-                           cv::OPTFLOW_USE_INITIAL_FLOW);
+  cv::calcOpticalFlowPyrLK(cur.with_derivatives, prev.with_derivatives, cur_uv, back_uv, found_back,
+                           cv::noArray(), cur.window, std::min(cur.last_level(), kBackLevels - 1),
+                           criteria, cv::OPTFLOW_USE_INITIAL_FLOW);
 
   for (std::size_t i = 0; i < result.size(); ++i) {
     const bool is_good = found[i] != 0 && found_back[i] != 0 &&

@@ -184,8 +184,11 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   return result;
 }
 
-bool PatchFrontEnd::accept(
-    const PatchMatch& found, const PatchPyramid& image, int frame, const Point& from, Track& track) {
+bool PatchFrontEnd::accept(const PatchMatch& found,
+                           const PatchPyramid& image,
+                           int frame,
+                           const Point& from,
+                           Track& track) {
   if (found.correlation < kMinCorrelation) {
     return false;
   }
@@ -201,8 +204,8 @@ bool PatchFrontEnd::accept(
   return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
 }
 
-std::optional<cv::Point2f> PatchFrontEnd::find_again(const ImagePyramid& image,
-                                                     const Point& point) {
+std::optional<cv::Point2f> PatchFrontEnd::match_projection(const ImagePyramid& image,
+                                                           const Point& point) {
   const auto known = tracks_.find(point.id);
   if (known == tracks_.end()) {
     return std::nullopt;

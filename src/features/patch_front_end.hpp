@@ -34,13 +34,16 @@ class PatchFrontEnd final : public PointFrontEnd {
   [[nodiscard]] bool begin_track(const ImagePyramid& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
-  [[nodiscard]] std::optional<cv::Point2f> find_again(const ImagePyramid& image,
-                                                      const Point& point) override;
+  [[nodiscard]] std::optional<cv::Point2f> match_projection(const ImagePyramid& image,
+                                                            const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,
                         const std::vector<Point>& good,
                         const Observations& expected) override;
-  [[nodiscard]] static bool accept(
-      const PatchMatch& found, const PatchPyramid& image, int frame, const Point& from, Track& track);
+  [[nodiscard]] static bool accept(const PatchMatch& found,
+                                   const PatchPyramid& image,
+                                   int frame,
+                                   const Point& from,
+                                   Track& track);
 
   std::map<int, Track> tracks_;                         ///< by id
   std::vector<std::map<int, Track>::node_type> ended_;  ///< their memory is that of new ones

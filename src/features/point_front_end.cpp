@@ -32,11 +32,11 @@ Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, int fr
       last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
     last_good_ = {};
-    expected_.clear();
+    projections_.clear();
   }
   Matches matches;
   View now{std::move(image), {}, frame};
-  end_other_tracks(last_.points, last_good_.points, expected_);
+  end_other_tracks(last_.points, last_good_.points, projections_);
   if (last_.image != nullptr) {
     replenish(last_);
     matches = track(last_, now);
@@ -74,14 +74,14 @@ bool PointFrontEnd::is_lost(const Matches& matches, const View& from) {
          kMinTracked * static_cast<double>(from.points.size());
 }
 
-void PointFrontEnd::keep(const std::vector<char>& is_good) {
-  if (is_good.size() != last_.points.size()) {
+void PointFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
+  if (is_inlier.size() != last_.points.size()) {
     return;
   }
   std::vector<Point> kept;
-  kept.reserve(is_good.size());
-  for (std::size_t i = 0; i < is_good.size(); ++i) {
-    if (is_good[i] != 0) {
+  kept.reserve(is_inlier.size());
+  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
+    if (is_inlier[i] != 0) {
       kept.push_back(last_.points[i]);
     }
   }
@@ -109,10 +109,10 @@ Matches PointFrontEnd::track(const View& from, View& to) {
 }
 
 /// Appends those that are found.
-void PointFrontEnd::find_expected(View& view) {
+void PointFrontEnd::match_projections(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
   const std::vector<Point> tracked = view.points;
-  for (const Observation& expected : std::exchange(expected_, {})) {
+  for (const Observation& expected : std::exchange(projections_, {})) {
     if (std::ranges::binary_search(tracked, expected.track_id, {}, &Point::id) ||
         std::ranges::binary_search(last_good_.points, expected.track_id, {}, &Point::id)) {
       continue;  // tracked here, or from the last good image
@@ -122,7 +122,7 @@ void PointFrontEnd::find_expected(View& view) {
     if (!inside.contains(start)) {
       continue;
     }
-    if (const auto found = find_again(*view.image, {start, expected.track_id})) {
+    if (const auto found = match_projection(*view.image, {start, expected.track_id})) {
       view.points.push_back({*found, expected.track_id});
     }
   }
@@ -132,7 +132,7 @@ void PointFrontEnd::find_expected(View& view) {
 /// several pixels wide, and any pixel of a corner will do.
 void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
-  find_expected(view);
+  match_projections(view);
   const ImagePyramid& image = *view.image;
   const std::size_t level = image.levels.size() > 1 ? 1 : 0;
   const cv::Mat& pixels = image.levels[level];

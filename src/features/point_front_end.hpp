@@ -18,8 +18,10 @@ class PointFrontEnd : public FrontEnd {
  public:
   using FrontEnd::process;
   [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
-  void keep(const std::vector<char>& is_good) override;
-  void look_for(Observations expected) override { expected_ = std::move(expected); }
+  void remove_outliers(const std::vector<char>& is_inlier) override;
+  void expect_projections(Observations projections) override {
+    projections_ = std::move(projections);
+  }
 
  protected:
   /// A point of an image, in that image's pixels.
@@ -47,8 +49,8 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                              const View& to) = 0;
   /// A track that ended, near `point` of the image; nullopt: it is not there.
-  [[nodiscard]] virtual std::optional<cv::Point2f> find_again(const ImagePyramid& /*image*/,
-                                                              const Point& /*point*/) {
+  [[nodiscard]] virtual std::optional<cv::Point2f> match_projection(const ImagePyramid& /*image*/,
+                                                                    const Point& /*point*/) {
     return std::nullopt;
   }
   /// No track but those of these, each ordered by id, goes on.
@@ -60,12 +62,12 @@ class PointFrontEnd : public FrontEnd {
   void track_from_last_good(View& now, Matches& matches);
   [[nodiscard]] static bool is_lost(const Matches& matches, const View& from);
   void replenish(View& view);
-  void find_expected(View& view);
+  void match_projections(View& view);
 
   FeatureOptions options_;
   View last_;
-  View last_good_;        ///< the one before nearly every track ended; none otherwise
-  Observations expected_;  ///< in last_; empty once they were looked for
+  View last_good_;            ///< the one before nearly every track ended; none otherwise
+  Observations projections_;  ///< in last_; empty once they were matched
   int next_id_ = 0;
 };
 

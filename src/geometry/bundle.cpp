@@ -9,8 +9,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "geometry/normal_equations.hpp"
 #include "geometry/cauchy_loss.hpp"
+#include "geometry/normal_equations.hpp"
 #include "internal_check.hpp"
 
 namespace stemvo {
@@ -67,7 +67,9 @@ class ReducedEquations {
 };
 
 template <std::size_t kColumns>
-void copy(const NormalEquations::Block<kColumns>& from, int num_rows, Eigen::Ref<Eigen::MatrixXd> to) {
+void copy(const NormalEquations::Block<kColumns>& from,
+          int num_rows,
+          Eigen::Ref<Eigen::MatrixXd> to) {
   for (std::size_t c = 0; c < kColumns; ++c) {
     for (int r = 0; r < num_rows; ++r) {
       to(r, static_cast<int>(c)) = from[c][r];
@@ -84,19 +86,23 @@ void move_camera(const IntrinsicsDelta& change, Bundle& bundle) {
 }
 
 void ReducedEquations::linearize(const Bundle& bundle,
-                                const std::vector<Reprojection>& at,
-                                double damping) {
+                                 const std::vector<Reprojection>& at,
+                                 double damping) {
   equations_.add_up(bundle, at, damping);
-  const NormalEquations::Block<2> of_camera = {equations_.camera.gradient, equations_.camera.diagonal};
+  const NormalEquations::Block<2> of_camera = {equations_.camera.gradient,
+                                               equations_.camera.diagonal};
   Eigen::Matrix<double, Eigen::Dynamic, 2> columns(size_, 2);  // gradient, diagonal
   copy(of_camera, num_camera_, columns.topRows(num_camera_));
-  copy(equations_.camera.with_camera, num_camera_, reduced_.topLeftCorner(num_camera_, num_camera_));
+  copy(equations_.camera.with_camera, num_camera_,
+       reduced_.topLeftCorner(num_camera_, num_camera_));
   for (int j = 0; j < equations_.num_free_poses(); ++j) {
     const NormalEquations::Pose& pose = equations_.poses[static_cast<std::size_t>(j)];
-    copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6, columns.middleRows<6>(row_of(j)));
+    copy(NormalEquations::Block<2>{pose.gradient, pose.diagonal}, 6,
+         columns.middleRows<6>(row_of(j)));
     copy(pose.with_camera, num_camera_, reduced_.block(0, row_of(j), num_camera_, 6));
     for (int i = 0; i <= j; ++i) {
-      copy(equations_.H_pp[equations_.index_of(i, j)], 6, reduced_.block<6, 6>(row_of(i), row_of(j)));
+      copy(equations_.H_pp[equations_.index_of(i, j)], 6,
+           reduced_.block<6, 6>(row_of(i), row_of(j)));
     }
   }
   gradient_ = columns.col(0);
@@ -104,9 +110,9 @@ void ReducedEquations::linearize(const Bundle& bundle,
 }
 
 bool ReducedEquations::step(double damping,
-                           const IntrinsicsDelta& from_prior,
-                           Bundle& bundle,
-                           IntrinsicsDelta& camera_change) const {
+                            const IntrinsicsDelta& from_prior,
+                            Bundle& bundle,
+                            IntrinsicsDelta& camera_change) const {
   Eigen::MatrixXd damped = reduced_;
   Eigen::VectorXd gradient = gradient_;
   damped.diagonal() += damping * diagonal_;
@@ -211,7 +217,8 @@ BundleResult solve_bundle_adjustment(Bundle& bundle, const BundleOptions& option
                "observations are ordered by point, then by pose, and none comes twice");
   BundleResult result;
   const auto prior_cost = [&](const IntrinsicsDelta& change) {
-    const IntrinsicsDelta off = options.camera ? IntrinsicsDelta(change - options.camera->mean) : change;
+    const IntrinsicsDelta off =
+        options.camera ? IntrinsicsDelta(change - options.camera->mean) : change;
     return options.camera ? off.dot(options.camera->information * off) : 0.0;
   };
   std::vector<Reprojection> at;

@@ -33,13 +33,15 @@ struct Bundle : BundleState {
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.
 using IntrinsicsDelta = Eigen::Matrix<double, 5, 1>;
 /// One change, then another: the focal lengths' factors multiply.
-[[nodiscard]] inline IntrinsicsDelta compose(const IntrinsicsDelta& first, const IntrinsicsDelta& then) {
+[[nodiscard]] inline IntrinsicsDelta compose(const IntrinsicsDelta& first,
+                                             const IntrinsicsDelta& then) {
   IntrinsicsDelta total = first + then;
   total[2] += first[2] * then[2];
   return total;
 }
 /// The change that completes `first` to `total`.
-[[nodiscard]] inline IntrinsicsDelta difference(const IntrinsicsDelta& total, const IntrinsicsDelta& first) {
+[[nodiscard]] inline IntrinsicsDelta difference(const IntrinsicsDelta& total,
+                                                const IntrinsicsDelta& first) {
   IntrinsicsDelta rest = total - first;
   rest[2] /= 1.0 + first[2];
   return rest;
@@ -55,7 +57,7 @@ struct CameraEstimate {
 
 /// The camera as it is known beforehand.
 struct CameraPrior {
-  IntrinsicsDelta mean;              ///< relative to the bundle's camera
+  IntrinsicsDelta mean;           ///< relative to the bundle's camera
   CameraInformation information;  ///< for observations of a noise of 1 px
 };
 

@@ -284,7 +284,9 @@ NormalEquations::NormalEquations(const Bundle& bundle, int fixed, bool with_came
       points(bundle.points.size()),
       H_pl(bundle.observations.size()) {}
 
-void NormalEquations::add_up(const Bundle& bundle, const std::vector<Reprojection>& at, double damping) {
+void NormalEquations::add_up(const Bundle& bundle,
+                             const std::vector<Reprojection>& at,
+                             double damping) {
   camera = {};
   std::ranges::fill(poses, Pose());
   std::ranges::fill(H_pp, Block<6>());

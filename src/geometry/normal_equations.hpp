@@ -75,7 +75,7 @@ struct NormalEquations {
   int num_fixed_poses;
   bool has_camera;
   Camera camera;
-  std::vector<Pose> poses;         ///< the free ones
+  std::vector<Pose> poses;     ///< the free ones
   std::vector<Block<6>> H_pp;  ///< pose by pose, without the points (see index_of)
   std::vector<Point> points;
   std::vector<Block<3>> H_pl;  ///< pose by landmark, one per observation

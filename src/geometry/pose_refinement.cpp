@@ -94,9 +94,9 @@ Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& direction) {
 }
 
 QuadraticModel<5> linearize_motion(const Rigid3& motion,
-                                    const std::vector<RayPair>& rays,
-                                    const Camera& camera,
-                                    double loss_scale_px) {
+                                   const std::vector<RayPair>& rays,
+                                   const Camera& camera,
+                                   double loss_scale_px) {
   const Eigen::Matrix3d rotation = motion.rotation_matrix();
   const Eigen::Matrix<double, 2, 3> to_tangent = tangent_basis(motion.translation).transpose();
   const Eigen::Vector3d squared_inverse_focal(1.0 / (camera.fx_px * camera.fx_px),
@@ -127,9 +127,9 @@ Rigid3 move_motion(const Rigid3& motion, const Vector5d& step) {
 /// Residual f (cur - R prev) of unit rays: the angle in px, without the singularity of a
 /// projection. Its Jacobian for R <- exp(w) R is f [R prev]x.
 QuadraticModel<3> linearize_rotation(const Eigen::Quaterniond& rotation,
-                                      const std::vector<RayPair>& unit_rays,
-                                      double focal_px,
-                                      double loss_scale_px) {
+                                     const std::vector<RayPair>& unit_rays,
+                                     double focal_px,
+                                     double loss_scale_px) {
   const Eigen::Matrix3d r = rotation.toRotationMatrix();
   const double squared_focal = focal_px * focal_px;
   QuadraticModel<3> equations;
@@ -147,10 +147,10 @@ QuadraticModel<3> linearize_rotation(const Eigen::Quaterniond& rotation,
 /// Residual projected - measured, px; its Jacobian by (w, v), x_in_camera <- exp(w) x_in_camera +
 /// v.
 QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
-                                  const std::vector<Eigen::Vector3d>& points,
-                                  const std::vector<Eigen::Vector2d>& uv,
-                                  const Camera& camera,
-                                  double loss_scale_px) {
+                                 const std::vector<Eigen::Vector3d>& points,
+                                 const std::vector<Eigen::Vector2d>& uv,
+                                 const Camera& camera,
+                                 double loss_scale_px) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation_matrix();
   QuadraticModel<6> equations;
   CauchyLoss loss(loss_scale_px);

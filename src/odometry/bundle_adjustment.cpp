@@ -18,8 +18,8 @@ namespace {
 constexpr double kMinDepth = 1e-6;
 /// Fewer observations of a landmark hold it nowhere.
 constexpr std::size_t kMinObservations = 2;
-/// Least Cauchy scale over the median error: a lens or a shutter that the camera model does not know
-/// makes every observation worse.
+/// Least Cauchy scale over the median error: a lens or a shutter that the camera model does not
+/// know makes every observation worse.
 constexpr double kLossShare = 2.0;
 
 /// The part of a window that is refined.
@@ -37,9 +37,10 @@ WindowBundle read_window(const Window& window, const Camera& camera, int num_fix
   for (const auto& [track_id, point] : window.landmarks) {
     const std::span<const KeyframeObservation> observations = walk.seek(track_id);
     const bool is_in_front =
-        std::all_of(observations.begin(), observations.end(), [&, &at = point](const KeyframeObservation& observation) {
-          return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
-        });
+        std::all_of(observations.begin(), observations.end(),
+                    [&, &at = point](const KeyframeObservation& observation) {
+                      return (bundle.camera_from_world[observation.keyframe] * at).z() > kMinDepth;
+                    });
     const bool moves_a_pose =
         !observations.empty() && static_cast<int>(observations.back().keyframe) >= num_fixed_poses;
     if (observations.size() < kMinObservations || !is_in_front || !moves_a_pose) {

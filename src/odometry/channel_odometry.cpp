@@ -70,13 +70,12 @@ void ChannelOdometry::track(Frame frame) {
 void ChannelOdometry::localize() {
   STEMVO_CHECK(tracked_.has_value(), "a frame was tracked");
   STEMVO_CHECK(!localized_.has_value(), "the frame before is optimized");
-  FrameInWork& work =
-      localized_.emplace(FrameInWork{*std::exchange(tracked_, std::nullopt), {}});
+  FrameInWork& work = localized_.emplace(FrameInWork{*std::exchange(tracked_, std::nullopt), {}});
   Stopwatch watch;
   work.localized = estimator_->localize(work.frame);
   if (work.frame.has_image()) {
-    front_end_->keep(work.localized.inlier_mask);
-    front_end_->look_for(std::move(work.localized.lost_landmarks));
+    front_end_->remove_outliers(work.localized.inlier_mask);
+    front_end_->expect_projections(std::move(work.localized.projections));
     work.frame.times.pose_ms = watch.lap_ms();
   }
 }

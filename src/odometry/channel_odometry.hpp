@@ -60,7 +60,7 @@ class ChannelOdometry {
   std::unique_ptr<Estimator> estimator_;
 
   int num_tracked_ = 0;
-  std::optional<Frame> tracked_;    ///< not localized
+  std::optional<Frame> tracked_;          ///< not localized
   std::optional<FrameInWork> localized_;  ///< not optimized
   FrameInWork optimized_;                 ///< the last one
 };

@@ -36,7 +36,7 @@ struct Frame {
 struct LocalizedFrame {
   FrameResult result;             ///< all but the pose, and the road measurement
   std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
-  Observations lost_landmarks;     ///< without an inlier, where they should be in this frame
+  Observations projections;       ///< of the landmarks without an inlier in this frame
 };
 
 /// Tracks in, poses out; the front end follows tracks to the next frame while a frame is optimized.

@@ -97,7 +97,7 @@ void Initializer::start(View reference) {
   waiting_.clear();
 }
 
-bool Initializer::is_worn_out(const Observations& now) const {
+bool Initializer::lost_reference(const Observations& now) const {
   const auto living = static_cast<double>(common_points(reference_.points, now).size());
   return living < kMinLiving * static_cast<double>(reference_.points.size());
 }
@@ -177,7 +177,7 @@ std::optional<Window> Initializer::open_window(const View& now,
     if (found.has_value()) {
       predicted = found->world_from_camera;
     }
-    window.keyframes.front().followers.push_back(
+    window.keyframes.front().non_keyframes.push_back(
         {view.frame, reference_.world_from_camera.inverse() * predicted});
   }
   return window;

@@ -35,7 +35,7 @@ class Initializer {
   void start(View reference);
   [[nodiscard]] const View& reference() const { return reference_; }
   /// Too few of its tracks live: it will not decide any more.
-  [[nodiscard]] bool is_worn_out(const Observations& now) const;
+  [[nodiscard]] bool lost_reference(const Observations& now) const;
 
   /// The motion from the reference to a frame. `inlier_mask` is one per match of the frame; a match
   /// that the reference does not see is kept.

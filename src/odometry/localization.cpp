@@ -70,10 +70,10 @@ SeenLandmarks find_seen_landmarks(const Window& window, const Observations& fram
   return seen;
 }
 
-Observations find_lost_landmarks(const Window& window,
-                                const Rigid3& world_from_camera,
-                                const Observations& frame,
-                                const Camera& camera) {
+Observations project_lost_landmarks(const Window& window,
+                                    const Rigid3& world_from_camera,
+                                    const Observations& frame,
+                                    const Camera& camera) {
   const Rigid3 camera_from_world = world_from_camera.inverse();
   Observations lost;
   auto seen = frame.begin();
@@ -112,12 +112,12 @@ std::optional<Localization> localize(const SeenLandmarks& seen,
   return best;
 }
 
-std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
-                                  const Eigen::Vector3d& held_position,
-                                  const SeenLandmarks& seen,
-                                  const Camera& camera,
-                                  double min_flow_px,
-                                  double bound_px) {
+std::optional<Rigid3> rotation_only_pose(const Rigid3& world_from_camera,
+                                         const Eigen::Vector3d& held_position,
+                                         const SeenLandmarks& seen,
+                                         const Camera& camera,
+                                         double min_flow_px,
+                                         double bound_px) {
   const Rigid3 camera_from_world = world_from_camera.inverse();
   const Rigid3 held(camera_from_world.rotation, -(camera_from_world.rotation * held_position));
   std::vector<Eigen::Vector2d> held_uv;

@@ -22,11 +22,11 @@ struct SeenLandmarks {
 };
 [[nodiscard]] SeenLandmarks find_seen_landmarks(const Window& window, const Observations& frame);
 
-/// Landmarks in front of the camera that are not among the frame's points, where they should be.
-[[nodiscard]] Observations find_lost_landmarks(const Window& window,
-                                              const Rigid3& world_from_camera,
-                                              const Observations& frame,
-                                              const Camera& camera);
+/// Projections of the landmarks in front of the camera that are not among the frame's points.
+[[nodiscard]] Observations project_lost_landmarks(const Window& window,
+                                                  const Rigid3& world_from_camera,
+                                                  const Observations& frame,
+                                                  const Camera& camera);
 
 struct LocalizationOptions {
   double first_loss_px = 2.0;  ///< Cauchy scale of the first round: the prediction may be far off
@@ -55,11 +55,11 @@ struct Localization {
 /// the frame's own position moves its landmarks in the image by less than `min_flow_px` (root mean
 /// square, pixels), once a rotation has done what it can. nullopt: it moved, or too few landmarks
 /// are within `bound_px` to tell.
-[[nodiscard]] std::optional<Rigid3> turned_pose(const Rigid3& world_from_camera,
-                                                const Eigen::Vector3d& held_position,
-                                                const SeenLandmarks& seen,
-                                                const Camera& camera,
-                                                double min_flow_px,
-                                                double bound_px);
+[[nodiscard]] std::optional<Rigid3> rotation_only_pose(const Rigid3& world_from_camera,
+                                                       const Eigen::Vector3d& held_position,
+                                                       const SeenLandmarks& seen,
+                                                       const Camera& camera,
+                                                       double min_flow_px,
+                                                       double bound_px);
 
 }  // namespace stemvo

@@ -39,7 +39,7 @@ double MetricScale::measure(const RoadImage* road, const Rigid3& cur_from_prev) 
   return estimate.metres_per_unit;
 }
 
-void MetricScale::hold(std::string_view reason) {
+void MetricScale::keep_last(std::string_view reason) {
   if (road_.has_value()) {
     sigma_ = road_->skip();
     state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
@@ -47,7 +47,7 @@ void MetricScale::hold(std::string_view reason) {
   }
 }
 
-void MetricScale::wait(std::string_view reason) {
+void MetricScale::set_unknown(std::string_view reason) {
   if (road_.has_value()) {
     state_ = ScaleState::kNone;
     reason_ = reason;

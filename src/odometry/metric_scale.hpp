@@ -32,9 +32,9 @@ class MetricScale {
   /// factor that makes a unit a metre; the caller multiplies its lengths by it.
   [[nodiscard]] double measure(const RoadImage* road, const Rigid3& cur_from_prev);
   /// A frame on which the road cannot be measured: the last scale is kept, its sigma grows.
-  void hold(std::string_view reason);
+  void keep_last(std::string_view reason);
   /// A frame without a map to scale.
-  void wait(std::string_view reason);
+  void set_unknown(std::string_view reason);
 
   /// State, reason and sigma of the last frame given.
   void report(FrameResult& result) const;

@@ -145,7 +145,7 @@ void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   result.state = motion_.state;
   if (motion_.state == FrameState::kNoImage) {
     chain_.extrapolate(/*has_image=*/false);
-    scale_.hold("no image");
+    scale_.keep_last("no image");
   } else if (motion_.state == FrameState::kFirst) {
     scale_.restart(frame.road.get());
   } else {

@@ -47,8 +47,8 @@ bool is_plausible(const CameraMeasurement& found) {
 
 SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinement)
     : given_(given), camera_(given), refinement_(refinement) {
-  const Eigen::Map<const IntrinsicsDelta> sigma(refinement == CameraRefinement::kAll ? kWeakPriorSigma
-                                                                                  : kPriorSigma);
+  const Eigen::Map<const IntrinsicsDelta> sigma(
+      refinement == CameraRefinement::kAll ? kWeakPriorSigma : kPriorSigma);
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
@@ -57,7 +57,7 @@ std::optional<CameraEstimate> SelfCalibration::estimate() const {
     return std::nullopt;
   }
   SelfCalibration after = *this;
-  after.take_in();
+  after.fuse_result();
   return CameraEstimate{after.mean_, after.sigma(), after.num_runs_};
 }
 
@@ -87,8 +87,8 @@ void SelfCalibration::observe(const Keyframe& keyframe, const BundleOptions& opt
   if (refinement_ == CameraRefinement::kOff) {
     return;
   }
-  take_in();
-  approach_believed();
+  fuse_result();
+  approach_target();
   const WindowOptions window_options{.num_keyframes = kNumKeyframes};
   add_keyframe(run_, keyframe, window_options);
   triangulate_landmarks(run_, camera_, window_options);
@@ -108,7 +108,7 @@ void SelfCalibration::begin_measuring(const BundleOptions& options) {
   run_ = {};
 }
 
-void SelfCalibration::take_in() {
+void SelfCalibration::fuse_result() {
   const Measured measured = std::exchange(measured_, {});
   const auto found = measured.valid() ? measured.get() : std::nullopt;
   if (!found.has_value() || !is_plausible(*found)) {
@@ -121,16 +121,16 @@ void SelfCalibration::take_in() {
   const auto insists = [&](int i, double max, double bias) {
     return sigmas[i] < max && std::abs(mean_[i]) > kMinSigmas * std::hypot(sigmas[i], bias);
   };
-  believed_.setZero();
-  believed_[0] = insists(0, kMaxSigma_px, kBias_px) ? mean_[0] : 0.0;
-  believed_[1] = insists(1, kMaxSigma_px, kBias_px) ? mean_[1] : 0.0;
+  target_.setZero();
+  target_[0] = insists(0, kMaxSigma_px, kBias_px) ? mean_[0] : 0.0;
+  target_[1] = insists(1, kMaxSigma_px, kBias_px) ? mean_[1] : 0.0;
   if (refinement_ == CameraRefinement::kAll && insists(2, kMaxSigmaOfFocal, 0.0)) {
-    believed_[2] = mean_[2];
+    target_[2] = mean_[2];
   }
 }
 
-void SelfCalibration::approach_believed() {
-  const IntrinsicsDelta left = believed_ - applied();
+void SelfCalibration::approach_target() {
+  const IntrinsicsDelta left = target_ - applied();
   const auto step = [&](int i, double max) { return std::clamp(left[i], -max, max); };
   camera_.cx_px += step(0, kMaxStep_px);
   camera_.cy_px += step(1, kMaxStep_px);

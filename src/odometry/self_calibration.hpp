@@ -50,8 +50,8 @@ class SelfCalibration {
 
   void begin_measuring(const BundleOptions& options);
   /// The run that is measured, if there is one; waits for it.
-  void take_in();
-  void approach_believed();
+  void fuse_result();
+  void approach_target();
   [[nodiscard]] IntrinsicsDelta applied() const;
   /// Standard deviations of mean_.
   [[nodiscard]] IntrinsicsDelta sigma() const;
@@ -59,8 +59,9 @@ class SelfCalibration {
   Camera given_;
   Camera camera_;
   CameraRefinement refinement_;
-  IntrinsicsDelta believed_ = IntrinsicsDelta::Zero();  ///< significant part of mean_; camera_ goes there
-  IntrinsicsDelta mean_ = IntrinsicsDelta::Zero();      ///< relative to the given camera
+  IntrinsicsDelta target_ =
+      IntrinsicsDelta::Zero();  ///< significant part of mean_; camera_ goes there
+  IntrinsicsDelta mean_ = IntrinsicsDelta::Zero();  ///< relative to the given camera
   CameraInformation information_;
   int num_runs_ = 0;   ///< measured
   Window run_;         ///< the keyframes since the last one that was measured

@@ -21,8 +21,8 @@ void sort_by_id(Observations& points) {
 }
 
 Observations kept_points(const std::vector<int>& track_ids,
-                        const std::vector<Eigen::Vector2d>& uv,
-                        const std::vector<char>& is_kept) {
+                         const std::vector<Eigen::Vector2d>& uv,
+                         const std::vector<char>& is_kept) {
   Observations points;
   points.reserve(uv.size());
   for (std::size_t i = 0; i < uv.size(); ++i) {

@@ -16,7 +16,8 @@
 namespace stemvo {
 
 /// Where the kept matches (one flag per match) start and end.
-[[nodiscard]] Observations previous_points(const Matches& matches, const std::vector<char>& is_kept);
+[[nodiscard]] Observations previous_points(const Matches& matches,
+                                           const std::vector<char>& is_kept);
 [[nodiscard]] Observations current_points(const Matches& matches, const std::vector<char>& is_kept);
 
 /// Adds where kept matches start that `points`, of the frame they start at, lacks: new corners are

@@ -24,9 +24,10 @@ bool is_seen_well(const Eigen::Vector3d& point_in_world,
                   const std::vector<Rigid3>& poses,
                   const Camera& camera,
                   double bound_px) {
-  return std::all_of(observations.begin(), observations.end(), [&](const KeyframeObservation& seen) {
-    return is_near(poses[seen.keyframe], point_in_world, seen.uv, camera, bound_px);
-  });
+  return std::all_of(
+      observations.begin(), observations.end(), [&](const KeyframeObservation& seen) {
+        return is_near(poses[seen.keyframe], point_in_world, seen.uv, camera, bound_px);
+      });
 }
 
 std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
@@ -60,10 +61,10 @@ void drop(Window& window, std::size_t i) {
     const Keyframe& leaving = window.keyframes[i];
     const Rigid3 before_from_leaving =
         before.world_from_camera.inverse() * leaving.world_from_camera;
-    before.followers.push_back({leaving.frame, before_from_leaving});
-    for (const FrameBetween& follower : leaving.followers) {
-      before.followers.push_back(
-          {follower.frame, before_from_leaving * follower.keyframe_from_camera});
+    before.non_keyframes.push_back({leaving.frame, before_from_leaving});
+    for (const NonKeyframe& non_keyframe : leaving.non_keyframes) {
+      before.non_keyframes.push_back(
+          {non_keyframe.frame, before_from_leaving * non_keyframe.keyframe_from_camera});
     }
   }
   window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(i));
@@ -179,8 +180,8 @@ void rescale(Window& window, double factor, const Eigen::Vector3d& center) {
   };
   for (Keyframe& keyframe : window.keyframes) {
     keyframe.world_from_camera.translation = scaled(keyframe.world_from_camera.translation);
-    for (FrameBetween& follower : keyframe.followers) {
-      follower.keyframe_from_camera.translation *= factor;
+    for (NonKeyframe& non_keyframe : keyframe.non_keyframes) {
+      non_keyframe.keyframe_from_camera.translation *= factor;
     }
   }
   for (auto& [track_id, point] : window.landmarks) {

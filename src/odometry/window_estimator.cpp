@@ -36,7 +36,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       initializer_(config),
       scale_(config),
       calibration_(camera, config.camera.refine),
-      step_(assumed_step(config.scale)) {
+      speed_per_frame_(assumed_step(config.scale)) {
   window_options_.num_keyframes = config.window.num_keyframes;
   refinement_.loss_scale_px = config.ba.loss_px;
   refinement_.max_iterations = config.ba.max_iterations;
@@ -50,12 +50,12 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   std::vector<char>& mask = localized.inlier_mask;
   mask.assign(frame.matches.cur_uv.size(), 1);
   result.state = find_pose(frame, localized);
-  is_held_ = frame.has_image() ? result.state != FrameState::kTracking : is_held_;
+  was_static_ = frame.has_image() ? result.state != FrameState::kTracking : was_static_;
   result.num_matches = static_cast<int>(mask.size());
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   if (frame.has_image() && !is_initializing_) {
-    localized.lost_landmarks =
-        find_lost_landmarks(window_, world_from_camera_, anchor_.points, camera());
+    localized.projections =
+        project_lost_landmarks(window_, world_from_camera_, last_moving_.points, camera());
   }
   return localized;
 }
@@ -66,7 +66,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     return FrameState::kNoImage;
   }
   if (last_.frame < 0) {
-    start_reference({frame.number, world_from_camera_, {}, frame.road});
+    reset_reference({frame.number, world_from_camera_, {}, frame.road});
     scale_.restart(frame.road.get());
     return FrameState::kFirst;
   }
@@ -74,8 +74,8 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   const Observations now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
-    if (is_stationary(anchor_.points, now, min_flow_px(), options_.min_inliers)) {
-      world_from_camera_ = anchor_.world_from_camera;
+    if (is_stationary(last_moving_.points, now, min_flow_px(), options_.min_inliers)) {
+      world_from_camera_ = last_moving_.world_from_camera;
       return FrameState::kStationary;
     }
   }
@@ -93,15 +93,16 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   world_from_camera_ = found.world_from_camera;
   mark_outliers(frame.matches, localized.inlier_mask);
   Observations now = current_points(frame.matches, localized.inlier_mask);
-  const Rigid3 before = anchor_.world_from_camera;
+  const Rigid3 before = last_moving_.world_from_camera;
   const double bound_px = kTurnFlow * min_flow_px();
   std::optional<Rigid3> turned;
   if (is_last_localized_) {
-    turned = turned_pose(world_from_camera_, before.translation, find_seen_landmarks(window_, now),
-                         camera(), bound_px, localization_.inlier_bound_px);
+    turned = rotation_only_pose(world_from_camera_, before.translation,
+                                find_seen_landmarks(window_, now), camera(), bound_px,
+                                localization_.inlier_bound_px);
   }
   world_from_camera_ = turned.value_or(world_from_camera_);
-  anchor_ = {frame.number, world_from_camera_, std::move(now)};
+  last_moving_ = {frame.number, world_from_camera_, std::move(now)};
   if (!turned.has_value()) {
     return FrameState::kTracking;
   }
@@ -118,8 +119,8 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   const View& reference = initializer_.reference();
   const bool starts_elsewhere =
       reference.points.empty() && frame.matches.prev_frame != reference.frame;
-  if (had_map || starts_elsewhere || initializer_.is_worn_out(now)) {
-    start_reference_before(frame.matches);
+  if (had_map || starts_elsewhere || initializer_.lost_reference(now)) {
+    reset_reference_before(frame.matches);
   }
   MeasuredMotion motion = initializer_.measure(frame.matches, now, camera());
   const double num_matches = static_cast<double>(frame.matches.cur_uv.size());
@@ -137,14 +138,14 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
                                           LocalizedFrame& localized) {
   if (motion.state == FrameState::kLost) {  // the last motion goes on, and no track does
     world_from_camera_ = world_from_camera_ * prev_from_cur_;
-    start_reference({frame.number, world_from_camera_, {}, frame.road});
+    reset_reference({frame.number, world_from_camera_, {}, frame.road});
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
     return FrameState::kLost;
   }
   // The length of the way since the reference is not known: as many steps as frames that moved.
   const View& reference = initializer_.reference();
   const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = step_ * (frame.number - reference.frame - frames_still_);
+  const double length = speed_per_frame_ * (frame.number - reference.frame - frames_still_);
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
   const Observations points = current_points(frame.matches, motion.inlier_mask);
@@ -165,16 +166,16 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
 
 /// The reference is the first keyframe of a map to be. The window, if there is one, stays until the
 /// map is: a frame may see it again.
-void WindowEstimator::start_reference(View reference) {
+void WindowEstimator::reset_reference(View reference) {
   initializer_.start(std::move(reference));
   frames_still_ = 0;
   is_initializing_ = true;
 }
 
 /// Where the matches start: the frame before, or the last one before trouble.
-void WindowEstimator::start_reference_before(const Matches& matches) {
+void WindowEstimator::reset_reference_before(const Matches& matches) {
   const int frame = std::max(matches.prev_frame, 0);
-  start_reference({frame,
+  reset_reference({frame,
                    trajectory_[static_cast<std::size_t>(frame)],
                    {},
                    frame == last_.frame ? last_.road : nullptr});
@@ -188,8 +189,9 @@ bool WindowEstimator::open_window(View view) {
     return false;
   }
   if (!window_.keyframes.empty()) {  // the frames since belong to the new one
-    std::erase_if(window_.keyframes.back().followers,
-                  [&](const FrameBetween& follower) { return follower.frame > reference.frame; });
+    std::erase_if(window_.keyframes.back().non_keyframes, [&](const NonKeyframe& non_keyframe) {
+      return non_keyframe.frame > reference.frame;
+    });
     history_.close(window_);
   }
   window_ = std::move(*window);
@@ -199,12 +201,12 @@ bool WindowEstimator::open_window(View view) {
   road_pose_ = road_view.world_from_camera;
   is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
-  anchor_ = std::move(view);
+  last_moving_ = std::move(view);
   return true;
 }
 
 double WindowEstimator::min_flow_px() const {
-  return (is_held_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
+  return (was_static_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
 }
 
 void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
@@ -230,7 +232,7 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
     }
-    if (result.state == FrameState::kTracking && is_keyframe(anchor_)) {
+    if (result.state == FrameState::kTracking && is_keyframe(last_moving_)) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
@@ -258,7 +260,7 @@ bool WindowEstimator::is_keyframe(const View& view) const {
 }
 
 void WindowEstimator::add_keyframe(const Frame& frame) {
-  Keyframe keyframe{frame.number, world_from_camera_, anchor_.points, {}};
+  Keyframe keyframe{frame.number, world_from_camera_, last_moving_.points, {}};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
     history_.leave(window_, leaving_keyframe(window_, keyframe), keyframe);
@@ -271,7 +273,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
         window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
-    anchor_.world_from_camera = world_from_camera_;
+    last_moving_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera(), window_options_);
   // The newest keyframe but one: it has its new corners.
@@ -281,12 +283,12 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
 
 void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   if (!frame.has_image()) {
-    scale_.hold("no image");
+    scale_.keep_last("no image");
   } else if (state == FrameState::kLost) {
-    scale_.hold("lost");
+    scale_.keep_last("lost");
   } else if (is_initializing_) {
     if (state != FrameState::kFirst) {
-      scale_.wait("no map");
+      scale_.set_unknown("no map");
     }
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
@@ -298,7 +300,7 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
       rescale(window_, factor, center);
       history_.rescale(window_, factor, is_first);
       calibration_.rescale(factor, center);
-      for (Rigid3* pose : {&world_from_camera_, &anchor_.world_from_camera}) {
+      for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);
       }
     }
@@ -316,14 +318,14 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
       prev_from_cur_ = motion_of_one_frame(before.world_from_camera.inverse() * world_from_camera_,
                                            frame.number - before.frame);
       const double step = prev_from_cur_.translation.norm();
-      step_ = step > 0.0 && state == FrameState::kTracking ? step : step_;
+      speed_per_frame_ = step > 0.0 && state == FrameState::kTracking ? step : speed_per_frame_;
     }
     is_last_localized_ = is_localized;
     last_ = {frame.number, world_from_camera_, {}, frame.road};
   }
   if (!window_.keyframes.empty() && window_.keyframes.back().frame != frame.number) {
     Keyframe& newest = window_.keyframes.back();
-    newest.followers.push_back(
+    newest.non_keyframes.push_back(
         {frame.number, newest.world_from_camera.inverse() * world_from_camera_});
   }
   trajectory_.push_back(world_from_camera_);

@@ -51,8 +51,8 @@ class WindowEstimator final : public Estimator {
                            const MeasuredMotion& motion,
                            LocalizedFrame& localized);
 
-  void start_reference(View reference);
-  void start_reference_before(const Matches& matches);
+  void reset_reference(View reference);
+  void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
   /// The one in use, which everything but the camera's own refinement is given.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
@@ -82,12 +82,12 @@ class WindowEstimator final : public Estimator {
   SelfCalibration calibration_;
   Rigid3 world_from_camera_;        ///< of the frame in work
   Rigid3 prev_from_cur_;            ///< the last motion of one frame
-  double step_;                     ///< length of the last step measured, per frame
+  double speed_per_frame_;          ///< length of the last step measured, per frame
   View last_;                       ///< the last frame with an image, without its points
-  View anchor_;                     ///< the last frame that was not stationary
+  View last_moving_;                ///< the last frame that was not stationary
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
-  bool is_held_ = false;            ///< the last image did not show new motion
+  bool was_static_ = false;         ///< the last image did not show new motion
   int frames_still_ = 0;            ///< since the initializer's reference: stationary, rotating
   int keyframes_since_refinement_ = 0;
   std::vector<Rigid3> trajectory_;

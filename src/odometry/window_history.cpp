@@ -92,14 +92,14 @@ void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, i
   tracks_.erase(track);
 }
 
-void WindowHistory::keep_followers(const Keyframe& keyframe) {
-  for (const FrameBetween& follower : keyframe.followers) {
-    keep_motion(keyframe.frame, follower.frame, follower.keyframe_from_camera);
+void WindowHistory::keep_non_keyframes(const Keyframe& keyframe) {
+  for (const NonKeyframe& non_keyframe : keyframe.non_keyframes) {
+    keep_motion(keyframe.frame, non_keyframe.frame, non_keyframe.keyframe_from_camera);
   }
 }
 
 void WindowHistory::keep_motions(const Keyframe& prev, const Keyframe& cur) {
-  keep_followers(prev);
+  keep_non_keyframes(prev);
   keep_motion(prev.frame, cur.frame, prev.world_from_camera.inverse() * cur.world_from_camera);
 }
 
@@ -129,7 +129,7 @@ void WindowHistory::close(const Window& window) {
     keep_motions(window.keyframes[i - 1], window.keyframes[i]);
   }
   if (!window.keyframes.empty()) {
-    keep_followers(window.keyframes.back());
+    keep_non_keyframes(window.keyframes.back());
   }
   for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend(); ++keyframe) {
     for (const Observation& observation : keyframe->points) {

@@ -62,7 +62,7 @@ class WindowHistory {
   void keep_motion(int prev, int cur, Rigid3 prev_from_cur);
   void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
   void keep_motions(const Keyframe& prev, const Keyframe& cur);
-  void keep_followers(const Keyframe& keyframe);
+  void keep_non_keyframes(const Keyframe& keyframe);
 
   std::vector<WindowMotion> motions_;
   std::vector<KeptLandmark> landmarks_;

@@ -101,7 +101,7 @@ TEST(KltFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   std::vector<char> is_good(first.track_ids.size(), 1);
   ASSERT_GT(is_good.size(), 10U);
   is_good[3] = 0;
-  front_end->keep(is_good);
+  front_end->remove_outliers(is_good);
   const Matches second = front_end->process(image_of(textured_image(size, {2.0, 0.0})));
   std::map<int, Eigen::Vector2d> second_prev;
   for (std::size_t i = 0; i < second.track_ids.size(); ++i) {
@@ -148,8 +148,8 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
       expected.push_back({first.track_ids[i], first.cur_uv[i] + off});
     }
   }
-  front_end->keep(is_good);
-  front_end->look_for(expected);
+  front_end->remove_outliers(is_good);
+  front_end->expect_projections(expected);
   const Matches second = show(2.0);
   std::size_t num_found = 0;
   for (std::size_t i = 0; i < n; i += 2) {
@@ -161,8 +161,9 @@ TEST(PatchFrontEnd, ATrackThatEndedIsFoundAgainWhereItIsExpectedOrForgotten) {
   EXPECT_GT(num_found, n / 8);  // of n / 6
   EXPECT_TRUE(std::ranges::is_sorted(second.track_ids));
 
-  front_end->keep(std::vector<char>(second.track_ids.size(), 1));
-  front_end->look_for({{first.track_ids[2], first.cur_uv[2] - Eigen::Vector2d(2.0, 0.0)}});
+  front_end->remove_outliers(std::vector<char>(second.track_ids.size(), 1));
+  front_end->expect_projections(
+      {{first.track_ids[2], first.cur_uv[2] - Eigen::Vector2d(2.0, 0.0)}});
   EXPECT_FALSE(start_of(show(3.0), first.track_ids[2]).has_value());  // it was not there once
 }
 
@@ -180,7 +181,7 @@ TEST(PatchFrontEnd, WhatIsExpectedInTheDarkIsStillTrackedFromTheLastGoodImage) {
   const cv::Mat dark(size, CV_8U, cv::Scalar(0));
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(show(dark).cur_uv.empty());
-    front_end->look_for(expected);
+    front_end->expect_projections(expected);
   }
   const Matches after = show(textured_image(size, {2.0, 0.0}));
   EXPECT_GT(after.track_ids.size(), before.track_ids.size() / 2);

@@ -77,15 +77,15 @@ TEST(Initializer, OpensAWindowOfTheReferenceAndNowWithTheFramesBetween) {
   EXPECT_EQ(window.keyframes.front().frame, 0);
   EXPECT_EQ(window.keyframes.back().frame, decided.frame);
   EXPECT_GT(window.landmarks.size(), 100U);
-  const std::vector<FrameBetween>& between = window.keyframes.front().followers;
+  const std::vector<NonKeyframe>& between = window.keyframes.front().non_keyframes;
   ASSERT_EQ(between.size(), static_cast<std::size_t>(decided.frame) - 1);
   const double unit_m = (walk.pose(decided.frame).translation - walk.pose(0).translation).norm();
-  for (const FrameBetween& follower : between) {
-    const Rigid3 truth = walk.pose(0).inverse() * walk.pose(follower.frame);
-    const Rigid3& estimate = follower.keyframe_from_camera;
+  for (const NonKeyframe& non_keyframe : between) {
+    const Rigid3 truth = walk.pose(0).inverse() * walk.pose(non_keyframe.frame);
+    const Rigid3& estimate = non_keyframe.keyframe_from_camera;
     EXPECT_LT((unit_m * estimate.translation - truth.translation).norm(), 0.15 * unit_m)
-        << follower.frame;
-    EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01) << follower.frame;
+        << non_keyframe.frame;
+    EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01) << non_keyframe.frame;
   }
 }
 
@@ -152,11 +152,11 @@ TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
   Initializer initializer(Options{});
   Observations points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
   initializer.start({0, Rigid3(), points});
-  EXPECT_FALSE(initializer.is_worn_out(points));
+  EXPECT_FALSE(initializer.lost_reference(points));
   points.resize(points.size() * 6 / 10);
-  EXPECT_FALSE(initializer.is_worn_out(points));
+  EXPECT_FALSE(initializer.lost_reference(points));
   points.resize(points.size() / 4);
-  EXPECT_TRUE(initializer.is_worn_out(points));
+  EXPECT_TRUE(initializer.lost_reference(points));
 }
 
 TEST(Initializer, TheMaskIsOfAllMatchesAndKeepsThoseTheReferenceDoesNotSee) {

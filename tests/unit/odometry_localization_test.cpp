@@ -80,7 +80,7 @@ TEST(Localization, LostLandmarksAreThoseInFrontThatTheFrameDoesNotTrack) {
       {2, {0.0, 0.0, 2.0}}, {5, {0.0, 0.0, 5.0}}, {6, {1.0, 0.0, -5.0}}, {9, {1.0, 2.0, 9.0}}};
   const Rigid3 world_from_camera(Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0});
   const Observations lost =
-      find_lost_landmarks(window, world_from_camera, {{5, {50.0, 40.0}}}, camera);
+      project_lost_landmarks(window, world_from_camera, {{5, {50.0, 40.0}}}, camera);
   ASSERT_EQ(lost.size(), 2U);
   EXPECT_EQ(lost[0].track_id, 2);
   EXPECT_EQ(lost[1].track_id, 9);

@@ -146,7 +146,7 @@ TEST(MetricScale, DisabledItChangesNothing) {
   const auto image = drive.road_image(0, true);
   scale.restart(image.get());
   EXPECT_EQ(scale.measure(image.get(), Rigid3()), 1.0);
-  scale.hold("no image");
+  scale.keep_last("no image");
   FrameResult result;
   scale.report(result);
   EXPECT_EQ(result.scale_state, ScaleState::kDisabled);

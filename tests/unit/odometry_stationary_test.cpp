@@ -30,7 +30,8 @@ struct Moved {
     }
   }
   [[nodiscard]] std::optional<Rigid3> turned(double min_flow_px) const {
-    return turned_pose(world_from_camera, held.translation, seen, camera, min_flow_px, kBound_px);
+    return rotation_only_pose(world_from_camera, held.translation, seen, camera, min_flow_px,
+                              kBound_px);
   }
 };
 

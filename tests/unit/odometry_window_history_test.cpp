@@ -62,7 +62,7 @@ TEST(WindowHistory, WhatHasLeftIsNotRescaledWithTheWindow) {
   rescale(window, 3.0, coming.world_from_camera.translation);
   history.close(window);
   const std::vector<WindowMotion>& motions = history.motions();
-  ASSERT_EQ(motions.size(), 5U);  // two keyframes, and a follower of each
+  ASSERT_EQ(motions.size(), 5U);  // two keyframes, and a non_keyframe of each
   const double lengths[] = {0.5, 1.0, 1.5, 3.0, 1.5};
   for (std::size_t i = 0; i < motions.size(); ++i) {
     EXPECT_NEAR(motions[i].prev_from_cur.translation.norm(), lengths[i], 1e-12) << i;

@@ -54,10 +54,10 @@ TEST(Window, OneViewIsKeptFromItsFirstKeyframeOn) {
   int next = 0;
   for (const Keyframe& keyframe : window.keyframes) {
     EXPECT_EQ(keyframe.frame, next++);
-    for (const FrameBetween& follower : keyframe.followers) {
-      EXPECT_EQ(follower.frame, next++);
-      const Rigid3 pose = keyframe.world_from_camera * follower.keyframe_from_camera;
-      const Rigid3 truth = pose_along(follower.frame);
+    for (const NonKeyframe& non_keyframe : keyframe.non_keyframes) {
+      EXPECT_EQ(non_keyframe.frame, next++);
+      const Rigid3 pose = keyframe.world_from_camera * non_keyframe.keyframe_from_camera;
+      const Rigid3 truth = pose_along(non_keyframe.frame);
       EXPECT_LT((pose.translation - truth.translation).norm(), 1e-9);
       EXPECT_LT(pose.rotation.angularDistance(truth.rotation), 1e-7);
     }

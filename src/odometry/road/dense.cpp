@@ -180,9 +180,8 @@ double correlate_road(const RoadImage::Level& prev,
   return 2 * count < samples.size() ? 0.0 : correlation_of(cc, pp, cp);
 }
 
-/// Joins the tiles. A tile counts by how well it correlates: plain or occluded ones do not. The
-/// samples of a tile are not independent (the images are smooth, and a bump or a kerb moves all
-/// of them): the spread of the tiles' gradients tells how much less they are worth together.
+/// Joins the tiles, each weighted by correlation^2 / noise: plain or occluded ones hardly count.
+/// The samples of a tile are not independent, which RoadNormal::inflate_variance accounts for.
 /// Returns the number of tiles that count.
 int join(const Tiles& tiles, RoadNormal& normal) {
   int num_tiles = 0;
@@ -199,7 +198,7 @@ int join(const Tiles& tiles, RoadNormal& normal) {
     normal.gradient += gradient;
     spread += gradient.head<3>().cwiseAbs2();
   }
-  normal.discount(spread);
+  normal.inflate_variance(spread);
   return num_tiles;
 }
 

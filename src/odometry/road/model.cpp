@@ -24,11 +24,13 @@ double RoadWarp::inverse_depth(const Eigen::Vector3d& ray) const {
   return flat > 0.0 && root > kMinRoadRoot ? 0.5 * flat * (1.0 + std::sqrt(root)) : 0.0;
 }
 
-void RoadNormal::discount(const Eigen::Vector3d& spread) {
+void RoadNormal::inflate_variance(const Eigen::Vector3d& spread) {
   const Eigen::Vector3d expected = information.diagonal().head<3>().cwiseMax(1e-12);
-  const double excess = std::max(1.0, spread.cwiseQuotient(expected).mean());
-  information /= excess;
-  gradient /= excess;
+  const double chi2_per_dof = spread.cwiseQuotient(expected).mean();
+  const double inflation =
+      std::max(1.0, chi2_per_dof);  // never below: few groups may agree by luck
+  information /= inflation;
+  gradient /= inflation;
 }
 
 void RoadNormal::add_prior(const RoadWarp& warp,

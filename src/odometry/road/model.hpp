@@ -108,10 +108,13 @@ struct RoadNormal {
   RoadMatrix information = RoadMatrix::Zero();
   RoadVector gradient = RoadVector::Zero();
 
-  /// Groups of data (tiles, cells) that are not independent within: `spread` is the sum over the
-  /// groups of the squares of their gradient by the plane. Where it exceeds what independent data
-  /// would give, everything so far is worth less by that factor.
-  void discount(const Eigen::Vector3d& spread);
+  /// Variance inflation by chi-square per degree of freedom: information and gradient are divided
+  /// by max(1, mean_k of sum_g g_k^2 / H_kk), where g are the gradients by the plane of groups of
+  /// data (tiles, cells) and `spread` is the sum of their squares. If all data are independent, a
+  /// group's gradient has the variance of its share of the information H, and the ratio is 1. A
+  /// bump or a kerb moves all data of a group at once: then the sum of squares exceeds H by as much
+  /// as the data are worth less.
+  void inflate_variance(const Eigen::Vector3d& spread);
   void add_prior(const RoadWarp& warp, const RoadPrior& prior, double rotation_sigma_rad);
   /// Moves the warp; false where there is no finite step or the plane tips over.
   [[nodiscard]] bool step(RoadWarp& warp);

@@ -205,7 +205,7 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
     for (const auto& [cell, gradient] : cells) {
       spread += gradient.cwiseAbs2();
     }
-    normal.discount(spread);
+    normal.inflate_variance(spread);
     normal.add_prior(warp, step.prior, step.options.rotation_sigma_rad);
     if (!normal.step(warp)) {
       return fit;
