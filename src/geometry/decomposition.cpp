@@ -46,9 +46,6 @@ Rigid3 planar_motion(const FaugerasTerms& f, double x1, double x3, bool d2_posit
 std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography, const Camera& camera) {
   const Eigen::Matrix3d k = camera.matrix();
   const Eigen::Matrix3d a = k.inverse() * homography * k;
-  if (!a.allFinite()) {
-    return {};
-  }
   const Svd3 svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Vector3d& d = svd.singularValues();
   // Negated, so that 0/0 is refused as well.
@@ -72,9 +69,6 @@ std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography, cons
 }
 
 std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential) {
-  if (!essential.allFinite()) {
-    return {};
-  }
   const Svd3 svd(essential, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d w;
   w << 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0;

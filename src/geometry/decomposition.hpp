@@ -13,12 +13,12 @@ namespace stemvo {
 
 /// The 8 hypotheses of H (pixels, cur_from_prev) by Faugeras & Lustman, lambda K^-1 H K = R + T
 /// n^T; |translation| == 1. Empty when two singular values of K^-1 H K coincide (ratio < 1.00001:
-/// pure rotation or degenerate), or H is not finite or has rank 1.
+/// pure rotation or degenerate), or H has rank 1.
 [[nodiscard]] std::vector<Rigid3> decompose_homography(const Eigen::Matrix3d& homography,
                                                        const Camera& camera);
 
 /// The 4 hypotheses {U W V^T, U W^T V^T} x {+u3, -u3}; |translation| == 1.
-/// E may have any scale; one that is not finite gives four identities without translation.
+/// E may have any scale.
 [[nodiscard]] std::array<Rigid3, 4> decompose_essential(const Eigen::Matrix3d& essential);
 
 /// E = K^T F K.

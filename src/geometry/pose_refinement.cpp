@@ -70,15 +70,12 @@ struct RayPair {
   Eigen::Vector3d cur;
 };
 
-std::vector<RayPair> finite_rays(const PixelPairs& pairs, const Camera& camera) {
+std::vector<RayPair> rays_of(const PixelPairs& pairs, const Camera& camera) {
   std::vector<RayPair> rays;
   rays.reserve(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const RayPair pair{camera.normalize(pairs.prev_uv[i]).homogeneous(),
-                       camera.normalize(pairs.cur_uv[i]).homogeneous()};
-    if (pair.prev.allFinite() && pair.cur.allFinite()) {
-      rays.push_back(pair);
-    }
+    rays.push_back({camera.normalize(pairs.prev_uv[i]).homogeneous(),
+                    camera.normalize(pairs.cur_uv[i]).homogeneous()});
   }
   return rays;
 }
@@ -147,8 +144,8 @@ QuadraticModel<3> linearize_rotation(const Eigen::Quaterniond& rotation,
 /// Residual projected - measured, px; its Jacobian by (w, v), x_in_camera <- exp(w) x_in_camera +
 /// v.
 QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
-                                 const std::vector<Eigen::Vector3d>& points,
-                                 const std::vector<Eigen::Vector2d>& uv,
+                                 std::span<const Eigen::Vector3d> points,
+                                 std::span<const Eigen::Vector2d> uv,
                                  const Camera& camera,
                                  double loss_scale_px) {
   const Eigen::Matrix3d rotation = camera_from_world.rotation_matrix();
@@ -183,10 +180,9 @@ RefinedMotion refine_relative_pose(const Rigid3& cur_from_prev,
                                    const PixelPairs& pairs,
                                    const Camera& camera,
                                    const RefinementOptions& options) {
-  const std::vector<RayPair> rays = finite_rays(pairs, camera);
+  const std::vector<RayPair> rays = rays_of(pairs, camera);
   const double length = cur_from_prev.translation.norm();
-  if (!std::isfinite(length) || !(length > 0.0) || !cur_from_prev.rotation.coeffs().allFinite() ||
-      rays.size() < 5) {
+  if (!(length > 0.0) || rays.size() < 5) {
     return {cur_from_prev};
   }
   RefinedMotion result{Rigid3(cur_from_prev.rotation, cur_from_prev.translation / length)};
@@ -203,8 +199,8 @@ Eigen::Quaterniond refine_rotation(const Eigen::Quaterniond& rotation,
                                    const PixelPairs& pairs,
                                    const Camera& camera,
                                    const RefinementOptions& options) {
-  std::vector<RayPair> rays = finite_rays(pairs, camera);
-  if (rays.size() < 2 || !rotation.coeffs().allFinite()) {
+  std::vector<RayPair> rays = rays_of(pairs, camera);
+  if (rays.size() < 2) {
     return rotation;
   }
   for (RayPair& pair : rays) {
@@ -230,20 +226,12 @@ Rigid3 refine_absolute_pose(const Rigid3& camera_from_world,
                             const Camera& camera,
                             const RefinementOptions& options) {
   STEMVO_CHECK(points_in_world.size() == uv.size(), "points and pixels are paired");
-  std::vector<Eigen::Vector3d> finite_points;
-  std::vector<Eigen::Vector2d> finite_uv;
-  for (std::size_t i = 0; i < uv.size(); ++i) {
-    if (points_in_world[i].allFinite() && uv[i].allFinite()) {
-      finite_points.push_back(points_in_world[i]);
-      finite_uv.push_back(uv[i]);
-    }
-  }
   Rigid3 refined = camera_from_world;
-  if (finite_points.size() >= 4) {
+  if (uv.size() >= 4) {
     minimize<6>(
         refined,
         [&](const Rigid3& pose) {
-          return linearize_pose(pose, finite_points, finite_uv, camera, options.loss_scale_px);
+          return linearize_pose(pose, points_in_world, uv, camera, options.loss_scale_px);
         },
         [](const Rigid3& pose, const Eigen::Matrix<double, 6, 1>& step) {
           return Rigid3(so3_exp(step.head<3>()), step.tail<3>()) * pose;

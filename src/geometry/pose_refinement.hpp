@@ -13,7 +13,7 @@
 namespace stemvo {
 
 // Robust refinement (Cauchy loss, Levenberg-Marquardt, analytic derivatives) from a start that is
-// roughly right. What is not a number is left out; with too little to go by the start comes back.
+// roughly right; with too few pairs the start comes back.
 
 struct RefinementOptions {
   double loss_scale_px = 0.3;  ///< Cauchy scale
@@ -26,7 +26,7 @@ struct RefinedMotion {
 };
 
 /// Sampson distance of the pairs over R (3) and the direction of T (2). Unchanged for fewer than 5
-/// pairs, and for a motion without translation or that is not finite.
+/// pairs, and for a motion without translation.
 [[nodiscard]] RefinedMotion refine_relative_pose(const Rigid3& cur_from_prev,
                                                  const PixelPairs& pairs,
                                                  const Camera& camera,

@@ -11,16 +11,9 @@ TriangulatedPoint triangulate(const Rigid3& cur_from_prev,
                               const Eigen::Vector2d& cur_xy) {
   const internal::CorrectedMatch match =
       internal::correct_match(essential_from_motion(cur_from_prev), prev_xy, cur_xy);
-  TriangulatedPoint result;
-  if (!match.prev.allFinite() || !match.cur.allFinite()) {
-    return result;
-  }
   const internal::RayMeeting meeting = internal::meet_rays(
       cur_from_prev.rotation_matrix(), cur_from_prev.translation, match.prev, match.cur);
-  result.cos_parallax = meeting.cos_rays;
-  result.finite = meeting.finite;
-  result.in_prev = meeting.depth_prev * match.prev.homogeneous();
-  return result;
+  return {meeting.depth_prev * match.prev.homogeneous(), meeting.cos_rays, meeting.finite};
 }
 
 }  // namespace stemvo

@@ -11,7 +11,7 @@ namespace stemvo {
 struct TriangulatedPoint {
   Eigen::Vector3d in_prev = Eigen::Vector3d::Zero();
   double cos_parallax = 1.0;  ///< cosine of the angle between the two viewing rays
-  bool finite = false;        ///< false: rays parallel within 1e-8 rad or not numbers, in_prev is 0
+  bool finite = false;        ///< false: rays parallel within 1e-8 rad; the rest means nothing
 };
 
 /// Least-squares triangulation of normalised image points (plane z = 1): the least correction that

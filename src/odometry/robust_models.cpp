@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/robust_models.hpp"
 
-#include <new>
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
@@ -62,14 +61,7 @@ std::optional<Eigen::Matrix3d> to_model(const cv::Mat& matrix) {
   return model;
 }
 
-/// OpenCV throws on degenerate input, which here means no model; running out of memory goes on.
-void throw_if_memory_ended(const cv::Exception& exception) {
-  if (exception.code == cv::Error::StsNoMem) {
-    throw std::bad_alloc();
-  }
-}
-
-/// Runs one of OpenCV's estimators.
+/// Runs one of OpenCV's estimators, which throw on some degenerate input: no model then.
 template <typename Estimator>
 std::optional<Eigen::Matrix3d> run_guarded(const PixelPairs& pairs, const Estimator& estimator) {
   if (pairs.size() < kMinMatches) {
@@ -77,8 +69,7 @@ std::optional<Eigen::Matrix3d> run_guarded(const PixelPairs& pairs, const Estima
   }
   try {
     return to_model(estimator(to_points(pairs.prev_uv), to_points(pairs.cur_uv)));
-  } catch (const cv::Exception& exception) {
-    throw_if_memory_ended(exception);
+  } catch (const cv::Exception&) {
     return std::nullopt;
   }
 }
@@ -148,8 +139,7 @@ std::optional<Rigid3> estimate_absolute_pose(std::span<const Eigen::Vector3d> po
                             inliers, params)) {
       return std::nullopt;
     }
-  } catch (const cv::Exception& exception) {
-    throw_if_memory_ended(exception);
+  } catch (const cv::Exception&) {
     return std::nullopt;
   }
   if (rotation.total() != 3 || translation.total() != 3) {

@@ -147,7 +147,7 @@ TEST(TwoViewEstimator, StationaryRotatingAndLowParallaxAreStates) {
   EXPECT_LE(low_parallax.cur_from_prev.inverse().rotation.angularDistance(creep.rotation), 5e-4);
 }
 
-TEST(TwoViewEstimator, TooFewRandomOrNotFiniteMatchesAreLostNotWrong) {
+TEST(TwoViewEstimator, TooFewOrRandomMatchesAreLostNotWrong) {
   const Scene scene = drive_scene({{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}}, 0.2, 0.0, 8);
   const TwoViewEstimator estimator(Options{});
   const auto few = std::span(scene.prev_uv).first(5);
@@ -162,9 +162,6 @@ TEST(TwoViewEstimator, TooFewRandomOrNotFiniteMatchesAreLostNotWrong) {
   const std::vector<Eigen::Vector2d> moved(100, Eigen::Vector2d(15.0, 20.0));
   EXPECT_TRUE(
       estimator.measure({same, moved}, scene.camera, true).cur_from_prev.translation.allFinite());
-  const std::vector<Eigen::Vector2d> broken(
-      100, Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
-  EXPECT_EQ(estimator.measure({same, broken}, scene.camera, false).state, FrameState::kLost);
 }
 
 }  // namespace

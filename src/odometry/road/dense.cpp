@@ -276,7 +276,7 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
 }  // namespace
 
 RoadMeasurement measure_dense(const RoadStep& step) {
-  if (!is_motion(step.cur_from_prev)) {
+  if (!(step.cur_from_prev.translation.norm() > 0.0)) {
     return no_road("no motion");
   }
   if (step.prev.full.values.empty() || step.cur.full.values.empty()) {

@@ -28,9 +28,6 @@ void RoadFilter::predict() {
 }
 
 bool RoadFilter::update(double log_scale, double sigma) {
-  if (!std::isfinite(log_scale) || !(sigma > 0.0) || !std::isfinite(sigma)) {
-    return false;
-  }
   const double measured = std::hypot(sigma, options_.flatness_sigma);
   if (!is_initialized_) {
     is_initialized_ = true;

@@ -87,8 +87,4 @@ RoadMeasurement no_road(std::string_view reason) {
   return result;
 }
 
-bool is_motion(const Rigid3& cur_from_prev) {
-  return cur_from_prev.matrix().allFinite() && cur_from_prev.translation.norm() > 0.0;
-}
-
 }  // namespace stemvo

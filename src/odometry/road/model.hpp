@@ -129,7 +129,5 @@ struct RoadNormal {
                                         double camera_height_m);
 /// A measurement that failed.
 [[nodiscard]] RoadMeasurement no_road(std::string_view reason);
-/// Finite and longer than zero.
-[[nodiscard]] bool is_motion(const Rigid3& cur_from_prev);
 
 }  // namespace stemvo

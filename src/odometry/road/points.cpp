@@ -219,7 +219,7 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
 }  // namespace
 
 RoadMeasurement measure_points(const RoadStep& step) {
-  if (!is_motion(step.cur_from_prev)) {
+  if (!(step.cur_from_prev.translation.norm() > 0.0)) {
     return no_road("no motion");
   }
   if (step.cur.full.values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {

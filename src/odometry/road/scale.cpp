@@ -113,9 +113,7 @@ std::string_view RoadScale::measure(const Past& past, const RoadImage& image) {
 }
 
 RoadScaleEstimate RoadScale::update(RoadImage image, const Rigid3& cur_from_prev) {
-  if (!cur_from_prev.matrix().allFinite()) {
-    restart();
-  } else if (!past_.empty()) {
+  if (!past_.empty()) {
     path_.move(cur_from_prev);
   }
   for (Past& past : past_) {
