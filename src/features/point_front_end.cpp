@@ -108,7 +108,7 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   return matches;
 }
 
-/// Appends those that are found.
+/// Appends the points that are found.
 void PointFrontEnd::match_projections(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
   const std::vector<Point> tracked = view.points;

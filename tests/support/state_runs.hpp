@@ -67,8 +67,7 @@ inline StateRun run_states(const std::filesystem::path& sequence,
                   "odometry.mode=" + mode, "--set", "scale.source=" + scale});
   EXPECT_EQ(done.exit_code, 0) << done.err;
   const std::string csv = read_file(out + "/frames.csv");
-  StateRun result{
-      column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}};
+  StateRun result{column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}};
   const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");  // refuses NaN
   EXPECT_TRUE(poses) << (poses ? "" : poses.error().message);
   result.poses = poses.value_or(Trajectory());

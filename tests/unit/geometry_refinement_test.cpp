@@ -25,7 +25,6 @@ using testing::SceneRandom;
 
 using Points = std::vector<Eigen::Vector2d>;
 
-
 /// The truth turned by rotation_rad and with its direction turned by direction_rad.
 Rigid3 disturbed(const Scene& scene, double rotation_rad, double direction_rad) {
   SceneRandom random(77);
