@@ -185,6 +185,7 @@ PatchMatch align_fine(const Patch& patch, const BorderedImage& image, const Simi
       return {result.warp, 0.0F};
     }
     result.correlation = sums[6] / std::sqrt(variance * patch.norm_sq);
+    // The patch's derivatives have its contrast; the image's are `gain` times as large.
     const float step[4] = {sums[0] / gain, sums[1] / gain, sums[2] / gain, sums[3] / gain};
     const float length = compose(result.warp, step);
     if (length < kFineConverged_px && !only_translates) {

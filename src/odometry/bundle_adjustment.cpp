@@ -115,7 +115,9 @@ std::optional<CameraMeasurement> measure_camera(const Window& window,
   solver.num_fixed_poses = 1;
   WindowBundle read = read_window(window, camera, solver.num_fixed_poses);
   const double error_px = median_error_px(read.bundle);
-  const double sigma_px = error_px / 1.1774;  // Rayleigh
+  // Lengths of noise with equal sigmas in u and v have Rayleigh's distribution, median 1.1774
+  // sigma.
+  const double sigma_px = error_px / 1.1774;
   solver.max_iterations = 30;  // to the end: what is left of the way there is left of the error
   solver.min_relative_decrease = 1e-4;
   solver.camera = CameraPrior{prior.mean, prior.information * (sigma_px * sigma_px)};

@@ -114,6 +114,7 @@ std::size_t leaving_keyframe(const Window& window, const Keyframe& coming) {
   for (std::size_t i = 1; i + kNumRecent <= keyframes.size(); ++i) {
     const double gap = (position(i + 1) - position(i - 1)).norm();
     const double age = (coming.world_from_camera.translation - position(i)).norm();
+    // Gap over age: the further back, the wider the keyframes may stand.
     if (gap < least * age) {
       least = gap / age;
       leaving = i;

@@ -57,8 +57,9 @@ bool RoadFilter::update(double log_scale, double sigma) {
       distance = std::abs(innovation) / std::hypot(measured, sigma_);
     }
   }
-  // Beyond kHuber the measurement's variance grows with its distance, beyond kDoubt with its
-  // square.
+  // Huber's weight of a residual d is kHuber / d, so the variance grows by d / kHuber; beyond
+  // kDoubt it grows by d / kDoubt once more: an outlier then moves the state less the farther it
+  // is.
   const double growth = std::max(1.0, distance / kHuber) * std::max(1.0, distance / kDoubt);
   const double variance = measured * measured * growth;
   const double gain = sigma_ * sigma_ / (sigma_ * sigma_ + variance);

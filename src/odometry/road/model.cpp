@@ -72,7 +72,7 @@ RoadMeasurement read_road(const RoadWarp& warp,
                           double camera_height_m) {
   RoadMeasurement result;
   const Eigen::Vector3d& m = warp.plane;
-  const Eigen::Vector3d gain = m / m.squaredNorm();  // of log |m|
+  const Eigen::Vector3d gain = m / m.squaredNorm();  // d log |m| / dm, for the sigma of log_scale
   result.log_scale = std::log(camera_height_m * m.norm());
   result.sigma = std::sqrt(gain.dot(covariance.topLeftCorner<3, 3>() * gain));
   result.slope_rad = -m.z() / m.y();

@@ -183,6 +183,7 @@ Fit fit_road(const std::vector<Track>& tracks, const RoadStep& step, RoadWarp& w
       residuals[i] = residual_of(tracks[i], warp, step.cur.full.camera);
       sizes[i] = residuals[i].is_valid ? std::abs(residuals[i].along_px) : 1e6;
     }
+    // A normal distribution's sigma is 1.4826 times its median absolute deviation.
     const double noise_px = std::max(kMinNoise_px / step.cur.map.scale.x(), 1.4826 * median(sizes));
     RoadNormal normal;
     std::map<int, Eigen::Vector3d> cells;

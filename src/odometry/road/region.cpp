@@ -34,6 +34,7 @@ RoadRegion::RoadRegion(const Rigid3& cur_from_prev,
   const double yaw_rad = -so3_log(cur_from_prev.rotation).y();
   if (step_m > 0.1 && t.z() < 0.0) {
     curvature_ = std::clamp(yaw_rad / step_m, -0.15, 0.15);
+    // The chord from one frame to the next points half the turn away from the tangent.
     heading_ = std::clamp(t.x() / t.z() + 0.5 * yaw_rad, -0.3, 0.3);
   }
 }
