@@ -54,7 +54,7 @@ class WindowEstimator final : public Estimator {
   void reset_reference(View reference);
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
-  /// The one in use, which everything but the camera's own refinement is given.
+  /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
   /// Least flow that counts as motion.
   [[nodiscard]] double min_flow_px() const;

@@ -10,7 +10,7 @@
 
 #include "features/patch_kernels.hpp"
 
-/// What features/patch_alignment.cpp computes, once more, to be read rather than to be fast: double
+/// The computation of features/patch_alignment.cpp once more, to be read, not to be fast: double
 /// precision, nothing prepared, each step solved by QR, and the same bounds of the iterations.
 /// Complex numbers are points and similarities.
 namespace stemvo::test {
@@ -44,7 +44,7 @@ inline double sample(const BorderedImage& image, Complex at, Weight weight) {
   return sum;
 }
 
-/// Of pixel k of a patch, from its centre.
+/// Pixel k of a patch, from its centre.
 inline Complex offset(Eigen::Index k) {
   return {static_cast<double>(k % 8) - 3.5, static_cast<double>(k / 8) - 3.5};
 }

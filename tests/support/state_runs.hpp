@@ -40,7 +40,7 @@ inline std::vector<std::string> column(const std::string& csv, const std::string
   return values;
 }
 
-/// What a run left behind.
+/// The results of a run.
 struct StateRun {
   std::vector<std::string> states;
   std::vector<std::string> roads;
