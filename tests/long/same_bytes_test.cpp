@@ -23,8 +23,8 @@ TEST(SameBytes, TwoRunsAndAnyNumberOfThreadsGiveTheSameBytes) {
     const std::string out = folder / std::to_string(i);
     variants[i].insert(variants[i].begin(), {"run", sequence, "--out", out});
     ASSERT_EQ(run_stemvo(variants[i]).exit_code, 0);
-    const std::string bytes = read_file(out + "/trajectory_kitti.txt") +
-                              read_file(out + "/trajectory_tum.txt");
+    const std::string bytes =
+        read_file(out + "/trajectory_kitti.txt") + read_file(out + "/trajectory_tum.txt");
     first = i == 0 ? bytes : first;
     EXPECT_FALSE(bytes.empty());
     EXPECT_TRUE(bytes == first) << "variant " << i;
