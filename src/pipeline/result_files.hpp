@@ -16,14 +16,9 @@
 namespace stemvo::pipeline {
 
 /// Files that a run writes into its folder, beside pictures/.
-inline constexpr std::array kResultNames = {"config.yaml",
-                                            "frames.csv",
-                                            "metrics.json",
-                                            "trajectory_kitti.txt",
-                                            "report.html",
-                                            "trajectory_tum.txt",
-                                            "trajectory.png",
-                                            "map.ply"};
+inline constexpr std::array kResultNames = {
+    "config.yaml", "frames.csv",         "metrics.json",   "trajectory_kitti.txt",
+    "report.html", "trajectory_tum.txt", "trajectory.png", "map.ply"};
 
 /// A run refers to its request, its frames and its odometry.
 struct Run {
