@@ -111,7 +111,7 @@ enum class Composition {
   kRight,  ///< R_c R
   kPaper,  ///< R R_c, as printed in eq. (12)
 };
-/// What a step of mode two_frame that does not go forward loses.
+/// A step of mode two_frame that does not go forward loses this.
 enum class ForwardGate { kTranslation, kPaper /* its rotation too */, kOff };
 
 /// Keys `odometry.*`.
@@ -136,8 +136,8 @@ struct BaOptions {
   double loss_px = 0.2;  ///< Cauchy scale on the reprojection error
 };
 
-/// What of the given camera is refined while driving (mode map): it is left only where the images
-/// insist.
+/// Parameters of the given camera that are refined while driving (mode map): they are changed only
+/// where the data are significant (> 2 sigma).
 enum class CameraRefinement { kOff, kPrincipalPoint, kAll /* the focal length too */ };
 
 /// Keys `camera.*`.

@@ -18,7 +18,7 @@ struct Similarity3 {
 };
 
 /// Least-squares fit of positions (Umeyama 1991; kScale: s = sum(x.y)/sum(x.x) about the origin, as
-/// kitti-odom-eval does). Same length, any number of points. What is undefined stays as it is: no
+/// kitti-odom-eval does). Same length, any number of points. The undefined part stays as it is: no
 /// rotation and scale 1 where all points coincide, the smallest rotation where all lie on a line,
 /// the identity for no points or points that are not numbers.
 [[nodiscard]] Similarity3 align_positions(std::span<const Eigen::Vector3d> source,
