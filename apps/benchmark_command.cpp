@@ -43,7 +43,6 @@ struct BenchmarkArguments {
 
 Expected<int> benchmark(BenchmarkArguments& arguments) {
   BenchmarkRequest& request = arguments.request;
-  request.models_dir = data_folder("models");
   request.command = command_line();
   request.published = data_folder("config") / "published.json";
   const Expected<Config> paper = load_config(data_folder("config") / "paper.yaml");

@@ -79,7 +79,6 @@ Expected<int> calibrate(CalibrateArguments& arguments) {
   }
   CalibrationRequest& request = arguments.request;
   request.config = *config;
-  request.models_dir = data_folder("models");
   Progress progress("frames", arguments.is_quiet);
   const Expected<CalibrationReport> result = calibrate_sequence(request, std::ref(progress));
   if (!result) {

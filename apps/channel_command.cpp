@@ -33,7 +33,6 @@ Expected<int> draw(ChannelArguments& arguments) {
     return config.error();
   }
   arguments.request.config = *config;
-  arguments.request.models_dir = data_folder("models");
   Progress progress("frames", /*is_quiet=*/false);
   const Expected<std::size_t> written = write_channel_images(arguments.request, std::ref(progress));
   if (!written) {

@@ -56,7 +56,6 @@ Expected<int> run(RobustnessArguments& arguments) {
   }
   request.config = *config;
   request.command = command_line();
-  request.models_dir = data_folder("models");
   Progress progress("runs", arguments.is_quiet);
   request.progress = std::ref(progress);
   const auto report = robustness::run_robustness(request);

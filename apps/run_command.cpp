@@ -92,7 +92,6 @@ Expected<int> run(RunArguments& arguments) {
   }
   RunRequest& request = arguments.request;
   request.config = *config;
-  request.models_dir = data_folder("models");
   request.command = command_line();
   request.started = process_start();
   if (!arguments.is_quiet) {

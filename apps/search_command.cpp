@@ -50,11 +50,10 @@ struct SearchArguments {
 
 Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
   search::SearchRequest& request = arguments.request;
-  request.models_dir = data_folder("models");
   request.is_stopped = [&arguments] { return arguments.was_stopped = is_interrupted(); };
   if (!arguments.merge.empty()) {
-    return search::merge_searches(arguments.merge, request.out_dir, request.models_dir,
-                                  command_line(), request.is_stopped);
+    return search::merge_searches(arguments.merge, request.out_dir, command_line(),
+                                  request.is_stopped);
   }
   const Expected<Config> config = read_config(arguments.config, search::search_defaults());
   if (!config) {
@@ -62,10 +61,10 @@ Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
   }
   for (const std::string& assignment : arguments.config.overrides) {
     const std::string key = assignment.substr(0, assignment.find('='));
-    if (key == "stem.model" || key == "stem.layer" || key == "stem.filter") {
+    if (key == "stem.model" || key == "stem.filter") {
       return fail(
-          fmt::format("--set {}: expected --model, --layers or --filters, which say what a "
-                      "search runs, found '{}'",
+          fmt::format("--set {}: expected --model or --filters, which say what a search "
+                      "runs, found '{}'",
                       key, assignment));
     }
   }
@@ -109,13 +108,11 @@ void add_options(CLI::App& command, SearchArguments& arguments) {
       ->type_name("");
   add_out_folder(command, request.out_dir);
   command
-      .add_option("--model", request.model,
-                  "Name in models/manifest.yaml or path of an .onnx; default: default")
-      ->type_name("MODEL");
-  command.add_option("--layers", request.layers, "Layers of the model, e.g. a,b; default: all")
+      .add_option("--model", request.models,
+                  "Built-in models or paths of .onnx files, e.g. a.onnx,b.onnx; default: default")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->type_name("NAME,..");
+      ->type_name("MODEL,..");
   command
       .add_option("--kinds", request.kinds,
                   "Each sequence also under these disturbances, at their middle strength "
@@ -124,7 +121,7 @@ void add_options(CLI::App& command, SearchArguments& arguments) {
       ->allow_extra_args(false)
       ->type_name("NAME,..");
   add_range_option(command, "--filters", request.filters,
-                   "Filters A to B-1 of each layer; default: all");
+                   "Filters A to B-1 of each model; default: all");
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 of each sequence");
   command
       .add_option("--held-out", request.held_out_dir, "A sequence that is reported, not ranked by")

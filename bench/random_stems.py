@@ -16,7 +16,7 @@ import _environment  # noqa: E402,F401  starts this tool again in build/venv
 
 import numpy as np  # noqa: E402
 
-from stems import families, fold, manifest, onnx_writer  # noqa: E402
+from stems import families, fold, metadata, onnx_writer  # noqa: E402
 from stems import stem as stem_module  # noqa: E402
 
 FILTERS, FILTER = 256, 10
@@ -36,13 +36,10 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="folder, created")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
-    (out / "manifest.yaml").unlink(missing_ok=True)
     full = random_stem(FILTERS, seed=1)
     for name, stem, chosen in (("full", full, FILTER), ("folded", fold.layer_norm_filter(full, FILTER), 0)):
-        file = out / f"{name}.onnx"
-        onnx_writer.write(stem, file)
-        manifest.add(out / "manifest.yaml", manifest.entry(name, file, stem, network="random, ConvNeXt-XLarge's shape", layer="stem",
-                                                           licence="MIT", default_filter=chosen, command="bench/random_stems.py"))
+        metadata.write(out / f"{name}.onnx", onnx_writer.build(stem), stem, network="random, ConvNeXt-XLarge's shape", layer="stem",
+                       licence="MIT", default_filter=chosen, command="bench/random_stems.py")
 
 
 if __name__ == "__main__":

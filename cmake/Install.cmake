@@ -1,6 +1,6 @@
 # `cmake --install`: the program, the static library, what they need at run time, and packages for CMake and pkg-config.
 #   bin/stemvo  lib/libstemvo.a  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
-#   share/stemvo/{models,config}  share/doc/stemvo
+#   share/stemvo/config  share/doc/stemvo
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -8,7 +8,7 @@ set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/stemvo)
 set(runtime_dir ${CMAKE_INSTALL_LIBDIR}/stemvo)
 
 install(DIRECTORY include/stemvo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(DIRECTORY models config DESTINATION share/stemvo)
+install(DIRECTORY config DESTINATION share/stemvo)
 install(FILES LICENSE DESTINATION share/doc/stemvo)
 
 install(TARGETS stemvo EXPORT stemvoTargets)

@@ -6,7 +6,6 @@
 #include <type_traits>
 #include <utility>
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
@@ -17,20 +16,12 @@
 #include "config/config.hpp"
 #include "dataset/camera_height.hpp"
 #include "frames.hpp"
-#include "models/manifest.hpp"
 #include "options/option_fields.hpp"
 
 namespace stemvo::python {
 namespace {
 
 using namespace nb::literals;
-
-/// models/ beside this module.
-std::filesystem::path models_folder() {
-  Dl_info info{};
-  const bool found = dladdr(reinterpret_cast<const void*>(&models_folder), &info) != 0;
-  return std::filesystem::path(found ? info.dli_fname : "").parent_path() / "models";
-}
 
 /// As --set takes it.
 std::string text_of(nb::handle value) {
@@ -88,13 +79,7 @@ class SafeOdometry {
   static Odometry create(const Camera& camera, const Config& config, const cv::Mat& mask) {
     auto made = [&]() -> Expected<Odometry> {
       const nb::gil_scoped_release release;
-      Options options = config;
-      const auto stem = with_network(options.stem, models_folder());
-      if (!stem) {
-        return stem.error();
-      }
-      options.stem = *stem;
-      return Odometry::create(camera, options, mask);
+      return Odometry::create(camera, config, mask);
     }();
     return value_or_raise(std::move(made));
   }

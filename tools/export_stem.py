@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Turns the weights of a pretrained network into OUT/NAME.onnx and adds its layers to OUT/manifest.yaml.
+"""Turns the weights of a pretrained network into OUT/NAME.onnx, of several layers into OUT/NAME_LAYER.onnx each.
 
 WEIGHTS is one of
   .h5 .keras             Keras: ConvNeXt, EfficientNetV2, NASNet, ResNet; the stem
@@ -8,7 +8,8 @@ WEIGHTS is one of
   .onnx                  any whole network, cut at the tensors named by --layers
   .npz                   arrays of a stem (tools/stems/weights.py lists the keys)
 
-The graph takes RGB 0..255; preprocessing and batch norm are inside it.
+The graph takes RGB 0..255; preprocessing and batch norm are inside it. The file says its kernel, stride and padding in its
+metadata, which stemvo needs.
 
 Padding: the default is none, as stemvo samples a stem more densely by running it on shifted copies
 of the frame, and padding would put borders between them. "same" is what the network was trained
@@ -25,7 +26,7 @@ import re
 import shlex
 import sys
 
-from stems import exports, families, layer_list, manifest, weights
+from stems import exports, families, layer_list, metadata, weights
 
 
 def parse_padding(text):
@@ -45,8 +46,8 @@ def parse_size(text):
 
 def parse_layers(text):
     names = text.split(",")
-    if not all(names) or len(set(names)) != len(names) or "first" in names:
-        raise argparse.ArgumentTypeError(f"expected different names joined by commas (`first` is none), found {text!r}")
+    if not all(names) or len(set(names)) != len(names):
+        raise argparse.ArgumentTypeError(f"expected different names joined by commas, found {text!r}")
     return names
 
 
@@ -62,10 +63,10 @@ def parse_arguments(arguments):
     parser.add_argument("--preprocessing", choices=sorted(families.PREPROCESSING), help="what the network is fed (.onnx: needed)")
     parser.add_argument("--name", help="of the model (default: of the file)")
     parser.add_argument("--padding", type=parse_padding, default="none", help="none | same | T,L,B,R (default: none)")
-    parser.add_argument("--network", help="for the manifest (default: as found, else the name); a known one is held "
+    parser.add_argument("--network", help="for the metadata (default: as found, else the name); a known one is held "
                         "against the file (of .npz and .onnx: against the first convolution)")
-    parser.add_argument("--layer", default="stem", help="of an .npz, for the manifest (default: stem)")
-    parser.add_argument("--licence", default="unknown", help="of the weights, for the manifest (default: unknown)")
+    parser.add_argument("--layer", default="stem", help="of an .npz, for the metadata (default: stem)")
+    parser.add_argument("--licence", default="unknown", help="of the weights, for the metadata (default: unknown)")
     parser.add_argument("--default-filter", type=int, default=0)
     options = parser.parse_args(arguments)
     if not options.list and options.out is None:
@@ -74,26 +75,32 @@ def parse_arguments(arguments):
 
 
 def export(options):
-    """Writes the files; returns the manifest's entries and what is to be said of them."""
+    """Writes the files; returns what each says of itself, and what is to be said of them."""
     name = options.name or options.weights.stem + ("" if options.filter is None else f"_filter{options.filter}")
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
-        raise manifest.ManifestError(f"--name: expected letters, digits, `.`, `_` and `-`, found {name!r}")
+        raise metadata.MetadataError(f"--name: expected letters, digits, `.`, `_` and `-`, found {name!r}")
     made = exports.make(options)
-    for layer, shape in made.layers.items():
+    for layer, (_, shape) in made.layers.items():
         if not 0 <= options.default_filter < shape.filters:
             raise weights.WeightsError(f"{options.weights}: {layer}: --default-filter: expected 0 to {shape.filters - 1}, "
                                        f"found {options.default_filter}")
-    manifest_file = options.out / "manifest.yaml"
-    manifest.load(manifest_file)  # a broken one is found before anything is written
     options.out.mkdir(parents=True, exist_ok=True)
-    onnx_file = options.out / f"{name}.onnx"
-    onnx_file.write_bytes(made.model)
-    entries = [manifest.entry(name, onnx_file, shape, network=options.network or made.network or name, layer=layer,
-                              licence=options.licence, default_filter=options.default_filter,
-                              command=command_line(options, name), sampling=getattr(shape, "sampling", "any"))
-               for layer, shape in made.layers.items()]
-    manifest.add(manifest_file, *entries)
-    return entries, made.notes
+    written = {}
+    for layer, (model, shape) in made.layers.items():
+        file = options.out / f"{file_name(name, layer, made.layers)}.onnx"
+        written[file] = metadata.write(file, model, shape, network=options.network or made.network or name, layer=layer,
+                                       licence=options.licence, default_filter=options.default_filter,
+                                       command=command_line(options, name), sampling=getattr(shape, "sampling", "any"))
+    return written, made.notes
+
+
+def file_name(name, layer, layers):
+    """Of one of a model's layers, without what a file's name cannot hold."""
+    if len(layers) == 1:
+        return name
+    plain = [re.sub(r"[^A-Za-z0-9._-]+", "_", other).strip("_") for other in layers]
+    own = plain[list(layers).index(layer)]
+    return f"{name}_{own}" if plain.count(own) == 1 else f"{name}_{own}_{list(layers).index(layer)}"
 
 
 def command_line(options, name):
@@ -121,16 +128,16 @@ def main(arguments=None):
         if options.list:
             print(layer_list.text(list_layers(options)))
             return 0
-        entries, notes = export(options)
-    except (weights.WeightsError, manifest.ManifestError) as error:
+        written, notes = export(options)
+    except (weights.WeightsError, metadata.MetadataError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except OSError as error:
         print(f"error: {error.filename}: expected to write here, found: {error.strerror}", file=sys.stderr)
         return 1
-    for entry in entries:
-        print(f"{options.out / entry['file']}: {entry['network']}, {entry['layer']}: {entry['filters']} filters, "
-              f"kernel {entry['kernel']}, stride {entry['stride']}, padding {entry['padding']}")
+    for file, said in written.items():
+        print(f"{file}: {said['network']}, {said['layer']}: {said['filters']} filters, kernel {said['kernel']}, "
+              f"stride {said['stride']}, padding {said['padding']}")
     for note in notes:
         print(f"  {note}")
     return 0

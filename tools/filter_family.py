@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""A grid of made filters of 8x8 at stride 2, for a search by odometry: OUT/family.onnx and its entry in OUT/manifest.yaml;
-prints number and name of each filter. docs/lab/evidence.md has what came of it.
+"""A grid of made filters of 8x8 at stride 2, for a search by odometry: OUT/family.onnx; prints number and name of each
+filter. docs/lab/evidence.md has what came of it.
 
 G1.3: Gaussian of sigma 1.3 px. S0.9-0.7x1.8: Gaussian of 0.9 less 0.7 of one of 1.8. D1.5@90: derivative of a Gaussian of 1.5
 along 90 degrees (down). M0.7+3D1.2@90: Gaussian of 0.7 plus 3 of a derivative.
@@ -15,7 +15,7 @@ import sys
 
 import numpy as np
 
-from stems import manifest, onnx_writer
+from stems import metadata, onnx_writer
 from stems import stem as stem_module
 
 SIDE, STRIDE = 8, 2
@@ -60,11 +60,8 @@ def main(arguments=None):
     file = out / "family.onnx"
     try:
         out.mkdir(parents=True, exist_ok=True)
-        onnx_writer.write(stem, file)
-        manifest.add(out / "manifest.yaml", manifest.entry("family", file, stem, network="made filters", layer="stem", licence="MIT",
-                                                           command="tools/filter_family.py --out models"))
-    except manifest.ManifestError as error:
-        sys.exit(f"error: {error}")
+        metadata.write(file, onnx_writer.build(stem), stem, network="made filters", layer="stem", licence="MIT",
+                       command="tools/filter_family.py --out models")
     except OSError as error:
         sys.exit(f"error: {error.filename}: expected to write here, found: {error.strerror}")
     print("\n".join(f"{index:2d} {name}" for index, name in enumerate(filters)))

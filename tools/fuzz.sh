@@ -17,7 +17,7 @@ mkdir -p "$FINDS"
 cmake --preset fuzz --log-level=WARNING >"$BUILD/configure.log" || { cat "$BUILD/configure.log" >&2; exit 1; }
 cmake --build --preset fuzz --parallel "$(nproc)" --target fuzzers >"$BUILD/build.log" || { tail -n 40 "$BUILD/build.log" >&2; exit 1; }
 # Seeds are made again each time; what the fuzzers added to build/fuzz/corpora stays.
-"$BUILD/tests/fuzz/fuzz_make_corpora" . "$BUILD/corpora"
+"$BUILD/tests/fuzz/fuzz_make_corpora" "$BUILD/corpora"
 
 (($# > 0)) || set -- $(sed -n 's/^set(targets \(.*\))$/\1/p' tests/fuzz/CMakeLists.txt)
 rm -f "$BUILD"/*.run.log

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Learns a stem from rendered drives and writes OUT/NAME.onnx, with --default-filter K that filter alone
-(OUT/NAME_filter_K.onnx: the same values at less cost), and their entry in OUT/manifest.yaml. The same drives and options give the same bytes. docs/lab/default_model.md explains it.
+"""Learns a stem from rendered drives and writes OUT/NAME.onnx, with --default-filter K that filter alone too
+(OUT/NAME_filter_K.onnx: the same values at less cost). The same drives and options give the same bytes.
+docs/lab/default_model.md explains it.
 
 DRIVE: made by `stemvo synth DRIVE --depth`, with --walk or without (pictures, exact depth and poses).
 """
@@ -15,7 +16,7 @@ import sys
 
 import numpy as np
 
-from stems import discriminant, drive, manifest, onnx_writer
+from stems import discriminant, drive, metadata, onnx_writer
 from stems import stem as stem_module
 
 FILTERS = 16
@@ -96,15 +97,14 @@ def learn(scatter, nuisance, options):
     return stem_module.Stem(weights, bias, stride=options.stride, mean=np.zeros(1), padding=padding, layer_norm=layer_norm), ratios
 
 
-def write_folded(stem, options):
-    """The default filter alone, sampled as it is meant to be: one pass, one output."""
-    file = options.out / f"{options.name}_filter_{options.default_filter}.onnx"
+def alone(stem, options):
+    """The default filter's model and what it is, sampled as it is meant to be: one pass, one output."""
     own = slice(options.default_filter, options.default_filter + 1)
     if stem.layer_norm is None:
-        onnx_writer.write(dataclasses.replace(stem, weights=stem.weights[own], bias=stem.bias[own]), file)
-    else:
-        onnx_writer.write(dataclasses.replace(stem, stride=options.sampling), file, pick=options.default_filter)
-    return manifest.folded(file, options.default_filter, options.sampling)
+        one = dataclasses.replace(stem, weights=stem.weights[own], bias=stem.bias[own])
+        return onnx_writer.build(one), one
+    dense = dataclasses.replace(stem, stride=options.sampling)
+    return onnx_writer.build(dense, options.default_filter), dense
 
 
 def command_line(options):
@@ -127,19 +127,18 @@ def run(options):
     nuisance = discriminant.Nuisance(options.gain, options.offset, options.noise)
     stem, ratios = learn(scatter, nuisance, options)
     options.out.mkdir(parents=True, exist_ok=True)
-    onnx_file = options.out / f"{options.name}.onnx"
-    onnx_writer.write(stem, onnx_file)
-    entry = manifest.entry(options.name, onnx_file, stem, network="stemvo, learned on rendered drives",
-                           layer="stem", licence="MIT", default_filter=options.default_filter or 0,
-                           command=command_line(options))
+    said = {"network": "stemvo, learned on rendered drives", "layer": "stem", "licence": "MIT",
+            "default_filter": options.default_filter or 0, "command": command_line(options), "filters": FILTERS}
+    file = options.out / f"{options.name}.onnx"
+    metadata.write(file, onnx_writer.build(stem), stem, **said)
     if options.default_filter is not None and options.stride % options.sampling == 0:
-        entry["folded"] = write_folded(stem, options)
-    manifest.add(options.out / "manifest.yaml", entry)
-    return scatter, stem, ratios, entry
+        metadata.write(options.out / f"{options.name}_filter_{options.default_filter}.onnx", *alone(stem, options),
+                       only_filter=options.default_filter, **said)
+    return scatter, stem, ratios, file
 
 
-def report(scatter, stem, ratios, entry):
-    print(f"{entry['file']}: {entry['filters']} filters from {scatter.count} pairs of patches, sha256 {entry['sha256']}")
+def report(scatter, stem, ratios, file):
+    print(f"{file}: {FILTERS} filters from {scatter.count} pairs of patches")
     filters = stem.weights.sum(axis=1).reshape(FILTERS, -1)
     deviation = np.sqrt(np.einsum("ki,ij,kj->k", filters, scatter.signal(), filters))
     for index in range(FILTERS):
@@ -152,7 +151,7 @@ def main(arguments=None):
     options = parse_arguments(arguments)
     try:
         result = run(options)
-    except (drive.DriveError, manifest.ManifestError) as error:
+    except drive.DriveError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except OSError as error:

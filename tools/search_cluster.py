@@ -57,8 +57,7 @@ def parse_arguments(arguments):
     parser.add_argument("sequences", metavar="SEQUENCE_DIR", nargs="+", type=pathlib.Path)
     parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True)
     parser.add_argument("--model", action="append", dest="models", help="name or path of an .onnx; may be repeated (default: default)")
-    parser.add_argument("--layers", type=lambda text: text.split(","), metavar="NAME,..", help="of each model those that it has (default: all)")
-    parser.add_argument("--filters", type=parse_range, metavar="A:B", help="of each layer (default: all)")
+    parser.add_argument("--filters", type=parse_range, metavar="A:B", help="of each model (default: all)")
     parser.add_argument("--frames", type=parse_range, metavar="A:B", help="of each sequence")
     parser.add_argument("--held-out", type=pathlib.Path, metavar="DIR", help="a sequence that is reported, not ranked by")
     parser.add_argument("--held-out-frames", type=parse_range, metavar="A:B")
@@ -106,12 +105,12 @@ def common_arguments(options):
 
 
 def model_files(models):
-    """The .onnx and manifest of models given by path."""
+    """The .onnx of models given by path."""
     found = {}
     for model in models:
         if model.endswith(".onnx"):
             file = pathlib.Path(model)
-            found[model] = {file.name: file.read_bytes(), "manifest.yaml": (file.parent / "manifest.yaml").read_bytes()}
+            found[model] = {file.name: file.read_bytes()}
     return found
 
 
@@ -146,9 +145,7 @@ def search(options):
         raise ClusterError(f"--program: expected the program stemvo (make build), found none at {options.program}")
     models_dir = ROOT / "models"
     num_sequences = len(options.sequences) + (1 if options.held_out else 0)
-    tasks = plan.tasks_of(models, models_dir, options.layers, options.filters, options.filters_per_task, num_sequences, not options.no_baselines)
-    for line in plan.lacking(models, models_dir, options.layers):
-        print(f"warning: {line}", file=sys.stderr)
+    tasks = plan.tasks_of(models, models_dir, options.filters, options.filters_per_task, num_sequences, not options.no_baselines)
     common = common_arguments(options)
     files = model_files(models)
     contents = [[name, len(content), hash_of(content)] for model in sorted(files) for name, content in sorted(files[model].items())]

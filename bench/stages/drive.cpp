@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "models/manifest.hpp"
 #include "odometry/road/image.hpp"
 #include "synth/synth.hpp"
 
@@ -102,9 +101,7 @@ Chain run_chain() {
 
 }  // namespace
 
-Stem load_stem(const StemOptions& options) {
-  return value_of(Stem::create(value_of(with_network(options, STEMVO_MODELS_DIR))));
-}
+Stem load_stem(const StemOptions& options) { return value_of(Stem::load(options)); }
 
 const Frames& frames() {
   static const Frames result = load_frames();

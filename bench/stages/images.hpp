@@ -5,7 +5,7 @@
 
 namespace stemvo::bench {
 
-/// The default model at its samplings, gray, and every .onnx of a folder (with its manifest.yaml).
+/// The default model at its samplings, gray, and every .onnx of a folder.
 void register_stems(const std::filesystem::path& models);
 
 }  // namespace stemvo::bench

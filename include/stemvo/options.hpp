@@ -1,43 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstdint>
-#include <filesystem>
-#include <optional>
 #include <string>
 
 #include "stemvo/error.hpp"
 
 namespace stemvo {
-
-/// A file of one filter alone: the same values as the network's, at less cost. Its graph has the
-/// network's kernel and padding, and stride `sampling_px`.
-struct FoldedFilter {
-  int filter = 0;
-  int sampling_px = 1;
-  std::filesystem::path file;
-  std::string sha256;  ///< empty: not checked
-};
-
-/// One layer of a network: an ONNX graph 1x3xHxW (RGB, 0 to 255) or 1x1xHxW -> 1xCxhxw, float.
-/// Kernel, stride and padding are held against the graph when it is loaded.
-struct StemNetwork {
-  std::string name;  ///< for messages
-  std::filesystem::path file;
-  std::string sha256;  ///< empty: not checked
-  std::string layer;   ///< the graph's output
-  int num_filters = 0;
-  std::array<int, 2> kernel_px{};  ///< y, x
-  int stride_px = 0;
-  std::array<int, 4> padding_px{};  ///< top, left, bottom, right, inside the graph
-  /// A deeper layer, padded inside or seeing more than its window, so that passes over a shifted
-  /// frame would not fit together. Kernel and padding then are those of one convolution with the
-  /// same centre and the same sizes of channels.
-  bool native_sampling_only = false;
-  int default_filter = 0;
-  std::optional<FoldedFilter> folded;
-};
 
 /// Size of the image that points are tracked on. kAuto: for patches and KLT kHalf where the focal
 /// length is 500 px or more, else kInputZoomed; for descriptors kInput.
@@ -52,14 +21,12 @@ enum class TrackingResolution {
 
 /// Keys `stem.*`: the filter channel a frame is seen through.
 struct StemOptions {
-  /// `default` (built in), or one made by hand, to compare with: `gray`, `input_layer` (filters 0,
-  /// 1, 2 = R, G, B), `log` (Laplacian of Gaussian), `census` (gray levels against their
-  /// surroundings'). Any other name, or path, needs `network`, which the program takes from a
-  /// manifest; `default` may have one.
+  /// `default` or `paper`, which are built in; the path of an .onnx file that says its kernel,
+  /// stride and padding in its metadata (tools/export_stem.py writes them); or one made by hand, to
+  /// compare with: `gray`, `input_layer` (filters 0, 1, 2 = R, G, B), `log` (Laplacian of
+  /// Gaussian), `census` (gray levels against their surroundings').
   std::string model = "default";
-  std::string layer = "first";  ///< of a model that has several in its manifest
-  std::optional<StemNetwork> network;
-  int filter = -1;      ///< -1: the network's default_filter (gray, input_layer: 0)
+  int filter = -1;      ///< -1: the model's default_filter (gray, input_layer: 0)
   int sampling_px = 0;  ///< input pixels per channel pixel, a divisor of the stride; 0: 2, or 1
   TrackingResolution tracking_resolution = TrackingResolution::kAuto;
   double contrast_low_percent = 0.5;  ///< percentiles mapped to 0 and 255

@@ -182,7 +182,6 @@ class Benchmark {
     RunRequest one;
     one.sequence_dir = sequence_dir(sequence["name"]);
     one.out_dir = run_dir(sequence, run);
-    one.models_dir = request_.models_dir;
     one.config = config;
     const bool takes_truth = run["scale_source"] == "ground_truth";
     one.config.scale.source = takes_truth ? ScaleSource::kGroundTruth : ScaleSource::kCameraHeight;

@@ -19,7 +19,6 @@ namespace stemvo {
 struct BenchmarkRequest {
   std::filesystem::path kitti_root;  ///< holds sequences/NN and poses/NN.txt
   std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
   std::filesystem::path published;     ///< the official sequences and published numbers
   std::vector<std::string> sequences;  ///< names of folders; empty: every folder that is there
   /// What is measured, under names that are also folders', e.g. "default".

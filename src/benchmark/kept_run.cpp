@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "io/sha256.hpp"
 #include "pipeline/result_files.hpp"
 #include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "search/input_hashes.hpp"
-#include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::benchmark {
@@ -33,7 +33,7 @@ Json with_results(const fs::path& folder, Json hashes) {
 
 Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
   const auto program = search::hash_program();
-  const auto model = search::hash_model(run.config, run.models_dir);
+  const auto model = search::hash_model(run.config.stem.model);
   const auto files =
       search::hash_sequence(sequence, run.sequence_dir, search::FrameIdentity::kNamesAndSizes);
   if (!program || !model || !files) {

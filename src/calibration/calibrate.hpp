@@ -20,7 +20,6 @@ namespace stemvo {
 struct CalibrationRequest {
   std::filesystem::path sequence_dir;
   std::filesystem::path out_file;
-  std::filesystem::path models_dir;
   Config config;                                     ///< of the odometry that learns the camera
   std::optional<FrameRangeRequest> frames;           ///< else all
   std::optional<std::filesystem::path> calibration;  ///< to start from; else the folder's calib.txt

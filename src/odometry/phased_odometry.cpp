@@ -12,7 +12,7 @@ namespace stemvo {
 Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
                                                 const Options& options,
                                                 const cv::Mat& mask) {
-  Expected<Stem> stem = Stem::create(options.stem);
+  Expected<Stem> stem = Stem::load(options.stem);
   if (!stem) {
     return stem.error();
   }

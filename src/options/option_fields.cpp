@@ -18,14 +18,10 @@ const Rule kAny;
 std::vector<Field> stem_fields(StemOptions& o) {
   return {
       {"stem", "model", &o.model, kAny,
-       "name in models/manifest.yaml, path of an .onnx, or made by hand, to compare with: gray, "
-       "log "
-       "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, "
-       "B)"},
-      {"stem", "layer", &o.layer, kAny,
-       "of a model that has several layers (stemvo models MODEL lists them), or first"},
+       "default or paper (built in), path of an .onnx, or made by hand, to compare with: gray, log "
+       "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, B)"},
       {"stem", "filter", &o.filter, Rule::between(-1, 1000000),
-       "the one filter whose response is the image; -1: the default_filter of the manifest"},
+       "the one filter whose response is the image; -1: the default_filter of the model"},
       {"stem", "sampling_px", &o.sampling_px, Rule::between(0, 4096),
        "input pixels per channel pixel, a divisor of the network's stride; 0: 2 where it "
        "divides the stride, else 1"},

@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
-#include "models/manifest.hpp"
 #include "pipeline/out_folder.hpp"
 #include "report/frame_image.hpp"
+#include "stem/stem.hpp"
 
 namespace stemvo {
 Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
@@ -23,7 +23,7 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
   if (!sequence) {
     return sequence.error();
   }
-  const Expected<Stem> stem = create_stem(request.config.stem, request.models_dir);
+  const Expected<Stem> stem = Stem::load_all(request.config.stem);
   if (!stem) {
     return stem.error();
   }

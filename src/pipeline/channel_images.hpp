@@ -15,7 +15,6 @@ namespace stemvo {
 /// Everything `stemvo channel` was asked for.
 struct ChannelImagesRequest : FrameSourceRequest {
   std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
   Config config;                             ///< `input` and `stem` are used
   std::optional<FrameRangeRequest> filters;  ///< half open, as frames; else all of the layer
 };

@@ -7,7 +7,6 @@
 
 #include <opencv2/core/utility.hpp>
 
-#include "models/manifest.hpp"
 #include "odometry/frame_loops.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -15,15 +14,8 @@ namespace stemvo::pipeline {
 
 Expected<PhasedOdometry> create_odometry(const Config& config,
                                          const Camera& camera,
-                                         const std::filesystem::path& models_dir,
                                          const cv::Mat& mask) {
-  Options options = config;
-  auto stem = with_network(config.stem, models_dir);
-  if (!stem) {
-    return stem.error();
-  }
-  options.stem = *std::move(stem);
-  return PhasedOdometry::create(camera, options, mask);
+  return PhasedOdometry::create(camera, config, mask);
 }
 
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {

@@ -20,11 +20,10 @@ namespace stemvo::pipeline {
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
-/// An odometry for a valid configuration whose network models_dir knows; `mask`: of the frames, as
-/// FrameList's. Errors: those of with_network and PhasedOdometry::create.
+/// An odometry for a valid configuration; `mask`: of the frames, as FrameList's. Errors: those of
+/// PhasedOdometry::create.
 [[nodiscard]] Expected<PhasedOdometry> create_odometry(const Config& config,
                                                        const Camera& camera,
-                                                       const std::filesystem::path& models_dir,
                                                        const cv::Mat& mask = {});
 
 /// Takes the frames of a sequence through an odometry, in three loops beside each other where

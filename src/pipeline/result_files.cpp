@@ -259,13 +259,12 @@ std::string config_text(const Run& run, std::size_t num_frames) {
   std::string text =
       fmt::format("# stemvo {}\n# {}\n", version(),
                   describe_frames(sequence, sequence.stream() ? num_frames : sequence.size()));
-  text += fmt::format("# model {}: {} filters, sampled every {} px{}\n", one_line(stem.model),
-                      stem.num_filters, stem.sampling_px,
-                      stem.sha256.empty() ? "" : ", sha256 " + stem.sha256);
+  text += fmt::format("# model {}: {} filters, sampled every {} px\n", one_line(stem.model),
+                      stem.num_filters, stem.sampling_px);
   if (const auto& calibration = sequence.given_calibration()) {
     text += fmt::format("# calibration {}\n", one_line(calibration->string()));
   }
-  // With what auto, -1 and 0 stand for, which may change with the manifest.
+  // With what auto, -1 and 0 stand for, which may change with the model.
   Config effective = run.request.config;
   effective.stem.tracking_resolution = choose_tracking_resolution(
       effective.stem.tracking_resolution, effective.features.method, sequence.camera());

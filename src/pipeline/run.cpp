@@ -118,8 +118,8 @@ Expected<RunSummary> run_source(RunRequest request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
   request.config = dataset::with_camera_height(request.config, sequence.frames());
-  Expected<PhasedOdometry> odometry = pipeline::create_odometry(
-      request.config, sequence.camera(), request.models_dir, sequence.frames().mask);
+  Expected<PhasedOdometry> odometry =
+      pipeline::create_odometry(request.config, sequence.camera(), sequence.frames().mask);
   if (!odometry) {
     return odometry.error();
   }

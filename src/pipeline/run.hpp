@@ -19,7 +19,6 @@ namespace stemvo {
 /// as dataset::with_camera_height says.
 struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;  ///< empty: a new results/NAME
-  std::filesystem::path models_dir;
   Config config;
   int num_threads = 0;         ///< 0: all cores
   int image_every = 0;         ///< 0: no per-frame images

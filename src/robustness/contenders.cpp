@@ -44,11 +44,10 @@ std::optional<int> plane_of(const std::string& color) {
 Contender make_control(const std::string& name, Config config) {
   const StemOptions defaults;
   const std::optional<FilterName> filter = parse_filter_name(name);
-  if (filter && filter->model == config.stem.model) {  // its layer, its sampling
+  if (filter && filter->model == config.stem.model) {  // its sampling
     config.stem.filter = filter->filter;
     return {name, config};
   }
-  config.stem.layer = defaults.layer;
   config.stem.sampling_px = defaults.sampling_px;
   config.stem.model = filter ? filter->model : name;
   config.stem.filter = filter ? filter->filter : defaults.filter;

@@ -166,8 +166,7 @@ class Robustness {
   /// A model or filter that is not there is refused now, not in the middle.
   Status create_each() {
     for (const Contender& one : contenders_) {
-      const auto odometry =
-          pipeline::create_odometry(one.config, sources_.front().camera(), request_.models_dir);
+      const auto odometry = pipeline::create_odometry(one.config, sources_.front().camera());
       if (!odometry) {
         return odometry.error();
       }
@@ -209,7 +208,7 @@ class Robustness {
                const PlannedRow& planned,
                const std::string& what,
                Outcome& outcome) {
-    auto odometry = pipeline::create_odometry(config, source.camera(), request_.models_dir);
+    auto odometry = pipeline::create_odometry(config, source.camera());
     if (!odometry) {
       if (odometry.error().lacks_memory) {
         throw std::bad_alloc();  // of the contender it says nothing

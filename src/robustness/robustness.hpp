@@ -25,7 +25,6 @@ struct RobustnessRequest {
   std::vector<std::filesystem::path> sequence_dirs;  ///< with ground truth
   std::optional<FrameRangeRequest> frames;           ///< of each
   std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
   Config config;                      ///< of the channel that is judged
   std::string command;                ///< that repeats it, for report.html; may be empty
   std::vector<std::string> kinds;     ///< of disturbances, and `none`; empty: all

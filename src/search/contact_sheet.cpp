@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 
 #include "dataset/sequence.hpp"
-#include "models/manifest.hpp"
 #include "report/frame_image.hpp"
 #include "search/records.hpp"
 #include "stem/stem.hpp"
@@ -36,9 +35,7 @@ Expected<Pictures> draw_filters(const Results& results,
     const LayerIdentity& layer = results.identity.layer_of(row->key);
     const Config config = config_of(results.config, layer, row->key.filter);
     const Expected<Channel> channel =
-        create_stem(config.stem, results.target.models_dir).and_then([&](const Stem& s) {
-          return s.apply(*frame);
-        });
+        Stem::load(config.stem).and_then([&](const Stem& stem) { return stem.apply(*frame); });
     if (!channel) {
       return channel.error();
     }

@@ -7,9 +7,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "models/manifest.hpp"
+#include "io/sha256.hpp"
 #include "stem/hand_made.hpp"
-#include "stem/model_file.hpp"
+#include "stem/model.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
 
@@ -64,17 +64,8 @@ Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
   return SequenceHashes{sha256_hex(text), *calibration, *ground_truth};
 }
 
-Expected<std::string> hash_model(const Config& config, const fs::path& models_dir) {
-  const std::string& model = config.stem.model;
-  if (is_hand_made(model)) {
-    return sha256_hex(model);
-  }
-  return find_model(model, config.stem.layer, models_dir).map([](const ModelEntry& entry) {
-    return sha256_hex(fmt::format("{} {} {} {} {} {} {} {}", entry.sha256, entry.layer,
-                                  entry.num_filters, entry.kernel_px, entry.stride_px,
-                                  entry.padding_px, entry.default_filter,
-                                  entry.native_sampling_only ? "native" : "any"));
-  });
+Expected<std::string> hash_model(const std::string& model) {
+  return is_hand_made(model) ? sha256_hex(model) : read_model(model).map(sha256_hex);
 }
 
 /// A build without a clean commit has a version that does not change with its code.

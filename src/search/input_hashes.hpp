@@ -28,9 +28,8 @@ struct SequenceHashes {
 [[nodiscard]] Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
                                                      const std::filesystem::path& sequence_dir,
                                                      FrameIdentity frames);
-/// Hashes the model's file and entry. Error: a model that is not there.
-[[nodiscard]] Expected<std::string> hash_model(const Config& config,
-                                               const std::filesystem::path& models_dir);
+/// Hashes the model's file. Error: a model that is not there.
+[[nodiscard]] Expected<std::string> hash_model(const std::string& model);
 /// Hashes the version; for a build without a clean commit the file as well.
 [[nodiscard]] Expected<std::string> hash_program();
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "models/manifest.hpp"
 #include "options/option_fields.hpp"
 #include "robustness/disturbance.hpp"
 #include "search/input_hashes.hpp"
 #include "search/race.hpp"
 #include "stem/hand_made.hpp"
+#include "stem/model.hpp"
 
 namespace stemvo::search {
 namespace {
@@ -19,51 +20,50 @@ namespace {
 constexpr const char* kInputLayer = "input";
 
 /// 0: half the stride; shifted passes of a coarse layer cost more than more of them tell.
-int sampling_of(int asked, const ModelEntry& entry) {
-  const bool is_halved = entry.stride_px > 2 && entry.stride_px % 2 == 0;
-  return asked != 0 || entry.native_sampling_only ? asked : entry.stride_px / (is_halved ? 2 : 1);
+int sampling_of(int asked, const ModelInfo& info) {
+  const bool is_halved = info.stride_px > 2 && info.stride_px % 2 == 0;
+  return asked != 0 || info.native_sampling_only ? asked : info.stride_px / (is_halved ? 2 : 1);
 }
 
-/// The model's layers, or those asked for in that order; without what the loaded stem says.
-Expected<std::vector<LayerIdentity>> model_layers(const SearchRequest& request) {
-  const std::string& model = request.model;
+/// The layer of a model, without what the loaded stem says.
+Expected<LayerIdentity> layer_of(const SearchRequest& request, const std::string& model) {
+  const bool is_file = model.ends_with(".onnx");
   LayerIdentity layer = {
-      .model = model,
+      .model = is_file ? std::filesystem::path(model).stem().string() : model,
       .layer = kInputLayer,
       .features = std::string(options::to_string(request.config.features.method)),
       .sampling_px = request.config.stem.sampling_px,
-      .stem_model = model.ends_with(".onnx") ? from_anywhere(model) : model};
+      .stem_model = is_file ? from_anywhere(model) : model};
   if (is_hand_made(model)) {
-    if (!request.layers.empty()) {
-      return fail(fmt::format("--layers: expected none for {}, found '{}'", model,
-                              fmt::join(request.layers, ",")));
+    return layer;
+  }
+  return read_model_info(model).map([&](const ModelInfo& info) {
+    layer.layer = info.layer;
+    layer.sampling_px = sampling_of(request.config.stem.sampling_px, info);
+    return layer;
+  });
+}
+
+/// Error: two that records could not tell apart.
+Expected<std::vector<LayerIdentity>> layers_of(const SearchRequest& request) {
+  std::vector<LayerIdentity> layers;
+  for (const std::string& model : request.models) {
+    const auto layer = layer_of(request, model);
+    if (!layer) {
+      return layer.error();
     }
-    return std::vector{layer};
-  }
-  const auto entries = find_layers(model, request.models_dir);
-  if (!entries) {
-    return entries.error();
-  }
-  std::vector<std::string> names(entries->size());
-  std::ranges::transform(*entries, names.begin(), &ModelEntry::layer);
-  std::vector<LayerIdentity> chosen;
-  for (const std::string& name : request.layers.empty() ? names : request.layers) {
-    const auto entry = std::ranges::find(*entries, name, &ModelEntry::layer);
-    if (entry == entries->end()) {
-      return fail(fmt::format("--layers: {}: expected one of {}, found '{}'", model,
-                              fmt::join(names, ", "), name));
+    if (std::ranges::any_of(
+            layers, [&](const LayerIdentity& other) { return other.is_layer_of(layer->key(0)); })) {
+      return fail(fmt::format("--model: expected each name once, found '{}' again", model));
     }
-    layer.model = entry->name;
-    layer.layer = name;
-    layer.sampling_px = sampling_of(request.config.stem.sampling_px, *entry);
-    chosen.push_back(layer);
+    layers.push_back(*layer);
   }
-  return chosen;
+  return layers;
 }
 
 Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan& plan) {
   const Config config = config_of(request.config, layer, 0);
-  Expected<Stem> stem = create_stem(config.stem, request.models_dir);
+  Expected<Stem> stem = Stem::load_all(config.stem);
   if (!stem) {
     return stem.error();
   }
@@ -73,11 +73,10 @@ Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan&
   const FrameRangeRequest asked = layer.baseline ? all : request.filters.value_or(all);
   const FrameRange filters{asked.begin, asked.end.value_or(count)};
   if (filters.begin >= filters.end || filters.end > count) {
-    return fail(fmt::format("--filters: expected filters inside 0:{} of {}{}, found {}:{}", count,
-                            request.model, info.layer.empty() ? "" : " layer " + info.layer,
-                            filters.begin, filters.end));
+    return fail(fmt::format("--filters: expected filters inside 0:{} of {}, found {}:{}", count,
+                            layer.model, filters.begin, filters.end));
   }
-  const auto hash = hash_model(config, request.models_dir);
+  const auto hash = hash_model(layer.stem_model);
   if (!hash) {
     return hash.error();
   }
@@ -90,10 +89,10 @@ Status load_layer(const SearchRequest& request, LayerIdentity layer, SearchPlan&
   return {};
 }
 
-/// Loads the model's layers, those asked for, and the baselines: ORB on gray, and R, G, B, where
-/// they are not what is searched.
+/// Loads the models and the baselines: ORB on gray, and R, G, B, where they are not what is
+/// searched.
 Status add_layers(const SearchRequest& request, SearchPlan& plan) {
-  Expected<std::vector<LayerIdentity>> layers = model_layers(request);
+  Expected<std::vector<LayerIdentity>> layers = layers_of(request);
   if (!layers) {
     return layers.error();
   }
@@ -145,11 +144,6 @@ Status check_request(const SearchRequest& request) {
         "--only-sequence: expected --exhaustive with it (halving goes by all sequences), found "
         "none");
   }
-  for (auto layer = request.layers.begin(); layer != request.layers.end(); ++layer) {
-    if (std::find(request.layers.begin(), layer, *layer) != layer) {
-      return fail(fmt::format("--layers: expected each once, found '{}' again", *layer));
-    }
-  }
   return {};
 }
 
@@ -174,7 +168,6 @@ void add_race(bool exhaustive, SearchPlan& plan) {
 
 Config config_of(Config common, const LayerIdentity& layer, int filter) {
   common.stem.model = layer.stem_model;
-  common.stem.layer = is_hand_made(layer.model) ? StemOptions().layer : layer.layer;
   common.stem.filter = filter;
   common.stem.sampling_px = layer.sampling_px;
   common.features.method = options::feature_method(layer.features);
@@ -212,7 +205,6 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   }
   Config common = request.config;
   common.stem.model = "default";  // the layers say which
-  common.stem.layer = StemOptions().layer;
   common.stem.filter = -1;
   plan.identity.program = *program;
   plan.identity.configuration = dump_config(common);

@@ -14,7 +14,7 @@ namespace stemvo::search {
 
 /// A layer of the identity, loaded.
 struct PlanLayer {
-  Config config;  ///< of its odometry, with the model and layer; the filter is the candidate's
+  Config config;  ///< of its odometry, with the model; the filter is the candidate's
   Stem stem;
   std::size_t max_in_flight = SIZE_MAX;  ///< filters that 1 GB holds, at least 1
 };

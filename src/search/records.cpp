@@ -13,9 +13,9 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "io/sha256.hpp"
 #include "report/metrics_keys.hpp"
 #include "search/record_check.hpp"
-#include "stem/model_file.hpp"
 #include "text/text_file.hpp"
 
 using Json = nlohmann::ordered_json;

@@ -98,12 +98,12 @@ using Schedule = std::vector<Rung>;
 
 /// Filters [first, last) of a layer, and what its response depends on.
 struct LayerIdentity {
-  std::string model = {};  ///< the manifest's name, not a path
+  std::string model = {};  ///< its name, or that of its file
   std::string layer = {};
   std::string features = {};
   int first = 0;
   int last = 0;
-  std::string hash = {};  ///< of the model's file and the manifest's entry
+  std::string hash = {};  ///< of the model's file
   int sampling_px = 1;
   std::string stem_model = {};  ///< as stem.model takes it here; not compared
   bool baseline = false;
@@ -232,7 +232,6 @@ struct FilterRow : FilterRecord {
 /// search, which may be empty.
 struct ResultsTarget {
   std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
   std::string command = {};
 };
 

@@ -11,7 +11,6 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include "models/manifest.hpp"
 #include "report/frame_image.hpp"
 #include "report/metrics_keys.hpp"
 #include "search/records.hpp"
@@ -239,10 +238,10 @@ std::string format_best(const Results& results) {
       "# {}: the best of the search, t_rel {:.4f} %{}\n"
       "# What repeats its row: the search's fast odometry, steps of the true length.\n"
       "# The filter with the defaults of a run: stemvo run SEQUENCE --out DIR --set stem.model={} "
-      "--set stem.layer={} --set stem.filter={}\n\n{}",
+      "--set stem.filter={}\n\n{}",
       version(), to_string(best.key), best.mean.t_rel_percent.value_or(0.0),
       results.identity.rungs.size() > 1 ? " (successive halving)" : "", config.stem.model,
-      config.stem.layer, config.stem.filter, dump_config(config));
+      config.stem.filter, dump_config(config));
 }
 
 /// All but config.yaml.

@@ -111,11 +111,9 @@ std::vector<LayerIdentity> join_layers(const SearchIdentity& parts, const Scores
 }
 
 std::vector<fs::path> inputs_of(const SearchRequest& request, const SearchPlan& plan) {
-  Config config = request.config;
-  config.stem.model = request.model;
-  std::vector<fs::path> inputs;
+  std::vector<fs::path> inputs(request.models.begin(), request.models.end());
   for (const PlanSequence& one : plan.sequences) {
-    const auto files = pipeline::input_files(one.sequence, config);
+    const auto files = pipeline::input_files(one.sequence, request.config);
     inputs.insert(inputs.end(), files.begin(), files.end());
   }
   return inputs;
@@ -177,8 +175,8 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
     return records.error();
   }
   const auto warnings = run_race(*plan, progress, *records);
-  auto report = write_results(plan->identity, records->records(),
-                              {request.out_dir, request.models_dir, request.command});
+  auto report =
+      write_results(plan->identity, records->records(), {request.out_dir, request.command});
   if (!warnings) {
     return warnings.error();  // the tables hold what was done before
   }
@@ -192,7 +190,6 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
 
 Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                       const std::filesystem::path& out_dir,
-                                      const std::filesystem::path& models_dir,
                                       const std::string& command,
                                       const IsStopped& is_stopped) {
   SearchIdentity identity;
@@ -232,7 +229,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   if (!written) {
     return written.error();
   }
-  auto report = write_results(identity, *records, {out_dir, models_dir, command});
+  auto report = write_results(identity, *records, {out_dir, command});
   if (report) {
     report->warnings.insert(report->warnings.begin(), warnings.begin(), warnings.end());
   }

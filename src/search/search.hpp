@@ -30,13 +30,11 @@ struct SearchRequest {
   std::optional<FrameRangeRequest> frames;           ///< of each sequence that ranks
   std::optional<FrameRangeRequest> held_out_frames;  ///< of the held-out one
   std::filesystem::path out_dir;
-  std::filesystem::path models_dir;
-  std::string model = "default";             ///< as StemOptions::model; made by hand too
-  std::vector<std::string> layers;           ///< of the model; empty: all it has
-  std::optional<FrameRangeRequest> filters;  ///< of each layer, half open; else all
-  bool baselines = true;                     ///< rows of ORB on gray, and of R, G and B
-  Config config = search_defaults();         ///< stem.model, .layer and .filter are not used
-  bool exhaustive = false;                   ///< every filter over every frame; else halving
+  std::vector<std::string> models = {"default"};  ///< as StemOptions::model; made by hand too
+  std::optional<FrameRangeRequest> filters;       ///< of each model, half open; else all
+  bool baselines = true;                          ///< rows of ORB on gray, and of R, G and B
+  Config config = search_defaults();              ///< stem.model and .filter are not used
+  bool exhaustive = false;                        ///< every filter over every frame; else halving
   /// Index of a sequence: as they are, then under each of `kinds`, the held-out one last. Runs it
   /// alone, as a part for merge_searches. Needs `exhaustive`; writes records.jsonl and no tables.
   std::optional<std::size_t> only_sequence;
@@ -62,7 +60,7 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 /// Ranks the filters, in parallel. out_dir receives records.jsonl (appended as blocks of filters
 /// end, what `resume` reads), filters.csv, filters.json, config.yaml (of all rows), best.yaml (what
 /// repeats the first row), report.html and, where the frames can be read, sheet.png. Tables do not
-/// depend on threads, blocks or interruptions. Errors, before work starts: unknown model or layer
+/// depend on threads, blocks or interruptions. Errors, before work starts: unknown model
 /// (lists the known ones), filters outside, no ground truth, a path too short for a segment,
 /// out_dir holds another search, or with `resume` one of other inputs (says what changed).
 [[nodiscard]] Expected<SearchReport> run_search(const SearchRequest& request,
@@ -74,7 +72,6 @@ using SearchProgress = std::function<bool(std::size_t, std::size_t)>;
 /// two different results or none on a sequence. `is_stopped`: as SearchRequest has it.
 [[nodiscard]] Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& parts,
                                                     const std::filesystem::path& out_dir,
-                                                    const std::filesystem::path& models_dir,
                                                     const std::string& command = {},
                                                     const IsStopped& is_stopped = {});
 

@@ -6,9 +6,9 @@
 #include <opencv2/core.hpp>
 
 #include "internal_check.hpp"
+#include "stem/model.hpp"
 #include "stem/onnx_session.hpp"
 #include "stem/stem.hpp"
-#include "stemvo/options.hpp"
 
 namespace stemvo::internal {
 
@@ -53,13 +53,11 @@ struct SamplingAxis {
 
 /// Both axes.
 struct SamplingPlan {
-  SamplingPlan(const StemNetwork& network, int sampling_px)
-      : x{network.kernel_px[1], network.stride_px, sampling_px, network.padding_px[1],
-          network.padding_px[3]},
-        y{network.kernel_px[0], network.stride_px, sampling_px, network.padding_px[0],
-          network.padding_px[2]},
-        sees_windows_only(!network.native_sampling_only) {
-    STEMVO_CHECK(sampling_px >= 1 && network.stride_px % sampling_px == 0,
+  SamplingPlan(const ModelInfo& info, int sampling_px)
+      : x{info.kernel_px[1], info.stride_px, sampling_px, info.padding_px[1], info.padding_px[3]},
+        y{info.kernel_px[0], info.stride_px, sampling_px, info.padding_px[0], info.padding_px[2]},
+        sees_windows_only(!info.native_sampling_only) {
+    STEMVO_CHECK(sampling_px >= 1 && info.stride_px % sampling_px == 0,
                  "sampling divides the stride");
   }
 

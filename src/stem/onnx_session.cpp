@@ -22,18 +22,12 @@ struct OnnxSession::TensorInfo {
   std::vector<std::int64_t> shape;  // -1: free
 
   [[nodiscard]] std::string describe() const {
-    static constexpr std::array kNames = {"no tensor", "float", "uint8",   "int8",
-                                          "uint16",    "int16", "int32",   "int64",
-                                          "string",    "bool",  "float16", "double"};
-    const auto index = static_cast<std::size_t>(type);
     std::vector<std::string> sizes;
     for (const std::int64_t size : shape) {
       sizes.push_back(size < 0 ? "?" : std::to_string(size));
     }
-    return fmt::format(
-        "{} {} {}", name,
-        index < kNames.size() ? kNames[index] : fmt::format("element type {}", index),
-        fmt::join(sizes, "x"));
+    const bool is_float = type == ONNX_TENSOR_ELEMENT_DATA_TYPE_FLOAT;
+    return fmt::format("{} {} {}", name, is_float ? "float" : "no float", fmt::join(sizes, "x"));
   }
 
   /// A wanted size of -1 may be fixed or free in the graph.
@@ -54,17 +48,6 @@ constexpr std::uint32_t kApiVersion = 5;
 // A model may name other files for its weights. In a folder that does not exist it finds none.
 constexpr const char* kFolderOfWeights = "session.model_external_initializers_file_folder_path";
 constexpr const char* kInputName = "image";
-constexpr const char* kOnlyOutput = "channels";
-
-/// Without the paths of ONNX Runtime's sources ("/onnxruntime_src/.../mod.cc:48 Status Run() ..").
-std::string without_sources(std::string message) {
-  constexpr std::string_view kSources = "/onnxruntime_src/";
-  for (std::size_t at = message.find(kSources); at != message.npos;
-       at = message.find(kSources, at)) {
-    message.erase(at, std::min(message.find(' ', at), message.size() - 1) + 1 - at);
-  }
-  return message;
-}
 
 }  // namespace
 
@@ -86,17 +69,15 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
   const bool is_memory = message.find("bad_alloc") != std::string::npos ||
                          message.find("Failed to allocate memory") != std::string::npos;
   return fail(fmt::format("{}: {}ONNX Runtime: {}", label_, is_memory ? "out of memory: " : "",
-                          one_line(without_sources(message))),
+                          one_line(message)),
               is_memory);
 }
 
-Expected<OnnxSession> OnnxSession::create(const std::string& label,
-                                          std::string_view model,
-                                          const std::string& layer) {
+Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) {
   OnnxSession session(label);
   Status status = session.load(model);
   status = status ? session.check_input() : status;
-  status = status ? session.choose_output(layer) : status;
+  status = status ? session.check_output() : status;
   if (!status) {
     return status.error();
   }
@@ -134,15 +115,6 @@ Status OnnxSession::load(std::string_view model) {
   return {};
 }
 
-Status OnnxSession::read_shape(const OrtTensorTypeAndShapeInfo* raw, TensorInfo& info) const {
-  std::size_t rank = 0;
-  STEMVO_ORT_TRY(api_->GetTensorElementType(raw, &info.type));
-  STEMVO_ORT_TRY(api_->GetDimensionsCount(raw, &rank));
-  info.shape.resize(rank);
-  STEMVO_ORT_TRY(api_->GetDimensions(raw, info.shape.data(), rank));
-  return {};
-}
-
 Expected<OnnxSession::TensorInfo> OnnxSession::read_tensor_info(bool is_input,
                                                                 std::size_t index) const {
   TensorInfo info;
@@ -165,8 +137,12 @@ Expected<OnnxSession::TensorInfo> OnnxSession::read_tensor_info(bool is_input,
   }
   const OrtTensorTypeAndShapeInfo* tensor = nullptr;  // part of `type`
   STEMVO_ORT_TRY(api_->CastTypeInfoToTensorInfo(raw_type, &tensor));
-  const Status status = read_shape(tensor, info);
-  return status ? Expected<TensorInfo>(info) : status.error();
+  std::size_t rank = 0;
+  STEMVO_ORT_TRY(api_->GetTensorElementType(tensor, &info.type));
+  STEMVO_ORT_TRY(api_->GetDimensionsCount(tensor, &rank));
+  info.shape.resize(rank);
+  STEMVO_ORT_TRY(api_->GetDimensions(tensor, info.shape.data(), rank));
+  return info;
 }
 
 Status OnnxSession::check_input() {
@@ -192,30 +168,39 @@ Status OnnxSession::check_input() {
   return {};
 }
 
-Status OnnxSession::choose_output(const std::string& layer) {
-  std::size_t count = 0;
-  STEMVO_ORT_TRY(api_->SessionGetOutputCount(session_.get(), &count));
-  std::vector<std::string> known;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto output = read_tensor_info(false, i);
-    if (!output) {
-      return output.error();
-    }
-    known.push_back(output->describe());
-    if (output->name != layer && (count > 1 || output->name != kOnlyOutput)) {
-      continue;
-    }
-    if (!output->is_float({1, -1, -1, -1}) || output->shape[1] < 1) {
-      return fail(fmt::format("{}: expected output '{} float 1xCxhxw' with C known, found '{}'",
-                              label_, output->name, known.back()));
-    }
-    output_ = output->name;
-    num_filters_ = static_cast<int>(output->shape[1]);
-    return {};
+Status OnnxSession::check_output() {
+  std::size_t outputs = 0;
+  STEMVO_ORT_TRY(api_->SessionGetOutputCount(session_.get(), &outputs));
+  if (outputs != 1) {
+    return fail(fmt::format("{}: expected 1 output, found {}", label_, outputs));
   }
-  return fail(fmt::format("{}: expected an output '{}'{}, found '{}'", label_, layer,
-                          count > 1 ? "" : fmt::format(" or '{}'", kOnlyOutput),
-                          fmt::join(known, "', '")));
+  const auto output = read_tensor_info(false, 0);
+  if (!output) {
+    return output.error();
+  }
+  if (!output->is_float({1, -1, -1, -1}) || output->shape[1] < 1) {
+    return fail(fmt::format("{}: expected output 'float 1xCxhxw' with C known, found '{}'", label_,
+                            output->describe()));
+  }
+  output_ = output->name;
+  num_filters_ = static_cast<int>(output->shape[1]);
+  return {};
+}
+
+Expected<std::optional<std::string>> OnnxSession::metadata(const std::string& key) const {
+  OrtAllocator* allocator = nullptr;  // the runtime's own, never freed
+  STEMVO_ORT_TRY(api_->GetAllocatorWithDefaultOptions(&allocator));
+  OrtModelMetadata* raw = nullptr;
+  STEMVO_ORT_TRY(api_->SessionGetModelMetadata(session_.get(), &raw));
+  const OnnxHandle<OrtModelMetadata> metadata(raw, api_->ReleaseModelMetadata);
+  char* value = nullptr;
+  STEMVO_ORT_TRY(api_->ModelMetadataLookupCustomMetadataMap(raw, allocator, key.c_str(), &value));
+  if (value == nullptr) {
+    return std::optional<std::string>();
+  }
+  std::optional<std::string> copy = value;
+  STEMVO_ORT_TRY(api_->AllocatorFree(allocator, value));
+  return copy;
 }
 
 Expected<OnnxHandle<OrtValue>> OnnxSession::make_tensor(const float* data,
@@ -232,39 +217,6 @@ Expected<OnnxHandle<OrtValue>> OnnxSession::make_tensor(const float* data,
   return OnnxHandle<OrtValue>(raw, api_->ReleaseValue);
 }
 
-Status OnnxSession::run_graph(const OrtValue* input, OrtValue*& output) const {
-  const char* const output_name = output_.c_str();
-  return to_status(
-      api_->Run(session_.get(), nullptr, &kInputName, &input, 1, &output_name, 1, &output));
-}
-
-Expected<cv::Size> OnnxSession::channel_size(cv::Size image_size) const {
-  const std::vector<float> zeros(static_cast<std::size_t>(num_planes_) *
-                                 static_cast<std::size_t>(image_size.area()));
-  const auto input = make_tensor(zeros.data(), num_planes_, image_size);
-  if (!input) {
-    return input.error();
-  }
-  OrtValue* raw_output = nullptr;
-  if (Status status = run_graph(input->get(), raw_output); !status) {
-    return status.error();
-  }
-  const OnnxHandle<OrtValue> output(raw_output, api_->ReleaseValue);
-  OrtTensorTypeAndShapeInfo* raw_info = nullptr;
-  STEMVO_ORT_TRY(api_->GetTensorTypeAndShape(raw_output, &raw_info));
-  const OnnxHandle<OrtTensorTypeAndShapeInfo> info(raw_info, api_->ReleaseTensorTypeAndShapeInfo);
-  TensorInfo found;
-  if (Status status = read_shape(raw_info, found); !status) {
-    return status.error();
-  }
-  found.name = output_;
-  if (!found.is_float({1, num_filters_, -1, -1})) {
-    return fail(fmt::format("{}: expected output '{} float 1x{}xhxw', found '{}'", label_, output_,
-                            num_filters_, found.describe()));
-  }
-  return cv::Size(static_cast<int>(found.shape[3]), static_cast<int>(found.shape[2]));
-}
-
 Status OnnxSession::run(const float* image,
                         cv::Size image_size,
                         float* channels,
@@ -274,8 +226,11 @@ Status OnnxSession::run(const float* image,
   if (!input || !output) {
     return (input ? output : input).error();
   }
+  const char* const output_name = output_.c_str();
+  const OrtValue* const raw_input = input->get();
   OrtValue* raw_output = output->get();
-  return run_graph(input->get(), raw_output);
+  return to_status(
+      api_->Run(session_.get(), nullptr, &kInputName, &raw_input, 1, &output_name, 1, &raw_output));
 }
 
 }  // namespace stemvo::internal

@@ -2,7 +2,6 @@
 #include "stem/stem.hpp"
 
 #include <algorithm>
-#include <initializer_list>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -11,7 +10,7 @@
 
 #include "internal_check.hpp"
 #include "stem/hand_made.hpp"
-#include "stem/model_file.hpp"
+#include "stem/model.hpp"
 #include "stem/network_layer.hpp"
 
 namespace stemvo {
@@ -32,107 +31,32 @@ Expected<int> choose_filter(int asked, const std::string& of, int num_filters, i
 
 /// 0 stands for every second pixel, where the stride allows it: a keypoint on a coarser channel is
 /// worth too many pixels. Error: not a divisor, or a layer that allows its own stride only.
-Expected<int> choose_sampling(int asked, const StemNetwork& network) {
-  const int stride = network.stride_px;
-  if (network.native_sampling_only) {
-    if (asked == 0 || asked == stride) {
-      return stride;
-    }
-    return fail(fmt::format(
-        "stem.sampling_px: expected {} for layer {} of {}, which the manifest allows at its native "
-        "stride only, found {}",
-        stride, network.layer, network.file.string(), asked));
-  }
-  if (asked == 0) {
-    return std::gcd(stride, 2);
-  }
-  if (asked > 0 && stride % asked == 0) {
-    return asked;
-  }
+Expected<int> choose_sampling(int asked, int stride, bool native_only) {
   std::vector<int> allowed;
-  for (int i = 1; i <= stride; ++i) {
+  for (int i = native_only ? stride : 1; i <= stride; ++i) {
     if (stride % i == 0) {
       allowed.push_back(i);
     }
   }
-  return fail(fmt::format("stem.sampling_px: expected {} (divisors of the stride {}), found {}",
-                          fmt::join(allowed, ", "), stride, asked));
-}
-
-/// What a manifest would refuse: numbers that no convolution has.
-Status check_network(const StemNetwork& network) {
-  using namespace internal;
-  struct Number {
-    const char* what;
-    int min;
-    int max;
-    int found;
-  };
-  for (const auto& [what, min, max, found] : std::initializer_list<Number>{
-           {"filters", 1, kMaxFilters, network.num_filters},
-           {"kernel", 1, kMaxKernel_px, network.kernel_px[0]},
-           {"kernel", 1, kMaxKernel_px, network.kernel_px[1]},
-           {"stride", 1, kMaxStride_px, network.stride_px},
-           {"padding", 0, kMaxKernel_px, *std::ranges::min_element(network.padding_px)},
-           {"padding", 0, kMaxKernel_px, *std::ranges::max_element(network.padding_px)},
-           {"default_filter", 0, kMaxFilters, network.default_filter},
-           {"folded sampling", 1, kMaxStride_px,
-            network.folded ? network.folded->sampling_px : 1}}) {
-    if (found < min || found > max) {
-      return fail(
-          fmt::format("{}: {}: expected {} to {}, found {}", network.name, what, min, max, found));
-    }
+  if (asked == 0) {
+    return native_only ? stride : std::gcd(stride, 2);
   }
-  return {};
-}
-
-/// Error: a name of no layer of our own, without a network, or a network that is none.
-Expected<StemNetwork> network_of(const StemOptions& options) {
-  if (const auto bank = internal::hand_made_bank(options.model)) {
-    if (options.layer != "first") {
-      return fail(fmt::format("stem.layer: expected none for {}, found '{}'", options.model,
-                              options.layer));
-    }
-    StemNetwork network;
-    network.name = options.model;
-    network.num_filters = bank->num_filters;
-    network.stride_px = 1;
-    return network;
-  }
-  if (options.network) {
-    const Status status = check_network(*options.network);
-    return status ? Expected<StemNetwork>(*options.network) : status.error();
-  }
-  if (options.model == "default") {
-    return internal::built_in_network();
+  if (std::ranges::find(allowed, asked) != allowed.end()) {
+    return asked;
   }
   return fail(fmt::format(
-      "stem.model: expected default, gray, input_layer, log, census or a network beside it, found "
-      "'{}'",
-      options.model));
+      "stem.sampling_px: expected {} ({} {}), found {}", fmt::join(allowed, ", "),
+      native_only ? "the model allows its stride only," : "divisors of the stride", stride, asked));
 }
 
-struct OpenedBank {
-  FilterBank bank;
-  bool takes_any_size;
-};
-
-Expected<OpenedBank> open_bank(const StemNetwork& network, bool is_built_in, int sampling) {
-  auto session =
-      is_built_in ? internal::open_built_in_model(network) : internal::open_model(network);
-  if (!session) {
-    return session.error();
-  }
-  const std::string file = network.file.string();
-  const internal::SamplingPlan plan(network, sampling);
-  if (plan.needs_margin() && !session->fixed_size().empty()) {
-    return fail(fmt::format(
-        "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
-        "found {}",
-        network.stride_px, file, sampling));
-  }
-  const bool takes_any_size = session->fixed_size().empty() && !network.native_sampling_only;
-  return OpenedBank{internal::make_network_layer(file, *std::move(session), plan), takes_any_size};
+/// The default network's best filter has a file of its own, which takes a fraction of the time.
+std::string choose_model(const StemOptions& options, bool all_filters) {
+  constexpr int kFilter = 2;
+  constexpr int kSampling_px = 2;
+  const bool is_alone = (options.filter == -1 || options.filter == kFilter) &&
+                        (options.sampling_px == 0 || options.sampling_px == kSampling_px);
+  return options.model == "default" && is_alone && !all_filters ? "default_filter_2"
+                                                                : options.model;
 }
 
 /// Pixel u of the frame is pixel zoom * (u + 0.5) - 0.5 of the enlarged one.
@@ -161,44 +85,55 @@ void check_frame(const cv::Mat& frame) {
 
 }  // namespace
 
-Expected<Stem> Stem::load(const StemOptions& options, bool all_filters) {
-  const auto network = network_of(options);
-  if (!network) {
-    return network.error();
-  }
-  const auto sampling = choose_sampling(options.sampling_px, *network);
-  if (!sampling) {
-    return sampling.error();
-  }
-  const std::string label =
-      options.layer == "first" ? network->name : network->name + " layer " + options.layer;
-  const auto filter =
-      choose_filter(options.filter, label, network->num_filters, network->default_filter);
-  if (!filter) {
-    return filter.error();
-  }
-  StemInfo info = {.model = network->name,
-                   .layer = network->layer,
-                   .sha256 = network->sha256,
-                   .filter = *filter,
-                   .num_filters = network->num_filters,
-                   .sampling_px = *sampling};
+Expected<Stem> Stem::create(const StemOptions& options, bool all_filters) {
   if (auto hand_made = internal::hand_made_bank(options.model)) {
-    return Stem(info, std::move(hand_made->bank), true);
+    const auto filter = choose_filter(options.filter, options.model, hand_made->num_filters, 0);
+    const auto sampling = choose_sampling(options.sampling_px, 1, /*native_only=*/false);
+    if (!filter || !sampling) {
+      return (filter ? sampling : filter).error();
+    }
+    return Stem({.model = options.model, .filter = *filter, .num_filters = hand_made->num_filters},
+                std::move(hand_made->bank), /*has_all=*/true);
   }
-  const bool has_all = all_filters || !network->folded || network->folded->filter != *filter ||
-                       network->folded->sampling_px != *sampling;
-  auto bank = open_bank(has_all ? *network : internal::folded_network(*network), !options.network,
-                        *sampling);
-  if (!bank) {
-    return bank.error();
+  auto model = internal::open_model(choose_model(options, all_filters));
+  if (!model) {
+    return model.error();
   }
-  info.takes_any_size = bank->takes_any_size;
-  return Stem(info, std::move(bank->bank), has_all);
+  const ModelInfo& info = model->info;
+  const auto filter =
+      choose_filter(options.filter, options.model, info.num_filters, info.default_filter);
+  const auto sampling =
+      choose_sampling(options.sampling_px, info.stride_px, info.native_sampling_only);
+  if (!filter || !sampling) {
+    return (filter ? sampling : filter).error();
+  }
+  if (info.only_filter && (all_filters || *filter != *info.only_filter)) {
+    return fail(fmt::format("{}: expected a model of {}, found one of filter {} alone",
+                            model->label,
+                            all_filters ? fmt::format("all {} filters", info.num_filters)
+                                        : fmt::format("filter {}", *filter),
+                            *info.only_filter));
+  }
+  const internal::SamplingPlan plan(info, *sampling);
+  const bool has_one_size = !model->session.fixed_size().empty();
+  if (plan.needs_margin() && has_one_size) {
+    return fail(fmt::format(
+        "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
+        "found {}",
+        info.stride_px, model->label, *sampling));
+  }
+  return Stem({.model = options.model,
+               .layer = info.layer,
+               .filter = *filter,
+               .num_filters = info.num_filters,
+               .sampling_px = *sampling,
+               .takes_any_size = !has_one_size && !info.native_sampling_only},
+              internal::make_network_layer(model->label, std::move(model->session), plan),
+              /*has_all=*/!info.only_filter);
 }
 
-Expected<Stem> Stem::create(const StemOptions& options) { return load(options, false); }
-Expected<Stem> Stem::create_all(const StemOptions& options) { return load(options, true); }
+Expected<Stem> Stem::load(const StemOptions& options) { return create(options, false); }
+Expected<Stem> Stem::load_all(const StemOptions& options) { return create(options, true); }
 
 Expected<Channel> Stem::apply(const cv::Mat& frame, int zoom) const {
   check_frame(frame);

@@ -15,12 +15,11 @@
 
 namespace stemvo {
 
-/// What is known of the loaded network, for reports (config.yaml, metrics.json).
+/// What is known of the loaded model.
 struct StemInfo {
-  std::string model;   ///< as asked for
-  std::string layer;   ///< empty for gray and input_layer
-  std::string sha256;  ///< of the .onnx file, empty for gray and input_layer
-  int filter = 0;      ///< the one chosen, never -1
+  std::string model = {};  ///< as asked for
+  std::string layer = {};  ///< empty for one made by hand
+  int filter = 0;          ///< the one chosen, never -1
   int num_filters = 1;
   int sampling_px = 1;
   bool takes_any_size = true;  ///< else frames of one size, or one channel pixel for each stride
@@ -40,13 +39,13 @@ using FilterBank =
 /// runtime refused it.
 class Stem {
  public:
-  /// Loads and checks the network: the one filter's own file where it has one, for `apply` alone.
-  /// Errors: a name without a network, a hash other than said, not ONNX, inputs or outputs other
-  /// than 1x3xHxW -> 1xCxhxw float, filter outside [0, C), sampling_px not a divisor of the stride
-  /// (lists the allowed values).
-  [[nodiscard]] static Expected<Stem> create(const StemOptions& options);
+  /// Loads and checks a model, for `apply` alone: of the default one the best filter's own file.
+  /// Errors: no such model, not ONNX, no metadata that say kernel, stride and padding, or others
+  /// than the graph's, inputs or outputs other than 1x3xHxW -> 1xCxhxw float, filter outside [0,
+  /// C), sampling_px not a divisor of the stride (lists the allowed values).
+  [[nodiscard]] static Expected<Stem> load(const StemOptions& options);
   /// The same with all filters, for `apply_all` and `apply_range` too.
-  [[nodiscard]] static Expected<Stem> create_all(const StemOptions& options);
+  [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options);
 
   [[nodiscard]] const StemInfo& info() const { return info_; }
   /// How many times larger (bicubic) the frame is made for the filters: 2 or 1.
@@ -56,7 +55,7 @@ class Stem {
   }
   /// The one filter chosen.
   [[nodiscard]] Expected<Channel> apply(const cv::Mat& frame, int zoom = 1) const;
-  /// All filters of the layer from one pass, in order. Of a stem made by create_all, as
+  /// All filters of the layer from one pass, in order. Of a stem made by load_all, as
   /// apply_range.
   [[nodiscard]] Expected<std::vector<Channel>> apply_all(const cv::Mat& frame) const {
     return apply_range(frame, 0, info_.num_filters);
@@ -71,7 +70,7 @@ class Stem {
  private:
   Stem(StemInfo info, internal::FilterBank bank, bool has_all)
       : info_(std::move(info)), bank_(std::move(bank)), has_all_(has_all) {}
-  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, bool all_filters);
+  [[nodiscard]] static Expected<Stem> create(const StemOptions& options, bool all_filters);
 
   StemInfo info_;
   internal::FilterBank bank_;

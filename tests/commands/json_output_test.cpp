@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "support/program_test.hpp"
+#include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
@@ -111,9 +112,8 @@ TEST_F(JsonOutput, BoundThatIsPassedIsInTheDocument) {
 }
 
 TEST_F(JsonOutput, SaysWhyAModelCannotBeUsed) {
-  const fs::path models = fs::path(STEMVO_SOURCE_DIR) / "models";
-  fs::copy(models / "manifest.yaml", folder_ / "manifest.yaml");
-  write_file(folder_ / "default.onnx", "no model");
+  const std::string good = read_file(testing::tiny_model("plain_k4s4"));
+  write_file(folder_ / "default.onnx", testing::with_metadata(good, "stride", "2"));
   const Json json = document({"models", folder_ / "default.onnx", "--json"}, 1);
   EXPECT_EQ(json["models"][0]["sound"], false);
   EXPECT_THAT(json["models"][0]["problem"].get<std::string>(), HasSubstr("default.onnx"));

@@ -38,7 +38,8 @@ def gray_stem(name, stride, pick=None):
         nodes += [helper.make_node("Slice", ["z", "from", "to", "axis"], ["own"])]
     nodes += [helper.make_node("Div", ["z" if pick is None else "own", "length"], ["channels"])]
     write(name, nodes, [value("image", [1, 1, "H", "W"])],
-          [value("channels", [1, 6 if pick is None else 1, "h", "w"])], constants)
+          [value("channels", [1, 6 if pick is None else 1, "h", "w"])], constants,
+          metadata=said("stem", 6, 4, stride, [0] * 4, **({} if pick is None else {"filter": pick})))
 
 
 def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W")):
@@ -56,11 +57,12 @@ def stem(name, filters, kernel, stride, pads, layer_norm=False, size=("H", "W"))
                   helper.make_node("Add", ["v", "epsilon"], ["ve"]),
                   helper.make_node("Sqrt", ["ve"], ["s"]),
                   helper.make_node("Div", ["d", "s"], ["channels"])]
-    write(name, nodes, [value("image", [1, 3, *size])], [value("channels", [1, filters, "h", "w"])], constants)
+    write(name, nodes, [value("image", [1, 3, *size])], [value("channels", [1, filters, "h", "w"])], constants,
+          metadata=said("stem", filters, kernel, stride, pads))
 
 
-def two_layers(name):
-    """`stem` as plain_k4s4; `deep` is a padded box of 3x3 over it, less its mean over the frame for the last filter."""
+def deep(name):
+    """A padded box of 3x3 over plain_k4s4, less its mean over the frame for the last filter."""
     box = np.zeros((2, 3, 3, 3), np.float32)
     box[0, 0] = box[1, 1] = 1.0 / 9.0
     constants = [numpy_helper.from_array(MEAN.reshape(1, 3, 1, 1), "mean"),
@@ -71,20 +73,28 @@ def two_layers(name):
              helper.make_node("Conv", ["stem", "box"], ["smooth"], kernel_shape=[3, 3], pads=[1, 1, 1, 1]),
              helper.make_node("GlobalAveragePool", ["smooth"], ["average"]),
              helper.make_node("Mul", ["average", "which"], ["level"]),
-             helper.make_node("Sub", ["smooth", "level"], ["deep"])]
-    write(name, nodes, [value("image", [1, 3, "H", "W"])],
-          [value("stem", [1, 3, "h", "w"]), value("deep", [1, 2, "h", "w"])], constants)
+             helper.make_node("Sub", ["smooth", "level"], ["channels"])]
+    write(name, nodes, [value("image", [1, 3, "H", "W"])], [value("channels", [1, 2, "h", "w"])], constants,
+          metadata=said("deep", 2, 12, 4, [4] * 4, sampling="native"))
 
 
 def value(name, shape, kind=TensorProto.FLOAT):
     return helper.make_tensor_value_info(name, kind, shape)
 
 
-def write(name, nodes, inputs, outputs, constants=(), domains=(), is_checked=True):
+def said(layer, filters, kernel, stride, padding, **more):
+    """What the model says of itself."""
+    values = {"network": "tiny", "layer": layer, "filters": filters, "kernel": f"{kernel} {kernel}", "stride": stride,
+              "padding": " ".join(map(str, padding)), "default_filter": 1, "licence": "MIT", "command": "tests/data/make_models.py", **more}
+    return {f"stemvo.{key}": str(value) for key, value in values.items()}
+
+
+def write(name, nodes, inputs, outputs, constants=(), domains=(), is_checked=True, metadata=None):
     graph = helper.make_graph(nodes, name, inputs, outputs, list(constants))
     domains = [helper.make_opsetid("", 13)] + [helper.make_opsetid(domain, 1) for domain in domains]
     model = helper.make_model(graph, opset_imports=domains, producer_name="stemvo tests")
     model.ir_version = 7
+    helper.set_model_props(model, metadata or {})
     if is_checked:
         onnx.checker.check_model(model)
     (OUT / f"{name}.onnx").write_bytes(model.SerializeToString(deterministic=True))
@@ -117,10 +127,11 @@ def main():
 
     gray_stem("gray_k4s4", 4)
     gray_stem("gray_k4s4_filter_1", 2, pick=1)
-    two_layers("two_layers")
+    deep("deep_k12s4")
     picture, shape = ["H", "W"], [1, 3, "H", "W"]
     identity("wrong_input_name", [value("x", shape)], [value("channels", shape)])
-    identity("wrong_output_name", [value("image", shape)], [value("y", shape)])
+    write("wrong_two_outputs", [helper.make_node("Identity", ["image"], ["a"]), helper.make_node("Identity", ["image"], ["b"])],
+          [value("image", shape)], [value("a", shape), value("b", shape)])
     identity("wrong_rank", [value("image", [3, *picture])], [value("channels", [3, *picture])])
     identity("wrong_planes", [value("image", [1, 2, *picture])], [value("channels", [1, 2, *picture])])
     identity("wrong_type", [value("image", shape, TensorProto.UINT8)], [value("channels", shape, TensorProto.UINT8)])
@@ -135,9 +146,11 @@ def main():
     write("wrong_output_rank", [helper.make_node("ReduceMean", ["image"], ["channels"], axes=[1], keepdims=0)],
           [value("image", shape)], [value("channels", [1, *picture])])
     external("wrong_external")
+    identity("wrong_no_metadata", [value("image", shape)], [value("channels", shape)])
     write("wrong_domain", [helper.make_node("Steal", ["image"], ["channels"], domain="com.example")],
           [value("image", shape)], [value("channels", shape)], domains=["com.example"])
-    write("wrong_infinite", [helper.make_node("Log", ["image"], ["channels"])], [value("image", shape)], [value("channels", shape)])
+    write("wrong_infinite", [helper.make_node("Log", ["image"], ["channels"])], [value("image", shape)], [value("channels", shape)],
+          metadata=said("stem", 3, 1, 1, [0] * 4))
 
 
 if __name__ == "__main__":

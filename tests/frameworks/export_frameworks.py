@@ -25,9 +25,9 @@ import _environment  # noqa: E402,F401
 
 import numpy as np  # noqa: E402
 import onnxruntime  # noqa: E402
-import yaml  # noqa: E402
 
 import export_stem  # noqa: E402
+from stems import metadata  # noqa: E402
 
 
 def exported(folder, case, *options):
@@ -77,8 +77,8 @@ class Frameworks(unittest.TestCase):
         """Without padding (the default), on even sizes: the same values away from the borders. Where the trained
         padding is no whole stride, the trained grid starts so many pixels later."""
         exported(folder, case, "--padding", "same")
-        (entry,) = yaml.safe_load((folder / "out/manifest.yaml").read_text(encoding="utf-8"))["models"]
-        (top, left, _, _), stride = entry["padding"], entry["stride"]
+        said = metadata.read(folder / "out/model.onnx")
+        (top, left, _, _), stride = map(int, said["padding"].split()), int(said["stride"])
         self.assertEqual(top, left)
         cropped = np.ascontiguousarray(picture[:, -top % stride:, -left % stride:])
         got = exported(folder, case).run(None, {"image": cropped[None]})[0][0]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// make_corpora SOURCE OUT: for each fuzzer a folder of small files as stemvo and its tests have
+// make_corpora OUT: for each fuzzer a folder of small files as stemvo and its tests have
 // them.
 #include <cstdio>
 #include <filesystem>
@@ -28,9 +28,6 @@ class Corpus {
   }
   void text(const std::string& name, const std::string& text) const {
     done(stemvo::write_text_file(folder_ / name, text));
-  }
-  void copy(const fs::path& file) const {
-    fs::copy_file(file, folder_ / file.filename(), fs::copy_options::overwrite_existing);
   }
   [[nodiscard]] fs::path operator/(const std::string& name) const { return folder_ / name; }
 
@@ -155,13 +152,12 @@ cv::Mat picture(int type, int rows, int cols) {
   return image;
 }
 
-void yaml_and_models(const fs::path& source, const fs::path& out) {
+void configurations(const fs::path& out) {
   const Corpus configuration(out, "configuration");
   configuration.text("all", stemvo::dump_config({}));
   configuration.text("few",
                      "stem: {filter: 3, model: gray}\nevaluation:\n  segment_lengths_m: [1]\n");
   configuration.text("assignment", "evaluation.segment_lengths_m=[100, 200]");
-  Corpus(out, "manifest").copy(source / "models/manifest.yaml");
 }
 
 void images(const fs::path& out) {
@@ -187,19 +183,18 @@ void images(const fs::path& out) {
 }  // namespace
 
 int main(int num_arguments, char** arguments) {
-  if (num_arguments != 3) {
-    std::fprintf(stderr, "usage: make_corpora SOURCE OUT\n");
+  if (num_arguments != 2) {
+    std::fprintf(stderr, "usage: make_corpora OUT\n");
     return 2;
   }
-  const fs::path source = arguments[1];
-  const fs::path out = arguments[2];
+  const fs::path out = arguments[1];
   kitti(out);
   poses(out);
   cameras(out);
   recordings(out);
   metrics(out);
   records(out);
-  yaml_and_models(source, out);
+  configurations(out);
   images(out);
   return 0;
 }

@@ -84,13 +84,11 @@ TEST_F(Robustness, SaysWhatItCannotDo) {
 
 /// A model of one frame size is refused where the frames are cropped: that costs its row alone.
 TEST_F(Robustness, ARefusedRunIsAWarning) {
-  const TempFolder models;
-  testing::write_models(models, testing::kFixed4);
   const std::string drive = folder_ / "tiny";
   ASSERT_EQ(
       run_stemvo({"synth", drive, "--frames", "30", "--width", "48", "--height", "32"}).exit_code,
       0);
-  const std::string control = (models / "fixed_k4s4.onnx").string() + ":0";
+  const std::string control = testing::tiny_model("fixed_k4s4") + ":0";
   const ProgramResult result =
       run_stemvo({"robustness", drive + "/sequences/00", "--kinds", "none,cropped", "--controls",
                   control, "--out", folder_ / "out"});

@@ -85,7 +85,7 @@ class Cut(Files):
         for colours_last in (False, True):
             model = network(self.path, colours_last=colours_last)
             entries = self.export(self.path, "--layers", "front,second,last", "--preprocessing", "caffe")
-            found = cut(self.folder / "out" / "whole.onnx", self.image)
+            found = [cut(self.folder / "out" / entry["file"], self.image)[0] for entry in entries]
             fed = self.image[::-1] - np.array([103.939, 116.779, 123.68]).reshape(3, 1, 1)
             for tensor, values, entry in zip(("front", "second", "last"), found, entries):
                 want = uncut(model, tensor, fed, colours_last)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: MIT
 """tools/export_stem.py against a plain numpy convolution: values, pixel map, padding, errors."""
 
-import contextlib
-import io
 import os
 import pathlib
 import unittest
@@ -10,9 +8,10 @@ import unittest
 from exporting import Files, random_arrays, run_onnx
 
 import numpy as np
+import onnx
 
 import export_stem
-from stems import manifest
+from stems import metadata
 
 
 class Npz(Files):
@@ -37,12 +36,12 @@ class Values(Npz):
 
     def test_same_stem_same_bytes(self):
         weights = self.save(random_arrays((4, 4), 4, norm="layer"))
-        first = self.export(weights)[0]["sha256"]
-        self.assertEqual(self.export(weights)[0]["sha256"], first)
+        first, second = ((self.folder / "out" / self.export(weights)[0]["file"]).read_bytes() for _ in range(2))
+        self.assertEqual(first, second)
 
 
 class PixelMap(Npz):
-    def test_centre_of_mass_of_a_spot_is_where_the_manifest_puts_it(self):
+    def test_centre_of_mass_of_a_spot_is_where_the_metadata_put_it(self):
         """All-ones filters see a spot wherever it is under the kernel: the pixels that see it, mapped by
         input = stride * channel + (kernel - 1) / 2 - padding, surround it evenly."""
         for kernel, stride, padding in (((4, 4), 1, (0, 0, 0, 0)), ((3, 5), 1, (2, 1, 0, 3))):
@@ -56,18 +55,21 @@ class PixelMap(Npz):
             self.assertAlmostEqual(entry["stride"] * columns.mean() + offset[1], 13.0)
 
 
-class Manifest(Npz):
-    def test_entries_are_replaced_by_name_and_others_stay(self):
+class Metadata(Npz):
+    def test_the_file_says_what_it_is(self):
         weights = self.save(random_arrays((4, 4), 4, norm="none"))
-        self.export(weights, "--name", "first")
-        self.export(weights, "--name", "second", "--licence", "yes: \"quoted\" # and odd")
-        models = self.export(weights, "--name", "first", "--default-filter", "3")
-        self.assertEqual([model["name"] for model in models], ["first", "second"])
-        self.assertEqual(models[0]["default_filter"], 3)
-        self.assertEqual(models[1]["licence"], "yes: \"quoted\" # and odd")
-        for model in models:
-            self.assertEqual(tuple(model), manifest.KEYS)
-            self.assertEqual(model["sha256"], manifest.sha256(self.folder / "out" / model["file"]))
+        odd = "yes: \"quoted\" # and odd"
+        (said,) = self.export(weights, "--name", "first", "--licence", odd, "--default-filter", "3", "--network", "ours", "--layer", "conv")
+        self.assertEqual({key: said[key] for key in ("network", "layer", "licence", "default_filter", "filters", "kernel", "stride", "padding")},
+                         {"network": "ours", "layer": "conv", "licence": odd, "default_filter": 3, "filters": 5, "kernel": [4, 4],
+                          "stride": 4, "padding": [0, 0, 0, 0]})
+        self.assertIn("tools/export_stem.py random.npz", said["command"])
+
+    def test_a_file_without_metadata_is_told_how_to_get_them(self):
+        model = onnx.ModelProto()
+        (self.folder / "plain.onnx").write_bytes(model.SerializeToString())
+        with self.assertRaisesRegex(metadata.MetadataError, "plain.onnx: expected metadata stemvo.network, found none; tools/export_stem.py"):
+            metadata.read(self.folder / "plain.onnx")
 
 
 class Errors(Npz):
@@ -110,14 +112,6 @@ class Errors(Npz):
             self.expect(damaged, "damaged.npz", "expected an .npz file")
         self.expect(self.folder / "absent.npz", "found nothing")
         self.expect(self.folder, "found no suffix")
-
-    def test_broken_manifest_is_not_overwritten(self):
-        (self.folder / "none").mkdir()
-        (self.folder / "none" / "manifest.yaml").write_text("models: [", encoding="utf-8")
-        with contextlib.redirect_stderr(io.StringIO()) as said:
-            export_stem.main([str(self.save(random_arrays((3, 3), 2, norm="batch"))), "--out", str(self.folder / "none")])
-        self.assertIn("manifest.yaml", said.getvalue())
-        self.assertEqual(os.listdir(self.folder / "none"), ["manifest.yaml"])
 
 
 @unittest.skipUnless("STEMVO_SHARED_DATA" in os.environ, "STEMVO_SHARED_DATA is not set")

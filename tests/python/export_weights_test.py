@@ -139,18 +139,18 @@ class Torch(Weights):
         safetensors.numpy.save_file(arrays, path)
         self.check(path, stem, "EfficientNetV2-S")
 
-    def test_two_layers_in_one_model(self):
+    def test_a_file_for_each_layer(self):
         path, stem = self.resnet()
         entries = self.export(path, "--layers", "conv1,bn1")
         self.assertEqual([entry["layer"] for entry in entries], ["conv1", "bn1"])
-        self.assertEqual(entries[0]["sha256"], entries[1]["sha256"])
+        self.assertEqual([entry["file"] for entry in entries], ["resnet18_conv1.onnx", "resnet18_bn1.onnx"])
 
     def test_one_filter(self):
         path, stem = self.resnet()
         image = np.random.default_rng(3).uniform(0, 255, (3, 20, 21))
         for options in ((), ("--fold",)):
             entry = self.export(path, "--filter", "7", *options)[-1]
-            self.assertEqual((entry["filters"], entry["name"]), (1, "resnet18_filter7"))
+            self.assertEqual((entry["filters"], entry["file"]), (1, "resnet18_filter7.onnx"))
             session = onnxruntime.InferenceSession(self.folder / "out" / entry["file"])
             got = session.run(None, {"image": image[None].astype(np.float32)})[0][0, 0]
             np.testing.assert_allclose(got, plain_stem(stem, image, (0, 0, 0, 0))[7], atol=1e-3)

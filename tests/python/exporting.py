@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import pathlib
+import re
 import sys
 import tempfile
 import unittest
@@ -17,11 +18,21 @@ import _environment  # noqa: E402,F401
 import h5py  # noqa: E402
 import numpy as np  # noqa: E402
 import onnxruntime  # noqa: E402
-import yaml  # noqa: E402
 
 import export_stem  # noqa: E402
+from stems import metadata  # noqa: E402
 
 IMAGENET = {"input_mean": np.array([0.485, 0.456, 0.406]), "input_std": np.array([0.229, 0.224, 0.225])}
+
+
+def written(text):
+    """What each file that export_stem.py wrote says of itself, with numbers as such."""
+    entries = []
+    for path in re.findall(r"^(.*\.onnx): ", text, re.MULTILINE):
+        said = metadata.read(path)
+        entries.append(said | {key: list(map(int, said[key].split())) for key in ("kernel", "padding")} |
+                       {key: int(said[key]) for key in ("filters", "stride", "default_filter")} | {"file": pathlib.Path(path).name})
+    return entries
 
 
 def run_onnx(path, image):
@@ -117,7 +128,7 @@ class Files(unittest.TestCase):
         with contextlib.redirect_stdout(io.StringIO()) as said:
             self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "out"), *options]), 0)
         self.said = said.getvalue()
-        return yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text(encoding="utf-8"))["models"]
+        return written(self.said)
 
     def check(self, path, arrays, *options, padding=(0, 0, 0, 0), size=(17, 22)):
         """The exported stem gives what the arrays say. Returns its entry."""

@@ -14,10 +14,9 @@ import _environment  # noqa: E402,F401
 import matplotlib.image  # noqa: E402
 import numpy as np  # noqa: E402
 import onnxruntime  # noqa: E402
-import yaml  # noqa: E402
 
 import learn_stem  # noqa: E402
-from stems import discriminant, drive  # noqa: E402
+from stems import discriminant, drive, metadata  # noqa: E402
 
 SIZE = (96, 128)
 FOCAL_PX = 100.0
@@ -98,8 +97,8 @@ class Learning(PlantedDrive):
         self.assertEqual(self.learn("b")[0], 0)
         first, second = ((self.folder / out / "default.onnx").read_bytes() for out in ("a", "b"))
         self.assertEqual(first, second)
-        entry = yaml.safe_load((self.folder / "a" / "manifest.yaml").read_text())["models"][0]
-        self.assertEqual((entry["filters"], entry["kernel"], entry["stride"]), (16, [8, 8], 2))
+        said = metadata.read(self.folder / "a" / "default.onnx")
+        self.assertEqual((said["filters"], said["kernel"], said["stride"]), ("16", "8 8", "2"))
 
     def test_the_layer_norm_is_the_one_of_the_page(self):
         """channel k = z_k / sqrt(mean z^2 + floor^2): z_k unspoiled by the mean over channels."""
@@ -127,13 +126,13 @@ class Learning(PlantedDrive):
                 self.assertEqual(len(alone), 1)
                 scale = np.abs(with_others[5]).max()
                 self.assertTrue(np.abs(alone[0][::step, ::step] - with_others[5]).max() <= 1e-6 * scale)
-        entry = yaml.safe_load((self.folder / "out" / "manifest.yaml").read_text())["models"][0]
-        self.assertEqual((entry["folded"]["filter"], entry["folded"]["sampling"]), (5, 2))
+        said = metadata.read(self.folder / "out" / "default_filter_5.onnx")
+        self.assertEqual((said["filters"], said["filter"], said["default_filter"], said["stride"]), ("16", "5", "5", "2"))
 
     def test_tracking_has_the_steeper_slope_in_its_worse_direction(self):
         """On the pictures themselves: smaller of the slopes' energies along x and y; the noise is 1 for each filter."""
         self.assertEqual(self.learn("tracking", "--objective", "tracking")[0], 0)
-        self.assertIn("--objective tracking", (self.folder / "tracking" / "manifest.yaml").read_text())
+        self.assertIn("--objective tracking", metadata.read(self.folder / "tracking" / "default.onnx")["command"])
         self.learn("matching")
         gray = drive.Drive(self.folder / "drive").gray(1)
         ratios = {}

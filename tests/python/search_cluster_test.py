@@ -18,25 +18,23 @@ import _environment  # noqa: E402,F401
 
 import numpy as np  # noqa: E402
 
-from stems import onnx_writer, manifest  # noqa: E402
+from stems import metadata, onnx_writer  # noqa: E402
 from stems import stem as stem_module  # noqa: E402
 
 PROGRAM = os.environ.get("STEMVO_PROGRAM", str(ROOT / "build/release/stemvo"))
 RAY = ROOT / "build/venv-ray/bin/python"
 
 
-def write_model(folder):
-    """Two layers of random filters, smoothed so that most of them can be tracked."""
+def write_models(folder):
+    """Two models of random filters, smoothed so that most of them can be tracked."""
     rng = np.random.default_rng(3)
-    stems = {}
+    files = []
     for name, filters in (("coarse", 5), ("fine", 4)):
         weights = rng.normal(size=(filters, 3, 4, 4)) / 40 + rng.normal(size=(filters, 1, 1, 1)) / 10
-        stems[name] = stem_module.Stem(weights, np.zeros(filters), 4 if name == "coarse" else 2)
-    file = folder / "two.onnx"
-    file.write_bytes(onnx_writer.to_bytes(onnx_writer.build_layers(stems)))
-    manifest.add(folder / "manifest.yaml", *(manifest.entry("two", file, stem, network="random", layer=name, licence="MIT", command="test")
-                                             for name, stem in stems.items()))
-    return file
+        stem = stem_module.Stem(weights, np.zeros(filters), 4 if name == "coarse" else 2)
+        files.append(folder / f"{name}.onnx")
+        metadata.write(files[-1], onnx_writer.build(stem), stem, network="random", layer=name, licence="MIT", command="test")
+    return files
 
 
 class Nodes:
@@ -75,19 +73,21 @@ class SearchCluster(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
-        cls.model = write_model(cls.folder)
+        cls.models = write_models(cls.folder)
         for name, seed in (("drive", 1), ("other", 7)):
             subprocess.run([PROGRAM, "synth", cls.folder / name, "--frames", "14", "--width", "620", "--height", "188", "--seed", str(seed)],
                            check=True, capture_output=True)
         for kind, name in (("sequences", "01"), ("poses", "01.txt")):
             (cls.folder / "other" / kind / name.replace("01", "00")).rename(cls.folder / "drive" / kind / name)
-        cls.what = [str(cls.folder / "drive/sequences/00"), str(cls.folder / "drive/sequences/01"), "--model", str(cls.model)]
+        cls.what = [str(cls.folder / "drive/sequences/00"), str(cls.folder / "drive/sequences/01")]
 
     def cluster(self, *options):
-        return [RAY, ROOT / "tools/search_cluster.py", *self.what, "--program", PROGRAM, *map(str, options)]
+        models = [word for model in self.models for word in ("--model", str(model))]
+        return [RAY, ROOT / "tools/search_cluster.py", *self.what, *models, "--program", PROGRAM, *map(str, options)]
 
     def test_a_killed_node_changes_nothing(self):
-        subprocess.run([PROGRAM, "search", *self.what, "--exhaustive", "--out", self.folder / "single", "--quiet"], check=True)
+        subprocess.run([PROGRAM, "search", *self.what, "--model", ",".join(map(str, self.models)), "--exhaustive", "--out", self.folder / "single",
+                        "--quiet"], check=True)
         out = self.folder / "cluster"
         with Nodes() as nodes:
             self.assertRegex(nodes.address, r":\d+$")
@@ -116,8 +116,8 @@ class SearchCluster(unittest.TestCase):
         for part in (*(out / "parts").iterdir(), out / "result"):
             identity = json.loads((part / "records.jsonl").read_text(encoding="utf-8").splitlines()[0])["of"]
             models = {layer["stem_model"] for layer in identity["layers"]}
-            self.assertIn(str(self.model), models)
-            self.assertLessEqual(models, {str(self.model), "gray", "input_layer"})
+            self.assertTrue(models & set(map(str, self.models)))
+            self.assertLessEqual(models, {*map(str, self.models), "gray", "input_layer"})
 
     def go_on(self, out):
         """Parts that are done are not run again; another search is refused."""
@@ -156,27 +156,24 @@ class SearchCluster(unittest.TestCase):
         shutil.copytree(self.folder / "drive", drive)
         frame = next((drive / "sequences/00").glob("image_2/*7.png"))
         frame.write_bytes(frame.read_bytes()[:2000])
-        what = [str(drive / "sequences/00"), "--model", str(self.model), "--layers", "fine", "--config", "default",
+        what = [str(drive / "sequences/00"), "--model", str(self.models[1]), "--config", "default",
                 "--set", "scale.source=ground_truth", "--no-baselines", "--quiet"]
         subprocess.run([PROGRAM, "search", *what, "--exhaustive", "--out", self.folder / "damaged_single"], check=True, capture_output=True)
-        done = subprocess.run([RAY, ROOT / "tools/search_cluster.py", *what, "--model", "default", "--layers", "fine", "--program", PROGRAM,
+        done = subprocess.run([RAY, ROOT / "tools/search_cluster.py", *what, "--program", PROGRAM,
                                "--filters-per-task", "2", "--out", self.folder / "damaged_cluster"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stderr.count(f"warning: {frame}: expected a sound PNG image"), 1, done.stderr)
-        self.assertIn("warning: --layers: default has stem, not fine; nothing of it is searched", done.stderr)
         table = (self.folder / "damaged_cluster/result/filters.csv").read_bytes()
         self.assertEqual(table, (self.folder / "damaged_single/filters.csv").read_bytes())
         self.assertEqual(len(table.splitlines()), 1 + 4)
 
     def test_errors(self):
         (self.folder / "text.onnx").write_text("text")
-        cases = ((("--layers", "fine,fine"), "--layers: expected each once, found 'fine' again"),
-                 (("--model", self.model), "--model: expected each once"),
-                 (("--layers", "coarse,top"), "; found 'top'"),
+        cases = ((("--model", self.models[0]), "--model: expected each once"),
                  (("--config", "defualt"), "--config: expected a file or one of default, fast, paper, found 'defualt'"),
                  (("--config", self.folder / "none.yaml"), "--config: expected a file, found nothing at"), (("--filters", "0:5"), "inside 0:4 of"),
-                 (("--model", "nope"), "--model: expected default, paper or the path of an .onnx, found 'nope'"),
-                 (("--model", self.folder / "text.onnx"), "expected an entry with 'file: text.onnx'"),
+                 (("--model", "nope"), "--model: expected default, default_filter_2, paper or the path of an .onnx, found 'nope'"),
+                 (("--model", self.folder / "text.onnx"), "text.onnx: expected an .onnx file"),
                  (("--program", self.folder / "none"), "expected the program stemvo"),
                  (("--address", "127.0.0.1:1"), "expected a Ray cluster"))
         for options, message in cases:

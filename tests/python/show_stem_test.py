@@ -32,7 +32,8 @@ class ShowStem(unittest.TestCase):
 
     def save(self, name, **more):
         path = self.folder / name
-        onnx_writer.write(stem.Stem(self.weights, np.zeros(3), 2, **{"mean": np.zeros(3), **more}), path)
+        made = stem.Stem(self.weights, np.zeros(3), 2, **{"mean": np.zeros(3), **more})
+        path.write_bytes(onnx_writer.to_bytes(onnx_writer.build(made)))
         return path
 
     def run_tool(self, *options):

@@ -22,7 +22,6 @@ class SearchRace : public Search {
 
   SearchRace() {
     request_.sequence_dirs = {sequence_};
-    request_.models_dir = fs::path(STEMVO_SOURCE_DIR) / "models";
     request_.baselines = false;
     request_.block = 3;
   }

@@ -17,9 +17,8 @@ TEST_F(Search, WrongRequestsAreNamedBeforeWorkStarts) {
     EXPECT_FALSE(fs::exists(folder_ / "wrong"));
     return result.err;
   };
-  EXPECT_THAT(message({"--layers", "block7"}), HasSubstr("expected one of stem, found 'block7'"));
   EXPECT_THAT(message({"--filters", "10:17"}), HasSubstr("inside 0:16"));
-  EXPECT_THAT(message({"--model", "nothing"}), HasSubstr("expected one of default"));
+  EXPECT_THAT(message({"--model", "nothing"}), HasSubstr("expected default"));
   EXPECT_THAT(message({"--set", "scale.source=none"}), HasSubstr("expected ground_truth"));
   EXPECT_THAT(message({"--frames", "0:3"}), HasSubstr("holds a segment of 10 m"));
   EXPECT_THAT(message({"--held-out", folder_ / "none"}), HasSubstr("none"));
@@ -31,17 +30,6 @@ TEST_F(Search, WrongRequestsAreNamedBeforeWorkStarts) {
   EXPECT_EQ(run_stemvo({"search", "--out", folder_ / "wrong"}).exit_code, 2);
 }
 
-TEST_F(Search, WeightsThatAreNotThoseOfTheManifest) {
-  fs::copy(fs::path(STEMVO_SOURCE_DIR) / "models", folder_ / "models", fs::copy_options::recursive);
-  const std::string model = folder_ / "models/default.onnx";
-  std::ofstream(model, std::ios::app) << "x";
-  EXPECT_THAT(search("out", {"--model", model}).err,
-              AllOf(StartsWith("error: "), HasSubstr("expected sha256")));
-  fs::remove(model);
-  EXPECT_THAT(search("out", {"--model", model}).err, HasSubstr("default.onnx"));
-  EXPECT_FALSE(fs::exists(folder_ / "out"));
-}
-
 TEST_F(Search, WhatIsAskedForTwiceIsRefused) {
   const auto message = [this](const Words& more) {
     const ProgramResult result = search("wrong", more);
@@ -49,8 +37,8 @@ TEST_F(Search, WhatIsAskedForTwiceIsRefused) {
     EXPECT_FALSE(fs::exists(folder_ / "wrong"));
     return result.err;
   };
-  EXPECT_THAT(message({"--layers", "stem,stem"}),
-              HasSubstr("expected each once, found 'stem' again"));
+  EXPECT_THAT(message({"--model", "default,default"}),
+              HasSubstr("expected each name once, found 'default' again"));
   EXPECT_THAT(message({sequence_.string()}), HasSubstr("SEQUENCE_DIR: expected each folder once"));
   const std::string link = folder_ / "07";
   fs::create_directory_symlink(sequence_, link);
@@ -79,8 +67,8 @@ TEST_F(Search, WhatIsAskedForTwiceIsRefused) {
 
 TEST_F(Search, OptionsThatWouldBeIgnoredAreWrongUsage) {
   for (const Words& option :
-       {Words{"--layers", "stem"}, Words{"--filters", "0:1"}, Words{"--frames", "0:9"},
-        Words{"--exhaustive"}, Words{"--resume"}, Words{"--no-baselines"}, Words{"--set", "seed=2"},
+       {Words{"--filters", "0:1"}, Words{"--frames", "0:9"}, Words{"--exhaustive"},
+        Words{"--resume"}, Words{"--no-baselines"}, Words{"--set", "seed=2"},
         Words{"--config", "default"}, Words{"--model", "gray"}, Words{"--block", "3"},
         Words{"--threads", "1"}, Words{"--held-out", sequence_.string()}}) {
     Words words = {"search", "--merge", folder_ / "a", "--out", folder_ / "wrong"};
@@ -90,7 +78,7 @@ TEST_F(Search, OptionsThatWouldBeIgnoredAreWrongUsage) {
     EXPECT_THAT(result.err,
                 AllOf(HasSubstr(" excludes "), HasSubstr("--merge"), HasSubstr(option.front())));
   }
-  for (const std::string key : {"model=gray", "layer=stem", "filter=3"}) {
+  for (const std::string key : {"model=gray", "filter=3"}) {
     const ProgramResult result = search("wrong", {"--set", "stem." + key});
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_THAT(result.err, AllOf(HasSubstr("--set stem." + key.substr(0, key.find('='))),

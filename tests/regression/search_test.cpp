@@ -14,6 +14,10 @@
 namespace stemvo {
 namespace {
 
+/// Models of 3 filters (layer `stem`) and of 2 (layer `deep`).
+const std::string kTwoLayers =
+    testing::tiny_model("plain_k4s4") + "," + testing::tiny_model("deep_k12s4");
+
 TEST_F(Search, PartsMergedAreTheWholeAndTheBestCanBeRun) {
   ASSERT_EQ(search("whole", {"--exhaustive", "--filters", "0:3"}).exit_code, 0);
   ASSERT_EQ(search("a", {"--exhaustive", "--filters", "0:1"}).exit_code, 0);
@@ -105,13 +109,11 @@ TEST_F(Search, PartsByFilterAndSequenceMergedAreTheWhole) {
 }
 
 TEST_F(Search, LayersAndTheHeldOutSequence) {
-  const testing::TempFolder models;
-  testing::write_two_layers(models);
-  const std::string model = (models / "two_layers.onnx").string();
+  const std::string models = kTwoLayers;
   copy_sequence("01");
   const fs::path held_out = sequence_;
   sequence_ = test::rendered_drive(kSize) / "sequences/00";
-  const Words asked = {"--model",           model,        "--exhaustive",
+  const Words asked = {"--model",           models,       "--exhaustive",
                        "--no-baselines",    "--held-out", held_out.string(),
                        "--held-out-frames", "5:30"};
   ASSERT_EQ(search("both", asked).exit_code, 0);
@@ -125,10 +127,11 @@ TEST_F(Search, LayersAndTheHeldOutSequence) {
   }
   EXPECT_THAT(table("both"), HasSubstr(",frames,held_out_t_rel_percent,"));
   Words deep = asked;
-  deep.insert(deep.end(), {"--layers", "deep"});
+  deep[1] = testing::tiny_model("deep_k12s4");
   ASSERT_EQ(search("deep", deep).exit_code, 0);
   EXPECT_EQ(count_lines(folder_ / "deep/filters.csv"), 3U);
-  EXPECT_THAT(table("deep"), AllOf(HasSubstr("two,deep,0,"), HasSubstr("two,deep,1,")));
+  EXPECT_THAT(table("deep"),
+              AllOf(HasSubstr("deep_k12s4,deep,0,"), HasSubstr("deep_k12s4,deep,1,")));
 }
 
 TEST_F(Search, TooSmallAChannelIsARowWithItsReason) {
@@ -186,12 +189,9 @@ TEST_F(Search, DisturbedSequencesRankBesideThem) {
 
 /// 2 of 5 filters (layer `deep`) are too small: neither the work nor the race counts them.
 TEST_F(Search, WhatCannotRunIsNoPartOfTheRaceAndBaselinesRunToTheEnd) {
-  const testing::TempFolder models;
-  testing::write_two_layers(models);
   const fs::path small =
       test::rendered_drive({.frames = 30, .width_px = 160, .height_px = 48}) / "sequences/00";
-  const Words asked = {"search",  small.string(), "--model", (models / "two_layers.onnx").string(),
-                       "--quiet", "--out"};
+  const Words asked = {"search", small.string(), "--model", kTwoLayers, "--quiet", "--out"};
   const auto run = [&](const std::string& out, const Words& more) {
     Words words = asked;
     words.push_back(folder_ / out);
@@ -211,7 +211,7 @@ TEST_F(Search, WhatCannotRunIsNoPartOfTheRaceAndBaselinesRunToTheEnd) {
   EXPECT_LT(halved["work"]["filter_frames"].get<int>(), 3 * 30);
   int baselines = 0;
   for (const auto& row : halved["filters"]) {
-    const bool is_baseline = row["model"] != "two";
+    const bool is_baseline = row["layer"] == "input";
     baselines += is_baseline ? 1 : 0;
     EXPECT_TRUE(!is_baseline || row["sequences"][0]["frames"] == 30) << row;
     EXPECT_TRUE(row["layer"] != "deep" || row["status"] == "not detected") << row;

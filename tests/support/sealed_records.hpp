@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "stem/model_file.hpp"
+#include "io/sha256.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::test {

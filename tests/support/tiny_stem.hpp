@@ -8,11 +8,8 @@
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <opencv2/core.hpp>
 
-#include "stem/model_file.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo::testing {
@@ -49,51 +46,18 @@ inline std::filesystem::path tiny_stems() {
   return std::filesystem::path(STEMVO_SOURCE_DIR) / "tests/data/stems";
 }
 
-/// One entry of a manifest, with the true hash.
-inline std::string manifest_entry(const TinyStem& stem) {
-  const std::string file = stem.name + ".onnx";
-  return fmt::format(
-      "  - name: {}\n    file: {}\n    sha256: {}\n    network: tiny\n    layer: stem\n"
-      "    filters: {}\n    kernel: [{}, {}]\n    stride: {}\n    padding: [{}]\n"
-      "    default_filter: 1\n    licence: MIT\n    command: tests/data/make_models.py\n",
-      stem.name, file, internal::sha256_hex(read_all(tiny_stems() / file)), stem.filters,
-      stem.kernel, stem.kernel, stem.stride, fmt::join(stem.padding, ", "));
+/// The path of a model of make_models.py, as stem.model takes it.
+inline std::string tiny_model(const std::string& name) {
+  return (tiny_stems() / (name + ".onnx")).string();
 }
 
-/// A folder as models/ is: the file and a manifest.
-inline void write_models(const TempFolder& folder, const TinyStem& stem) {
-  std::filesystem::copy_file(tiny_stems() / (stem.name + ".onnx"), folder / (stem.name + ".onnx"));
-  (void)folder.file("manifest.yaml", "models:\n" + manifest_entry(stem));
-}
-
-/// gray_k4s4 and its filter 1 alone, sampled every 2 pixels.
-inline void write_folded(const TempFolder& folder) {
-  const TinyStem gray{.name = "gray_k4s4", .filters = 6};
-  write_models(folder, gray);
-  const std::string file = "gray_k4s4_filter_1.onnx";
-  std::filesystem::copy_file(tiny_stems() / file, folder / file);
-  (void)folder.file(
-      "manifest.yaml",
-      fmt::format("models:\n{}    folded: {{filter: 1, sampling: 2, file: {}, sha256: {}}}\n",
-                  manifest_entry(gray), file, internal::sha256_hex(read_all(tiny_stems() / file))));
-}
-
-/// Both layers of two_layers.onnx, as make_models.py writes them: `stem` is kPlain4, `deep` a
-/// padded 3x3 box over its first two filters; of the second the mean over the frame is taken off.
-inline void write_two_layers(const TempFolder& folder) {
-  const std::string file = "two_layers.onnx";
-  std::filesystem::copy_file(tiny_stems() / file, folder / file);
-  const auto entry = [&](const std::string& layer, int filters, int kernel, int padding,
-                         const std::string& sampling) {
-    return fmt::format(
-        "  - name: two\n    file: {}\n    sha256: {}\n    network: tiny\n    layer: {}\n"
-        "    filters: {}\n    kernel: [{}, {}]\n    stride: 4\n    padding: [{}, {}, {}, {}]\n"
-        "    sampling: {}\n    default_filter: 1\n    licence: MIT\n    command: make_models.py\n",
-        file, internal::sha256_hex(read_all(tiny_stems() / file)), layer, filters, kernel, kernel,
-        padding, padding, padding, padding, sampling);
+/// A model's bytes with another text under `stemvo.KEY`: of two with one key the last counts.
+inline std::string with_metadata(std::string model, std::string key, const std::string& value) {
+  const auto field = [](char tag, const std::string& text) {
+    return std::string{tag, static_cast<char>(text.size())} + text;
   };
-  (void)folder.file("manifest.yaml", "models:\n" + entry("stem", 3, 4, 0, "any") +
-                                         entry("deep", 2, 12, 4, "native"));
+  key.insert(0, "stemvo.");
+  return model += field('\x72', field('\x0a', key) + field('\x12', value));
 }
 
 /// A textured frame with no symmetry, from sines: CV_8UC3 or CV_8UC1.

@@ -69,7 +69,6 @@ class BenchmarkRuns : public ::testing::Test {
     write_sequence(folder_ / "kitti", "street");
     request_.kitti_root = folder_ / "kitti";
     request_.out_dir = folder_ / "out";
-    request_.models_dir = STEMVO_SOURCE_DIR "/models";
     request_.published = folder_.file("published.json", kPublished);
     request_.num_threads = 1;
     Config config;

@@ -30,7 +30,6 @@ class CalibrateSequence : public ::testing::Test {
                                                         .height_px = 240}));
     request_.sequence_dir = folder_ / "sequences/00";
     request_.out_file = folder_ / "refined.txt";
-    request_.models_dir = STEMVO_SOURCE_DIR "/models";
   }
   [[nodiscard]] std::string error() const {
     const auto report = calibrate_sequence(request_);

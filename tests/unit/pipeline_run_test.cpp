@@ -73,7 +73,6 @@ class PipelineRun : public ::testing::Test {
     }
     request_.sequence_dir = sequence;
     request_.out_dir = folder_ / "out";
-    request_.models_dir = STEMVO_SOURCE_DIR "/models";
     request_.config.stem.model = "gray";
     request_.num_threads = 1;
   }
@@ -333,7 +332,6 @@ TEST_F(PipelineRun, ChannelImagesOfTheInputLayer) {
   ChannelImagesRequest request;
   request.sequence_dir = request_.sequence_dir;
   request.out_dir = request_.out_dir;
-  request.models_dir = request_.models_dir;
   request.config.stem.model = "input_layer";
   request.frames = FrameRangeRequest{2, 4};
   const auto written = write_channel_images(request);

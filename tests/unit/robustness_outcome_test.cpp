@@ -95,15 +95,12 @@ TEST(Segments, BlockIsAsLongAsTheLongestOfThem) {
 TEST(Contenders, KeepWhatTheJudgedModelNeeds) {
   Config judged;
   judged.stem.model = "net";
-  judged.stem.layer = "conv2";
   judged.stem.sampling_px = 4;
   const auto made = make_contenders(judged, {"net:7", "other:3", "gray", "net:7", "blue"}, true);
   ASSERT_TRUE(made);
   ASSERT_EQ(made->size(), 5U);  // one given twice counts once
-  EXPECT_EQ((*made)[1].config.stem.layer, "conv2");
   EXPECT_EQ((*made)[1].config.stem.sampling_px, 4);
   EXPECT_EQ((*made)[1].config.stem.filter, 7);
-  EXPECT_EQ((*made)[2].config.stem.layer, StemOptions().layer);
   EXPECT_EQ((*made)[2].config.stem.model, "other");
   EXPECT_EQ((*made)[4].config.stem.model, "input_layer");
   EXPECT_EQ((*made)[4].config.stem.filter, 2);

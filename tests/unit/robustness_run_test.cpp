@@ -22,7 +22,6 @@ class RobustnessRun : public testing::SmallDrive {
   RobustnessRun() {
     request_.sequence_dirs = {sequence_};
     request_.out_dir = folder_ / "out";
-    request_.models_dir = STEMVO_SOURCE_DIR "/models";
     request_.config.scale.source = ScaleSource::kGroundTruth;
     request_.config.evaluation.segment_lengths_m = {2.0, 4.0};
     request_.kinds = {kUndisturbed, "sensor_noise", "every_nth"};

@@ -24,7 +24,6 @@ class SearchRun : public testing::SmallDrive {
     SearchRequest request;
     request.sequence_dirs = {sequence_};
     request.out_dir = folder_ / out;
-    request.models_dir = STEMVO_SOURCE_DIR "/models";
     request.filters = FrameRangeRequest{0, 4};
     request.config.evaluation.segment_lengths_m = {2.0, 4.0};
     request.exhaustive = true;
@@ -109,8 +108,7 @@ TEST_F(SearchRun, PartsMergedAreTheWhole) {
   second.baselines = false;
   ASSERT_TRUE(run_search(first));
   const auto merge = [&] {
-    return merge_searches({folder_ / "first", folder_ / "second"}, folder_ / "merged",
-                          first.models_dir);
+    return merge_searches({folder_ / "first", folder_ / "second"}, folder_ / "merged");
   };
   EXPECT_FALSE(merge()) << "a part that was not run";
   ASSERT_TRUE(run_search(second));
@@ -130,11 +128,11 @@ TEST_F(SearchRun, DisturbedFramesRankToo) {
 
 TEST_F(SearchRun, WhatIsWrongIsSaidBeforeWorkStarts) {
   SearchRequest wrong = request("out");
-  wrong.model = "nosuch";
+  wrong.models = {"nosuch"};
   EXPECT_THAT(error_of(wrong), HasSubstr("nosuch"));
   wrong = request("out");
-  wrong.layers = {"nosuch"};
-  EXPECT_THAT(error_of(wrong), HasSubstr("nosuch"));
+  wrong.models = {"gray", "gray"};
+  EXPECT_THAT(error_of(wrong), HasSubstr("expected each name once"));
   wrong = request("out");
   wrong.filters = FrameRangeRequest{0, 500};
   EXPECT_THAT(error_of(wrong), HasSubstr("500"));

@@ -8,9 +8,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include "models/manifest.hpp"
 #include "stem/stem.hpp"
-#include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -18,23 +16,20 @@ namespace {
 
 using ::testing::HasSubstr;
 
-StemOptions options_of(const std::string& model, int filter = -1) {
+StemOptions options_of(const std::string& name, int filter = -1) {
   StemOptions options;
-  options.model = model;
+  options.model = testing::tiny_model(name);
   options.filter = filter;
   return options;
 }
 
 TEST(StemFolded, OneFilterAloneHasTheSameBytes) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
   for (const int type : {CV_8UC1, CV_8UC3}) {
     // With and without a remainder by 4; the last is computed in strips of rows.
     for (const cv::Size size : {cv::Size(96, 64), {97, 66}, {94, 63}, {95, 61}, {800, 93}}) {
       const cv::Mat frame = testing::textured_frame(size, type);
-      StemOptions options = options_of("gray_k4s4");
-      const auto folded = Stem::create(with_network(options, folder.path()).value());
-      const auto all = create_stem(options, folder.path());
+      const auto folded = Stem::load(options_of("gray_k4s4_filter_1"));
+      const auto all = Stem::load_all(options_of("gray_k4s4"));
       ASSERT_TRUE(folded && all);
       EXPECT_EQ(folded->info().num_filters, 6);
       const cv::Mat alone = folded->apply(frame)->values;
@@ -65,8 +60,6 @@ double gray_response(const cv::Mat1d& gray, cv::Point at, int filter) {
 }
 
 TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
   const cv::Mat frame = testing::textured_frame({97, 66}, CV_8UC3);
   cv::Mat3d colours;
   frame.convertTo(colours, CV_64F);
@@ -76,7 +69,7 @@ TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
   });
   for (const int filter : {0, 1, 5}) {  // 1 has a file of its own
     const auto stem =
-        Stem::create(with_network(options_of("gray_k4s4", filter), folder.path()).value());
+        Stem::load(options_of(filter == 1 ? "gray_k4s4_filter_1" : "gray_k4s4", filter));
     const cv::Mat1f values = stem->apply(frame)->values;
     for (const cv::Point at : {cv::Point(0, 0), cv::Point(11, 7), cv::Point(46, 30)}) {
       EXPECT_NEAR(values(at), gray_response(gray, at, filter), 1e-5);
@@ -84,18 +77,25 @@ TEST(StemFolded, AGrayGraphSeesTheUnroundedGrayOfAColourFrame) {
   }
 }
 
-TEST(StemFolded, ADamagedFileIsNotLoaded) {
-  const testing::TempFolder folder;
-  testing::write_folded(folder);
-  (void)folder.file("gray_k4s4_filter_1.onnx", "no longer what it was");
-  const auto error_of = [&](int filter) {
-    const auto stem =
-        Stem::create(with_network(options_of("gray_k4s4", filter), folder.path()).value());
-    return stem ? "no error" : stem.error().message;
-  };
-  EXPECT_THAT(error_of(1), HasSubstr("gray_k4s4_filter_1.onnx: expected sha256 "));
-  EXPECT_EQ(error_of(2), "no error");
-  EXPECT_FALSE(check_model(find_layers("gray_k4s4", folder.path())->front()));
+TEST(StemFolded, AFileOfOneFilterHasNoOthers) {
+  const auto other = Stem::load(options_of("gray_k4s4_filter_1", 2));
+  ASSERT_FALSE(other);
+  EXPECT_THAT(other.error().message, HasSubstr("expected a model of filter 2, found one of filter "
+                                               "1 alone"));
+  const auto all = Stem::load_all(options_of("gray_k4s4_filter_1"));
+  ASSERT_FALSE(all);
+  EXPECT_THAT(all.error().message, HasSubstr("expected a model of all 6 filters"));
+}
+
+TEST(StemFolded, TheDefaultFilterAloneIsThatOfTheDefaultModel) {
+  const cv::Mat frame = testing::textured_frame({96, 64}, CV_8UC1);
+  const auto alone = Stem::load({});
+  const auto all = Stem::load_all({});
+  ASSERT_TRUE(alone && all);
+  EXPECT_EQ(alone->info().filter, 2);
+  EXPECT_EQ(alone->info().num_filters, 16);
+  EXPECT_EQ(all->info().filter, 2);
+  EXPECT_LT(cv::norm(alone->apply(frame)->values, all->apply(frame)->values, cv::NORM_INF), 1e-3);
 }
 
 }  // namespace

@@ -25,29 +25,29 @@ std::string read_model(const std::string& name) {
 }
 
 std::string error_of(const std::string& name, const std::string& bytes) {
-  const auto session = OnnxSession::create(name, bytes, "stem");
+  const auto session = OnnxSession::create(name, bytes);
   return session ? "no error" : session.error().message;
 }
 
 TEST(OnnxSession, LoadsAStem) {
-  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"), "stem");
+  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ(session->num_filters(), 3);
   EXPECT_EQ(session->fixed_size(), cv::Size(0, 0));
-  EXPECT_EQ(session->channel_size({31, 17}).value(), cv::Size(7, 4));
 }
 
 TEST(OnnxSession, LoadsAStemOfOneSize) {
-  const auto session = OnnxSession::create("fixed", read_model("fixed_k4s4.onnx"), "stem");
+  const auto session = OnnxSession::create("fixed", read_model("fixed_k4s4.onnx"));
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ(session->fixed_size(), cv::Size(48, 32));
-  EXPECT_EQ(session->channel_size({48, 32}).value(), cv::Size(12, 8));
-  EXPECT_THAT(session->channel_size({40, 32}).error().message,
+  const std::vector<float> image(3 * 40 * 32);
+  std::vector<float> channels(3 * 10 * 8);
+  EXPECT_THAT(session->run(image.data(), {40, 32}, channels.data(), {10, 8}).error().message,
               AllOf(HasSubstr("fixed: ONNX Runtime"), Not(HasSubstr("\n"))));
 }
 
 TEST(OnnxSession, RunsOnTheCallersBuffers) {
-  auto created = OnnxSession::create("plain", read_model("plain_k4s4.onnx"), "stem");
+  auto created = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
   ASSERT_TRUE(created) << created.error().message;
   const OnnxSession session = std::move(*created);  // still works after a move
   const std::vector<float> image(3 * 8 * 8, 100.0F);
@@ -61,16 +61,11 @@ TEST(OnnxSession, RunsOnTheCallersBuffers) {
               HasSubstr("plain: ONNX Runtime"));
 }
 
-TEST(OnnxSession, ChoosesTheOutputOfTheLayer) {
-  const std::string bytes = read_model("two_layers.onnx");
-  const auto stem = OnnxSession::create("two", bytes, "stem");
-  const auto deep = OnnxSession::create("two", bytes, "deep");
-  ASSERT_TRUE(stem) << stem.error().message;
-  ASSERT_TRUE(deep) << deep.error().message;
-  EXPECT_EQ(stem->num_filters(), 3);
-  EXPECT_EQ(deep->num_filters(), 2);
-  EXPECT_EQ(OnnxSession::create("two", bytes, "other").error().message,
-            "two: expected an output 'other', found 'stem float 1x3x?x?', 'deep float 1x2x?x?'");
+TEST(OnnxSession, FindsMetadataByTheirKey) {
+  const auto session = OnnxSession::create("plain", read_model("plain_k4s4.onnx"));
+  ASSERT_TRUE(session) << session.error().message;
+  EXPECT_EQ(session->metadata("stemvo.kernel").value(), "4 4");
+  EXPECT_EQ(session->metadata("stemvo.none").value(), std::nullopt);
 }
 
 TEST(OnnxSession, RefusesWhatIsNoModel) {
@@ -100,17 +95,17 @@ TEST(OnnxSession, RefusesOtherInputsAndOutputs) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"wrong_input_name",
        "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'x float 1x3x?x?'"},
-      {"wrong_output_name", "expected an output 'stem' or 'channels', found 'y float 1x3x?x?'"},
+      {"wrong_two_outputs", "expected 1 output, found 2"},
       {"wrong_rank", "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 3x?x?'"},
       {"wrong_planes",
        "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image float 1x2x?x?'"},
       {"wrong_type",
-       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image uint8 1x3x?x?'"},
+       "expected input 'image float 1x3xHxW' or 1x1xHxW, found 'image no float 1x3x?x?'"},
       {"wrong_free_filters",
-       "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?x?'"},
       {"wrong_two_inputs", "expected 1 input, found 2"},
       {"wrong_output_rank",
-       "expected output 'channels float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
+       "expected output 'float 1xCxhxw' with C known, found 'channels float 1x?x?'"},
   };
   for (const auto& [name, message] : cases) {
     EXPECT_EQ(error_of(name, read_model(name + ".onnx")), name + ": " + message);

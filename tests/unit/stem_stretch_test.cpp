@@ -6,9 +6,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "models/manifest.hpp"
 #include "stem/stem.hpp"
-#include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -180,16 +178,14 @@ class BrightSpot : public ::testing::TestWithParam<Case> {};
 
 TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
   const auto& [tiny, sampling, resolution] = GetParam();
-  const testing::TempFolder folder;
-  testing::write_models(folder, *tiny);
   StemOptions options;
-  options.model = tiny->name;
+  options.model = testing::tiny_model(tiny->name);
   options.filter = 0;  // a box: the only symmetric one
   options.sampling_px = sampling;
   options.tracking_resolution = resolution;
   options.contrast_low_percent = 0.0;
   options.contrast_high_percent = 100.0;
-  auto stem = create_stem(options, folder.path());
+  auto stem = Stem::load(options);
   ASSERT_TRUE(stem) << stem.error().message;
   for (const Eigen::Vector2d& spot :
        {Eigen::Vector2d(60.0, 45.0), Eigen::Vector2d(61.3, 43.8), Eigen::Vector2d(58.5, 47.25)}) {

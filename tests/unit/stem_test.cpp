@@ -11,8 +11,6 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "models/manifest.hpp"
-#include "support/temp_folder.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -25,15 +23,12 @@ using testing::TinyStem;
 /// Frame sizes with and without a remainder by 4.
 const std::vector<cv::Size> kSizes = {{96, 64}, {97, 66}, {94, 63}, {95, 61}};
 
-Stem make_stem(const testing::TempFolder& folder,
-               const TinyStem& tiny,
-               int sampling,
-               int filter = -1) {
+Stem make_stem(const TinyStem& tiny, int sampling, int filter = -1) {
   StemOptions options;
-  options.model = tiny.name;
+  options.model = testing::tiny_model(tiny.name);
   options.sampling_px = sampling;
   options.filter = filter;
-  auto stem = create_stem(options, folder.path());
+  auto stem = Stem::load_all(options);
   EXPECT_TRUE(stem) << stem.error().message;
   return *std::move(stem);
 }
@@ -62,9 +57,7 @@ class StemSampling : public ::testing::TestWithParam<Case> {};
 
 TEST_P(StemSampling, EqualsTheConvolutionWithTheSmallerStride) {
   const auto& [tiny, sampling] = GetParam();
-  const testing::TempFolder folder;
-  testing::write_models(folder, *tiny);
-  const Stem stem = make_stem(folder, *tiny, sampling);
+  const Stem stem = make_stem(*tiny, sampling);
   for (const int type : {CV_8UC1, CV_8UC3}) {
     for (const cv::Size size : kSizes) {
       const cv::Mat frame = testing::textured_frame(size, type);
@@ -83,7 +76,7 @@ TEST_P(StemSampling, EqualsTheConvolutionWithTheSmallerStride) {
             << size << " filter " << i << " type " << type;
         EXPECT_TRUE(cv::checkRange(values));
       }
-      const auto one = stem.apply(frame);  // the manifest's default filter is 1
+      const auto one = stem.apply(frame);  // the model's default filter is 1
       ASSERT_TRUE(one);
       EXPECT_EQ(cv::norm(one->values, (*channels)[1].values, cv::NORM_INF), 0.0);
     }
@@ -110,9 +103,7 @@ TEST(Stem, ShiftedPassesSeeNoPaddingAndNoOtherSide) {
   // On a plain frame every output is the same, the border's too.
   for (const TinyStem& tiny :
        {testing::kPlain4, testing::kPadded3, testing::kSame3, testing::kPadded7}) {
-    const testing::TempFolder folder;
-    testing::write_models(folder, tiny);
-    const Stem stem = make_stem(folder, tiny, 1, 0);
+    const Stem stem = make_stem(tiny, 1, 0);
     const auto channel = stem.apply(cv::Mat(61, 95, CV_8UC3, cv::Scalar(10, 200, 90)));
     ASSERT_TRUE(channel) << channel.error().message;
     const cv::Mat difference = channel->values - channel->values.at<float>(5, 5);
@@ -121,9 +112,7 @@ TEST(Stem, ShiftedPassesSeeNoPaddingAndNoOtherSide) {
 }
 
 TEST(Stem, SameBytesForAnyNumberOfThreadsAndAnyHistory) {
-  const testing::TempFolder folder;
-  testing::write_models(folder, testing::kNorm4);
-  const Stem stem = make_stem(folder, testing::kNorm4, 1);
+  const Stem stem = make_stem(testing::kNorm4, 1);
   const cv::Mat frame = testing::textured_frame({131, 77}, CV_8UC3);
   const cv::Mat other = testing::textured_frame({90, 50}, CV_8UC1);
   const int threads_before = cv::getNumThreads();
@@ -151,7 +140,7 @@ TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
   }
   StemOptions options;
   options.model = "gray";
-  const Stem gray = Stem::create(options).value();
+  const Stem gray = Stem::load(options).value();
   const Channel channel = gray.apply(ramp, 2).value();
   ASSERT_EQ(channel.values.size(), ramp.size() * 2);
   for (int row = 8; row < channel.values.rows - 8; ++row) {
@@ -163,7 +152,7 @@ TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
   EXPECT_EQ(gray.frame_zoom(TrackingResolution::kInputZoomed), 1)
       << "its sampling is odd: nothing to gain";
 
-  const Stem learned = Stem::create({}).value();
+  const Stem learned = Stem::load({}).value();
   EXPECT_EQ(learned.frame_zoom(TrackingResolution::kInput), 1);
   ASSERT_EQ(learned.frame_zoom(TrackingResolution::kInputZoomed), 2);
   const Channel fine = learned.apply(ramp, 2).value();
@@ -175,7 +164,7 @@ TEST(Stem, AnEnlargedFramesPixelsAreWhereTheyWere) {
 TEST(Stem, InputLayerAndGray) {
   StemOptions options;
   options.model = "input_layer";
-  const auto colours = create_stem(options, "/nowhere");
+  const auto colours = Stem::load_all(options);
   ASSERT_TRUE(colours) << colours.error().message;
   EXPECT_EQ(colours->info().num_filters, 3);
   EXPECT_EQ(colours->info().filter, 0);
@@ -189,85 +178,61 @@ TEST(Stem, InputLayerAndGray) {
   EXPECT_EQ((*channels)[2].map.scale, Eigen::Vector2d(1, 1));
   EXPECT_EQ((*channels)[2].map.offset_px, Eigen::Vector2d(0, 0));
   options.filter = 2;
-  EXPECT_EQ(create_stem(options, "")->apply(frame)->values.at<float>(0, 0), 40.0F);
-  EXPECT_EQ(create_stem(options, "")->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
+  EXPECT_EQ(Stem::load_all(options)->apply(frame)->values.at<float>(0, 0), 40.0F);
+  EXPECT_EQ(Stem::load_all(options)->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
 
   options.model = "gray";
   options.filter = -1;
-  const auto gray = create_stem(options, "");
+  const auto gray = Stem::load_all(options);
   ASSERT_TRUE(gray) << gray.error().message;
   EXPECT_NEAR(gray->apply(frame)->values.at<float>(1, 1), 2.99 + 11.74 + 4.56, 1e-4);
   EXPECT_EQ(gray->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);
 }
 
 TEST(Stem, InfoNamesTheModel) {
-  const testing::TempFolder folder;
-  testing::write_models(folder, testing::kNorm4);
-  const Stem stem = make_stem(folder, testing::kNorm4, 2);
-  EXPECT_EQ(stem.info().model, "norm_k4s4");
+  const Stem stem = make_stem(testing::kNorm4, 2);
+  EXPECT_EQ(stem.info().model, testing::tiny_model("norm_k4s4"));
   EXPECT_EQ(stem.info().layer, "stem");
-  EXPECT_EQ(stem.info().sha256.size(), 64U);
   EXPECT_EQ(stem.info().filter, 1);
   EXPECT_EQ(stem.info().num_filters, 6);
   EXPECT_EQ(stem.info().sampling_px, 2);
 }
 
-class StemErrors : public ::testing::Test {
- protected:
-  void SetUp() override { testing::write_models(folder, testing::kPlain4); }
-  std::string error_of(const std::string& model, int filter = -1, int sampling = 0) {
-    StemOptions options;
-    options.model = model;
-    options.filter = filter;
-    options.sampling_px = sampling;
-    const auto stem = create_stem(options, folder.path());
-    return stem ? "no error" : stem.error().message;
-  }
-  testing::TempFolder folder;
-};
+std::string error_of(const std::string& model, int filter = -1, int sampling = 0) {
+  StemOptions options;
+  options.model = model;
+  options.filter = filter;
+  options.sampling_px = sampling;
+  const auto stem = Stem::load_all(options);
+  return stem ? "no error" : stem.error().message;
+}
 
-TEST_F(StemErrors, NamesAndPaths) {
-  EXPECT_EQ(error_of("plain_k4s4"), "no error");
-  EXPECT_EQ(error_of((folder / "plain_k4s4.onnx").string()), "no error");
+TEST(StemErrors, NamesAndPaths) {
+  EXPECT_EQ(error_of(testing::tiny_model("plain_k4s4")), "no error");
   EXPECT_EQ(error_of("other"),
-            (folder / "manifest.yaml").string() +
-                ": stem.model: expected one of plain_k4s4, gray, input_layer, log, census, "
-                "the path of an .onnx, found 'other'");
-  EXPECT_EQ(error_of("/no/such.onnx"), "/no/such.onnx: no such file; check the path");
-  std::filesystem::copy_file(folder / "plain_k4s4.onnx", folder / "unlisted.onnx");
-  EXPECT_EQ(error_of((folder / "unlisted.onnx").string()),
-            (folder / "manifest.yaml").string() +
-                ": expected an entry with 'file: unlisted.onnx', found none");
-  std::filesystem::remove(folder / "manifest.yaml");
-  EXPECT_THAT(error_of((folder / "plain_k4s4.onnx").string()),
-              HasSubstr("expected a manifest.yaml beside it"));
-  EXPECT_THAT(error_of("plain_k4s4"), HasSubstr("manifest.yaml: cannot read"));
+            "stem.model: expected default, paper, gray, input_layer, log, census or the path of an "
+            ".onnx, found 'other'");
+  EXPECT_THAT(error_of("/no/such.onnx"), HasSubstr("/no/such.onnx: cannot read: No such file"));
 }
 
-TEST_F(StemErrors, ADamagedFileIsNotLoaded) {
-  std::string bytes = testing::read_all(folder / "plain_k4s4.onnx");
-  bytes.back() = static_cast<char>(bytes.back() ^ 1);
-  (void)folder.file("plain_k4s4.onnx", bytes);
-  EXPECT_THAT(error_of("plain_k4s4"),
-              AllOf(HasSubstr("plain_k4s4.onnx: expected sha256 "), HasSubstr(", found ")));
-}
-
-TEST_F(StemErrors, FilterAndSamplingNameTheAllowedValues) {
-  EXPECT_EQ(error_of("plain_k4s4", 3), "stem.filter: expected 0 to 2 for plain_k4s4, found 3");
-  EXPECT_EQ(error_of("plain_k4s4", -2), "stem.filter: expected 0 to 2 for plain_k4s4, found -2");
+TEST(StemErrors, FilterAndSamplingNameTheAllowedValues) {
+  const std::string plain = testing::tiny_model("plain_k4s4");
+  EXPECT_EQ(error_of(plain, 3), "stem.filter: expected 0 to 2 for " + plain + ", found 3");
+  EXPECT_EQ(error_of(plain, -2), "stem.filter: expected 0 to 2 for " + plain + ", found -2");
   EXPECT_EQ(error_of("gray", 1), "stem.filter: expected 0 to 0 for gray, found 1");
   EXPECT_EQ(error_of("input_layer", 3), "stem.filter: expected 0 to 2 for input_layer, found 3");
   const std::string divisors = "stem.sampling_px: expected 1, 2, 4 (divisors of the stride 4)";
   for (const int sampling : {3, 8, -1}) {
-    EXPECT_EQ(error_of("plain_k4s4", 0, sampling),
-              divisors + ", found " + std::to_string(sampling));
+    EXPECT_EQ(error_of(plain, 0, sampling), divisors + ", found " + std::to_string(sampling));
   }
   EXPECT_EQ(error_of("gray", 0, 2),
             "stem.sampling_px: expected 1 (divisors of the stride 1), found 2");
+  EXPECT_EQ(error_of(testing::tiny_model("deep_k12s4"), 0, 2),
+            "stem.sampling_px: expected 4 (the model allows its stride only, 4), found 2");
 }
 
-TEST_F(StemErrors, SmallFramesAndFixedSizes) {
-  const Stem stem = make_stem(folder, testing::kPlain4, 2);
+TEST(StemErrors, SmallFramesAndFixedSizes) {
+  const Stem stem = make_stem(testing::kPlain4, 2);
   EXPECT_EQ(stem.apply(cv::Mat1b(4, 4, 1))->values.size(), cv::Size(1, 1));
   EXPECT_EQ(stem.apply(cv::Mat1b(5, 6, 1))->values.size(), cv::Size(2, 1));
   EXPECT_THAT(stem.apply(cv::Mat1b(3, 9, 1)).error().message,
@@ -275,19 +240,34 @@ TEST_F(StemErrors, SmallFramesAndFixedSizes) {
   EXPECT_EQ(stem.frame_zoom(TrackingResolution::kInputZoomed), 2);
   EXPECT_THAT(stem.apply(cv::Mat1b(1, 9, 1), 2).error().message,
               AllOf(HasSubstr("at least 4x4, found 18x2"), HasSubstr("a frame of 9x1 enlarged")));
-  const testing::TempFolder other;
-  testing::write_models(other, testing::kFixed4);
-  const Stem fixed = make_stem(other, testing::kFixed4, 2);
+  const Stem fixed = make_stem(testing::kFixed4, 2);
   EXPECT_EQ(fixed.frame_zoom(TrackingResolution::kInputZoomed), 1);
   EXPECT_EQ(fixed.apply(cv::Mat1b(32, 48, 1))->values.size(), cv::Size(23, 15));
   EXPECT_THAT(fixed.apply(cv::Mat1b(33, 48, 1)).error().message,
               HasSubstr("expected frames of 48x32, the model's fixed size, found 48x33"));
 }
 
+TEST(Stem, ADeepLayerHasItsOwnPixelMap) {
+  const cv::Mat frame = testing::textured_frame({96, 64}, CV_8UC3);
+  const auto expected = testing::reference_channels(testing::kPlain4, frame, 4);
+  StemOptions options;
+  options.model = testing::tiny_model("deep_k12s4");
+  const auto deep = Stem::load_all(options);
+  ASSERT_TRUE(deep) << deep.error().message;
+  EXPECT_EQ(deep->info().layer, "deep");
+  EXPECT_EQ(deep->info().sampling_px, 4);
+  const auto channel = deep->apply_range(frame, 0, 1);
+  ASSERT_TRUE(channel) << channel.error().message;
+  ASSERT_EQ(channel->size(), 1U);
+  EXPECT_EQ(channel->front().map.to_input({5, 5}), Eigen::Vector2d(21.5, 21.5));
+  const cv::Mat1f values = channel->front().values;
+  EXPECT_NEAR(values(5, 6), cv::mean(expected[0](cv::Rect(5, 4, 3, 3)))[0], 1e-3);
+}
+
 Channel hand_made(const std::string& model, const cv::Mat& frame) {
   StemOptions options;
   options.model = model;
-  const auto stem = Stem::create(options);
+  const auto stem = Stem::load(options);
   EXPECT_TRUE(stem) << stem.error().message;
   return *stem->apply(frame);
 }

@@ -141,9 +141,7 @@ typedef struct OrtApi {
   OrtStatusPtr (*GetDimensions)(const OrtTensorTypeAndShapeInfo* info,
                                 int64_t* dimensions,
                                 size_t rank);
-  void* unused_63_64[2];
-  OrtStatusPtr (*GetTensorTypeAndShape)(const OrtValue* value, OrtTensorTypeAndShapeInfo** out);
-  void* unused_66_68[3];
+  void* unused_63_68[6];
   OrtStatusPtr (*CreateCpuMemoryInfo)(OrtAllocatorType type,
                                       OrtMemType mem_type,
                                       OrtMemoryInfo** out);
@@ -159,7 +157,7 @@ typedef struct OrtApi {
   void (*ReleaseValue)(OrtValue* value);
   void* unused_97;
   void (*ReleaseTypeInfo)(OrtTypeInfo* info);
-  void (*ReleaseTensorTypeAndShapeInfo)(OrtTensorTypeAndShapeInfo* info);
+  void* unused_99;
   void (*ReleaseSessionOptions)(OrtSessionOptions* options);
   void* unused_101_110[10];
   OrtStatusPtr (*SessionGetModelMetadata)(const OrtSession* session, OrtModelMetadata** out);

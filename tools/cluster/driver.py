@@ -52,9 +52,8 @@ class Outcome:
 
 
 def _arguments(task, options):
-    onnx = next((name for name in options.model_files.get(task.model, {}) if name.endswith(".onnx")), None)
     words = task.arguments()
-    if onnx:
+    for onnx in options.model_files.get(task.model, {}):
         words[1] = "{folder}/" + onnx
     return [*options.common, *words]
 

@@ -20,8 +20,8 @@ def _die_with_parent():
 
 
 def run_task(program, arguments, model_files, threads):
-    """`stemvo search ARGUMENTS` -> the files of its folder: name -> bytes, and the lines of its warnings. model_files: name -> bytes of an .onnx and its
-    manifest, written to a folder of this node, which {folder} stands for in arguments and in what comes back."""
+    """`stemvo search ARGUMENTS` -> the files of its folder: name -> bytes, and the lines of its warnings. model_files: name -> bytes of an .onnx,
+    written to a folder of this node, which {folder} stands for in arguments and in what comes back."""
     with tempfile.TemporaryDirectory(prefix="stemvo_search_") as text:
         folder = pathlib.Path(text)
         for name, content in model_files.items():

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Shared by the Python tools: stems as arrays, as ONNX files, and in a manifest."""
+"""Shared by the Python tools: stems as arrays and as ONNX files that say what they hold."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the model that export_stem.py writes, and its layers, from any kind of weights. Nothing is written here."""
+"""Makes the models that export_stem.py writes, one of each layer, from any kind of weights. Nothing is written here."""
 
 import dataclasses
 
@@ -9,9 +9,8 @@ from stems.weights import WeightsError
 
 @dataclasses.dataclass
 class Export:
-    """layers: name -> what the manifest says (filters, kernel, stride, padding, sampling)."""
+    """layers: name -> its model, and what its metadata says (filters, kernel, stride, padding, sampling)."""
 
-    model: bytes
     layers: dict
     network: str | None = None
     notes: tuple = ()
@@ -77,15 +76,15 @@ def _of_stems(options):
                                f"{'no --filter' if options.filter is None else f'{len(stems)} layers'}")
         name, stem = next(iter(stems.items()))
         folded, more = _fold_one(options, name, stem)
-        return Export(onnx_writer.to_bytes(onnx_writer.build_layers({name: folded})), {name: folded}, network, notes + more)
-    layers = stems
-    if options.filter is not None:
-        for name, stem in stems.items():
+        return Export({name: (onnx_writer.build(folded), folded)}, network, notes + more)
+    layers = {}
+    for name, stem in stems.items():
+        shape = stem
+        if options.filter is not None:
             _check_filter(options.weights, name, stem.filters, options.filter)
-        layers = {name: fold.one_filter(dataclasses.replace(stem, layer_norm=None), options.filter) for name, stem in stems.items()}
-    # A model of one layer calls its output `channels`, as it always did.
-    named = {onnx_writer.OUTPUT: next(iter(stems.values()))} if single else stems
-    return Export(onnx_writer.to_bytes(onnx_writer.build_layers(named, options.filter)), layers, network, notes)
+            shape = fold.one_filter(dataclasses.replace(stem, layer_norm=None), options.filter)
+        layers[name] = (onnx_writer.build(stem, options.filter), shape)
+    return Export(layers, network, notes)
 
 
 def _check_network(options, model):
@@ -110,13 +109,16 @@ def _of_graph(options):
                            f"({', '.join(families.PREPROCESSING)}), found none")
     if options.padding != "none" or options.fold:
         raise WeightsError(f"{options.weights}: expected no --padding and no --fold for a whole network, found one")
+    layers = {}
     with graph_cut.refusing_unsound(options.weights):
         _check_network(options, whole)
-        model, layers = graph_cut.cut(options.weights, whole, options.layers,
-                                      families.PREPROCESSING[options.preprocessing], options.size, options.filter)
-    notes = tuple(f"{layer.name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
-                  f"stride {layer.stride} only" for layer in layers if layer.sampling == "native")
-    return Export(onnx_writer.to_bytes(model), {layer.name: layer for layer in layers}, None, notes)
+        for name in options.layers:
+            model, (layer,) = graph_cut.cut(options.weights, graph_cut.read(options.weights), [name],
+                                            families.PREPROCESSING[options.preprocessing], options.size, options.filter)
+            layers[layer.name] = (model, layer)
+    notes = tuple(f"{name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
+                  f"stride {layer.stride} only" for name, (_, layer) in layers.items() if layer.sampling == "native")
+    return Export(layers, None, notes)
 
 
 def make(options):

@@ -28,14 +28,14 @@ ROWS = 16
 
 
 class _Graph:
-    """Nodes in a chain, and their constants. prefix: of all names but the input's."""
+    """Nodes in a chain, and their constants."""
 
-    def __init__(self, prefix=""):
-        self.nodes, self.constants, self._prefix = [], [], prefix
+    def __init__(self):
+        self.nodes, self.constants = [], []
         self.last = INPUT
 
     def constant(self, name, values, kind=np.float32):
-        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values, kind), self._prefix + name))
+        self.constants.append(numpy_helper.from_array(np.ascontiguousarray(values, kind), name))
         return name
 
     def integers(self, name, values):
@@ -43,8 +43,7 @@ class _Graph:
 
     def add(self, kind, output, *constants, inputs=None, **attributes):
         """inputs: names of earlier outputs (default: of the last one)."""
-        names = [self._prefix + name for name in (*(inputs or []), *constants)]
-        output = self._prefix + output
+        names = [*(inputs or []), *constants]
         self.nodes.append(helper.make_node(kind, names if inputs else [self.last, *names], [output], name=output,
                                            **attributes))
         self.last = output
@@ -142,28 +141,15 @@ def _add_stem(graph, stem, pick):
 
 def build(stem, pick=None):
     """The graph of a stem or a FoldedStem, checked by ONNX. pick: this filter only, of all that are computed."""
-    return build_layers({OUTPUT: stem}, pick)
-
-
-def build_layers(stems, pick=None):
-    """One graph with several outputs: name -> stem."""
-    nodes, constants, outputs = [], [], []
-    for name, stem in stems.items():
-        graph = _Graph(prefix="" if len(stems) == 1 else f"{name}/")
-        if isinstance(stem, fold.FoldedStem):
-            _add_folded(graph, stem)
-        else:
-            _add_stem(graph, stem, pick)
-        graph.nodes[-1].output[0] = name
-        nodes, constants = nodes + graph.nodes, constants + graph.constants
-        filters = stem.filters if pick is None else 1
-        outputs.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, [1, filters, "h", "w"]))
-
-    planes = {stem.weights.shape[1] for stem in stems.values()}
-    if len(planes) > 1:
-        raise ValueError("layers of one graph take one image")
-    image = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, [1, *planes, "H", "W"])
-    model = helper.make_model(helper.make_graph(nodes, "stem", [image], outputs, constants),
+    graph = _Graph()
+    if isinstance(stem, fold.FoldedStem):
+        _add_folded(graph, stem)
+    else:
+        _add_stem(graph, stem, pick)
+    graph.nodes[-1].output[0] = OUTPUT
+    channels = helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, [1, stem.filters if pick is None else 1, "h", "w"])
+    image = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, [1, stem.weights.shape[1], "H", "W"])
+    model = helper.make_model(helper.make_graph(graph.nodes, "stem", [image], [channels], graph.constants),
                               opset_imports=[helper.make_opsetid("", OPSET)], producer_name="stemvo")
     model.ir_version = IR_VERSION
     onnx.checker.check_model(model)
@@ -173,8 +159,3 @@ def build_layers(stems, pick=None):
 def to_bytes(model):
     """The same model gives the same bytes."""
     return model.SerializeToString(deterministic=True)
-
-
-def write(stem, path, pick=None):
-    with open(path, "wb") as file:
-        file.write(to_bytes(build(stem, pick)))

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "stem/model.hpp"
+#include "support/temp_folder.hpp"
+#include "support/tiny_stem.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+TEST(Model, SaysWhatItIs) {
+  const auto info = read_model_info(testing::tiny_model("plain_k3s2same"));
+  ASSERT_TRUE(info) << info.error().message;
+  EXPECT_EQ(info->network, "tiny");
+  EXPECT_EQ(info->layer, "stem");
+  EXPECT_EQ(info->licence, "MIT");
+  EXPECT_EQ(info->command, "tests/data/make_models.py");
+  EXPECT_EQ(info->num_filters, 3);
+  EXPECT_EQ(info->default_filter, 1);
+  EXPECT_FALSE(info->only_filter.has_value());
+  EXPECT_THAT(info->kernel_px, ElementsAre(3, 3));
+  EXPECT_EQ(info->stride_px, 2);
+  EXPECT_THAT(info->padding_px, ElementsAre(0, 0, 1, 1));
+  EXPECT_FALSE(info->native_sampling_only);
+  EXPECT_TRUE(read_model_info(testing::tiny_model("deep_k12s4"))->native_sampling_only);
+  EXPECT_EQ(read_model_info(testing::tiny_model("gray_k4s4_filter_1"))->only_filter, 1);
+}
+
+TEST(Model, TheBuiltInOnesAreThoseOfTheFolder) {
+  EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_2", "paper"));
+  for (const std::string& model : built_in_models()) {
+    EXPECT_EQ(read_model(model).value(),
+              testing::read_all(STEMVO_SOURCE_DIR "/models/" + model + ".onnx"));
+    EXPECT_TRUE(internal::open_model(model)) << model;
+  }
+}
+
+TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
+  const std::string model = testing::tiny_model("wrong_no_metadata");
+  EXPECT_THAT(internal::open_model(model).error().message,
+              AllOf(HasSubstr(model + ": expected metadata stemvo.network, found none"),
+                    HasSubstr("tools/export_stem.py " + model)));
+}
+
+/// What a model is refused with that says something else under a key.
+std::string error_with(const std::string& name, const std::string& key, const std::string& value) {
+  const testing::TempFolder folder;
+  const std::string bytes = testing::read_all(testing::tiny_model(name));
+  const auto file = folder.file("changed.onnx", testing::with_metadata(bytes, key, value));
+  const auto model = internal::open_model(file.string());
+  return model ? "no error" : model.error().message;
+}
+
+TEST(Model, MetadataThatAreNoneAreNamed) {
+  EXPECT_EQ(error_with("plain_k4s4", "licence", "CC0"), "no error");
+  for (const auto& [key, value, expected] :
+       {std::tuple("kernel", "4", "2 whole numbers from 1 to 4096"),
+        {"kernel", "4 4.5", "2 whole numbers from 1 to 4096"},
+        {"kernel", "40000 4", "2 whole numbers from 1 to 4096"},
+        {"stride", "0", "1 whole numbers from 1 to 256"},
+        {"stride", "many", "1 whole numbers from 1 to 256"},
+        {"padding", "0 0 4 0", "4 whole numbers from 0 to 3"},
+        {"padding", "0 0 -1 0", "4 whole numbers from 0 to 3"},
+        {"filters", "5000", "1 whole numbers from 1 to 4096"},
+        {"default_filter", "3", "1 whole numbers from 0 to 2"},
+        {"filter", "3", "1 whole numbers from 0 to 2"}}) {
+    EXPECT_THAT(error_with("plain_k4s4", key, value),
+                HasSubstr(std::string("changed.onnx: stemvo.") + key + ": expected " + expected +
+                          ", found '" + value + "'"));
+  }
+}
+
+TEST(Model, IsHeldAgainstItsGraph) {
+  EXPECT_THAT(error_with("plain_k3s2p1", "filters", "4"), HasSubstr("expected 4 filters, found 3"));
+  EXPECT_THAT(error_with("plain_k3s2p1", "filter", "0"), HasSubstr("expected 1 filters, found 3"));
+  EXPECT_THAT(error_with("plain_k3s2p1", "stride", "1"), HasSubstr("expected channels of"));
+  EXPECT_THAT(error_with("plain_k3s2p1", "kernel", "5 5"), HasSubstr("expected channels of"));
+  EXPECT_THAT(error_with("deep_k12s4", "kernel", "17 17"), HasSubstr("expected channels of"));
+  // The same sizes, but another pixel map: only the values can tell.
+  EXPECT_THAT(error_with("plain_k3s2p1", "padding", "1 0 1 2"),
+              HasSubstr("found that pixels outside it matter"));
+  EXPECT_THAT(error_with("deep_k12s4", "sampling", "any"),
+              HasSubstr("found that pixels outside it matter"));
+  EXPECT_THAT(internal::open_model(testing::tiny_model("wrong_infinite")).error().message,
+              HasSubstr("expected finite channels"));
+}
+
+/// Every side of the window matters.
+TEST(Model, ALargerWindowThanTheGraphsIsRefused) {
+  const testing::TempFolder folder;
+  std::string bytes = testing::read_all(testing::tiny_model("plain_k3s2p1"));
+  bytes = testing::with_metadata(bytes, "kernel", "4 3");
+  bytes = testing::with_metadata(bytes, "padding", "1 1 2 1");
+  EXPECT_THAT(internal::open_model(folder.file("changed.onnx", bytes).string()).error().message,
+              HasSubstr("found that the 3x1 pixels at 0, 3 of it do not matter"));
+}
+
+}  // namespace
+}  // namespace stemvo
