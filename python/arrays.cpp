@@ -62,8 +62,7 @@ std::string in_python(std::string message) {
   for (const auto& [words, ours] :
        {std::pair("a folder, a video file, a quoted pattern of images or camera:N",
                   "a folder or a pattern of images (docs/python.md: FrameView for videos)"),
-        std::pair(" ('stemvo run --help' lists what is read)", ""),
-        std::pair("'stemvo --dump-config' explains each", "print(stemvo.Options()) lists all")}) {
+        std::pair(" ('stemvo run --help' lists what is read)", "")}) {
     if (const std::size_t at = message.find(words); at != std::string::npos) {
       message.replace(at, std::string_view(words).size(), ours);
     }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include <yaml-cpp/yaml.h>
@@ -12,28 +14,74 @@
 
 namespace stemvo::config {
 
-using namespace options;  // NOLINT: the fields are read and written here
-
 /// The one document of a YAML text. Errors "<source>:<line>: ...": not YAML, several documents.
 [[nodiscard]] Expected<YAML::Node> parse_document(const std::string& text, std::string_view source);
 
-/// Reads a document into the fields it names, and marks them. Errors "<source>:<line>: <key>: ...":
+/// Read a value, numbers in decimal ("010" is ten). Nothing, or "expected ..., found ...". A list
+/// may also stand in a text, as --set gives it.
+[[nodiscard]] std::string parse(const YAML::Node& node, bool& value);
+[[nodiscard]] std::string parse(const YAML::Node& node, int& value);
+[[nodiscard]] std::string parse(const YAML::Node& node, double& value);
+[[nodiscard]] std::string parse(const YAML::Node& node, std::uint64_t& value);
+[[nodiscard]] std::string parse(const YAML::Node& node, std::string& value);
+[[nodiscard]] std::string parse(const YAML::Node& node, std::vector<double>& value);
+template <options::Enumeration Enum>
+[[nodiscard]] std::string parse(const YAML::Node& node, Enum& value) {
+  std::string name;
+  const std::string problem = parse(node, name);
+  const auto& names = options::kNames<Enum>;
+  value = options::from_string<Enum>(name);
+  return problem.empty() ? violation_of(name, options::Rule::one_of({names.begin(), names.end()}))
+                         : problem;
+}
+
+/// YAML of a value, exact: numbers read back to the same bits.
+[[nodiscard]] std::string format(bool value);
+[[nodiscard]] std::string format(int value);
+[[nodiscard]] std::string format(double value);
+[[nodiscard]] std::string format(std::uint64_t value);
+[[nodiscard]] std::string format(const std::string& value);
+[[nodiscard]] std::string format(const std::vector<double>& value);
+template <options::Enumeration Enum>
+[[nodiscard]] std::string format(Enum value) {
+  return std::string(options::to_string(value));
+}
+
+/// A key that a document may have. Its value must outlive it.
+struct Key {
+  template <typename Value>
+  Key(std::string_view section_name,
+      std::string_view key_name,
+      Value& value,
+      const options::Rule& rule = {})
+      : section(section_name), key(key_name), read([&value, rule](const YAML::Node& node) {
+          Value found{};
+          std::string problem = parse(node, found);
+          problem = problem.empty() ? options::violation_of(found, rule) : problem;
+          if (problem.empty()) {
+            value = found;
+          }
+          return problem;
+        }) {}
+
+  std::string_view section;  ///< empty for the keys of the top level
+  std::string_view key;
+  std::function<std::string(const YAML::Node&)> read;
+  bool is_given = false;  ///< a document that was read names it
+
+  [[nodiscard]] std::string name() const { return options::full_name(section, key); }
+};
+
+/// Reads a document into the keys it names, and marks them. Errors "<source>:<line>: <key>: ...":
 /// unknown or duplicated key, wrong type, value the rule refuses.
 [[nodiscard]] Status read_document(const YAML::Node& root,
                                    std::string_view source,
-                                   std::vector<Field>& fields);
+                                   std::vector<Key>& keys);
 
-/// Reads what --set gives: a list as it is written in a file; anything else as it stands, so that a
-/// path may hold any character. Decimal numbers only ("010" is ten). Nothing, or "expected ...,
-/// found ...".
-[[nodiscard]] std::string read_assigned(const std::string& text, const Field& field);
-
-/// "unknown key; known keys of stem: model, filter, ..."
-[[nodiscard]] std::string unknown_key(std::string_view section,
-                                      std::string_view key,
-                                      const std::vector<Field>& fields);
-
-/// YAML of the value, exact: numbers read back to the same bits.
-[[nodiscard]] std::string format_value(const Field& field);
+/// Reads one value into the key of this name. Nothing, or the problem: unknown key, value refused.
+[[nodiscard]] std::string read_key(std::string_view section,
+                                   const std::string& key,
+                                   const YAML::Node& value,
+                                   std::vector<Key>& keys);
 
 }  // namespace stemvo::config

@@ -170,7 +170,7 @@ Config config_of(Config common, const LayerIdentity& layer, int filter) {
   common.stem.model = layer.stem_model;
   common.stem.filter = filter;
   common.stem.sampling_px = layer.sampling_px;
-  common.features.method = options::feature_method(layer.features);
+  common.features.method = options::from_string<FeatureMethod>(layer.features);
   return common;
 }
 

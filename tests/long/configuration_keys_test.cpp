@@ -23,27 +23,27 @@ TEST_F(BadInputTable, ConfigurationKeys) {
     cases.push_back(
         {assignment, {"run", none, "--out", folder_ / "out", "--set", assignment}, word});
   };
-  for (const options::Field& field : options::fields_of(options)) {
-    const bool is_whole = std::holds_alternative<int*>(field.value);
-    const std::string key = field.name();
-    if (is_whole || std::holds_alternative<double*>(field.value)) {
+  options::visit(options, [&](std::string_view section, std::string_view name, auto& value,
+                              const options::Rule& rule, std::string_view) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    constexpr bool is_whole = std::is_same_v<Value, int>;
+    const std::string key = options::full_name(section, name);
+    if (is_whole || std::is_same_v<Value, double>) {
       const double step = is_whole ? 1.0 : 1e-6;
-      add(key, fmt::format("{}", field.rule.min - step), key);
-      add(key,
-          fmt::format("{}", is_whole ? std::ceil(1.001 * field.rule.max + step)
-                                     : 1.001 * field.rule.max + step),
-          key);
+      const double beyond = 1.001 * rule.max + step;
+      add(key, fmt::format("{}", rule.min - step), key);
+      add(key, fmt::format("{}", is_whole ? std::ceil(beyond) : beyond), key);
       add(key, "nan", key);
       add(key, "1e300", key);
       const bool is_pair = key.starts_with("stem.contrast_");  // one of them ends at the other
-      add(key, fmt::format("{}", field.rule.min), is_pair ? "error" : none);
-      add(key, fmt::format("{}", field.rule.max), is_pair ? "error" : none);
+      add(key, fmt::format("{}", rule.min), is_pair ? "error" : none);
+      add(key, fmt::format("{}", rule.max), is_pair ? "error" : none);
     }
-    if (!std::holds_alternative<std::string*>(field.value)) {
+    if (!std::is_same_v<Value, std::string>) {
       add(key, "x", key);
       add(key, "", key);
     }
-  }
+  });
   EXPECT_GT(cases.size(), 250U);
   expect_refused(cases);
 }

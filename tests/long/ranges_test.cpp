@@ -15,12 +15,15 @@ namespace {
 std::vector<std::string> ends_of_all_numbers() {
   Options options;
   std::vector<std::string> ends;
-  for (const options::Field& field : options::fields_of(options)) {
-    if (std::holds_alternative<int*>(field.value) || std::holds_alternative<double*>(field.value)) {
-      ends.push_back(fmt::format("{}={}", field.name(), field.rule.min));
-      ends.push_back(fmt::format("{}={}", field.name(), field.rule.max));
+  options::visit(options, [&](std::string_view section, std::string_view name, auto& value,
+                              const options::Rule& rule, std::string_view) {
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if (std::is_same_v<Value, int> || std::is_same_v<Value, double>) {
+      const std::string key = options::full_name(section, name);
+      ends.push_back(fmt::format("{}={}", key, rule.min));
+      ends.push_back(fmt::format("{}={}", key, rule.max));
     }
-  }
+  });
   return ends;
 }
 
