@@ -20,7 +20,7 @@ foreach(i RANGE ${last})
   string(REGEX REPLACE "/.*" "" stage "${name}")
   list(APPEND names ${stage})
 endforeach()
-foreach(stage decode stem stem_load stretch pyramid road_image detection klt orb homography fundamental essential
+foreach(stage decode stem stem_load contrast pyramid road_image detection klt orb homography fundamental essential
               two_view_refinement two_view localization window_refinement road_scale)
   if(NOT stage IN_LIST names)
     message(SEND_ERROR "no benchmark of ${stage}")

@@ -16,7 +16,7 @@
 #include "config/config.hpp"
 #include "dataset/camera_height.hpp"
 #include "frames.hpp"
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 
 namespace stemvo::python {
 namespace {

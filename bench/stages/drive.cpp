@@ -74,14 +74,14 @@ Chain run_chain() {
   result.camera = frames().sequence.camera();
   const Config& config = result.config;
   const Stem stem = load_stem(config.stem);
-  ChannelStretch stretch(config.stem);
+  ContrastNormalization contrast(config.stem);
   const auto front_end = create_front_end(config.features);
   result.estimator = std::make_unique<WindowEstimator>(config, result.camera);
   const int last = static_cast<int>(frames().pixels.size()) - 1;
   for (int i = 0; i <= last; ++i) {
     const cv::Mat& pixels = frames().pixels[static_cast<std::size_t>(i)];
     result.channel = value_of(stem.apply(pixels));
-    result.images.push_back(stretch.apply(result.channel));
+    result.images.push_back(contrast.apply(result.channel));
     Frame frame;
     frame.number = i;
     frame.image = pixels;

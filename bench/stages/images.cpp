@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From the file to what the points are looked for on: decode, stem, stretch, pyramid, road image.
+// From the file to what the points are looked for on: decode, stem, contrast, pyramid, road image.
 #include "stages/images.hpp"
 
 #include <fstream>
@@ -74,10 +74,10 @@ void stem_load(State& state) {
   }
 }
 
-void stretch(State& state) {
-  ChannelStretch stretching(chain().config.stem);
+void contrast(State& state) {
+  ContrastNormalization normalization(chain().config.stem);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(stretching.apply(chain().channel).pixels.data);
+    benchmark::DoNotOptimize(normalization.apply(chain().channel).pixels.data);
   }
 }
 
@@ -99,7 +99,7 @@ BENCHMARK_CAPTURE(decode, color, true)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(decode_by_opencv, gray, false)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(decode_by_opencv, color, true)->Unit(benchmark::kMillisecond);
 BENCHMARK(stem_load)->Unit(benchmark::kMillisecond);
-BENCHMARK(stretch)->Unit(benchmark::kMillisecond);
+BENCHMARK(contrast)->Unit(benchmark::kMillisecond);
 BENCHMARK(pyramid)->Unit(benchmark::kMillisecond);
 BENCHMARK(road_image)->Unit(benchmark::kMillisecond);
 

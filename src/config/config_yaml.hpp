@@ -9,7 +9,7 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::config {

@@ -13,11 +13,11 @@
 namespace stemvo {
 namespace {
 
-StemOptions stretch_options(const Options& options, const Camera& camera) {
-  StemOptions stretch = options.stem;
-  stretch.tracking_resolution =
-      choose_tracking_resolution(stretch.tracking_resolution, options.features.method, camera);
-  return stretch;
+StemOptions contrast_options(const Options& options, const Camera& camera) {
+  StemOptions contrast = options.stem;
+  contrast.tracking_resolution =
+      choose_tracking_resolution(contrast.tracking_resolution, options.features.method, camera);
+  return contrast;
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ StemOptions stretch_options(const Options& options, const Camera& camera) {
 ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask)
     : given_camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
-      stretch_(stretch_options(options, camera)),
+      contrast_(contrast_options(options, camera)),
       front_end_(create_front_end(options.features)) {
   front_end_->set_mask(mask);
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
@@ -45,7 +45,7 @@ Frame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& image) {
   Frame frame;
   frame.image = image;
   Stopwatch watch;
-  const ChannelImage seen = timed(Stage::kStretch, [&] { return stretch_.apply(channel); });
+  const ChannelImage seen = timed(Stage::kContrast, [&] { return contrast_.apply(channel); });
   frame.times.stem_ms = watch.lap_ms();
   frame.pyramid = front_end_->prepare(seen);
   if (asks_road_) {

@@ -22,11 +22,11 @@ namespace stemvo {
 /// Movable. The same channels give the same poses, whatever runs beside it.
 class ChannelOdometry {
  public:
-  /// For valid options; `options.stem` gives the stretch only. `mask`: as FrontEnd::set_mask.
+  /// For valid options; `options.stem` gives the contrast only. `mask`: as FrontEnd::set_mask.
   ChannelOdometry(const Options& options, const Camera& camera, const cv::Mat& mask = {});
 
   /// The phases, as in PhasedOdometry. `image`, of the camera's size, is where landmarks get their
-  /// colour; `times.stem_ms` is the stretch's alone.
+  /// colour; `times.stem_ms` is the contrast's alone.
   [[nodiscard]] Frame prepare(const Channel& channel, const cv::Mat& image);
   void track(Frame frame);
   void localize();
@@ -55,7 +55,7 @@ class ChannelOdometry {
 
   Camera given_camera_;  ///< the estimator owns the one in use
   bool asks_road_;
-  ChannelStretch stretch_;
+  ContrastNormalization contrast_;
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<Estimator> estimator_;
 

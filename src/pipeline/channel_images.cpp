@@ -43,9 +43,9 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
       status = write_image(request.out_dir / fmt::format("{:06}_{}.png", number, name), image);
     }
   };
-  // Each filter keeps its own stretch.
-  std::vector<ChannelStretch> stretches(filters->end - filters->begin,
-                                        ChannelStretch(request.config.stem));
+  // Each filter keeps its own contrast limits.
+  std::vector<ContrastNormalization> contrasts(filters->end - filters->begin,
+                                               ContrastNormalization(request.config.stem));
   bool goes_on = true;
   for (std::size_t i = 0; i < sequence->size() && goes_on && status; ++i) {
     const std::size_t number = sequence->range().begin + i;
@@ -62,7 +62,7 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
     std::vector<std::string> captions = {fmt::format("input, frame {}", number)};
     save(*frame, number, "input");
     for (std::size_t k = filters->begin; k < filters->end; ++k) {
-      images.push_back(stretches[k - filters->begin].apply((*channels)[k]).pixels);
+      images.push_back(contrasts[k - filters->begin].apply((*channels)[k]).pixels);
       captions.push_back(fmt::format("{} filter {}", request.config.stem.model, k));
       save(images.back(), number, fmt::format("filter_{:03}", k));
     }

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
 #include "report/map_ply.hpp"

@@ -9,7 +9,7 @@
 #include <fmt/ranges.h>
 
 #include "internal_check.hpp"
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "search/records.hpp"
 #include "text/text_file.hpp"
 

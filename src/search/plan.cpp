@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "robustness/disturbance.hpp"
 #include "search/input_hashes.hpp"
 #include "search/race.hpp"

@@ -27,7 +27,8 @@ struct Channel {
   PixelMap map;
 };
 
-/// What OpenCV detects and tracks on: a channel stretched to 8 bit, at its own or the input's size.
+/// What OpenCV detects and tracks on: a channel normalized to 8 bits, at its own or the input's
+/// size.
 struct ChannelImage {
   cv::Mat pixels;  ///< CV_8U
   PixelMap map;    ///< from `pixels` to input pixels

@@ -91,11 +91,11 @@ class Stem {
 /// brings it to the input's size, or half of it, or the mean of 2x2 pixels where it is twice as
 /// fine (PixelMap is adjusted; no resampling between pixels). A channel without contrast becomes
 /// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
-class ChannelStretch {
+class ContrastNormalization {
  public:
   /// Of `options.tracking_resolution`, kAuto and kInputZoomed stand for
   /// kInput: see choose_tracking_resolution.
-  explicit ChannelStretch(const StemOptions& options);
+  explicit ContrastNormalization(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);
 
  private:

@@ -16,7 +16,7 @@ namespace stemvo {
 namespace {
 
 constexpr std::array<std::string_view, kNumStages> kNames = {
-    "read and decode",     "stem",         "stretch",           "pyramid",    "description",
+    "read and decode",     "stem",         "contrast",          "pyramid",    "description",
     "road image",          "detection",    "tracking",          "homography", "epipolar geometry",
     "two-view refinement", "localization", "window refinement", "camera",     "road scale",
     "frame files",         "result files"};

@@ -16,7 +16,7 @@ namespace stemvo {
 enum class Stage {
   kRead,         ///< file and PNG decoder
   kStem,         ///< the filter
-  kStretch,      ///< channel to 8-bit image
+  kContrast,     ///< channel to 8-bit image
   kPyramid,      ///< klt
   kDescription,  ///< orb, sift: descriptors
   kRoadImage,

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "support/bad_input_table.hpp"
 
 namespace stemvo {

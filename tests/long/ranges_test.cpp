@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 #include "support/program_test.hpp"
 
 namespace stemvo {

@@ -108,7 +108,7 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   test::expect_accurate(result.poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
 }
 
-// Five gray levels of contrast under noise of one: the stretch makes an image of them.
+// Five gray levels of contrast under noise of one: contrast normalization makes an image of them.
 TEST_F(Disturbed, AFewDimFramesAreFollowed) {
   const StateDrive drive = test::steady_drive();
   copy("steady", drive);

@@ -58,8 +58,7 @@ class FramePipeline : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] PhasedOdometry odometry() const {
-    return pipeline::create_odometry(config_, sequence_->camera(), STEMVO_SOURCE_DIR "/models")
-        .value();
+    return pipeline::create_odometry(config_, sequence_->camera()).value();
   }
 
   Config config_;

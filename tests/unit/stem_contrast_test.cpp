@@ -24,12 +24,12 @@ Channel ramp(float low, float high) {
   return channel;
 }
 
-TEST(ChannelStretch, PercentilesBecomeBlackAndWhite) {
+TEST(ContrastNormalization, PercentilesBecomeBlackAndWhite) {
   StemOptions options;
   options.contrast_low_percent = 10.0;
   options.contrast_high_percent = 60.0;
-  ChannelStretch stretch(options);
-  const ChannelImage image = stretch.apply(ramp(-3.0F, 7.0F));
+  ContrastNormalization contrast(options);
+  const ChannelImage image = contrast.apply(ramp(-3.0F, 7.0F));
   ASSERT_EQ(image.pixels.type(), CV_8UC1);
   const auto at_percent = [&](int percent) {
     const int i = 20000 * percent / 100;
@@ -42,52 +42,52 @@ TEST(ChannelStretch, PercentilesBecomeBlackAndWhite) {
   EXPECT_EQ(at_percent(80), 255);
 }
 
-TEST(ChannelStretch, LimitsFollowSlowly) {
+TEST(ContrastNormalization, LimitsFollowSlowly) {
   StemOptions options;
   options.contrast_low_percent = 0.0;
   options.contrast_high_percent = 100.0;
   options.contrast_memory = 0.75;
-  ChannelStretch stretch(options);
-  (void)stretch.apply(ramp(0.0F, 100.0F));
+  ContrastNormalization contrast(options);
+  (void)contrast.apply(ramp(0.0F, 100.0F));
   // White moves from 100 to 0.75 * 100 + 0.25 * 116 = 104.
-  const ChannelImage second = stretch.apply(ramp(0.0F, 116.0F));
+  const ChannelImage second = contrast.apply(ramp(0.0F, 116.0F));
   EXPECT_NEAR(second.pixels.at<unsigned char>(25, 0), 29.0 / 104.0 * 255.0, 1.0);
-  const ChannelImage third = stretch.apply(ramp(0.0F, 116.0F));
+  const ChannelImage third = contrast.apply(ramp(0.0F, 116.0F));
   EXPECT_NEAR(third.pixels.at<unsigned char>(25, 0), 29.0 / 107.0 * 255.0, 1.0);
 }
 
 /// A lamp goes on, a tunnel ends: nothing of the new image is cut off or lost in a few gray values.
-TEST(ChannelStretch, LimitsJumpWithTheLight) {
+TEST(ContrastNormalization, LimitsJumpWithTheLight) {
   StemOptions options;
   options.contrast_low_percent = 0.0;
   options.contrast_high_percent = 100.0;
-  ChannelStretch stretch(options);
-  const cv::Mat before = stretch.apply(ramp(0.0F, 100.0F)).pixels;
+  ContrastNormalization contrast(options);
+  const cv::Mat before = contrast.apply(ramp(0.0F, 100.0F)).pixels;
   for (const float white : {200.0F, 20.0F}) {
-    const cv::Mat after = stretch.apply(ramp(0.0F, white)).pixels;
+    const cv::Mat after = contrast.apply(ramp(0.0F, white)).pixels;
     EXPECT_LE(cv::norm(before, after, cv::NORM_INF), 1.0) << white;
   }
 }
 
-TEST(ChannelStretch, NoContrastIsOneGrayAndForgotten) {
-  ChannelStretch stretch{StemOptions{}};
+TEST(ContrastNormalization, NoContrastIsOneGrayAndForgotten) {
+  ContrastNormalization contrast{StemOptions{}};
   Channel flat;
   flat.values = cv::Mat1f(20, 30, 5.0F);
-  cv::Mat pixels = stretch.apply(flat).pixels;
+  cv::Mat pixels = contrast.apply(flat).pixels;
   EXPECT_EQ(cv::norm(pixels, cv::Mat1b(20, 30, 128), cv::NORM_INF), 0.0);
   flat.values = cv::Mat1f(20, 30, 0.0F);
-  EXPECT_EQ(cv::norm(stretch.apply(flat).pixels, cv::Mat1b(20, 30, 128), cv::NORM_INF), 0.0);
+  EXPECT_EQ(cv::norm(contrast.apply(flat).pixels, cv::Mat1b(20, 30, 128), cv::NORM_INF), 0.0);
 
-  const cv::Mat before = stretch.apply(ramp(0.0F, 10.0F)).pixels;
-  (void)stretch.apply(flat);
-  const cv::Mat after = stretch.apply(ramp(0.0F, 10.0F)).pixels;
+  const cv::Mat before = contrast.apply(ramp(0.0F, 10.0F)).pixels;
+  (void)contrast.apply(flat);
+  const cv::Mat after = contrast.apply(ramp(0.0F, 10.0F)).pixels;
   EXPECT_EQ(cv::norm(before, after, cv::NORM_INF), 0.0);
 }
 
-TEST(ChannelStretch, NotANumberHarmsNobodyElse) {
+TEST(ContrastNormalization, NotANumberHarmsNobodyElse) {
   StemOptions options;
-  ChannelStretch clean(options);
-  ChannelStretch dirty(options);
+  ContrastNormalization clean(options);
+  ContrastNormalization dirty(options);
   const cv::Mat expected = clean.apply(ramp(0.0F, 10.0F)).pixels;
   Channel broken = ramp(0.0F, 10.0F);
   broken.values.at<float>(50, 50) = std::numeric_limits<float>::quiet_NaN();
@@ -104,16 +104,16 @@ TEST(ChannelStretch, NotANumberHarmsNobodyElse) {
   EXPECT_EQ(dirty.apply(nothing).pixels.size(), cv::Size(10, 10));
 }
 
-TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsOfThatSize) {
+TEST(ContrastNormalization, HalfIsNativeWhereTheChannelIsOfThatSize) {
   for (const double sampling : {2.0, 3.0}) {  // no whole factor leads from 3 to 2
     Channel channel = ramp(0.0F, 1.0F);
     channel.map.scale = Eigen::Vector2d::Constant(sampling);
     channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
     StemOptions options;
     options.tracking_resolution = TrackingResolution::kNative;
-    const ChannelImage native = ChannelStretch(options).apply(channel);
+    const ChannelImage native = ContrastNormalization(options).apply(channel);
     options.tracking_resolution = TrackingResolution::kHalf;
-    const ChannelImage half = ChannelStretch(options).apply(channel);
+    const ChannelImage half = ContrastNormalization(options).apply(channel);
     EXPECT_EQ(cv::norm(native.pixels, half.pixels, cv::NORM_INF), 0.0);
     EXPECT_EQ(native.map.scale, half.map.scale);
     EXPECT_EQ(native.map.offset_px, half.map.offset_px);
@@ -121,7 +121,7 @@ TEST(ChannelStretch, HalfIsNativeWhereTheChannelIsOfThatSize) {
 }
 
 /// Gray and the input's colours: half the size for every channel, or comparisons are not fair.
-TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
+TEST(ContrastNormalization, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   Channel channel;
   channel.values.create(37, 51, CV_32F);
   cv::theRNG().state = 1;
@@ -130,7 +130,7 @@ TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   options.tracking_resolution = TrackingResolution::kHalf;
   options.contrast_low_percent = 0.0;
   options.contrast_high_percent = 100.0;
-  const ChannelImage half = ChannelStretch(options).apply(channel);
+  const ChannelImage half = ContrastNormalization(options).apply(channel);
   ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
   const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
   EXPECT_EQ(centre, Eigen::Vector2d(14.5, 6.5));
@@ -138,14 +138,14 @@ TEST(ChannelStretch, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   EXPECT_NEAR(half.pixels.at<unsigned char>(3, 7), mean, 1.5);
 }
 
-TEST(ChannelStretch, NativeKeepsTheSize) {
+TEST(ContrastNormalization, NativeKeepsTheSize) {
   StemOptions options;
   options.tracking_resolution = TrackingResolution::kNative;
-  ChannelStretch stretch(options);
+  ContrastNormalization contrast(options);
   Channel channel = ramp(0.0F, 1.0F);
   channel.map.scale = Eigen::Vector2d(2, 2);
   channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
-  const ChannelImage image = stretch.apply(channel);
+  const ChannelImage image = contrast.apply(channel);
   EXPECT_EQ(image.pixels.size(), channel.values.size());
   EXPECT_EQ(image.map.scale, channel.map.scale);
   EXPECT_EQ(image.map.offset_px, channel.map.offset_px);
@@ -196,10 +196,10 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
         frame(y, x) = cv::saturate_cast<unsigned char>(20.0 + 220.0 * std::exp(-d2 / 200.0));
       }
     }
-    ChannelStretch stretch(options);
+    ContrastNormalization contrast(options);
     const auto channel = stem->apply(frame);
     ASSERT_TRUE(channel);
-    const ChannelImage image = stretch.apply(*channel);
+    const ChannelImage image = contrast.apply(*channel);
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "options/option_fields.hpp"
+#include "options/visit.hpp"
 
 #include <cmath>
 

@@ -67,9 +67,9 @@ PixelMap resized(const PixelMap& map, double factor) {
 
 }  // namespace
 
-ChannelStretch::ChannelStretch(const StemOptions& options) : options_(options) {}
+ContrastNormalization::ContrastNormalization(const StemOptions& options) : options_(options) {}
 
-ChannelImage ChannelStretch::apply(const Channel& channel) {
+ChannelImage ContrastNormalization::apply(const Channel& channel) {
   STEMVO_CHECK(channel.values.type() == CV_32FC1 && !channel.values.empty(),
                "a channel is one plane of floats");
   std::vector<float> samples = sample(channel.values);
