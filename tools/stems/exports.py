@@ -113,8 +113,7 @@ def _of_graph(options):
     with graph_cut.refusing_unsound(options.weights):
         _check_network(options, whole)
         for name in options.layers:
-            model, (layer,) = graph_cut.cut(options.weights, graph_cut.read(options.weights), [name],
-                                            families.PREPROCESSING[options.preprocessing], options.size, options.filter)
+            model, layer = graph_cut.cut(options.weights, name, families.PREPROCESSING[options.preprocessing], options.size, options.filter)
             layers[layer.name] = (model, layer)
     notes = tuple(f"{name}: {'sees the whole frame' if layer.field.whole_frame else 'padded inside'}: sampled at its "
                   f"stride {layer.stride} only" for name, (_, layer) in layers.items() if layer.sampling == "native")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Cuts a whole network (.onnx) at named tensors: image 1x3xHxW, RGB 0..255 -> the layers asked for.
+"""Cuts a whole network (.onnx) at a named tensor: image 1x3xHxW, RGB 0..255 -> the layer asked for.
 
-onnx.utils.Extractor takes the nodes that the layers need. Preprocessing goes in front of them; "same" paddings, which depend on the
+onnx.utils.Extractor takes the nodes that the layer needs. Preprocessing goes in front of them; "same" paddings, which depend on the
 size of the picture, become numbers; a network whose pictures have their colours last gets a transposition.
 """
 
@@ -34,7 +34,7 @@ def refusing_unsound(path, expected="a sound graph"):
 
 @dataclasses.dataclass(frozen=True)
 class CutLayer:
-    """One output of the cut graph."""
+    """The output of the cut graph."""
 
     name: str
     filters: int
@@ -154,16 +154,15 @@ def _without_size_arithmetic(model):
         return onnx.load(options.optimized_model_filepath)
 
 
-def _find(path, model, names):
-    """Tensors by their own name or their node's."""
+def _find(path, model, name):
+    """A tensor by its own name or its node's."""
     outputs = {output: output for node in model.graph.node for output in node.output if output}
     by_node = {node.name: node.output[0] for node in model.graph.node if node.name}
-    for name in names:
-        if name not in outputs and name not in by_node:
-            convolutions = [node.output[0] for node in model.graph.node if node.op_type == "Conv"]
-            raise WeightsError(f"{path}: --layers: expected the network's layers (--list shows all {len(outputs)}), such as "
-                               f"{', '.join(convolutions[:8])}; found {name!r}")
-    return [outputs.get(name) or by_node[name] for name in names]
+    if name in outputs or name in by_node:
+        return outputs.get(name) or by_node[name]
+    convolutions = [node.output[0] for node in model.graph.node if node.op_type == "Conv"]
+    raise WeightsError(f"{path}: --layers: expected the network's layers (--list shows all {len(outputs)}), such as "
+                       f"{', '.join(convolutions[:8])}; found {name!r}")
 
 
 def _preprocessing_nodes(fed, target, colours_last):
@@ -212,48 +211,44 @@ def _output_nodes(path, tensor, field, shape, filter_index):
     return nodes, constants, tensor, filters
 
 
-def cut(path, model, names, fed, size=None, filter_index=None):
-    """The cut model and its layers. size: width, height: "same" paddings are for pictures of its parity (None: even at every level)."""
+def cut(path, name, fed, size=None, filter_index=None):
+    """The cut model and its layer. size: width, height: "same" paddings are for pictures of its parity (None: even at every level)."""
+    model = read(path)
     image, colours_last = _image_input(path, model)
-    tensors = _find(path, model, names)
-    body = _extracted(model, image, colours_last, tensors)
+    tensor = _find(path, model, name)
+    body = _extracted(model, image, colours_last, [tensor])
     if any(node.op_type == "Shape" for node in body.graph.node):
-        body = _without_size_arithmetic(_extracted(body, image, colours_last, tensors, size or _ANY_SIZE))
-    shapes = _shapes(_extracted(body, image, colours_last, tensors, size or _ANY_SIZE))
+        body = _without_size_arithmetic(_extracted(body, image, colours_last, [tensor], size or _ANY_SIZE))
+    shapes = _shapes(_extracted(body, image, colours_last, [tensor], size or _ANY_SIZE))
     _make_paddings_numbers(body, shapes)
-    fields = receptive_field.Walk(body.graph, image, _start(colours_last)).fields
-    nodes, constants = _preprocessing_nodes(fed, image, colours_last)
-    nodes, constants = [*nodes, *body.graph.node], [*constants, *body.graph.initializer]
-    layers = []
-    for tensor in tensors:
-        behind, more, output, filters = _output_nodes(path, tensor, fields.get(tensor), shapes.get(tensor), filter_index)
-        nodes, constants = nodes + behind, constants + more
-        layers.append(CutLayer(output, filters, fields[tensor]))
-    graph = helper.make_graph(nodes, "layers", [helper.make_tensor_value_info(onnx_writer.INPUT, TensorProto.FLOAT, [1, 3, "H", "W"])],
-                              [helper.make_tensor_value_info(layer.name, TensorProto.FLOAT, [1, layer.filters, None, None]) for layer in layers],
-                              constants)
+    field = receptive_field.Walk(body.graph, image, _start(colours_last)).fields.get(tensor)
+    front, constants = _preprocessing_nodes(fed, image, colours_last)
+    behind, more, output, filters = _output_nodes(path, tensor, field, shapes.get(tensor), filter_index)
+    layer = CutLayer(output, filters, field)
+    graph = helper.make_graph([*front, *body.graph.node, *behind], "layer",
+                              [helper.make_tensor_value_info(onnx_writer.INPUT, TensorProto.FLOAT, [1, 3, "H", "W"])],
+                              [helper.make_tensor_value_info(output, TensorProto.FLOAT, [1, filters, None, None])],
+                              [*constants, *body.graph.initializer, *more])
     cut_model = helper.make_model(graph, opset_imports=model.opset_import, functions=body.functions, producer_name="stemvo",
                                   ir_version=model.ir_version)
     onnx.checker.check_model(cut_model)
-    _check_sizes(path, cut_model, layers)
-    return cut_model, layers
+    _check_sizes(path, cut_model, layer)
+    return cut_model, layer
 
 
-def _check_sizes(path, model, layers):
-    """Runs the graph on noise of two sizes. Error: its outputs are not what their windows say."""
-    stride = max(layer.stride for layer in layers)
+def _check_sizes(path, model, layer):
+    """Runs the graph on noise of two sizes. Error: its output is not what its window says."""
+    (top, left, bottom, right), (rows, columns), stride = layer.padding, layer.kernel, layer.stride
     small = max(6 * stride, 96)
     for width, height in ((small + stride - 1, small + stride // 2), (small + stride, small)):
         image = np.random.default_rng(1).uniform(0, 255, (1, 3, height, width)).astype(np.float32)
         with refusing_unsound(path, f"a network that takes pictures of any size, {width}x{height} too"):
             session = onnxruntime.InferenceSession(model.SerializeToString(), _silent(), providers=["CPUExecutionProvider"])
-            outputs = session.run([layer.name for layer in layers], {onnx_writer.INPUT: image})
-        for layer, output in zip(layers, outputs):
-            (top, left, bottom, right), (rows, columns) = layer.padding, layer.kernel
-            expected = (1, layer.filters, (height + top + bottom - rows) // layer.stride + 1, (width + left + right - columns) // layer.stride + 1)
-            if output.shape != expected or not np.all(np.isfinite(output)):
-                raise WeightsError(f"{path}: {layer.name}: expected {'x'.join(map(str, expected))} finite numbers of a picture of {width}x{height}, "
-                                   f"found {'x'.join(map(str, output.shape))}" + ("" if output.shape != expected else " with NaN or infinity"))
+            (output,) = session.run(None, {onnx_writer.INPUT: image})
+        expected = (1, layer.filters, (height + top + bottom - rows) // stride + 1, (width + left + right - columns) // stride + 1)
+        if output.shape != expected or not np.all(np.isfinite(output)):
+            raise WeightsError(f"{path}: {layer.name}: expected {'x'.join(map(str, expected))} finite numbers of a picture of {width}x{height}, "
+                               f"found {'x'.join(map(str, output.shape))}" + ("" if output.shape != expected else " with NaN or infinity"))
 
 
 def _silent():
