@@ -129,7 +129,6 @@ TEST_F(BadInputTable, MetricsAndThresholds) {
       folder_ / "limits.yaml", "1.5", check, {},
       {text("empty", ""), text("a list", "[1, 2]"), text("no bound", "t_rel_percent: {}\n"),
        text("unknown bound", "t_rel_percent: {most: 1}\n"),
-       text("twice", "t_rel_percent: {max: 1}\nt_rel_percent: {max: 2}\n"),
        text("unknown number", "t_rel: {max: 1}\n"),
        text("two documents", "t_rel_percent: {max: 1}\n---\nt_rel_percent: {max: 2}\n")});
 }

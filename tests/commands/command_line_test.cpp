@@ -106,7 +106,6 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
       {{"check", "metrics.json"}, "--against"},
-      {{"models", "x", "y"}, "y"},
       {{"runn", "x", "--out", "o"}, "robustness, search, found 'runn'"},
       {{"benchmark", "x"}, "--out"},
   };

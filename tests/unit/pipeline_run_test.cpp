@@ -139,7 +139,7 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
   EXPECT_EQ(read_file(request_.out_dir / "trajectory_kitti.txt"), poses);
   auto json = nlohmann::ordered_json::parse(read_file(request_.out_dir / "metrics.json"));
   const auto timing = json["timing"];
-  for (const char* name : {"read and decode", "stem", "stretch", "pyramid"}) {
+  for (const char* name : {"read and decode", "stem", "contrast", "pyramid"}) {
     EXPECT_EQ(timing["stages"][name]["calls"], 6) << name;
   }
   for (const char* name : {"detection", "tracking", "homography", "epipolar geometry"}) {
