@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -100,6 +101,20 @@ std::string parse_number(std::string_view kind, const YAML::Node& node, Number& 
              : fmt::format("expected {}, found {}", kind, options::quote(text));
 }
 
+/// Line of the second document, which yaml-cpp would leave out without a word.
+std::optional<int> line_of_second_document(const std::string& text) {
+  bool has_content = false;
+  int line_number = 0;
+  for (const std::string_view line : split_lines(text)) {
+    ++line_number;
+    if (line.starts_with("---") && has_content) {
+      return line_number;
+    }
+    has_content = has_content || !(line.empty() || line[0] == '#' || line[0] == '%');
+  }
+  return std::nullopt;
+}
+
 /// Walks one YAML map, top level (section empty) or section.
 class MapReader {
  public:
@@ -149,14 +164,12 @@ class MapReader {
 }  // namespace
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
+  if (const auto line = line_of_second_document(text)) {
+    return fail(
+        fmt::format("{}:{}: not YAML: expected one document, found more behind it", source, *line));
+  }
   try {
-    // YAML::Load would leave out a second document without a word.
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) {
-      return fail(fmt::format("{}:{}: not YAML: expected one document, found more behind it",
-                              source, line_of(documents[1])));
-    }
-    return documents.empty() ? YAML::Node() : documents.front();
+    return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     return fail(fmt::format("{}:{}: not YAML: {}", source, error.mark.line + 1, error.msg));
   }

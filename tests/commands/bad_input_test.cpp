@@ -55,11 +55,8 @@ TEST_F(BadInput, MissingSequence) {
 
 /// yaml-cpp's LoadAll never ends here.
 TEST_F(BadInput, MoreBehindTheDocument) {
-  for (const char* text : {"{stem: {filter: 3}},\n", "seed: 1\n---\nseed: 2\n"}) {
-    expect_error(run_with_config(text), 1, {"my.yaml:", "not YAML", "more behind it"});
-  }
-  expect_error(run({"--set", "evaluation.segment_lengths_m=[100,200],"}), 1,
-               {"evaluation.segment_lengths_m", "more behind it"});
+  expect_error(run_with_config("seed: 1\n---\nseed: 2\n"), 1,
+               {"my.yaml:2:", "not YAML", "more behind it"});
 }
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {
