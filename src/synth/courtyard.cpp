@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "synth/drive.hpp"
 #include "synth/materials.hpp"
-#include "synth/walk.hpp"
 
 namespace stemvo::synth {
 namespace {

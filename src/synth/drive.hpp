@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -48,12 +49,8 @@ class RoadCurve {
   }
   /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
   [[nodiscard]] RoadFrame at(double arc_m) const;
-  /// Arc length of the knot nearest to `point` among those within `reach_m` of `guess_m`.
-  [[nodiscard]] double nearest(const Vec3& point, double guess_m, double reach_m) const;
 
  private:
-  void squeeze_in_turns();
-
   std::vector<RoadFrame> knots_;
 };
 
@@ -78,5 +75,27 @@ inline constexpr double kDriveRate_hz = 10.0;
 
 /// The street near `arc_m`: from 60 m behind to 170 m ahead.
 void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& scene);
+
+/// A courtyard of some 8 m x 8 m: three walkways each way with a thing between every four of them,
+/// walls all round. x right, z forward, floor at y = 0, -y up; metres.
+struct Courtyard {
+  std::uint64_t seed = 0;
+  std::array<double, 3> x_m{};     ///< walkways along z
+  std::array<double, 3> z_m{};     ///< walkways along x
+  std::array<double, 4> wall_m{};  ///< from the outer walkways: left, right, near, far
+};
+
+[[nodiscard]] Courtyard lay_courtyard(std::uint64_t seed);
+void add_courtyard(const Courtyard& courtyard, Scene& scene);
+
+/// Poses of a hand-held camera, and the courtyard around them.
+struct Walk {
+  Trajectory world_from_camera;
+  Courtyard courtyard;
+};
+
+/// A walk with a camera in the hand, some 1.5 m above the floor, at 0.5 m/s in the mean: the sway
+/// of steps, slow wander of the view, turns, glances aside and pauses.
+[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz);
 
 }  // namespace stemvo::synth

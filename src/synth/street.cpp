@@ -8,16 +8,10 @@
 namespace stemvo::synth {
 namespace {
 
-/// The part of a road that is drawn: knots [begin, end).
-struct RoadWindow {
-  int begin;
-  int end;
-};
-
 /// Builders of things along the road need this.
 struct Street {
   const RoadCurve& road;
-  RoadWindow window;
+  cv::Range window;         ///< knots of the road that are drawn
   double texture_origin_m;  ///< arc length where u = 0
   std::uint64_t seed;
   Scene& scene;
@@ -26,13 +20,9 @@ struct Street {
   /// along the whole road, so that a thing is the same from wherever it is seen.
   template <typename Build>
   void for_each_slot(double length_m, const Build& build) const {
-    const double begin_m = window.begin;
-    const double end_m = (window.end - 1);
-    const int first = static_cast<int>(begin_m / length_m);
-    for (int slot = first; slot * length_m + length_m <= end_m; ++slot) {
-      if (slot * length_m >= begin_m) {
-        build(slot, slot * length_m);
-      }
+    const int first = static_cast<int>(std::ceil(window.start / length_m));
+    for (int slot = first; slot * length_m + length_m <= window.end - 1; ++slot) {
+      build(slot, slot * length_m);
     }
   }
   /// The same on the left (-1) and on the right (1): build(draw, side, arc_m).
@@ -126,7 +116,7 @@ void add_ground(const Street& street) {
     const Style style{.material = left->material,
                       .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
                       .albedo = left->albedo};
-    for (int i = street.window.begin; i + 1 < street.window.end; ++i) {
+    for (int i = street.window.start; i + 1 < street.window.end; ++i) {
       add_segment(street, i,
                   {{{0, left->lateral_m, left->height_m},
                     {0, right->lateral_m, right->height_m},
@@ -144,7 +134,7 @@ void add_borders(const Street& street) {
   constexpr Style kFence{.material = materials::fence, .albedo = {0.33F, 0.25F, 0.17F}};
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
-    for (int i = street.window.begin; i + 1 < street.window.end; ++i) {
+    for (int i = street.window.start; i + 1 < street.window.end; ++i) {
       Draw draw(street.seed, 'B', side > 0.0, i / 16);
       const std::uint32_t seed = draw.bits();
       const double share = draw.next();
@@ -374,7 +364,7 @@ void add_parked_cars(const Street& street) {
 
 /// Nothing stands in the way of the street the camera is in: the window ends where the road comes
 /// back to itself.
-RoadWindow visible_window(const RoadCurve& road, double arc_m) {
+cv::Range visible_window(const RoadCurve& road, double arc_m) {
   constexpr double kSeenBehind_m = 60.0;
   constexpr double kSeenAhead_m = 170.0;
   constexpr int kBeside = 30;  // what is ahead must not stand in the street just behind the camera

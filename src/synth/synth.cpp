@@ -2,11 +2,9 @@
 #include "synth/synth.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <span>
 #include <system_error>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,7 +19,6 @@ namespace stemvo {
 namespace {
 
 namespace fs = std::filesystem;
-using Path = std::variant<synth::Drive, synth::Walk>;
 
 Camera camera_of(const SyntheticDriveOptions& options) {
   const int width_px = options.width_px.value_or(options.walk ? 640 : 1241);
@@ -36,7 +33,7 @@ Camera camera_of(const SyntheticDriveOptions& options) {
   return {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px};
 }
 
-Expected<Path> plan_path(const SyntheticDriveOptions& options) {
+Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
     return synth::make_walk(options.num_frames, options.seed, options.walk_rate_hz);
   }
@@ -59,25 +56,16 @@ struct DriveFolder {
 
 /// Makes the folders, empty. Error: what is there was not rendered.
 Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive, bool with_depth) {
-  const fs::path mark = drive.sequence / "rendered_by_stemvo";
   std::error_code code;
-  for (const fs::path& path : {drive.sequence, drive.poses}) {
-    if (!fs::exists(mark, code) && fs::exists(path, code) && !fs::is_empty(path, code)) {
-      return fail(
-          fmt::format("{}: expected a drive that stemvo rendered, which a new one may replace, "
-                      "or none, found something else (--name gives another name)",
-                      path.string()));
-    }
+  if (fs::exists(drive.poses, code) && !pipeline::is_our_folder(drive.sequence)) {
+    return fail(
+        fmt::format("{}: expected poses of a rendered drive or none, found others (--name gives "
+                    "another name)",
+                    drive.poses.string()));
   }
-  for (const fs::path& folder : {drive.sequence, drive.poses.parent_path()}) {
-    if (const Status made = pipeline::create_out_folder(folder); !made) {
-      return made.error();
-    }
-  }
-  auto lock = pipeline::lock_folder(drive.sequence);
-  const Status marked = lock ? write_text_file(mark, "") : Status(lock.error());
-  if (!marked) {
-    return marked.error();
+  auto lock = pipeline::open_out_folder(drive.sequence, {});
+  if (!lock) {
+    return lock;
   }
   for (const char* content : {"image_2", "depth", "times.txt"}) {
     fs::remove_all(drive.sequence / content, code);
@@ -86,12 +74,12 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive, bool with_d
   if (with_depth) {
     fs::create_directory(drive.sequence / "depth", code);
   }
-  return lock;
+  const Status made = pipeline::create_out_folder(drive.poses.parent_path());
+  return made ? std::move(lock) : made.error();
 }
 
 /// NumPy format 1.0, little-endian float32, rows first.
 std::string encode_npy(const cv::Mat& values) {
-  static_assert(std::endian::native == std::endian::little, "the header says '<f4'");
   // Magic, version and the length of the header, which fills 128 bytes with them and a newline.
   std::string bytes("\x93NUMPY\x01\x00\x76\x00", 10);
   bytes += fmt::format(

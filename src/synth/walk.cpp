@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "synth/walk.hpp"
-
 #include <algorithm>
 #include <array>
 #include <iterator>
+
+#include "synth/drive.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -78,7 +78,16 @@ class WalkPlan {
  public:
   WalkPlan(const Courtyard& courtyard, double duration_s, double cruise_m_s)
       : yard_(courtyard), draw_(courtyard.seed, 'v'), cruise_m_s_(cruise_m_s) {
-    draw_start();
+    // The start lies in the middle of a way from one side to the other.
+    const std::array<Crossing, 4> directions = {{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
+    direction_ = directions[draw_.bits() % 4];
+    const auto line = static_cast<int>(draw_.bits() % 3);
+    const Crossing from(direction_.x() == 0 ? line : 1 - direction_.x(),
+                        direction_.y() == 0 ? line : 1 - direction_.y());
+    to_ = from + 2 * direction_;
+    at_m_ = position(from);
+    at_m_ += draw_.in(0.36, 0.44) * (position(to_) - at_m_);
+    heading_rad_ = heading_to(to_);
     for (int leg = 0; now_s_ < duration_s; ++leg) {
       walk_leg(leg);
       turn(leg);
@@ -89,19 +98,6 @@ class WalkPlan {
   std::vector<Glance> glances;
 
  private:
-  /// In the middle of a way from one side to the other.
-  void draw_start() {
-    const std::array<Crossing, 4> directions = {{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
-    direction_ = directions[draw_.bits() % 4];
-    const auto line = static_cast<int>(draw_.bits() % 3);
-    const Crossing from(direction_.x() == 0 ? line : 1 - direction_.x(),
-                        direction_.y() == 0 ? line : 1 - direction_.y());
-    to_ = from + 2 * direction_;
-    const Vec2 begin = position(from);
-    at_m_ = begin + draw_.in(0.36, 0.44) * (position(to_) - begin);
-    heading_rad_ = heading_to(to_);
-  }
-
   /// A crossing is missed by a few centimetres.
   [[nodiscard]] Vec2 position(const Crossing& at) const {
     Draw draw(yard_.seed, 'J', at.x(), at.y());

@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "synth/walk.hpp"
+#include "synth/drive.hpp"
 
 namespace stemvo::synth {
 namespace {
