@@ -12,7 +12,7 @@ import tempfile
 import time
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tools"))
 import _environment  # noqa: E402,F401
 
@@ -42,7 +42,7 @@ class Nodes:
 
     def __enter__(self):
         environment = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
-        self._process = subprocess.Popen([RAY, ROOT / "tests/python/ray_nodes.py"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        self._process = subprocess.Popen([RAY, ROOT / "tests/python/long/ray_nodes.py"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                          stderr=subprocess.DEVNULL, text=True, env=environment)
         self.address = self._process.stdout.readline().strip()
         return self

@@ -15,7 +15,7 @@ import unittest
 import documented
 import PIL.Image
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 FRAMES = 12
 CAMERA = ("fx", "cx", "cy", "fx_sigma", "cx_sigma", "cy_sigma")

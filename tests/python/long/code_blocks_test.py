@@ -21,30 +21,30 @@ FRAMES = 25
 
 # Commands that build, install, fetch, or need hours: how they begin, and what runs them, or their tool, instead.
 RUN_ELSEWHERE = {
-    "make demo": "tests/python/code_blocks_test.py",
+    "make demo": "tests/python/long/code_blocks_test.py",
     "make test": ".ci/run",
     "make build": ".ci/run",
     "ctest --preset": ".ci/run",
     "cmake --preset": ".ci/run",
-    "make bench": "tests/python/bench_run_test.py",
-    "bench/run.py": "tests/python/bench_run_test.py",
+    "make bench": "tests/python/long/bench_run_test.py",
+    "bench/run.py": "tests/python/long/bench_run_test.py",
     "build/release/stemvo_bench": ".ci/run",
     "build/release/tests/stemvo_unit_tests": ".ci/run",
     "STEMVO_BENCH_": ".ci/run",
     "cmake -S examples": "tests/package/install_and_consume.cmake",
     "build/examples/": "tests/package/install_and_consume.cmake",
-    "pip install": "tests/python/package_test.py",
-    "python -m stemvo.view": "tests/python/package_test.py",
+    "pip install": "tests/python/long/package_test.py",
+    "python -m stemvo.view": "tests/python/long/package_test.py",
     "python -m stemvo.bag": "tests/python/bag_test.py",
-    "tools/ablation.py": "tests/python/ablation_test.py",
-    "tools/long_drives.py": "tests/python/long_drives_test.py",
-    "tools/planted_camera.py": "tests/python/long_drives_test.py",
+    "tools/ablation.py": "tests/python/long/ablation_test.py",
+    "tools/long_drives.py": "tests/python/long/long_drives_test.py",
+    "tools/planted_camera.py": "tests/python/long/long_drives_test.py",
     "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
-    "tools/search_cluster.py": "tests/python/search_cluster_test.py",
-    "build/venv-ray/bin/ray": "tests/python/search_cluster_test.py",
+    "tools/search_cluster.py": "tests/python/long/search_cluster_test.py",
+    "build/venv-ray/bin/ray": "tests/python/long/search_cluster_test.py",
 }
 # A reader puts names in these places; the rest makes a command short.
 IN_PLACE_OF = [

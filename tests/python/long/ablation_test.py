@@ -10,7 +10,7 @@ import unittest
 
 import ablation
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 
 

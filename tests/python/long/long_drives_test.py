@@ -12,7 +12,7 @@ import unittest
 
 from drives import rendered, watched_run
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 STEP_M = 0.8
 

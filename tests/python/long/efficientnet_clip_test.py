@@ -10,7 +10,7 @@ import sys
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = ROOT / "build/release/stemvo"
 CHOSEN_ON_00 = 16  # lowest t_rel of its 32 filters on clip 00: 0.74 %, the default model 1.00
 MAX_T_REL_PERCENT = 1.0  # 0.84; the default model 0.44: 200 frames do not choose for 03
