@@ -2,7 +2,6 @@
 #include "pipeline/frame_pipeline.hpp"
 
 #include <array>
-#include <chrono>
 #include <utility>
 
 #include <opencv2/core/utility.hpp>
@@ -20,7 +19,6 @@ Expected<PhasedOdometry> create_odometry(const Config& config,
 
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
   struct Frame {
-    std::chrono::steady_clock::time_point started;
     Expected<cv::Mat> pixels;
     stemvo::Frame prepared;
   };
@@ -30,7 +28,6 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
       .read =
           [&](std::size_t index) {
             Frame& frame = frame_at(index);
-            frame.started = std::chrono::steady_clock::now();
             frame.prepared = {};
             frame.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
             return !sequence.stream() || !frame.pixels || !frame.pixels->empty();
@@ -45,11 +42,7 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
       .localize = [&](std::size_t) { odometry.localize(); },
       .optimize =
           [&](std::size_t index) {
-            const bool goes_on = visit(index, frame_at(index).pixels, odometry.optimize());
-            if (StageRecorder* recorder = StageRecorder::active()) {
-              recorder->add_frame(frame_at(index).started);
-            }
-            return goes_on;
+            return visit(index, frame_at(index).pixels, odometry.optimize());
           }};
   run_frame_loops(stages, sequence.size(), cv::getNumThreads());
 }

@@ -279,6 +279,7 @@ Status write_results(const Run& run, const Drive& drive, MetricsReport& report) 
   if (const StageRecorder* recorder = StageRecorder::active()) {
     report.timing = recorder->report();
     report.timing->fps = report.fps;
+    report.timing->num_frames = report.num_frames;
     report.timing->num_threads = cv::getNumThreads();
   }
   keep_first(written, write_metrics_json(run.request.out_dir / "metrics.json", report));

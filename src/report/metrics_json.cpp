@@ -26,27 +26,19 @@ void to_json(Json& json, const CameraReport& report) {
 void to_json(Json& json, const AbsoluteTrajectoryError& ate) {
   json = {{"none", ate.none_m}, {"scale", ate.scale_m}, {"se3", ate.se3_m}, {"sim3", ate.sim3_m}};
 }
-void to_json(Json& json, const TimeSummary& time) {
-  json = {{"median_ms", time.median_ms}, {"p95_ms", time.p95_ms}};
-}
 
 void to_json(Json& json, const TimingReport& report) {
   json["threads"] = report.num_threads;
   json["fps"] = report.fps;
-  json["loop_fps"] = static_cast<double>(report.num_frames) / report.loop_s;
-  json["interval"] = report.interval;
-  json["latency"] = report.latency;
   json["peak_memory_mib"] = report.peak_memory_mib;
   json["cpu_s"] = report.cpu_s;
-  json["start_cpu_s"] = report.start_cpu_s;
   json["other_cpu_s"] = report.rest_cpu_s;
   json["stages"] = Json::object();
   for (const StageTiming& stage : report.stages) {
     json["stages"][stage.name] = {{"calls", stage.calls},
-                                  {"median_ms", stage.wall.median_ms},
-                                  {"p95_ms", stage.wall.p95_ms},
-                                  {"cpu_s", stage.cpu_s},
-                                  {"share_percent", stage.share_percent}};
+                                  {"median_ms", stage.median_ms},
+                                  {"p95_ms", stage.p95_ms},
+                                  {"cpu_s", stage.cpu_s}};
   }
 }
 

@@ -45,8 +45,8 @@ struct MetricsReport {
 /// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
 /// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
 /// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg and, only where it was asked for,
-/// timing{threads fps loop_fps interval{median_ms,p95_ms} latency{median_ms,p95_ms} peak_memory_mib
-/// cpu_s start_cpu_s other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s,share_percent}}}. Numbers
+/// timing{threads fps peak_memory_mib cpu_s other_cpu_s
+/// stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers
 /// round-trip; a number that is not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);

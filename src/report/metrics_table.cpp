@@ -103,41 +103,25 @@ std::string format_metrics_table(const MetricsReport& report) {
 }
 
 std::string format_timing_table(const TimingReport& report) {
-  const auto num_frames = static_cast<double>(report.num_frames);
-  const auto ms_per_frame = [&](double cpu_s) {
-    return fmt::format("{:.3f}", 1e3 * cpu_s / num_frames);
-  };
   TextTable table("lrrrrr");
   table.add({"stage", "calls", "median ms", "p95 ms", "CPU ms/frame", "share %"});
   table.rule();
+  const auto add = [&](std::vector<std::string> row, double cpu_s) {
+    row.push_back(fmt::format("{:.3f}", 1e3 * cpu_s / static_cast<double>(report.num_frames)));
+    row.push_back(fmt::format("{:.1f}", 100.0 * cpu_s / report.cpu_s));
+    table.add(row);
+  };
   for (const StageTiming& stage : report.stages) {
-    table.add({stage.name, fmt::format("{}", stage.calls),
-               fmt::format("{:.3f}", stage.wall.median_ms),
-               fmt::format("{:.3f}", stage.wall.p95_ms), ms_per_frame(stage.cpu_s),
-               fmt::format("{:.1f}", stage.share_percent)});
+    add({stage.name, fmt::format("{}", stage.calls), fmt::format("{:.3f}", stage.median_ms),
+         fmt::format("{:.3f}", stage.p95_ms)},
+        stage.cpu_s);
   }
-  const auto add_rest = [&](const char* name, double cpu_s) {
-    table.add({name, "", "", "", ms_per_frame(cpu_s),
-               fmt::format("{:.1f}", 100.0 * cpu_s / report.cpu_s)});
-  };
-  add_rest("start of the program", report.start_cpu_s);
-  add_rest("other, and OpenCV's threads", report.rest_cpu_s);
+  add({"start, other, OpenCV's threads", "", "", ""}, report.rest_cpu_s);
   table.rule();
-  add_rest("processor time", report.cpu_s);
-
-  TextTable whole("lrl");
-  const auto add_time = [&](const char* name, const TimeSummary& time) {
-    whole.add({name, fmt::format("{:.2f} ms", time.median_ms),
-               fmt::format("p95 {:.2f} ms", time.p95_ms)});
-  };
-  add_time("a frame's result every", report.interval);
-  add_time("from frame to result", report.latency);
-  whole.add({"speed, whole program", fmt::format("{:.1f} frames/s", report.fps),
-             fmt::format("{} frames, {} threads", report.num_frames, report.num_threads)});
-  whole.add(
-      {"speed, loop over frames", fmt::format("{:.1f} frames/s", num_frames / report.loop_s)});
-  whole.add({"peak memory", fmt::format("{:.0f} MiB", report.peak_memory_mib)});
-  return table.str() + '\n' + whole.str();
+  add({"processor time", "", "", ""}, report.cpu_s);
+  return table.str() + fmt::format("\n{:.1f} frames/s, {} frames, {} threads, {:.0f} MiB at most\n",
+                                   report.fps, report.num_frames, report.num_threads,
+                                   report.peak_memory_mib);
 }
 
 }  // namespace stemvo

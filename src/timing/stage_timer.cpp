@@ -21,8 +21,6 @@ constexpr std::array<std::string_view, kNumStages> kNames = {
     "two-view refinement", "localization", "window refinement", "camera",     "road scale",
     "frame files",         "result files"};
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 double read_ms(clockid_t clock) {
   timespec time{};
   clock_gettime(clock, &time);
@@ -43,10 +41,11 @@ double peak_memory_mib() {
       return kib / 1024.0;
     }
   }
-  return kNaN;
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
-double nearest_rank(std::vector<double>& values, double share) {
+/// One of the values: that which a share of them does not exceed.
+double nearest_rank(std::vector<double> values, double share) {
   const double rank = std::max(1.0, std::ceil(share * static_cast<double>(values.size())));
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank) - 1;
   std::nth_element(values.begin(), at, values.end());
@@ -55,21 +54,9 @@ double nearest_rank(std::vector<double>& values, double share) {
 
 }  // namespace
 
-TimeSummary summarize_ms(std::span<const double> values_ms) {
-  if (values_ms.empty()) {
-    return {kNaN, kNaN};
-  }
-  std::vector<double> values(values_ms.begin(), values_ms.end());
-  return {nearest_rank(values, 0.5), nearest_rank(values, 0.95)};
-}
-
 std::atomic<StageRecorder*> StageRecorder::active_ = nullptr;
 
-StageRecorder::StageRecorder()
-    : start_cpu_ms_(read_ms(CLOCK_PROCESS_CPUTIME_ID)),
-      start_(std::chrono::steady_clock::now()),
-      last_frame_(start_),
-      stages_(kNumStages) {
+StageRecorder::StageRecorder() : stages_(kNumStages) {
   StageRecorder* none = nullptr;
   STEMVO_CHECK(active_.compare_exchange_strong(none, this), "one run at a time is timed");
 }
@@ -83,41 +70,24 @@ void StageRecorder::add(Stage stage, double wall_ms, double cpu_ms) {
   samples.cpu_ms += cpu_ms;
 }
 
-void StageRecorder::add_frame(std::chrono::steady_clock::time_point started) {
-  const auto now = std::chrono::steady_clock::now();
-  const std::lock_guard lock(mutex_);
-  intervals_ms_.push_back(ms_between(last_frame_, now));
-  latencies_ms_.push_back(ms_between(started, now));
-  last_frame_ = now;
-}
-
 double StageRecorder::cpu_ms(Stage stage) const {
   const std::lock_guard lock(mutex_);
   return stages_[static_cast<std::size_t>(stage)].cpu_ms;
 }
 
 TimingReport StageRecorder::report() const {
-  const double total_ms = read_ms(CLOCK_PROCESS_CPUTIME_ID);
   const std::lock_guard lock(mutex_);
   TimingReport report;
-  double rest_ms = total_ms - start_cpu_ms_;
+  report.cpu_s = read_ms(CLOCK_PROCESS_CPUTIME_ID) / 1e3;
+  report.rest_cpu_s = report.cpu_s;
   for (std::size_t i = 0; i < stages_.size(); ++i) {
-    const Samples& samples = stages_[i];
-    if (samples.wall_ms.empty()) {
-      continue;
+    const auto& [wall_ms, cpu_ms] = stages_[i];
+    if (!wall_ms.empty()) {
+      report.stages.push_back({std::string(kNames[i]), wall_ms.size(), nearest_rank(wall_ms, 0.5),
+                               nearest_rank(wall_ms, 0.95), cpu_ms / 1e3});
+      report.rest_cpu_s -= cpu_ms / 1e3;
     }
-    report.stages.push_back({std::string(kNames[i]), samples.wall_ms.size(),
-                             summarize_ms(samples.wall_ms), samples.cpu_ms / 1e3,
-                             100.0 * samples.cpu_ms / total_ms});
-    rest_ms -= samples.cpu_ms;
   }
-  report.start_cpu_s = start_cpu_ms_ / 1e3;
-  report.rest_cpu_s = rest_ms / 1e3;
-  report.cpu_s = total_ms / 1e3;
-  report.num_frames = intervals_ms_.size();
-  report.loop_s = ms_between(start_, last_frame_) / 1e3;
-  report.interval = summarize_ms(intervals_ms_);
-  report.latency = summarize_ms(latencies_ms_);
   report.peak_memory_mib = peak_memory_mib();
   return report;
 }

@@ -37,7 +37,6 @@ inline constexpr int kNumStages = static_cast<int>(Stage::kResultFiles) + 1;
 /// Collects what StageTimers measure, in any thread, while it lives. One at a time (checked).
 class StageRecorder {
  public:
-  /// Processor time of the process until now is the report's row `start`.
   StageRecorder();
   ~StageRecorder();
   StageRecorder(const StageRecorder&) = delete;
@@ -47,11 +46,9 @@ class StageRecorder {
   [[nodiscard]] static StageRecorder* active() { return active_.load(std::memory_order_acquire); }
 
   void add(Stage stage, double wall_ms, double cpu_ms);
-  /// A frame's result is there; `started`: when it was asked for.
-  void add_frame(std::chrono::steady_clock::time_point started);
   /// Processor time of all calls of a stage so far.
   [[nodiscard]] double cpu_ms(Stage stage) const;
-  /// The report covers everything so far.
+  /// Covers everything so far; `fps`, `num_frames` and `num_threads` are the caller's to fill in.
   [[nodiscard]] TimingReport report() const;
 
  private:
@@ -63,12 +60,7 @@ class StageRecorder {
   static std::atomic<StageRecorder*> active_;
 
   mutable std::mutex mutex_;
-  double start_cpu_ms_;
-  std::chrono::steady_clock::time_point start_;
-  std::chrono::steady_clock::time_point last_frame_;
   std::vector<Samples> stages_;
-  std::vector<double> intervals_ms_;
-  std::vector<double> latencies_ms_;
 };
 
 /// Measures a stage from here to the end of the block; without a StageRecorder it does nothing. It

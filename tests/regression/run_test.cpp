@@ -55,8 +55,8 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
   EXPECT_GT(fs::file_size(out_ + "/trajectory.png"), 10000U);
   EXPECT_GT(fs::file_size(out_ + "/report.html"), 1000000U);
   EXPECT_THAT(read_file(out_ + "/config.yaml"),
-              AllOf(HasSubstr("# stemvo 0."), HasSubstr("sha256"), HasSubstr("frames 0:60 of 00"),
-                    HasSubstr("source: ground_truth")));
+              AllOf(HasSubstr("# stemvo 0."), HasSubstr("# model default: 16 filters"),
+                    HasSubstr("frames 0:60 of 00"), HasSubstr("source: ground_truth")));
   for (const char* name : {"000000", "000020", "000040"}) {
     EXPECT_TRUE(fs::exists(out_ + "/pictures/" + name + ".png")) << name;
   }
