@@ -21,7 +21,7 @@ TEST_F(Overwrite, SynthSparesWhatItDidNotRender) {
   const std::string image = read_file(sequence_ / "image_2/000003.png");
   const std::string poses = read_file(folder_ / "poses/00.txt");
   expect_error(run_stemvo({"synth", folder_.path().string(), "--frames", "2"}), 1,
-               {"sequences/00", "expected a drive that stemvo rendered"});
+               {"poses/00.txt", "expected poses of a rendered drive or none"});
   EXPECT_EQ(read_file(sequence_ / "image_2/000003.png"), image);
   EXPECT_EQ(read_file(folder_ / "poses/00.txt"), poses);
 }
