@@ -24,7 +24,7 @@ std::string wrap(std::string line) {
       break;
     }
     text += line.substr(0, line.find_last_not_of(' ', end) + 1) + '\n';
-    line = hang + line.substr(end + 1);
+    line.replace(0, end + 1, hang);
   }
   return text + line + '\n';
 }

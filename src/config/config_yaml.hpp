@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <yaml-cpp/yaml.h>
@@ -59,7 +60,7 @@ struct Key {
           std::string problem = parse(node, found);
           problem = problem.empty() ? options::violation_of(found, rule) : problem;
           if (problem.empty()) {
-            value = found;
+            value = std::move(found);
           }
           return problem;
         }) {}

@@ -90,7 +90,7 @@ class FrameLoops {
     num_frames_ = num_frames;
     changed_.notify_all();
   }
-  void stop(std::exception_ptr thrown) {
+  void stop(const std::exception_ptr& thrown) {
     const std::lock_guard lock(mutex_);
     thrown_ = thrown_ == nullptr ? thrown : thrown_;
     is_stopped_ = true;
