@@ -209,7 +209,7 @@ void bind_odometry(nb::module_& module) {
            "timestamp"_a = nb::none(),
            "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")
       .def("landmarks", &SafeOdometry::landmarks,
-           "Nx3 in the world, and Nx3 colours: well seen ones, with look-ahead")
+           "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
       .def("tracked_points", &SafeOdometry::tracked_points,
            "Of the last image: Nx4 (u, v before; u, v now), and N: fits the motion")
       .def("channel_image", &SafeOdometry::channel_image,

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "features/front_end.hpp"
 #include "geometry/bundle.hpp"
-#include "odometry/landmark_map.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
@@ -39,6 +41,14 @@ struct LocalizedFrame {
   Observations projections;       ///< of the landmarks without an inlier in this frame
 };
 
+/// A landmark in the camera of the last keyframe that saw it, in the units of its pose in the
+/// trajectory.
+struct KeptLandmark {
+  int frame = 0;  ///< of the keyframe
+  Eigen::Vector3f in_camera = Eigen::Vector3f::Zero();
+  std::array<std::uint8_t, 3> rgb{};
+};
+
 /// Tracks in, poses out; the front end follows tracks to the next frame while a frame is optimized.
 /// Frames come in order, each through both halves.
 class Estimator {
@@ -56,8 +66,9 @@ class Estimator {
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }
-  /// Landmarks as Odometry::landmarks() has them; none where there is no window.
-  [[nodiscard]] virtual LandmarkMap map() const { return {}; }
+  /// The landmarks of Odometry::landmarks(), to be placed by the trajectory; none where there is no
+  /// window.
+  [[nodiscard]] virtual std::vector<KeptLandmark> landmarks() const { return {}; }
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for.

@@ -14,8 +14,6 @@
 namespace stemvo {
 namespace {
 
-/// So many frames can be localized afterwards; earlier ones stay where the reference is.
-constexpr std::size_t kMaxWaiting = 300;
 constexpr double kMinLiving = 0.3;
 /// A window that opens with fewer would soon be lost.
 constexpr int kMinLandmarks = 25;
@@ -92,10 +90,7 @@ void refine(std::vector<Hypothesis>& hypotheses,
 Initializer::Initializer(const Options& config)
     : loss_px_(config.two_view.refine_loss_px), two_view_(config) {}
 
-void Initializer::start(View reference) {
-  reference_ = std::move(reference);
-  waiting_.clear();
-}
+void Initializer::start(View reference) { reference_ = std::move(reference); }
 
 bool Initializer::lost_reference(const Observations& now) const {
   const auto living = static_cast<double>(common_points(reference_.points, now).size());
@@ -160,34 +155,16 @@ void Initializer::choose_motion(const PixelPairs& pairs,
 
 std::optional<Window> Initializer::open_window(const View& now,
                                                const Camera& camera,
-                                               const WindowOptions& window_options,
-                                               const LocalizationOptions& localization) const {
+                                               const WindowOptions& window_options) const {
   Window window;
-  add_keyframe(window, {reference_.frame, reference_.world_from_camera, reference_.points, {}},
+  add_keyframe(window, {reference_.frame, reference_.world_from_camera, reference_.points},
                window_options);
-  add_keyframe(window, {now.frame, now.world_from_camera, now.points, {}}, window_options);
+  add_keyframe(window, {now.frame, now.world_from_camera, now.points}, window_options);
   triangulate_landmarks(window, camera, window_options);
   if (static_cast<int>(window.landmarks.size()) < kMinLandmarks) {
     return std::nullopt;
   }
-  Rigid3 predicted = reference_.world_from_camera;
-  for (const View& view : waiting_) {
-    const auto found =
-        localize(find_seen_landmarks(window, view.points), predicted, camera, localization);
-    if (found.has_value()) {
-      predicted = found->world_from_camera;
-    }
-    window.keyframes.front().non_keyframes.push_back(
-        {view.frame, reference_.world_from_camera.inverse() * predicted});
-  }
   return window;
-}
-
-void Initializer::wait(View view) {
-  waiting_.push_back(std::move(view));
-  if (waiting_.size() > kMaxWaiting) {
-    waiting_.pop_front();
-  }
 }
 
 }  // namespace stemvo

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <deque>
 #include <memory>
 #include <optional>
 
-#include "odometry/localization.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/tracks.hpp"
 #include "odometry/two_view_estimator.hpp"
@@ -43,14 +41,11 @@ class Initializer {
                                        const Observations& now,
                                        const Camera& camera);
 
-  /// The window of the reference, `now` and the landmarks between them, the frames between them
-  /// localized. `now.world_from_camera` says where it is. nullopt: too few landmarks.
+  /// The window of the reference, `now` and the landmarks that both see. `now.world_from_camera`
+  /// says where it is. nullopt: too few landmarks.
   [[nodiscard]] std::optional<Window> open_window(const View& now,
                                                   const Camera& camera,
-                                                  const WindowOptions& window_options,
-                                                  const LocalizationOptions& localization) const;
-  /// A frame that did not decide: localized once the window is open.
-  void wait(View view);
+                                                  const WindowOptions& window_options) const;
 
  private:
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
@@ -60,7 +55,6 @@ class Initializer {
   double loss_px_;
   TwoViewEstimator two_view_;
   View reference_;
-  std::deque<View> waiting_;
 };
 
 }  // namespace stemvo

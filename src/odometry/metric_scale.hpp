@@ -21,11 +21,6 @@ class MetricScale {
 
   [[nodiscard]] bool is_enabled() const { return road_.has_value(); }
 
-  /// The lengths of the last frame given are metres.
-  [[nodiscard]] bool has_scale() const {
-    return state_ == ScaleState::kMeasured || state_ == ScaleState::kHeld;
-  }
-
   /// The first image, or one that nothing connects with the ones before.
   void restart(const RoadImage* road);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the

@@ -86,11 +86,10 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) 
 FrameResult Odometry::process_missing() { return impl_->odometry.process({}); }
 
 std::vector<MapLandmark> Odometry::landmarks() const {
-  const LandmarkMap map = impl_->odometry.frames().estimator().map();
+  const Estimator& estimator = impl_->odometry.frames().estimator();
   std::vector<MapLandmark> landmarks;
-  landmarks.reserve(map.landmarks.size());
-  for (const KeptLandmark& kept : map.landmarks) {
-    const Rigid3& world_from_camera = map.world_from_camera[static_cast<std::size_t>(kept.frame)];
+  for (const KeptLandmark& kept : estimator.landmarks()) {
+    const Rigid3& world_from_camera = estimator.trajectory()[static_cast<std::size_t>(kept.frame)];
     landmarks.push_back({world_from_camera * kept.in_camera.cast<double>(), kept.rgb});
   }
   return landmarks;

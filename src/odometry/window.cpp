@@ -54,22 +54,6 @@ std::optional<Eigen::Vector3d> triangulate_track(const Window& window,
              : std::nullopt;
 }
 
-/// The keyframe before takes over the frames that a keyframe between others leaves behind.
-void drop(Window& window, std::size_t i) {
-  if (i > 0) {
-    Keyframe& before = window.keyframes[i - 1];
-    const Keyframe& leaving = window.keyframes[i];
-    const Rigid3 before_from_leaving =
-        before.world_from_camera.inverse() * leaving.world_from_camera;
-    before.non_keyframes.push_back({leaving.frame, before_from_leaving});
-    for (const NonKeyframe& non_keyframe : leaving.non_keyframes) {
-      before.non_keyframes.push_back(
-          {non_keyframe.frame, before_from_leaving * non_keyframe.keyframe_from_camera});
-    }
-  }
-  window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(i));
-}
-
 }  // namespace
 
 ObservationWalk::ObservationWalk(const Window& window) : window_(window) {
@@ -143,7 +127,7 @@ void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& option
     for (const int track_id : lost_tracks(window, leaving, keyframe)) {
       window.landmarks.erase(track_id);
     }
-    drop(window, leaving);
+    window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
   }
   window.keyframes.push_back(std::move(keyframe));
 }
@@ -181,9 +165,6 @@ void rescale(Window& window, double factor, const Eigen::Vector3d& center) {
   };
   for (Keyframe& keyframe : window.keyframes) {
     keyframe.world_from_camera.translation = scaled(keyframe.world_from_camera.translation);
-    for (NonKeyframe& non_keyframe : keyframe.non_keyframes) {
-      non_keyframe.keyframe_from_camera.translation *= factor;
-    }
   }
   for (auto& [track_id, point] : window.landmarks) {
     point = scaled(point);

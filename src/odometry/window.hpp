@@ -15,18 +15,11 @@
 
 namespace stemvo {
 
-/// A frame between two keyframes, stored relative to the earlier one.
-struct NonKeyframe {
-  int frame = 0;
-  Rigid3 keyframe_from_camera;
-};
-
 /// A frame that stays in the window.
 struct Keyframe {
   int frame = 0;
   Rigid3 world_from_camera;
   Observations points;
-  std::vector<NonKeyframe> non_keyframes;  ///< frames after it, until the next keyframe; in order
 };
 
 /// Keyframes of one view and the landmarks they see, connected by track ids. Everything is in units
@@ -88,8 +81,8 @@ class ObservationWalk {
                                            std::size_t leaving,
                                            const Keyframe& coming);
 
-/// Appends the keyframe to the window. A full one first drops its leaving keyframe, which becomes a
-/// non_keyframe of the one before it, and landmarks that no keyframe sees any more.
+/// Appends the keyframe to the window. A full one first drops its leaving keyframe, and landmarks
+/// that no keyframe sees any more.
 void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& options);
 
 /// Triangulates the tracks of the newest keyframe that are no landmarks yet, from the first and the

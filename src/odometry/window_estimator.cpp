@@ -148,9 +148,10 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   const double length = speed_per_frame_ * (frame.number - reference.frame - frames_still_);
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
-  const Observations points = current_points(frame.matches, motion.inlier_mask);
   const bool is_tracking = motion.state == FrameState::kTracking;
-  if (is_tracking && motion.is_decisive && open_window({frame.number, guess, points, frame.road})) {
+  if (is_tracking && motion.is_decisive &&
+      open_window(
+          {frame.number, guess, current_points(frame.matches, motion.inlier_mask), frame.road})) {
     return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
@@ -160,7 +161,6 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   const bool is_still =
       motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
   frames_still_ += is_still ? 1 : 0;
-  initializer_.wait({frame.number, world_from_camera_, points});
   return is_tracking ? FrameState::kInitializing : motion.state;
 }
 
@@ -183,17 +183,11 @@ void WindowEstimator::reset_reference_before(const Matches& matches) {
 
 bool WindowEstimator::open_window(View view) {
   const View& reference = initializer_.reference();
-  std::optional<Window> window =
-      initializer_.open_window(view, camera(), window_options_, localization_);
+  std::optional<Window> window = initializer_.open_window(view, camera(), window_options_);
   if (!window.has_value()) {
     return false;
   }
-  if (!window_.keyframes.empty()) {  // the frames since belong to the new one
-    std::erase_if(window_.keyframes.back().non_keyframes, [&](const NonKeyframe& non_keyframe) {
-      return non_keyframe.frame > reference.frame;
-    });
-    history_.close(window_);
-  }
+  history_.close(window_);
   window_ = std::move(*window);
   const View& road_view = reference.road != nullptr ? reference : view;
   scale_.restart(road_view.road.get());
@@ -260,7 +254,7 @@ bool WindowEstimator::is_keyframe(const View& view) const {
 }
 
 void WindowEstimator::add_keyframe(const Frame& frame) {
-  Keyframe keyframe{frame.number, world_from_camera_, last_moving_.points, {}};
+  Keyframe keyframe{frame.number, world_from_camera_, last_moving_.points};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
     history_.leave(window_, leaving_keyframe(window_, keyframe), keyframe);
@@ -293,12 +287,11 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
     const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
-    const bool is_first = !scale_.has_scale();
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
     if (factor != 1.0) {
       rescale(window_, factor, center);
-      history_.rescale(window_, factor, is_first);
+      history_.rescale(factor);
       calibration_.rescale(factor, center);
       for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);
@@ -323,19 +316,14 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
     is_last_localized_ = is_localized;
     last_ = {frame.number, world_from_camera_, {}, frame.road};
   }
-  if (!window_.keyframes.empty() && window_.keyframes.back().frame != frame.number) {
-    Keyframe& newest = window_.keyframes.back();
-    newest.non_keyframes.push_back(
-        {frame.number, newest.world_from_camera.inverse() * world_from_camera_});
-  }
   trajectory_.push_back(world_from_camera_);
-  history_.end_frame();
+  history_.end_frame(window_);
 }
 
-LandmarkMap WindowEstimator::map() const {
+std::vector<KeptLandmark> WindowEstimator::landmarks() const {
   WindowHistory history = history_;
   history.close(window_);
-  return {history.landmarks(), refined_poses(trajectory_, history.motions())};
+  return history.landmarks();
 }
 
 }  // namespace stemvo

@@ -30,7 +30,7 @@ class WindowEstimator final : public Estimator {
   void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
-  [[nodiscard]] LandmarkMap map() const override;
+  [[nodiscard]] std::vector<KeptLandmark> landmarks() const override;
 
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();

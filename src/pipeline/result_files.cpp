@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "geometry/median.hpp"
 #include "options/visit.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
@@ -45,25 +46,24 @@ std::string describe_numbers(const MetricsReport& report) {
   return text;
 }
 
-/// Steps to both sides of a frame that tell how much its surroundings were stretched.
-constexpr std::size_t kStepsAround = 5;
-
-double path_length(std::span<const Rigid3> poses, std::size_t begin, std::size_t end) {
-  double length = 0.0;
-  for (std::size_t i = begin + 1; i < end; ++i) {
-    length += (poses[i].translation - poses[i - 1].translation).norm();
-  }
-  return length;
-}
-
-/// Written units per unit of the landmarks, around a frame.
+/// Written units per unit of the estimate around a frame: the median over steps, since one that
+/// ends the wait for a first map spans many frames. Frames stay where no step was measured.
 double stretch_at(std::span<const Rigid3> estimated,
                   std::span<const Rigid3> written,
                   std::size_t frame) {
+  constexpr std::size_t kStepsAround = 5;  // to both sides
+  const auto step = [](std::span<const Rigid3> poses, std::size_t i) {
+    return (poses[i].translation - poses[i - 1].translation).norm();
+  };
+  std::vector<double> stretches;
   const std::size_t begin = frame - std::min(frame, kStepsAround);
   const std::size_t end = std::min(frame + kStepsAround + 1, estimated.size());
-  const double before = path_length(estimated, begin, end);
-  return before > 0.0 ? path_length(written, begin, end) / before : 1.0;
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    if (const double before = step(estimated, i); before > 0.0) {
+      stretches.push_back(step(written, i) / before);
+    }
+  }
+  return stretches.empty() ? 1.0 : median(stretches);
 }
 
 /// "frames 10:20 of 03", in the folder's numbering; "frames 10: of 03" where the end is not known.
@@ -194,16 +194,15 @@ class ResultWriter {
 
   /// Landmarks and the camera's path among them. Where steps are rescaled, both are.
   [[nodiscard]] Status write_map() const {
-    const LandmarkMap map = run_.odometry.frames().estimator().map();
-    const Trajectory path = as_written(run_, map.world_from_camera);
+    const Estimator& estimator = run_.odometry.frames().estimator();
     std::vector<ColoredPoint> points;
-    for (const KeptLandmark& landmark : map.landmarks) {
+    for (const KeptLandmark& landmark : estimator.landmarks()) {
       const auto frame = static_cast<std::size_t>(landmark.frame);
-      const Eigen::Vector3d in_camera =
-          stretch_at(map.world_from_camera, path, frame) * landmark.in_camera.cast<double>();
-      points.push_back({(path[frame] * in_camera).cast<float>(), landmark.rgb});
+      const Eigen::Vector3d in_camera = stretch_at(estimator.trajectory(), trajectory_, frame) *
+                                        landmark.in_camera.cast<double>();
+      points.push_back({(trajectory_[frame] * in_camera).cast<float>(), landmark.rgb});
     }
-    return write_map_ply(request_.out_dir / "map.ply", points, path);
+    return write_map_ply(request_.out_dir / "map.ply", points, trajectory_);
   }
 
   /// All frames, in the world of the ground truth where some have one.

@@ -155,4 +155,26 @@ inline double length_ratio(std::span<const Rigid3> poses,
   return length(poses) / length(truth);
 }
 
+/// The drive's point in the direction of a landmark, in the camera that saw it last.
+inline Eigen::Vector3d true_place(const KeptLandmark& landmark, const DriveTracks& drive) {
+  const Eigen::Vector3d direction = landmark.in_camera.cast<double>().normalized();
+  const Rigid3 camera_from_world = drive.pose(landmark.frame).inverse();
+  const auto cosine = [&](const Eigen::Vector3d& point) {
+    return direction.dot((camera_from_world * point).normalized());
+  };
+  return camera_from_world * *std::ranges::max_element(drive.points, {}, cosine);
+}
+
+/// Distance from a landmark, placed by the poses, to its true place, over its depth. Both paths
+/// begin at the origin.
+inline double placing_error(const KeptLandmark& landmark,
+                            std::span<const Rigid3> poses,
+                            double unit_m,
+                            const DriveTracks& drive) {
+  const Eigen::Vector3d in_camera = true_place(landmark, drive);
+  const Eigen::Vector3d place =
+      poses[static_cast<std::size_t>(landmark.frame)] * landmark.in_camera.cast<double>();
+  return (unit_m * place - drive.pose(landmark.frame) * in_camera).norm() / in_camera.z();
+}
+
 }  // namespace stemvo::testing

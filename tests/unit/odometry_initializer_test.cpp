@@ -35,10 +35,9 @@ Decided initialize(const DriveTracks& drive, const Options& config = {}) {
     if (result.motion.state == FrameState::kTracking && result.motion.is_decisive) {
       result.frame = i;
       now.world_from_camera = result.motion.cur_from_prev.inverse();
-      result.window = initializer.open_window(now, drive.camera, {}, {});
+      result.window = initializer.open_window(now, drive.camera, {});
       return result;
     }
-    initializer.wait(std::move(now));
   }
   return result;
 }
@@ -68,7 +67,7 @@ TEST(Initializer, DecidesBetweenTheReferenceAndNowWhereNeighboursHaveNoParallax)
   }
 }
 
-TEST(Initializer, OpensAWindowOfTheReferenceAndNowWithTheFramesBetween) {
+TEST(Initializer, OpensAWindowOfTheReferenceAndNow) {
   const DriveTracks walk = sideways_walk(0.1, 4);
   const Decided decided = initialize(walk);
   ASSERT_TRUE(decided.window.has_value());
@@ -77,16 +76,6 @@ TEST(Initializer, OpensAWindowOfTheReferenceAndNowWithTheFramesBetween) {
   EXPECT_EQ(window.keyframes.front().frame, 0);
   EXPECT_EQ(window.keyframes.back().frame, decided.frame);
   EXPECT_GT(window.landmarks.size(), 100U);
-  const std::vector<NonKeyframe>& between = window.keyframes.front().non_keyframes;
-  ASSERT_EQ(between.size(), static_cast<std::size_t>(decided.frame) - 1);
-  const double unit_m = (walk.pose(decided.frame).translation - walk.pose(0).translation).norm();
-  for (const NonKeyframe& non_keyframe : between) {
-    const Rigid3 truth = walk.pose(0).inverse() * walk.pose(non_keyframe.frame);
-    const Rigid3& estimate = non_keyframe.keyframe_from_camera;
-    EXPECT_LT((unit_m * estimate.translation - truth.translation).norm(), 0.15 * unit_m)
-        << non_keyframe.frame;
-    EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01) << non_keyframe.frame;
-  }
 }
 
 TEST(Initializer, APlanarSceneDecidesByTheHomography) {

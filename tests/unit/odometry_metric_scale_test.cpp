@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -106,9 +107,8 @@ INSTANTIATE_TEST_SUITE_P(Modes,
                            return mode.param == OdometryMode::kMap ? "map" : "two_frame";
                          });
 
-// The first road multiplies the window, whose poses are as far from each other as they were; what
-// has left the window before keeps the length it had.
-TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
+// The first road multiplies the window; landmarks stay in the units of the poses that place them.
+TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
   const int num_frames = 44;
   const int first_road = 32;
   RoadDrive drive(num_frames);
@@ -119,22 +119,34 @@ TEST(MetricScale, TheFirstRoadRescalesTheWindowAndDoesNotTearWhatHasLeft) {
   run.road = [&](int i) { return drive.road_image(i, i >= first_road); };
   run.add_range(0, first_road);
   EXPECT_EQ(run.results.back().scale_state, ScaleState::kNone);
-  const double unit_m = kStep_m / step_m(run, first_road - 1);
   EXPECT_NEAR(step_m(run, first_road - 1), 1.0, 0.05);  // the assumed step
-  const int left_before = estimator.window().keyframes.front().frame;
-  ASSERT_GT(left_before, 2);
   run.add_range(first_road, num_frames);
   EXPECT_EQ(run.results.back().scale_state, ScaleState::kMeasured);
   EXPECT_NEAR(step_m(run, num_frames - 1), kStep_m, 0.02 * kStep_m);
-  const std::vector<Rigid3> refined = estimator.map().world_from_camera;
-  ASSERT_EQ(refined.size(), static_cast<std::size_t>(num_frames));
-  for (int i = 1; i < num_frames; ++i) {
-    const double ratio = testing::length_ratio(refined, drive.tracks.world_from_camera, i - 1, i);
-    if (i <= left_before) {
-      EXPECT_NEAR(ratio * unit_m, 1.0, 0.02) << i;
-    } else if (i > left_before + 1) {
-      EXPECT_NEAR(ratio, 1.0, 0.03) << i;
-    }
+  int num_before = 0;
+  int num_after = 0;
+  for (const KeptLandmark& landmark : estimator.landmarks()) {
+    const bool is_metric = landmark.frame >= first_road;
+    const double unit_m = is_metric ? 1.0 : kStep_m;
+    const double depth_m = testing::true_place(landmark, drive.tracks).z();
+    EXPECT_NEAR(unit_m * landmark.in_camera.z(), depth_m, 0.05 * depth_m) << landmark.frame;
+    ++(is_metric ? num_after : num_before);
+  }
+  EXPECT_GT(num_before, 20);
+  EXPECT_GT(num_after, 100);
+}
+
+TEST(MetricScale, TheTrajectoryPlacesLandmarksInMetres) {
+  const RoadDrive drive(44);
+  WindowEstimator estimator(metric_config(), drive.scene.camera);
+  EstimatorRun run(estimator, drive.tracks);
+  run.road = [&](int i) { return drive.road_image(i, true); };
+  run.add_all();
+  const std::vector<KeptLandmark> landmarks = estimator.landmarks();
+  ASSERT_GT(landmarks.size(), 200U);
+  for (const KeptLandmark& landmark : landmarks) {
+    EXPECT_LT(testing::placing_error(landmark, estimator.trajectory(), 1.0, drive.tracks), 0.05)
+        << landmark.frame;
   }
 }
 

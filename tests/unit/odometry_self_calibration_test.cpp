@@ -30,7 +30,7 @@ void observe_run(int k,
   }
   const DriveTracks drive(path, points, 0.1, static_cast<std::uint64_t>(k), true_camera);
   for (int i = 0; i < kLength; ++i) {
-    Keyframe keyframe{kLength * k + i, drive.pose(i), {}, {}};
+    Keyframe keyframe{kLength * k + i, drive.pose(i), {}};
     for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
       keyframe.points.push_back({id, uv});
     }
@@ -164,7 +164,7 @@ TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) 
 TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
   const DriveTracks drive(kLength, 0.1, 5);
   const auto keyframe_of = [&](int i, double unit) {
-    Keyframe keyframe{i, drive.pose(i), {}, {}};
+    Keyframe keyframe{i, drive.pose(i), {}};
     keyframe.world_from_camera.translation *= unit;
     for (const auto& [id, uv] : drive.observations[static_cast<std::size_t>(i)]) {
       keyframe.points.push_back({id, uv});
