@@ -28,7 +28,7 @@ if(STEMVO_SANITIZE_THREAD)
   target_link_options(stemvo_options INTERFACE -fsanitize=thread)
 endif()
 
-# What is shipped stops where memory is written beyond its end (docs/reliability.md). Not for a project that includes
+# The shipped program stops where memory is written beyond its end (docs/reliability.md). Not for a project that includes
 # this one.
 if(PROJECT_IS_TOP_LEVEL)
   set(CMAKE_POSITION_INDEPENDENT_CODE ON)

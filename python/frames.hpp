@@ -7,13 +7,13 @@
 
 namespace stemvo::python {
 
-/// What a camera file makes of frames that come from elsewhere.
+/// View of a camera file for frames that come from elsewhere.
 struct CameraView {
   FrameList frames;  ///< none of its own
   dataset::FrameView view;
 };
 
-/// Of a Recording or a FrameView; nullptr: of neither.
+/// Frames of a Recording or a FrameView; nullptr: of neither.
 [[nodiscard]] const FrameList* frames_of(nb::handle object);
 
 }  // namespace stemvo::python

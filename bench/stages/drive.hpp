@@ -16,8 +16,8 @@
 
 namespace stemvo::bench {
 
-/// What the stages are measured on: the first frames of $STEMVO_BENCH_SEQUENCE, a KITTI folder, or
-/// of a drive rendered for this run, at KITTI's size.
+/// Drive that the stages are measured on: the first frames of $STEMVO_BENCH_SEQUENCE, a KITTI
+/// folder, or of a drive rendered for this run, at KITTI's size.
 struct Frames {
   std::filesystem::path folder;  ///< room for files, removed at the end
   KittiSequence sequence;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What measuring costs: a frame meets some 15 timers.
+// Cost of measuring: a frame meets some 15 timers.
 #include <benchmark/benchmark.h>
 
 #include "timing/stage_timer.hpp"

@@ -27,7 +27,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kScaleSources[] = {"camera_height", "ground_truth"};
 constexpr double kLengthTolerance_m = 1.5;
 
-/// Those asked for, where one that is not there is a row, or all.
+/// Sequences asked for, where one that is not there is a row, or all.
 Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& request) {
   const fs::path folder = request.kitti_root / "sequences";
   std::vector<std::string> names;
@@ -145,7 +145,7 @@ class Benchmark {
     return summary_;
   }
 
-  /// Of the sequences in the plan.
+  /// Input files of the sequences in the plan.
   [[nodiscard]] const std::vector<fs::path>& inputs() const { return inputs_; }
 
  private:

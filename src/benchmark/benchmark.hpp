@@ -21,7 +21,7 @@ struct BenchmarkRequest {
   std::filesystem::path out_dir;
   std::filesystem::path published;     ///< the official sequences and published numbers
   std::vector<std::string> sequences;  ///< names of folders; empty: every folder that is there
-  /// What is measured, under names that are also folders', e.g. "default".
+  /// Configurations to measure, under names that are also folders', e.g. "default".
   std::vector<std::pair<std::string, Config>> configurations;
   int num_threads = 0;  ///< 0: all cores
   std::string command;  ///< that repeats it, for report.html; may be empty

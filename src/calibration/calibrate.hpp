@@ -35,7 +35,7 @@ struct CalibratedParameter {
   bool is_determined = false;
 };
 
-/// What a drive tells of its camera.
+/// Camera parameters that a drive has determined.
 struct CalibrationReport {
   Camera refined;
   /// Focal length, principal point x and y (px); k1 and k2, the radial distortion

@@ -16,14 +16,14 @@ struct InputOptions {
   std::string camera = "auto";
 };
 
-/// What the program reads from YAML; config/default.yaml is generated from the defaults.
+/// The program's configuration, read from YAML; config/default.yaml is generated from the defaults.
 struct Config : Options {
   InputOptions input;
   EvaluationOptions evaluation;
 
   std::filesystem::path file;  ///< that load_config read; empty: none
 
-  // Who chose a key, e.g. "scale.source".
+  // Keys that somebody chose, e.g. "scale.source".
   std::set<std::string> keys_in_file;     ///< of load_config
   std::set<std::string> keys_overridden;  ///< of apply_override
 };

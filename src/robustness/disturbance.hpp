@@ -14,7 +14,7 @@
 
 namespace stemvo::robustness {
 
-/// Of one frame: what an effect may depend on. The same numbers give the same image.
+/// Facts about one frame that an effect may depend on. The same numbers give the same image.
 struct EffectContext {
   std::size_t frame = 0;  ///< counted from the drive's first
   std::uint64_t seed = 0;
@@ -34,7 +34,7 @@ struct Disturbance {
   /// Whether a frame is disturbed; null: all are.
   bool (*is_on)(std::size_t frame, double strength) = nullptr;
 
-  /// Of a frame of a drive of so many, calm end included.
+  /// Whether it changes a frame of a drive of so many, calm end included.
   [[nodiscard]] bool disturbs(std::size_t frame, std::size_t num_frames, double strength) const;
 };
 
@@ -60,7 +60,7 @@ struct Disturbance {
 /// Random numbers of one frame (`frame`: any number where all frames share them).
 [[nodiscard]] cv::RNG random_of(std::uint64_t seed, std::uint64_t frame);
 
-/// Those with `apply`, and those with `resample`.
+/// Disturbances with `apply`, and those with `resample`.
 [[nodiscard]] std::vector<Disturbance> effects();
 [[nodiscard]] std::vector<Disturbance> resamplings();
 

@@ -91,7 +91,7 @@ struct Summary {
 [[nodiscard]] std::string format_table(const RobustnessReport& report);
 /// A line per row, drive and contender.
 [[nodiscard]] std::string format_csv(const RobustnessReport& report);
-/// What robustness.json holds.
+/// Content of robustness.json.
 [[nodiscard]] nlohmann::ordered_json document(const RobustnessReport& report);
 /// A page for a browser: ratios with their intervals, error over strength. Error: cannot be
 /// written.

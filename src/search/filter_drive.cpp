@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMaxPathPoints = 400;
 constexpr std::size_t kMaxDense = 400;
-/// Of the path so far; chosen among prefixes of clips (docs/search.md).
+/// Shares of the path so far; chosen among prefixes of clips (docs/search.md).
 constexpr std::array<double, 3> kEarlyShares = {0.25, 0.5, 0.75};
 
 /// Evenly spaced, first and last included, to the centimetre.

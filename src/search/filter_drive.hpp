@@ -22,7 +22,7 @@ class FilterDrive {
   /// Null: no image, or a stem that refused it.
   void process(const Channel* channel, const cv::Mat& frame);
 
-  /// Of the frames so far, at least one.
+  /// Score over the frames so far, at least one.
   [[nodiscard]] DriveScore score() const;
 
  private:
@@ -32,7 +32,7 @@ class FilterDrive {
   ChannelOdometry odometry_;
   const Config* config_;
   const FrameSource* sequence_;
-  // Of the frames after the first.
+  // Sums over the frames after the first.
   std::size_t num_matches_ = 0;
   std::size_t num_inliers_ = 0;
   enum Outcome { kFewMatches, kFewInliers, kGated, kNoImage, kMeasured, kNumOutcomes };

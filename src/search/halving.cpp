@@ -12,7 +12,7 @@ namespace stemvo::search {
 namespace {
 
 constexpr double kBudget = 0.25;
-/// Of fewer filters an even fall would leave too few where the order begins to be known, at a
+/// With fewer filters an even fall would leave too few where the order begins to be known, at a
 /// quarter of the frames.
 constexpr std::size_t kFewFilters = 16;
 
@@ -34,8 +34,8 @@ Schedule schedule_of(std::size_t num_filters, const Shares& shares, std::size_t 
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-/// What survivors are chosen by: first detected or not and the early error; the other numbers tell
-/// whether two filters are one.
+/// Order by which survivors are chosen: first detected or not and the early error; the other
+/// numbers tell whether two filters are one.
 std::tuple<int, double, double, double, double> standing_of(const FilterRecord& record) {
   const DriveScore mean = mean_score(record.drives);
   return {mean.detected ? 0 : 1, early_error(mean), mean.E_r_deg.value_or(kNone),
@@ -78,7 +78,7 @@ std::size_t frames_at(const Rung& rung, std::size_t num_frames) {
 }
 
 std::vector<std::size_t> best_first(std::span<const FilterRecord* const> records) {
-  // What gives the same numbers to the last bit is the same channel: one of them tells all.
+  // Filters with the same numbers to the last bit are the same channel: one of them tells all.
   std::map<decltype(standing_of({})), std::map<FilterKey, std::size_t>> channels;
   for (std::size_t i = 0; i < records.size(); ++i) {
     channels[standing_of(*records[i])].emplace(records[i]->key, i);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a search depends on, and what of it has changed since.
+// A search's inputs, and which of them have changed since.
 #include <algorithm>
 #include <string>
 #include <string_view>
@@ -38,7 +38,7 @@ struct Fact {
   std::string hash = {};
 };
 
-/// What is said of a feature method in a name.
+/// Part of a name that tells the feature method.
 std::string unless_default(const std::string& features) {
   return features == options::to_string(FeatureOptions().method) ? "" : " " + features;
 }

@@ -16,7 +16,7 @@
 namespace stemvo::search {
 namespace {
 
-/// What the layer of a channel made by hand is called in tables.
+/// Name in tables of the layer of a channel made by hand.
 constexpr const char* kInputLayer = "input";
 
 /// 0: half the stride; shifted passes of a coarse layer cost more than more of them tell.
@@ -117,7 +117,7 @@ Status add_layers(const SearchRequest& request, SearchPlan& plan) {
   return {};
 }
 
-/// What can be said before anything is opened.
+/// Checks that need no open file.
 Status check_request(const SearchRequest& request) {
   if (const Status valid = validate(request.config); !valid) {
     return valid;

@@ -19,11 +19,11 @@ namespace fs = std::filesystem;
 /// A channel needs room for the windows of a tracker or descriptor and for motion.
 constexpr int kMinSide_px = 16;
 
-/// What the filters in flight may take by the estimate; the process takes some 0.2 GB more, and the
-/// weights and layers of the network.
+/// Memory that filters in flight may take by the estimate; the process takes some 0.2 GB more, and
+/// the weights and layers of the network.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 30;
 
-/// Of three.
+/// Second of three strengths.
 constexpr std::size_t kMiddleStrength = 1;
 
 /// Each sequence ranks once, under a name of its own, and the held-out one has no frame that ranks.

@@ -27,8 +27,8 @@ struct Race {
   const SearchProgress& progress;
   RecordFile& file;
   std::size_t max_kept = 0;
-  /// Of candidates in flight or kept, else empty: the odometry on each sequence; none where it has
-  /// not started, or cannot.
+  /// Odometries of candidates in flight or kept, one for each sequence, else empty; none where it
+  /// has not started, or cannot.
   std::vector<std::vector<std::optional<FilterDrive>>> drives{plan.candidates.size()};
   std::vector<std::string> warnings = {};
   std::size_t frames_done = 0;
@@ -95,7 +95,7 @@ struct Race {
     return found == file.records().end() ? nullptr : &*found;
   }
 
-  /// Of candidates that ran the rung; the odometries of the others are given up.
+  /// Best candidates that ran the rung; the odometries of the others are given up.
   Candidates best_of(const Candidates& group, std::size_t rung, std::size_t count) {
     std::vector<const FilterRecord*> found;
     for (const std::size_t candidate : group) {
@@ -114,7 +114,7 @@ struct Race {
     return best;
   }
 
-  /// Of those of a block only what goes on, as far as there is room.
+  /// Keeps those of a block that go on, as far as there is room.
   void limit_kept(std::size_t rung, const Candidates& block) {
     auto num_kept = static_cast<std::size_t>(
         std::ranges::count_if(drives, [](auto& one) { return !one.empty(); }));
@@ -126,8 +126,8 @@ struct Race {
     }
   }
 
-  /// Those without a record, in blocks; those that go on apart from those that start, since a block
-  /// is at one frame.
+  /// Candidates without a record, in blocks; those that go on apart from those that start, since a
+  /// block is at one frame.
   Status run_rung(std::size_t rung, const Candidates& alive) {
     Candidates going_on;
     Candidates starting;

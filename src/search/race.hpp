@@ -63,7 +63,7 @@ struct SearchPlan {
 /// Errors: those of run_search.
 [[nodiscard]] Expected<SearchPlan> make_plan(const SearchRequest& request);
 
-/// Of a filter in flight, by an estimate: its channel of two frames and, per sequence, its
+/// Estimated memory of a filter in flight: its channel of two frames and, per sequence, its
 /// odometry. 256 filters of 620x188 take 1.7 to 2.1 MB each (1 and 2 threads), by this 2.0.
 [[nodiscard]] std::size_t bytes_in_flight(cv::Size channel,
                                           cv::Size image,

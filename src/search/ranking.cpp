@@ -12,7 +12,7 @@
 namespace stemvo::search {
 namespace {
 
-/// What a mean is taken of.
+/// Numbers of a score that a mean is taken of.
 constexpr std::optional<double> DriveScore::* kNumbers[] = {
     &DriveScore::t_rel_percent,    &DriveScore::r_rel_deg_per_100m,
     &DriveScore::average_offset_m, &DriveScore::E_t_m,
@@ -35,7 +35,8 @@ std::tuple<FilterStatus, double, double> order_of(const FilterRow& row) {
           is_stopped ? early_error(row.mean) : 0.0};
 }
 
-/// Of the dense errors, as paired_ratio has them; of t_rel where the path is too short for them.
+/// Mean of the dense errors, as paired_ratio has them; of t_rel where the path is too short for
+/// them.
 double mean_error_percent(const DriveScore& drive) {
   const std::vector<double>& dense = drive.dense_t_percent;
   return dense.empty()

@@ -17,12 +17,12 @@ namespace stemvo::search {
 namespace {
 
 constexpr int kMaxFilter = 1000000;
-// Of a search. Lines of more sequences would be longer than kMaxRecordBytes.
+// Most rungs of a search. Lines of more sequences would be longer than kMaxRecordBytes.
 constexpr std::size_t kMaxRungs = 20;
 constexpr std::size_t kMaxLayers = 300;
 constexpr std::size_t kMaxSequences = 300;
 constexpr std::size_t kMaxFrames = 100000000;
-/// Of every number of a score: far above what a drive on Earth has.
+/// Bound of every number of a score: far above what a drive on Earth has.
 constexpr double kMaxNumber = 1e9;
 constexpr std::size_t kMaxPoints = 1000;
 
@@ -98,7 +98,7 @@ Status check_score(const DriveScore& score, const SequenceIdentity& sequence, co
   return status ? check_shape(score, num_frames == sequence.num_frames) : status;
 }
 
-/// Those that a record of this rung tells of.
+/// Sequences that a record of this rung tells of.
 std::vector<SequenceIdentity> sequences_of(const SearchIdentity& identity, bool is_last_rung) {
   std::vector<SequenceIdentity> sequences;
   std::set<std::string> names;

@@ -83,7 +83,7 @@ std::string sealed(const std::string& text, const internal::Sha256& seal) {
   return fmt::format("{}{}{}{}{}", kBeforeHash, seal.hex(text), kBeforeText, text, kBehind);
 }
 
-/// What is in it. Error, without file and line: no search wrote it.
+/// Content of a sealed line. Error, without file and line: no search wrote it.
 Expected<std::string> unsealed(std::string_view line, const internal::Sha256& seal) {
   constexpr std::size_t kHashSize = 64;
   constexpr std::size_t kTextAt = kBeforeHash.size() + kHashSize + kBeforeText.size();
@@ -122,7 +122,8 @@ int depth_of(std::string_view text) {
   return deepest;
 }
 
-/// Of the lines' members. A cast of a number that is none may be undefined, or give another one.
+/// Checks the lines' members. A cast of a number that is none may be undefined, or give another
+/// one.
 bool has_whole_numbers(const ReadJson& json) {
   static constexpr std::array kWhole = {
       "rung",         "filter",      "filter_frames", "held_out_filter_frames",

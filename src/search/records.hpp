@@ -29,7 +29,7 @@
 namespace stemvo::search {
 
 inline constexpr const char* kRecordsFile = "records.jsonl";
-/// What it holds at most (24,000 drives of a KITTI sequence and more), and one line of it.
+/// Most that the file (24,000 drives of a KITTI sequence and more) and one line of it may hold.
 inline constexpr int kMaxRecords_MB = 512;
 inline constexpr std::size_t kMaxRecordBytes = 8000000;
 
@@ -71,7 +71,7 @@ struct DriveScore {
   bool operator==(const DriveScore&) const = default;
 };
 
-/// What a filter did on one rung.
+/// A filter's result on one rung.
 struct FilterRecord {
   std::size_t rung = 0;
   FilterKey key;
@@ -180,7 +180,7 @@ class RecordFile {
   /// Error: they cannot be written, or would make it larger than what is read again.
   [[nodiscard]] Status append(const std::vector<FilterRecord>& records);
   [[nodiscard]] const FilterRecords& records() const { return records_; }
-  /// Of what it held when it was opened.
+  /// Warnings about its content when it was opened.
   [[nodiscard]] const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
@@ -201,7 +201,7 @@ enum class FilterStatus { kRanked, kStopped, kNotDetected };
 struct FilterRow : FilterRecord {
   FilterStatus status = FilterStatus::kRanked;
   DriveScore mean;  ///< of the drives
-  // Of ranked rows:
+  // Set in ranked rows only:
   ErrorRatio over_best;   ///< dense errors over those of the row that has the lowest, drives'
                           ///< geometric mean
   bool is_equal = false;  ///< the interval does not say that it is worse
@@ -211,7 +211,7 @@ struct FilterRow : FilterRecord {
 /// reason that of the first sequence whose pose was not detected.
 [[nodiscard]] DriveScore mean_score(const std::vector<DriveScore>& drives);
 
-/// What unfinished filters are compared by: early errors, near ties by inliers.
+/// Compares unfinished filters: early errors, near ties by inliers.
 [[nodiscard]] double early_error(const DriveScore& mean);
 
 /// One row per filter from its last rung: those that cannot be told from the best, by
@@ -228,7 +228,7 @@ struct FilterRow : FilterRecord {
 [[nodiscard]] std::string format_csv(const SearchIdentity& identity,
                                      const std::vector<FilterRow>& rows);
 
-/// What is written to a folder, where named models are found, and the command that repeats the
+/// Everything written to a folder, where named models are found, and the command that repeats the
 /// search, which may be empty.
 struct ResultsTarget {
   std::filesystem::path out_dir;
@@ -255,7 +255,7 @@ struct Results {
   Config config;  ///< of all rows
   std::vector<FilterRow> rows;
 };
-/// What a search's results show of its first sequence.
+/// Pictures of a search's first sequence for its results.
 struct Pictures {
   cv::Mat sheet;  ///< RGB; empty: nothing was found. The input and the channels of choose_rows
   std::vector<html::CaptionedImage> channels;  ///< those of the sheet

@@ -111,7 +111,7 @@ std::vector<Column> csv_columns(const SearchIdentity& identity, const FilterRow&
   return columns;
 }
 
-/// Those columns of filters.csv that tell filters apart, for people: numbers to the right.
+/// Table for people of the columns that tell filters apart: numbers to the right.
 std::string format_table(const SearchIdentity& identity, const std::vector<FilterRow>& rows) {
   static const std::map<std::string, char> kShown = {{"model", 'l'},
                                                      {"layer", 'l'},
@@ -203,7 +203,7 @@ std::string format_json(const Results& results, const Json& work, bool is_comple
   return to_text(json);
 }
 
-/// What stands below the table.
+/// Lines below the table.
 std::string format_summary(const Results& results, const Json& work) {
   const auto num_frames = work["filter_frames"].get<std::size_t>();
   const auto num_exhaustive = work["exhaustive_filter_frames"].get<double>();

@@ -57,10 +57,10 @@ Status add_identity(const SearchIdentity& part, SearchIdentity& joined) {
   return {};
 }
 
-/// What all parts found: of each filter, by (is it held out, name of the sequence).
+/// Scores of all parts: for each filter, by (is it held out, name of the sequence).
 using Scores = std::map<FilterKey, std::map<std::pair<bool, std::string>, DriveScore>>;
 
-/// What two parts hold is no trouble where they agree; else an error.
+/// Records that two parts hold must agree; else an error.
 Status add_record(const FilterRecord& record, Scores& scores) {
   std::vector<DriveScore> found = record.drives;
   if (record.held_out) {

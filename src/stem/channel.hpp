@@ -27,7 +27,7 @@ struct Channel {
   PixelMap map;
 };
 
-/// What OpenCV detects and tracks on: a channel normalized to 8 bits, at its own or the input's
+/// The image that points are tracked on: a channel normalized to 8 bits, at its own or the input's
 /// size.
 struct ChannelImage {
   cv::Mat pixels;  ///< CV_8U

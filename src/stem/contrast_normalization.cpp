@@ -13,10 +13,10 @@ namespace {
 
 // Enough for percentiles to a hundredth of the range, few enough to cost nothing.
 constexpr int kSamplesWanted = 20000;
-// Of the larger limit's magnitude: below it, the spread is rounding.
+// Share of the larger limit's magnitude: below it, the spread is rounding.
 constexpr double kLeastContrast = 1e-5;
 constexpr double kMiddleGray = 128.0;
-// Of the limits' distance: the next frame's lie no further from this one's, nearly always.
+// Share of the limits' distance: the next frame's limits nearly always lie no further away.
 constexpr double kMargin = 0.1;
 // The same: beyond it the light has changed, and the old limits would cut off or hide the image.
 constexpr double kJump = 0.2;

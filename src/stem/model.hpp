@@ -12,7 +12,7 @@
 
 namespace stemvo {
 
-/// What a model file says of its one layer, in its metadata (`stemvo.kernel` ..).
+/// A model file's statements on its one layer, from its metadata (`stemvo.kernel` ..).
 struct ModelInfo {
   std::string network;  ///< e.g. "EfficientNetV2-B0"
   std::string layer;
@@ -37,7 +37,7 @@ struct ModelInfo {
 /// The .onnx file of a built-in model, or that of a path. Error: neither, or it cannot be read.
 [[nodiscard]] Expected<std::string> read_model(const std::string& model);
 
-/// What the file says, without the checks of open_model.
+/// Reads the file's statements, without the checks of open_model.
 [[nodiscard]] Expected<ModelInfo> read_model_info(const std::string& model);
 
 namespace internal {

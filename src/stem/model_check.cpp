@@ -18,7 +18,7 @@ namespace {
 constexpr int kStrides = 6;
 // Side of an image that all of a deep network's layers can take.
 constexpr int kSmallest = 96;
-// Of the output's size: differences below it are rounding.
+// Share of the output's size: differences below it are rounding.
 constexpr float kRounding = 1e-4F;
 
 /// First output whose window lies in the frame, and one more: the frame goes on around it.

@@ -35,9 +35,9 @@ struct SamplingAxis {
   }
   [[nodiscard]] int margin_after() const { return needs_margin() ? after : 0; }
   [[nodiscard]] int buffer_size(int size) const { return margin_before() + size + margin_after(); }
-  /// Of the interleaved channel; 0 if the frame is smaller than the kernel.
+  /// Size of the interleaved channel; 0 if the frame is smaller than the kernel.
   [[nodiscard]] int channel_size(int size) const { return outputs(size, sampling); }
-  /// Of one pass over the buffer.
+  /// Size of the output of one pass over the buffer.
   [[nodiscard]] int pass_size(int size) const { return outputs(buffer_size(size), stride); }
   /// Outputs of each pass before the first that is kept.
   [[nodiscard]] int first_output() const { return margin_before() / stride; }

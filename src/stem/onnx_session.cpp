@@ -15,7 +15,7 @@
 
 namespace stemvo::internal {
 
-/// What a graph says of one input or output.
+/// Name, type and shape of one input or output of a graph.
 struct OnnxSession::TensorInfo {
   std::string name;
   ONNXTensorElementDataType type = ONNX_TENSOR_ELEMENT_DATA_TYPE_UNDEFINED;

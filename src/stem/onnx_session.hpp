@@ -36,7 +36,7 @@ class OnnxSession {
 
   /// The model's metadata_props under this key; nullopt: none.
   [[nodiscard]] Expected<std::optional<std::string>> metadata(const std::string& key) const;
-  /// Of the image: 3 or 1.
+  /// Planes of the image: 3 or 1.
   [[nodiscard]] int num_planes() const { return num_planes_; }
   [[nodiscard]] int num_filters() const { return num_filters_; }
   /// The only size of image the graph takes; 0 where an axis is free.

@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// What is known of the loaded model.
+/// Facts about the loaded model.
 struct StemInfo {
   std::string model = {};  ///< as asked for
   std::string layer = {};  ///< empty for one made by hand
@@ -77,7 +77,7 @@ class Stem {
   bool has_all_;  ///< else `bank_` is the one chosen, in a file of its own
 };
 
-/// What kAuto stands for: for tracked points kHalf where half the size still has many pixels per
+/// Resolves kAuto: for tracked points kHalf where half the size still has many pixels per
 /// degree (a focal length of 500 px and more in the input), else kInputZoomed; for others kInput.
 [[nodiscard]] TrackingResolution choose_tracking_resolution(TrackingResolution asked,
                                                             FeatureMethod method,
@@ -93,7 +93,7 @@ class Stem {
 /// one gray and leaves the limits as they were; NaN becomes 0 (upsampled: its surroundings too).
 class ContrastNormalization {
  public:
-  /// Of `options.tracking_resolution`, kAuto and kInputZoomed stand for
+  /// In `options.tracking_resolution`, kAuto and kInputZoomed stand for
   /// kInput: see choose_tracking_resolution.
   explicit ContrastNormalization(const StemOptions& options);
   [[nodiscard]] ChannelImage apply(const Channel& channel);

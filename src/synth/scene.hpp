@@ -32,7 +32,7 @@ struct Face {
   Style style;
 };
 
-/// What is near one frame: part of a street, or a courtyard.
+/// Surroundings of one frame: part of a street, or a courtyard.
 class Scene {
  public:
   /// `ambient`: light on what the sun does not reach.

@@ -86,7 +86,7 @@ try_package() {
   done
 }
 
-# Of zsh and fish; deb.cmake has bash's.
+# Tries zsh and fish; deb.cmake has bash's.
 try_completions() {
   echo "==> Completions"
   install zsh fish

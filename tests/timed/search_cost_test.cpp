@@ -8,7 +8,7 @@
 namespace stemvo {
 namespace {
 
-/// What a search may cost, loosely: a layer of 256 filters as wide as ConvNeXt-XL's stem, of frames
+/// Loose bound on a search's cost: a layer of 256 filters as wide as ConvNeXt-XL's stem, of frames
 /// of KITTI's size.
 class SearchCost : public Search {
  protected:

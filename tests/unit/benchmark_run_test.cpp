@@ -161,7 +161,8 @@ TEST_F(BenchmarkRuns, OnlyWhatChangedIsRepeated) {
   EXPECT_THAT(runs_, SizeIs(0));
 }
 
-/// What stands beside 03, whose frames, size and length are those of an official sequence.
+/// Published numbers stand beside 03, whose frames, size and length are those of an official
+/// sequence.
 TEST_F(BenchmarkRuns, PublishedNumbersStandOnlyBesideAllOfficialFrames) {
   request_.sequences = {"03"};
   request_.configurations.resize(1);

@@ -98,7 +98,7 @@ std::string name_of(const ::testing::TestParamInfo<Disturbance>& one) {
 
 class EachEffect : public EachDisturbance {};
 
-/// Those that change the image: more with every strength, and the last frames not at all.
+/// Effects change the image: more with every strength, and the last frames not at all.
 TEST_P(EachEffect, DisturbsMoreWithItsStrengthAndLeavesTheEndCalm) {
   const FrameSource source = make_source();
   double before = 0.0;
@@ -160,7 +160,7 @@ TEST(Disturbances, DuskHasPhotonNoise) {
   EXPECT_GT(noise_over_signal(200, 0.01), 2.0 * noise_over_signal(200, 0.1));
 }
 
-/// What is red stays red: a JPEG of the colours swapped has other brightness.
+/// Red stays red: a JPEG of the colours swapped has other brightness.
 TEST(Disturbances, JpegKeepsColours) {
   cv::Mat image(64, 64, CV_8UC3, cv::Scalar(200, 40, 20));
   apply("jpeg", image, 30.0, {0, 0, {}});

@@ -255,7 +255,7 @@ TEST(HalvingSchedule, KeepsTheBudgetAndEndsWithAllFrames) {
   }
 }
 
-/// Of more filters than docs/search.md says more go on to a rung than odometries are kept.
+/// More filters go on to a rung than odometries are kept.
 TEST(HalvingSchedule, HowManyFiltersFitIntoMemory) {
   EXPECT_LE(halving_schedule(892)[1].filters, kMaxKept);
   EXPECT_GT(halving_schedule(893)[1].filters, kMaxKept);

@@ -126,7 +126,7 @@ TEST_F(Records, AWholeLineThatIsNoRecordIsLeftOutAndNamed) {
   EXPECT_FALSE(RecordFile::open(file("a"), identity(0, 3), false));  // never replaced
 }
 
-/// What somebody, or a broken disk, made of the second of three records.
+/// Somebody, or a broken disk, changes the second of three records.
 TEST_F(Records, WhatNoSearchWritesIsLeftOutAndTheRestKept) {
   const std::vector<std::pair<std::string, std::string>> changes = {
       {R"("filter":1)", R"("filter":7)"},

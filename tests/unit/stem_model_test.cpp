@@ -49,7 +49,7 @@ TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
                     HasSubstr("tools/export_stem.py " + model)));
 }
 
-/// What a model is refused with that says something else under a key.
+/// Error of a model that says something else under a key.
 std::string error_with(const std::string& name, const std::string& key, const std::string& value) {
   const testing::TempFolder folder;
   const std::string bytes = testing::read_all(testing::tiny_model(name));

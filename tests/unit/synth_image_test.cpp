@@ -57,7 +57,7 @@ cv::Mat predict(const RenderedFrame& a,
   return map;
 }
 
-/// What tracking finds between frames and their successors warped on to them, in pixels.
+/// Offsets that tracking finds between frames and their successors warped on to them, in pixels.
 struct Offsets {
   std::vector<double> dx;
   std::vector<double> dy;

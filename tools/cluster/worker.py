@@ -7,7 +7,7 @@ import signal
 import subprocess
 import tempfile
 
-# What a part is; the rest of a search's folder is made again by the merge.
+# Files of a part; the rest of a search's folder is made again by the merge.
 PART_FILES = ("records.jsonl",)
 
 
