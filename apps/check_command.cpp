@@ -19,7 +19,7 @@ its bounds:
   tracked_fraction: {min: 0.99}
   ate_rmse_m.sim3: {max: 3}
 
-Exit code 1 when a bound is passed, so that it gates a script:
+Exit code 1 when a number is outside its bounds, so that it gates a script:
   stemvo check result/metrics.json --against thresholds.yaml)";
 
 struct CheckArguments {

@@ -24,7 +24,7 @@ std::string describe(const std::string& model, const ModelInfo& info, const Stat
   return fmt::format(
       "{}: {}\n"
       "  network   {}, layer {}\n"
-      "  filters   {}{} of {}x{} pixels, stride {}, the best: {}\n"
+      "  filters   {}{} of {}x{} pixels, stride {}, default: {}\n"
       "  licence   {}\n"
       "  made by   {}\n",
       model, status ? "sound" : "NOT SOUND", info.network, info.layer, alone, info.num_filters,

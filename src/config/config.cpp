@@ -19,7 +19,8 @@ void visit_keys(C& config, V&& v) {
     "folder of the sequence to read; auto: image_2 (colour) where present, else image_0 (gray)");
   v("evaluation", "segment_lengths_m", config.evaluation.segment_lengths_m,
     Rule::between(0.01, 1e6),
-    "of t_rel and r_rel; []: 100, 200, .. 800, or 10, 20, .. 50 where the path is under 100 m");
+    "lengths of the segments of t_rel and r_rel; []: 100, 200, .. 800, or 10, 20, .. 50 where the "
+    "path is under 100 m");
   options::visit(config, v);
 }
 

@@ -15,7 +15,8 @@ namespace {
 Status check_options(const Options& options) {
   if (options.scale.source == ScaleSource::kGroundTruth) {
     return fail(
-        "scale.source: expected none, constant or camera_height, found ground_truth, for which "
+        "scale.source: expected none, constant_speed or camera_height, found ground_truth, for "
+        "which "
         "the odometry has no poses");
   }
   return validate(options);

@@ -35,7 +35,7 @@ constexpr double kBias_px = 0.3;
 /// The camera moves by this at a keyframe: the window can follow.
 constexpr double kMaxStep_px = 0.25;
 
-/// Finite, and nowhere less than nothing.
+/// The numbers are finite and the information is positive.
 bool is_plausible(const CameraMeasurement& found) {
   const Eigen::Map<const IntrinsicsDelta> scale(kPriorSigma);
   const CameraInformation scaled = scale.asDiagonal() * found.information * scale.asDiagonal();

@@ -26,11 +26,11 @@ class SelfCalibration {
 
   SelfCalibration(const Camera& given, CameraRefinement refinement);
 
-  /// The next keyframe, its pose refined. A run that is long enough is measured until the next
-  /// call, in another thread where there may be one beside this (cv::setNumThreads), and taken in
-  /// then: the same on any number of threads.
+  /// Takes the next keyframe, refined where the window is. A run that is long enough is measured
+  /// until the next call, in another thread where there may be one beside this (cv::setNumThreads),
+  /// and taken in then: the same on any number of threads.
   void observe(const Keyframe& keyframe, const BundleOptions& options);
-  /// As of a window.
+  /// Rescales the run as the window is rescaled.
   void rescale(double factor, const Eigen::Vector3d& center) {
     stemvo::rescale(run_, factor, center);
   }
@@ -42,7 +42,7 @@ class SelfCalibration {
   /// The estimate of all runs, whether it is significant or not, after one that is still measured;
   /// nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraEstimate> estimate() const;
-  /// It counts the runs that were fused; nullopt: nothing is refined.
+  /// Standard deviations after the runs fused so far; nullopt: nothing is refined.
   [[nodiscard]] std::optional<CameraSigma> camera_sigma() const;
 
  private:

@@ -21,7 +21,8 @@
 namespace stemvo {
 
 /// The estimator (`odometry.mode: map`): a window of keyframes is the truth, and a frame is
-/// localized against its landmarks. It alone owns pose, window and scale (docs/architecture.md).
+/// localized against its landmarks. It alone owns pose, window, scale and camera
+/// (docs/architecture.md).
 class WindowEstimator final : public Estimator {
  public:
   WindowEstimator(const Options& config, const Camera& camera);

@@ -124,7 +124,8 @@ inline const Rule kPixels = Rule::between(1e-3, 1000);
 template <Is<StemOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("model", o.model, kAny,
-    "default or paper (built in), path of an .onnx, or made by hand, to compare with: gray, log "
+    "default, default_filter_2 or paper (built in), path of an .onnx, or made by hand, to compare "
+    "with: gray, log "
     "(Laplacian of Gaussian), census (local contrast), input_layer (filters 0-2 = R, G, B)");
   v("filter", o.filter, Rule::between(-1, 1000000),
     "the one filter whose response is the image; -1: the default_filter of the model");
@@ -176,10 +177,12 @@ void visit(O& o, V&& v) {
   v("homography_ratio", o.homography_ratio, Rule::between(0, 1),
     "R_H of eq. (7) above it: the initial pose comes from the homography");
   v("estimator", o.estimator, kAny, "robust estimator");
-  v("inlier_threshold_px", o.inlier_threshold_px, kPixels, "of the robust estimator, input pixels");
+  v("inlier_threshold_px", o.inlier_threshold_px, kPixels,
+    "epipolar distance of an inlier, for the robust estimator, input pixels");
   v("confidence", o.confidence, Rule::between(0.5, 0.999999999),
-    "of the robust estimator: probability that a good sample was drawn");
-  v("max_iterations", o.max_iterations, Rule::between(1, 10000000), "of the robust estimator");
+    "probability that the robust estimator has drawn a good sample");
+  v("max_iterations", o.max_iterations, Rule::between(1, 10000000),
+    "most iterations of the robust estimator");
   v("refine", o.refine, kAny, "nonlinear refinement of the motion on the inliers");
   v("refine_loss_px", o.refine_loss_px, kPixels,
     "epipolar distance from which the refinement mistrusts a match, input pixels");
@@ -191,7 +194,7 @@ void visit(O& o, V&& v) {
     "two_frame: motions of pairs of frames are chained; map: each frame is localized against the "
     "landmarks of a window of keyframes, which are refined together");
   v("composition", o.composition, kAny,
-    "how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)");
+    "two_frame: how steps are chained: right, R_c R; paper, R R_c as printed in eq. (12)");
   v("gate", o.gate, kAny,
     "two_frame: what a step that does not go forward loses: its translation, paper: its rotation "
     "too; off: nothing");
@@ -213,7 +216,8 @@ template <Is<BaOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("every_n_keyframes", o.every_n_keyframes, Rule::between(0, 1000000),
     "keyframes between bundle adjustments of the window, the paper's m; 0: never");
-  v("max_iterations", o.max_iterations, Rule::between(1, 1000), "of one bundle adjustment");
+  v("max_iterations", o.max_iterations, Rule::between(1, 1000),
+    "most iterations of one bundle adjustment");
   v("loss_px", o.loss_px, kPixels,
     "reprojection error from which an observation is mistrusted, input pixels");
 }
@@ -256,7 +260,7 @@ void visit(O& o, V&& v) {
   visit(o.ba, section("ba"));
   visit(o.camera, section("camera"));
   visit(o.scale, section("scale"));
-  v("", "seed", o.seed, kAny, "of every random number");
+  v("", "seed", o.seed, kAny, "seed of every random number");
 }
 
 }  // namespace stemvo::options

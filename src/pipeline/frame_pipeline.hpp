@@ -14,7 +14,7 @@
 
 namespace stemvo::pipeline {
 
-/// Called for each frame, in order, one call at a time, not always from the same thread, while
+/// Called for each frame, in order, one call at a time, from the thread of run_frames, while
 /// the odometry holds what it knows of this frame. `index` counts from 0; `frame` is the image or
 /// the Error that names its file. False ends the run: frames already read ahead are dropped.
 using FrameVisitor =

@@ -45,8 +45,8 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   return sequence;
 }
 
-/// Removes an earlier run's results. Whenever this one is killed, all under final
-/// names is of one run: config.yaml comes before frames and results.
+/// Removes an earlier run's results, so that every file under its final name belongs to this run
+/// whenever it is killed: config.yaml comes before frames and results.
 Status prepare_out_folder(const Run& run) {
   const std::filesystem::path& out = run.request.out_dir;
   Status status;
@@ -96,7 +96,7 @@ void note_start(const Run& run, bool is_replacing) {
                            describe_size(sequence), describe_truth(request, sequence)));
   if (is_replacing) {
     request.note(
-        fmt::format("results of an earlier run in {} are replaced (another --out keeps them)",
+        fmt::format("files of an earlier result in {} are replaced (another --out keeps them)",
                     request.out_dir.string()));
   }
 }
@@ -118,6 +118,8 @@ Expected<RunSummary> run_source(RunRequest request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
   request.config = dataset::with_camera_height(request.config, sequence.frames());
+  // Lives longer than the odometry, whose thread that measures the camera may end last.
+  std::optional<StageRecorder> recorder;
   Expected<PhasedOdometry> odometry =
       pipeline::create_odometry(request.config, sequence.camera(), sequence.frames().mask);
   if (!odometry) {
@@ -138,7 +140,6 @@ Expected<RunSummary> run_source(RunRequest request,
   if (!prepared) {
     return prepared.error();
   }
-  std::optional<StageRecorder> recorder;
   if (request.measure_times) {
     recorder.emplace();
   }

@@ -8,7 +8,8 @@
 
 namespace stemvo::pipeline {
 
-/// While it lives, the process works on `num_threads` threads (0: one per core), OpenCV's included.
+/// While it lives, OpenCV works on `num_threads` threads (0: one per core); with one, no loop of
+/// the odometry has a thread of its own.
 class ThreadScope {
  public:
   explicit ThreadScope(int num_threads)

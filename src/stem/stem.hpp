@@ -41,8 +41,8 @@ class Stem {
  public:
   /// Loads and checks a model, for `apply` alone: of the default one the best filter's own file.
   /// Errors: no such model, not ONNX, no metadata that say kernel, stride and padding, or others
-  /// than the graph's, inputs or outputs other than 1x3xHxW -> 1xCxhxw float, filter outside [0,
-  /// C), sampling_px not a divisor of the stride (lists the allowed values).
+  /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
+  /// outside [0, C), sampling_px not a divisor of the stride (lists the allowed values).
   [[nodiscard]] static Expected<Stem> load(const StemOptions& options);
   /// The same with all filters, for `apply_all` and `apply_range` too.
   [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options);

@@ -12,16 +12,16 @@
 
 namespace stemvo {
 
-/// A frame goes through these, in this order. Each is done at most once per frame.
+/// A frame goes through these, in this order; most are done at most once per frame.
 enum class Stage {
   kRead,         ///< file and PNG decoder
   kStem,         ///< the filter
   kContrast,     ///< channel to 8-bit image
-  kPyramid,      ///< klt
+  kPyramid,      ///< patch, klt
   kDescription,  ///< orb, sift: descriptors
   kRoadImage,
   kDetection,   ///< corners or keypoints
-  kTracking,    ///< klt both ways, or matching of descriptors
+  kTracking,    ///< patches, klt both ways, or matching of descriptors
   kHomography,  ///< robust estimate
   kEpipolar,    ///< fundamental or essential matrix, robust estimate
   kTwoViewRefinement,

@@ -10,7 +10,7 @@ namespace stemvo {
 /// One row of `stemvo run --timing`.
 struct StageTiming {
   std::string name;
-  std::size_t calls = 0;   ///< at most one per frame
+  std::size_t calls = 0;
   double median_ms = 0.0;  ///< wall time of one call
   double p95_ms = 0.0;     ///< 95 of 100 calls take no longer
   double cpu_s = 0.0;      ///< of the calling thread, all calls

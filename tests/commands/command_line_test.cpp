@@ -118,7 +118,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
   }
 }
 
-TEST(CommandLine, ModelsListsTheManifest) {
+TEST(CommandLine, ModelsListsTheBuiltInOnes) {
   const ProgramResult result = run_stemvo({"models"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("default: sound"));
