@@ -325,7 +325,7 @@ Expected<BenchmarkSummary> run_benchmark(const BenchmarkRequest& request) {
     return fail(fmt::format("{}: expected official sequences and published numbers, found: {}",
                             request.published.string(), error.what()));
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir, benchmark.inputs());
+  const auto lock = pipeline::open_out_folder(request.out_dir, "benchmark", benchmark.inputs());
   return lock ? benchmark.run() : lock.error();
 }
 

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <optional>
+#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include "text/text_file.hpp"
 
@@ -25,6 +26,7 @@ constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
     {"scale.constant_m", "scale.step_m"},
     {"scale.joining", "scale.temporal_filter"},
     {"scale.source=constant", "scale.source=constant_speed"},
+    {"stem.layer", "stem.model (a file holds one layer)"},
     {"stem.stretch_high_percent", "stem.contrast_high_percent"},
     {"stem.stretch_low_percent", "stem.contrast_low_percent"},
     {"stem.stretch_memory", "stem.contrast_memory"},
@@ -101,19 +103,30 @@ std::string parse_number(std::string_view kind, const YAML::Node& node, Number& 
              : fmt::format("expected {}, found {}", kind, options::quote(text));
 }
 
-/// Line of the second document, which yaml-cpp would leave out without a word.
-std::optional<int> line_of_second_document(const std::string& text) {
-  bool has_content = false;
-  int line_number = 0;
-  for (const std::string_view line : split_lines(text)) {
-    ++line_number;
-    if (line.starts_with("---") && has_content) {
-      return line_number;
-    }
-    has_content = has_content || !(line.empty() || line[0] == '#' || line[0] == '%');
-  }
-  return std::nullopt;
-}
+/// Finds where documents begin: YAML::Load reads the first and leaves out others without a word.
+class DocumentLines final : public YAML::EventHandler {
+ public:
+  std::vector<int> lines;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { lines.push_back(mark.line + 1); }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&,
+                const std::string&,
+                YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&,
+                       const std::string&,
+                       YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&,
+                  const std::string&,
+                  YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
 
 /// Walks one YAML map, top level (section empty) or section.
 class MapReader {
@@ -164,11 +177,14 @@ class MapReader {
 }  // namespace
 
 Expected<YAML::Node> parse_document(const std::string& text, std::string_view source) {
-  if (const auto line = line_of_second_document(text)) {
-    return fail(
-        fmt::format("{}:{}: not YAML: expected one document, found more behind it", source, *line));
-  }
   try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    DocumentLines documents;
+    if (parser.HandleNextDocument(documents) && parser.HandleNextDocument(documents)) {
+      return fail(fmt::format("{}:{}: not YAML: expected one document, found more behind it",
+                              source, documents.lines.back()));
+    }
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     return fail(fmt::format("{}:{}: not YAML: {}", source, error.mark.line + 1, error.msg));

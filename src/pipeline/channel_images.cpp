@@ -34,7 +34,7 @@ Expected<std::size_t> write_channel_images(const ChannelImagesRequest& request,
     return filters.error();
   }
   const auto lock = pipeline::open_out_folder(
-      request.out_dir, pipeline::input_files(request, *sequence, request.config));
+      request.out_dir, "channel", pipeline::input_files(request, *sequence, request.config));
   Status status = lock ? Status() : lock.error();
   std::size_t num_written = 0;
   const auto save = [&](const cv::Mat& image, std::size_t number, const std::string& name) {

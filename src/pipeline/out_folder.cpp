@@ -25,23 +25,34 @@ Error refuse(const fs::path& folder, const std::string& found) {
                           folder.string(), found));
 }
 
-Status check_is_ours(const fs::path& folder) {
+std::string mark_of(const std::string& command) {
+  return fmt::format("Results of 'stemvo {}': its next run may replace them.\n", command);
+}
+
+Status check_may_be_replaced(const fs::path& folder, const std::string& command) {
   std::error_code code;
-  if (!fs::is_directory(folder, code) || fs::is_empty(folder, code) || is_our_folder(folder)) {
+  if (!fs::is_directory(folder, code) || fs::is_empty(folder, code) ||
+      is_folder_of(folder, command)) {
     return {};
   }
   return fail(
-      fmt::format("{}: expected a new folder, an empty one or results of stemvo, found other "
-                  "files (no {})",
-                  folder.string(), kMark));
+      fmt::format("{}: expected a new folder, an empty one or results of 'stemvo {}', found other "
+                  "files",
+                  folder.string(), command));
 }
 
 Status check_holds_none(const fs::path& folder, const std::vector<fs::path>& inputs) {
   std::error_code code;
   const fs::path root = fs::weakly_canonical(fs::absolute(folder, code), code);
+  const auto is_below_root = [&root](const fs::path& path) {
+    return std::ranges::mismatch(root, path).in1 == root.end();
+  };
   const auto is_inside = [&](const fs::path& input) {
-    const fs::path parent = fs::weakly_canonical(fs::absolute(input, code).parent_path(), code);
-    return std::ranges::mismatch(root, parent).in1 == root.end() && fs::exists(input, code);
+    const fs::path path = fs::absolute(input, code);
+    // A link to a file may lie in the folder, or lead into it.
+    return fs::exists(input, code) &&
+           (is_below_root(fs::weakly_canonical(path.parent_path(), code)) ||
+            is_below_root(fs::weakly_canonical(path, code).parent_path()));
   };
   const auto found = std::ranges::find_if(inputs, is_inside);
   return found == inputs.end()
@@ -74,9 +85,9 @@ Status create_out_folder(const fs::path& folder) {
   return code ? Status(refuse(folder, code.message())) : Status();
 }
 
-bool is_our_folder(const fs::path& folder) {
-  std::error_code code;
-  return fs::exists(folder / kMark, code);
+bool is_folder_of(const fs::path& folder, const std::string& command) {
+  const auto mark = read_text_file(folder / kMark, kMaxSettings_MB);
+  return mark && *mark == mark_of(command);
 }
 
 Expected<fs::path> create_results_folder(const std::string& name) {
@@ -92,18 +103,19 @@ Expected<fs::path> create_results_folder(const std::string& name) {
   return code ? Expected<fs::path>(refuse(folder, code.message())) : folder;
 }
 
-Expected<FolderLock> open_out_folder(const fs::path& folder, const std::vector<fs::path>& inputs) {
-  const Status status = check_is_ours(folder)
-                            .and_then([&] { return check_holds_none(folder, inputs); })
-                            .and_then([&] { return create_out_folder(folder); });
-  if (!status) {
-    return status.error();
+Expected<FolderLock> open_out_folder(const fs::path& folder,
+                                     const std::string& command,
+                                     const std::vector<fs::path>& inputs) {
+  const Status status =
+      check_holds_none(folder, inputs).and_then([&] { return create_out_folder(folder); });
+  auto lock = status ? lock_folder(folder) : Expected<FolderLock>(status.error());
+  if (!lock) {
+    return lock;
   }
-  auto lock = lock_folder(folder);
-  const Status marked =
-      lock ? write_text_file(folder / kMark,
-                             "Results of stemvo: its next command may replace them.\n")
-           : Status();
+  if (const Status ours = check_may_be_replaced(folder, command); !ours) {
+    return ours.error();
+  }
+  const Status marked = write_text_file(folder / kMark, mark_of(command));
   return marked ? std::move(lock) : refuse(folder, marked.error().message);
 }
 

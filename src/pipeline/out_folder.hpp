@@ -21,17 +21,19 @@ using FolderLock = std::shared_ptr<void>;
 /// Creates the folder and those above it.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
 
-/// Whether a command of ours made the folder: it holds our mark, the file .stemvo.
-[[nodiscard]] bool is_our_folder(const std::filesystem::path& folder);
+/// Whether this command ("run", ..) made the folder: the mark in it, the file .stemvo, says so.
+[[nodiscard]] bool is_folder_of(const std::filesystem::path& folder, const std::string& command);
 
 /// Creates results/NAME, or results/NAME_2, _3 .. where that is taken.
 [[nodiscard]] Expected<std::filesystem::path> create_results_folder(const std::string& name);
 
-/// Creates the folder with our mark and locks it; every command with a folder asks for it so.
-/// Errors: it holds files but no mark of ours; one of the `inputs` lies in it; it cannot be
-/// written; another process has it now.
+/// Creates the folder with the command's mark and locks it; every command with a folder asks for it
+/// so. Errors: it holds files but no mark of this command; one of the `inputs` lies in it, also
+/// through a link; it cannot be written; another process has it now.
 [[nodiscard]] Expected<FolderLock> open_out_folder(
-    const std::filesystem::path& folder, const std::vector<std::filesystem::path>& inputs);
+    const std::filesystem::path& folder,
+    const std::string& command,
+    const std::vector<std::filesystem::path>& inputs);
 
 /// Files that are read for a source's frames and its model; some need not be there.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSource& source,

@@ -133,9 +133,9 @@ Expected<RunSummary> run_source(RunRequest request,
     request.out_dir = *folder;
   }
   const Run run{request, sequence, *odometry};
-  const bool is_replacing = pipeline::is_our_folder(request.out_dir);
+  const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
   const auto lock = pipeline::open_out_folder(
-      request.out_dir, pipeline::input_files(request, sequence, request.config));
+      request.out_dir, "run", pipeline::input_files(request, sequence, request.config));
   const Status prepared = lock ? prepare_out_folder(run) : lock.error();
   if (!prepared) {
     return prepared.error();

@@ -278,7 +278,7 @@ Expected<RobustnessReport> run_robustness(const RobustnessRequest& request) {
   if (const Status status = robustness.plan(); !status) {
     return status.error();
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir, robustness.inputs());
+  const auto lock = pipeline::open_out_folder(request.out_dir, "robustness", robustness.inputs());
   if (!lock) {
     return lock.error();
   }

@@ -162,7 +162,7 @@ Expected<SearchReport> run_search(const SearchRequest& request, const SearchProg
   if (!plan) {
     return plan.error();
   }
-  const auto lock = pipeline::open_out_folder(request.out_dir, inputs_of(request, *plan));
+  const auto lock = pipeline::open_out_folder(request.out_dir, "search", inputs_of(request, *plan));
   if (!lock) {
     return lock.error();
   }
@@ -220,7 +220,7 @@ Expected<SearchReport> merge_searches(const std::vector<std::filesystem::path>& 
   identity.layers = join_layers(identity, scores);
   identity.rungs = {{1.0, identity.count(false)}};
   identity.only_sequence.reset();
-  const auto lock = pipeline::open_out_folder(out_dir, inputs);
+  const auto lock = pipeline::open_out_folder(out_dir, "search", inputs);
   if (!lock) {
     return lock.error();
   }

@@ -5,6 +5,7 @@
 #include <array>
 #include <climits>
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include <fmt/format.h>
@@ -91,6 +92,8 @@ Status OnnxSession::load(std::string_view model) {
     return fail(fmt::format("ONNX Runtime {}: expected function table version {}, found none",
                             base->GetVersionString(), kApiVersion));
   }
+  // ONNX Runtime would send telemetry, and keep a file for it in the user's cache.
+  ::setenv("ORT_DISABLE_TELEMETRY", "1", 0);
   // Fatal only: whatever goes wrong comes back as a status, and must not be printed twice.
   OrtEnv* env = nullptr;
   STEMVO_ORT_TRY(api_->CreateEnv(ORT_LOGGING_LEVEL_FATAL, "stemvo", &env));

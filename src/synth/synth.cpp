@@ -55,15 +55,21 @@ struct DriveFolder {
 };
 
 /// Makes the folders, empty. Error: what is there was not rendered.
-Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive, bool with_depth) {
+Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
+                                           const SyntheticDriveOptions& options) {
   std::error_code code;
-  if (fs::exists(drive.poses, code) && !pipeline::is_our_folder(drive.sequence)) {
+  if (options.trajectory && fs::equivalent(*options.trajectory, drive.poses, code)) {
+    return fail(fmt::format(
+        "{}: expected poses that the drive's do not replace (--name gives another name)",
+        drive.poses.string()));
+  }
+  if (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth")) {
     return fail(
         fmt::format("{}: expected poses of a rendered drive or none, found others (--name gives "
                     "another name)",
                     drive.poses.string()));
   }
-  auto lock = pipeline::open_out_folder(drive.sequence, {});
+  auto lock = pipeline::open_out_folder(drive.sequence, "synth", {});
   if (!lock) {
     return lock;
   }
@@ -71,7 +77,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive, bool with_d
     fs::remove_all(drive.sequence / content, code);
   }
   fs::create_directory(drive.sequence / "image_2", code);
-  if (with_depth) {
+  if (options.write_depth) {
     fs::create_directory(drive.sequence / "depth", code);
   }
   const Status made = pipeline::create_out_folder(drive.poses.parent_path());
@@ -151,7 +157,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
   }
   const DriveFolder drive{out_dir / "sequences" / options.name,
                           out_dir / "poses" / (options.name + ".txt")};
-  const auto lock = open_folder(drive, options.write_depth);
+  const auto lock = open_folder(drive, options);
   if (!lock) {
     return lock.error();
   }

@@ -55,8 +55,10 @@ TEST_F(BadInput, MissingSequence) {
 
 /// yaml-cpp's LoadAll never ends here.
 TEST_F(BadInput, MoreBehindTheDocument) {
-  expect_error(run_with_config("seed: 1\n---\nseed: 2\n"), 1,
-               {"my.yaml:2:", "not YAML", "more behind it"});
+  for (const char* text : {"seed: 1\n---\nseed: 2\n", "seed: 1\n...\nseed: 2\n",
+                           "{seed: 1}\nstem: {filter: 3}\n", "{stem: {filter: 3}},\n"}) {
+    expect_error(run_with_config(text), 1, {"my.yaml:", "not YAML", "more behind it"});
+  }
 }
 
 TEST_F(BadInput, WhatIsNoModelIsNamed) {

@@ -41,14 +41,60 @@ TEST_F(Overwrite, CalibrateSparesWhatItReads) {
 }
 
 TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
-  const std::string folder = sequence_ / "image_2";
+  const fs::path mine = folder_ / "mine";
+  fs::create_directory(mine);
+  write_file(mine / "notes.txt", "mine");
   for (const char* command : {"run", "search", "robustness", "channel"}) {
-    expect_error(run_stemvo({command, sequence_, "--out", folder}), 1,
-                 {folder, "expected a new folder, an empty one or results of stemvo"});
+    expect_error(run_stemvo({command, sequence_, "--out", mine}), 1,
+                 {mine, "expected a new folder, an empty one or results of 'stemvo "});
+    expect_error(run_stemvo({command, sequence_, "--out", sequence_ / "image_2"}), 1,
+                 {sequence_ / "image_2", "expected a folder that holds no input"});
   }
-  expect_error(run_stemvo({"benchmark", folder_.path(), "--out", folder}), 1,
-               {folder, "expected a new folder, an empty one or results of stemvo"});
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 10);
+  expect_error(run_stemvo({"benchmark", folder_.path(), "--out", mine}), 1,
+               {mine, "expected a new folder, an empty one or results of 'stemvo "});
+  EXPECT_EQ(std::distance(fs::directory_iterator(mine), fs::directory_iterator()), 1);
+}
+
+TEST_F(Overwrite, ResultsOfAnotherCommandStay) {
+  ASSERT_EQ(run_stemvo({"channel", sequence_, "--frames", "0:1", "--filters", "0:1", "--out", out_})
+                .exit_code,
+            0);
+  write_file(fs::path(out_) / "config.yaml", "mine");
+  expect_error(run_stemvo({"run", sequence_, "--quiet", "--out", out_}), 1,
+               {out_, "results of 'stemvo run', found other files"});
+  EXPECT_EQ(read_file(fs::path(out_) / "config.yaml"), "mine");
+}
+
+TEST_F(Overwrite, AnInputBehindALinkStays) {
+  ASSERT_EQ(run_stemvo({"run", sequence_, "--quiet", "--out", out_}).exit_code, 0);
+  const fs::path truth = fs::path(out_) / "trajectory_kitti.txt";
+  fs::copy_file(folder_ / "poses/00.txt", truth, fs::copy_options::overwrite_existing);
+  fs::create_symlink(truth, folder_ / "gt.txt");
+  expect_error(run_stemvo({"run", sequence_, "--gt", folder_ / "gt.txt", "--quiet", "--out", out_}),
+               1, {out_, "expected a folder that holds no input"});
+  EXPECT_EQ(read_file(truth), read_file(folder_ / "poses/00.txt"));
+}
+
+TEST_F(Overwrite, PosesThatADriveIsRenderedAlongStay) {
+  const std::string drive = folder_ / "drive";
+  const std::vector<std::string> synth = {"synth", drive, "--frames", "2"};
+  ASSERT_EQ(run_stemvo(synth).exit_code, 0);
+  const fs::path poses = fs::path(drive) / "poses/00.txt";
+  const std::string before = read_file(poses);
+  std::vector<std::string> along = synth;
+  along.insert(along.end(), {"--trajectory", poses});
+  expect_error(run_stemvo(along), 1, {poses, "do not replace"});
+  EXPECT_EQ(read_file(poses), before);
+}
+
+TEST_F(Overwrite, NothingIsLeftInTheUsersHome) {
+  const fs::path home = folder_ / "home";
+  fs::create_directory(home);
+  const ProgramResult result = test::run_program(
+      "/usr/bin/env", {"HOME=" + home.string(), "XDG_CACHE_HOME=" + (home / "cache").string(),
+                       STEMVO_PROGRAM, "run", sequence_, "--quiet", "--out", out_});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(fs::is_empty(home)) << "ONNX Runtime's telemetry keeps a file there";
 }
 
 TEST_F(Overwrite, ARunIsRepeatedWithItsOwnConfiguration) {

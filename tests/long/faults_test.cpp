@@ -7,6 +7,7 @@
 
 #include <gmock/gmock.h>
 
+#include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 
 namespace stemvo {
@@ -69,6 +70,26 @@ TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
   EXPECT_EQ(judged.exit_code, 0) << judged.err;
 }
 
+TEST_F(LongRun, PosesSoFarHaveTrueStepsWhereTheyAreAskedFor) {
+  std::vector<std::string> with_truth = arguments();
+  with_truth.insert(with_truth.end(), {"--set", "scale.source=ground_truth"});
+  test::RunningProgram program(STEMVO_PROGRAM, with_truth);
+  wait_for_poses();
+  program.send(SIGKILL);
+  EXPECT_EQ(program.wait().exit_code, 128 + SIGKILL) << "the run was over too soon to tell";
+  const auto poses = read_kitti_trajectory(out_ / "trajectory_kitti.txt").value();
+  const auto truth = read_kitti_trajectory(drive_ / "../../poses/00.txt").value();
+  const auto length = [&](const Trajectory& path) {
+    double sum_m = 0.0;
+    for (std::size_t i = 1; i < poses.size(); ++i) {
+      sum_m += (path[i].translation - path[i - 1].translation).norm();
+    }
+    return sum_m;
+  };
+  ASSERT_GT(poses.size(), 10U);
+  EXPECT_NEAR(length(poses), length(truth), 0.02 * length(truth));
+}
+
 TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
   test::RunningProgram first(STEMVO_PROGRAM, arguments());
   wait_for_poses();
@@ -80,7 +101,8 @@ TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
   }
   first.send(SIGKILL);
   static_cast<void>(first.wait());
-  EXPECT_EQ(run_stemvo(channel).exit_code, 0) << "the lock of a process that was killed is gone";
+  EXPECT_EQ(run_stemvo(arguments()).exit_code, 0)
+      << "the lock of a process that was killed is gone";
 }
 
 }  // namespace

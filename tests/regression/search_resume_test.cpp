@@ -119,7 +119,8 @@ TEST_F(Search, ASheetThatCannotBeWrittenIsAnError) {
   for (const char* name : {"sheet.png", "report.html"}) {
     fs::remove(folder_ / "out" / name);  // which the search before this wrote
     fs::create_directories(folder_ / "out" / name);
-    write_file(folder_ / "out/.stemvo", "");
+    write_file(folder_ / "out/.stemvo",
+               "Results of 'stemvo search': its next run may replace them.\n");
     expect_error(search("out", {"--exhaustive", "--filters", "0:1", "--no-baselines", "--resume"}),
                  1, {name, "expected a file to write, found a folder"});
     EXPECT_THAT(table("out"), HasSubstr("default,stem,0"));
