@@ -48,8 +48,7 @@ Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   return synth::make_drive_along(*poses);
 }
 
-/// OUT/sequences/NAME and OUT/poses/NAME.txt.
-struct DriveFolder {
+struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
   fs::path sequence;
   fs::path poses;
 };
@@ -58,16 +57,13 @@ struct DriveFolder {
 Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
                                            const SyntheticDriveOptions& options) {
   std::error_code code;
-  if (options.trajectory && fs::equivalent(*options.trajectory, drive.poses, code)) {
+  const bool is_input =
+      options.trajectory && fs::equivalent(*options.trajectory, drive.poses, code);
+  if (is_input ||
+      (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth"))) {
     return fail(fmt::format(
-        "{}: expected poses that the drive's do not replace (--name gives another name)",
-        drive.poses.string()));
-  }
-  if (fs::exists(drive.poses, code) && !pipeline::is_folder_of(drive.sequence, "synth")) {
-    return fail(
-        fmt::format("{}: expected poses of a rendered drive or none, found others (--name gives "
-                    "another name)",
-                    drive.poses.string()));
+        "{}: expected poses of a rendered drive or none, found {} (--name gives another name)",
+        drive.poses.string(), is_input ? "the given trajectory" : "others"));
   }
   auto lock = pipeline::open_out_folder(drive.sequence, "synth", {});
   if (!lock) {

@@ -83,7 +83,7 @@ TEST_F(Overwrite, PosesThatADriveIsRenderedAlongStay) {
   const std::string before = read_file(poses);
   std::vector<std::string> along = synth;
   along.insert(along.end(), {"--trajectory", poses});
-  expect_error(run_stemvo(along), 1, {poses, "do not replace"});
+  expect_error(run_stemvo(along), 1, {poses, "found the given trajectory"});
   EXPECT_EQ(read_file(poses), before);
 }
 
