@@ -8,8 +8,9 @@
 #include "text/text_file.hpp"
 
 namespace stemvo {
-
+namespace {
 using Json = nlohmann::ordered_json;
+}  // namespace
 
 // Found by nlohmann's library.
 void to_json(Json& json, const CameraReport& report) {
