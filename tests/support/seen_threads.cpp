@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -25,7 +26,7 @@ class SeenThreads : public cv::parallel::ParallelForAPI {
     }
     std::atomic<int> next = 0;
     std::vector<std::jthread> threads;
-    for (int i = 0; i < std::min(kNumThreads, num_stripes); ++i) {
+    for (int i = 0; i < std::min(num_threads_, num_stripes); ++i) {
       threads.emplace_back([&, i] {
         thread_index = i;
         for (int stripe = next++; stripe < num_stripes; stripe = next++) {
@@ -35,9 +36,14 @@ class SeenThreads : public cv::parallel::ParallelForAPI {
     }
   }
   [[nodiscard]] int getThreadNum() const override { return std::max(thread_index, 0); }
-  [[nodiscard]] int getNumThreads() const override { return kNumThreads; }
-  int setNumThreads(int) override { return kNumThreads; }
+  [[nodiscard]] int getNumThreads() const override { return num_threads_; }
+  int setNumThreads(int num_threads) override {
+    return std::exchange(num_threads_, num_threads > 0 ? num_threads : kNumThreads);
+  }
   [[nodiscard]] const char* getName() const override { return "seen threads"; }
+
+ private:
+  int num_threads_ = kNumThreads;
 };
 
 /// Before each test: a run of the pipeline sets OpenCV's own back.
