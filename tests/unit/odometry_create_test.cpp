@@ -80,7 +80,7 @@ TEST(OdometryCreate, AMaskThatDoesNotFitIsRefusedAndOneThatDoesKeepsPointsAway) 
 TEST(OdometryCreate, StepsOfTheGroundTruthAreNotGuessed) {
   Options options;
   options.scale.source = ScaleSource::kGroundTruth;
-  EXPECT_THAT(error_of(options), HasSubstr("scale.source: expected none, constant or"));
+  EXPECT_THAT(error_of(options), HasSubstr("scale.source: expected none, constant_speed or"));
 }
 
 TEST(OdometryCreate, ACameraThatIsNoneIsAnError) {
