@@ -52,7 +52,7 @@ Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, cons
   config.odometry.mode = OdometryMode::kMap;
   config.scale.source = ScaleSource::kConstantSpeed;
   config.camera.refine = CameraRefinement::kAll;
-  return pipeline::create_odometry(config, camera);
+  return PhasedOdometry::create(camera, config);
 }
 
 /// Runs the odometry over the sequence.

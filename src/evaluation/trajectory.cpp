@@ -31,18 +31,23 @@ Trajectory relative_to_first(std::span<const Rigid3> world_from_camera) {
   return moved;
 }
 
+Eigen::Vector3d rescaled_step(std::span<const Rigid3> estimate,
+                              std::span<const Rigid3> ground_truth,
+                              std::size_t i) {
+  const Eigen::Vector3d step = estimate[i].translation - estimate[i - 1].translation;
+  const double true_length_m =
+      (ground_truth[i].translation - ground_truth[i - 1].translation).norm();
+  const double length_m = step.norm();
+  return length_m > kNoStep_m ? Eigen::Vector3d(true_length_m / length_m * step)
+                              : Eigen::Vector3d::Zero();
+}
+
 Trajectory rescale_steps(std::span<const Rigid3> estimate, std::span<const Rigid3> ground_truth) {
   STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
   Trajectory rescaled(estimate.begin(), estimate.end());
   for (std::size_t i = 1; i < rescaled.size(); ++i) {
-    const Eigen::Vector3d step = estimate[i].translation - estimate[i - 1].translation;
-    const double true_length_m =
-        (ground_truth[i].translation - ground_truth[i - 1].translation).norm();
-    const double length_m = step.norm();
-    rescaled[i].translation = rescaled[i - 1].translation;
-    if (length_m > kNoStep_m) {
-      rescaled[i].translation += true_length_m / length_m * step;
-    }
+    rescaled[i].translation =
+        rescaled[i - 1].translation + rescaled_step(estimate, ground_truth, i);
   }
   return rescaled;
 }

@@ -30,6 +30,10 @@ using Trajectory = std::vector<Rigid3>;
 /// Moves all poses so that the first one is the identity.
 [[nodiscard]] Trajectory relative_to_first(std::span<const Rigid3> world_from_camera);
 
+/// The step to pose i > 0 in its own direction with the true step's length; zero where it is zero.
+[[nodiscard]] Eigen::Vector3d rescaled_step(std::span<const Rigid3> estimate,
+                                            std::span<const Rigid3> ground_truth,
+                                            std::size_t i);
 /// The paper's protocol: each step keeps its direction and takes the true step's length. A step of
 /// length zero stays. Rotations are untouched. Both have the same length.
 [[nodiscard]] Trajectory rescale_steps(std::span<const Rigid3> estimate,

@@ -79,6 +79,7 @@ void WindowHistory::leave(const Window& window, std::size_t leaving, const Keyfr
   for (const int track_id : lost_tracks(window, leaving, coming)) {
     keep(window, window.keyframes[leaving], track_id);
   }
+  scale_of_keyframe_.erase(window.keyframes[leaving].frame);
 }
 
 void WindowHistory::close(const Window& window) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/drive_loop.hpp"
 
-#include <array>
 #include <bit>
 #include <cerrno>
 #include <chrono>
 #include <fstream>
-#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -104,7 +102,7 @@ class DriveLoop {
     const std::string row = frames_csv_row(number, time_s, pose);
     drive_.csv += row;
     rows_.add(row);
-    const Rigid3 written = as_written(i, pose.world_from_camera);
+    const Rigid3& written = drive_.trajectory.emplace_back(as_written(i, pose.world_from_camera));
     kitti_.add(kitti_row(written));
     tum_.add(tum_row(time_s, written));
     if (Clock::now() - last_written_ > std::chrono::seconds(1)) {
@@ -116,19 +114,15 @@ class DriveLoop {
     return !drive_.interrupted;
   }
 
-  /// Pose i as result files hold it: with scale.source=ground_truth its step has the true length.
-  Rigid3 as_written(std::size_t i, const Rigid3& pose) {
-    if (i == 0 || run_.request.config.scale.source != ScaleSource::kGroundTruth) {
-      written_ = pose;
-    } else {
-      const std::array step = {last_, pose};
-      const Trajectory rescaled =
-          rescale_steps(step, std::span(*run_.sequence.ground_truth()).subspan(i - 1, 2));
-      written_ = {pose.rotation,
-                  written_.translation + rescaled[1].translation - last_.translation};
+  /// The last pose as result files hold it: with scale.source=ground_truth its step has the true
+  /// length.
+  [[nodiscard]] Rigid3 as_written(std::size_t i, Rigid3 pose) const {
+    if (i > 0 && run_.request.config.scale.source == ScaleSource::kGroundTruth) {
+      const Trajectory& estimate = run_.odometry.frames().estimator().trajectory();
+      pose.translation = drive_.trajectory.back().translation +
+                         rescaled_step(estimate, *run_.sequence.ground_truth(), i);
     }
-    last_ = pose;
-    return written_;
+    return pose;
   }
 
   void keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
@@ -194,8 +188,6 @@ class DriveLoop {
   GrowingFile kitti_{run_.request.out_dir / "trajectory_kitti.txt"};
   GrowingFile tum_{run_.request.out_dir / "trajectory_tum.txt"};
   Clock::time_point last_written_;
-  Rigid3 last_;     ///< pose of the last frame as it came ..
-  Rigid3 written_;  ///< .. and as it is written
 };
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace stemvo::pipeline {
 
 /// Takes a run's frames through the odometry and keeps what each brings. Rows of frames.csv,
 /// trajectory_kitti.txt and trajectory_tum.txt grow on the disk meanwhile: a run that is killed
-/// loses less than two seconds. Poses are as they come, also of scale.source=ground_truth.
+/// loses less than two seconds.
 [[nodiscard]] Drive run_drive(const Run& run, const RunProgress& progress);
 
 }  // namespace stemvo::pipeline

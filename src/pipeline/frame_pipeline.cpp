@@ -11,38 +11,32 @@
 
 namespace stemvo::pipeline {
 
-Expected<PhasedOdometry> create_odometry(const Config& config,
-                                         const Camera& camera,
-                                         const cv::Mat& mask) {
-  return PhasedOdometry::create(camera, config, mask);
-}
-
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
-  struct Frame {
+  struct Slot {
     Expected<cv::Mat> pixels;
-    stemvo::Frame prepared;
+    Frame frame;
   };
-  std::array<Frame, kMaxInFlight> ring;
-  const auto frame_at = [&](std::size_t index) -> Frame& { return ring[index % kMaxInFlight]; };
+  std::array<Slot, kMaxInFlight> ring;
+  const auto slot_of = [&](std::size_t index) -> Slot& { return ring[index % kMaxInFlight]; };
   const FrameStages stages = {
       .read =
           [&](std::size_t index) {
-            Frame& frame = frame_at(index);
-            frame.prepared = {};
-            frame.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
-            return !sequence.stream() || !frame.pixels || !frame.pixels->empty();
+            Slot& slot = slot_of(index);
+            slot.frame = {};
+            slot.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
+            return !sequence.stream() || !slot.pixels || !slot.pixels->empty();
           },
       .prepare =
           [&](std::size_t index) {
-            if (Frame& frame = frame_at(index); frame.pixels) {
-              frame.prepared = odometry.prepare(*frame.pixels);
+            if (Slot& slot = slot_of(index); slot.pixels) {
+              slot.frame = odometry.prepare(*slot.pixels);
             }
           },
-      .track = [&](std::size_t index) { odometry.track(std::move(frame_at(index).prepared)); },
+      .track = [&](std::size_t index) { odometry.track(std::move(slot_of(index).frame)); },
       .localize = [&](std::size_t) { odometry.localize(); },
       .optimize =
           [&](std::size_t index) {
-            return visit(index, frame_at(index).pixels, odometry.optimize());
+            return visit(index, slot_of(index).pixels, odometry.optimize());
           }};
   run_frame_loops(stages, sequence.size(), cv::getNumThreads());
 }

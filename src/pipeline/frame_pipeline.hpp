@@ -20,12 +20,6 @@ namespace stemvo::pipeline {
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
-/// An odometry for a valid configuration; `mask`: of the frames, as FrameList's. Errors: those of
-/// PhasedOdometry::create.
-[[nodiscard]] Expected<PhasedOdometry> create_odometry(const Config& config,
-                                                       const Camera& camera,
-                                                       const cv::Mat& mask = {});
-
 /// Takes the frames of a sequence through an odometry, in three loops beside each other where
 /// ThreadScope allows more than one thread; the poses do not depend on it. What a stage or the
 /// visitor throws leaves this function; frames behind the last one visited are dropped then.

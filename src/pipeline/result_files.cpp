@@ -90,22 +90,6 @@ double share_in_place(const std::vector<FrameResult>& frames) {
                            : 0.0;
 }
 
-Trajectory poses_of(const Drive& drive) {
-  Trajectory poses;
-  for (const FrameResult& frame : drive.frames) {
-    poses.push_back(frame.world_from_camera);
-  }
-  return poses;
-}
-
-/// As result files hold it: of scale.source=ground_truth with the ground truth's step lengths.
-Trajectory as_written(const Run& run, Trajectory trajectory) {
-  return run.request.config.scale.source == ScaleSource::kGroundTruth
-             ? rescale_steps(trajectory,
-                             std::span(*run.sequence.ground_truth()).first(trajectory.size()))
-             : trajectory;
-}
-
 class ResultWriter {
  public:
   ResultWriter(const Run& run, const Drive& drive)
@@ -113,7 +97,7 @@ class ResultWriter {
         sequence_(run.sequence),
         run_(run),
         drive_(drive),
-        trajectory_(as_written(run, poses_of(drive))),
+        trajectory_(drive.trajectory),
         config_text_(config_text(run, trajectory_.size())) {
     const auto truth = sequence_.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
     matched_ = truth ? Status() : truth.error();
@@ -229,7 +213,7 @@ class ResultWriter {
   const FrameSource& sequence_;
   const Run& run_;
   const Drive& drive_;
-  Trajectory trajectory_;
+  const Trajectory& trajectory_;
   std::string config_text_;
   std::optional<GroundTruth> truth_;
   Status matched_;  ///< the ground truth of a stream

@@ -30,6 +30,7 @@ struct Run {
 /// The loop over the frames leaves this behind.
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
+  Trajectory trajectory;                     ///< as result files hold it
   std::string csv;                           ///< frames.csv of them
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;

@@ -121,7 +121,7 @@ Expected<RunSummary> run_source(RunRequest request,
   // Lives longer than the odometry, whose thread that measures the camera may end last.
   std::optional<StageRecorder> recorder;
   Expected<PhasedOdometry> odometry =
-      pipeline::create_odometry(request.config, sequence.camera(), sequence.frames().mask);
+      PhasedOdometry::create(sequence.camera(), request.config, sequence.frames().mask);
   if (!odometry) {
     return odometry.error();
   }

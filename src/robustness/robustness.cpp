@@ -166,7 +166,7 @@ class Robustness {
   /// A model or filter that is not there is refused now, not in the middle.
   Status create_each() {
     for (const Contender& one : contenders_) {
-      const auto odometry = pipeline::create_odometry(one.config, sources_.front().camera());
+      const auto odometry = PhasedOdometry::create(sources_.front().camera(), one.config);
       if (!odometry) {
         return odometry.error();
       }
@@ -208,7 +208,7 @@ class Robustness {
                const PlannedRow& planned,
                const std::string& what,
                Outcome& outcome) {
-    auto odometry = pipeline::create_odometry(config, source.camera());
+    auto odometry = PhasedOdometry::create(source.camera(), config);
     if (!odometry) {
       if (odometry.error().lacks_memory) {
         throw std::bad_alloc();  // of the contender it says nothing

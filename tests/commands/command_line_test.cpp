@@ -4,22 +4,13 @@
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "config/config.hpp"
 #include "stemvo/version.hpp"
-#include "support/run_program.hpp"
+#include "support/program_test.hpp"
 
 namespace stemvo {
 namespace {
-
-using test::ProgramResult;
-using test::run_stemvo;
-using test::TempFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::StartsWith;
 
 const std::vector<std::string> kCommands = {"run",        "evaluate", "channel", "synth",
                                             "calibrate",  "check",    "models",  "benchmark",

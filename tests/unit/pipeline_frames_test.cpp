@@ -58,7 +58,7 @@ class FramePipeline : public ::testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] PhasedOdometry odometry() const {
-    return pipeline::create_odometry(config_, sequence_->camera()).value();
+    return PhasedOdometry::create(sequence_->camera(), config_).value();
   }
 
   Config config_;
