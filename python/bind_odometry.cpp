@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: MIT
 // Camera, Options, Odometry, Result: the public headers in Python.
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
 #include "config/config.hpp"
@@ -95,20 +102,53 @@ class SafeOdometry {
   Odometry odometry_;
 };
 
+/// By the enumerator's number.
+constexpr std::array<const char*, 3> kDistortions = {"none", "radial-tangential", "equidistant"};
+
+void set_distortion(Camera& camera,
+                    const std::string& distortion,
+                    const std::vector<double>& coefficients) {
+  const auto found = std::ranges::find(kDistortions, distortion);
+  if (found == kDistortions.end() || coefficients.size() > camera.distortion_coefficients.size()) {
+    throw nb::value_error(
+        fmt::format("distortion: expected one of {} with at most {} coefficients, "
+                    "found '{}' with {}",
+                    fmt::join(kDistortions, ", "), camera.distortion_coefficients.size(),
+                    distortion, coefficients.size())
+            .c_str());
+  }
+  camera.distortion = static_cast<Distortion>(found - kDistortions.begin());
+  std::ranges::copy(coefficients, camera.distortion_coefficients.begin());
+}
+
 void bind_camera(nb::module_& module) {
-  nb::class_<Camera>(module, "Camera", "Pinhole camera without distortion, in pixels")
+  nb::class_<Camera>(
+      module, "Camera",
+      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3) "
+      "or equidistant (k1 k2 k3 k4)")
       .def(
           "__init__",
-          [](Camera* self, double fx, double fy, double cx, double cy, int width, int height) {
+          [](Camera* self, double fx, double fy, double cx, double cy, int width, int height,
+             const std::string& distortion, const std::vector<double>& coefficients) {
             new (self) Camera{fx, fy, cx, cy, width, height};
+            set_distortion(*self, distortion, coefficients);
           },
-          "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a)
+          "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a, "distortion"_a = "none",
+          "coefficients"_a = std::vector<double>())
       .def_ro("fx", &Camera::fx_px)
       .def_ro("fy", &Camera::fy_px)
       .def_ro("cx", &Camera::cx_px)
       .def_ro("cy", &Camera::cy_px)
       .def_ro("width", &Camera::width_px)
       .def_ro("height", &Camera::height_px)
+      .def_prop_ro(
+          "distortion",
+          [](const Camera& c) { return kDistortions.at(static_cast<std::size_t>(c.distortion)); })
+      .def_prop_ro("coefficients",
+                   [](const Camera& c) {
+                     return std::vector<double>(c.distortion_coefficients.begin(),
+                                                c.distortion_coefficients.end());
+                   })
       .def("__repr__", [](const Camera& c) {
         return fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})", c.fx_px,
                            c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px);

@@ -97,7 +97,7 @@ nb::object truth_frames_of(const FrameSource& source) {
 CameraView view_of_file(const Path& camera_file, const std::vector<std::string>& masks) {
   const auto camera = value_or_raise(dataset::read_camera_file(camera_file));
   CameraView made;
-  made.view = value_or_raise(dataset::FrameView::create(camera.lens, camera_file));
+  made.view = value_or_raise(dataset::view_of(camera.camera, camera_file));
   made.frames.camera_height_m = camera.camera_height_m;
   value_or_raise(dataset::add_view(made.frames, made.view, masks, {}));
   return made;

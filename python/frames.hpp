@@ -3,14 +3,14 @@
 
 #include "arrays.hpp"
 #include "dataset/frame_source.hpp"
-#include "dataset/frame_view.hpp"
+#include "odometry/frame_view.hpp"
 
 namespace stemvo::python {
 
 /// View of a camera file for frames that come from elsewhere.
 struct CameraView {
   FrameList frames;  ///< none of its own
-  dataset::FrameView view;
+  FrameView view;
 };
 
 /// Frames of a Recording or a FrameView; nullptr: of neither.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
+
 #include <Eigen/Core>
 
 namespace stemvo {
@@ -8,8 +10,14 @@ namespace stemvo {
 /// OpenCV's maps of pixels hold no larger coordinate.
 inline constexpr int kMaxImageSide_px = 32767;
 
-/// Pinhole camera without distortion (KITTI is rectified). Pixels: the centre of the top-left pixel
-/// is (0, 0). Camera axes: x right, y down, z forward.
+enum class Distortion {
+  kNone,
+  kRadialTangential,  ///< OpenCV's k1 k2 p1 p2 k3
+  kEquidistant,       ///< OpenCV's fisheye k1 k2 k3 k4
+};
+
+/// Pinhole camera. Pixels: the centre of the top-left pixel is (0, 0). Camera axes: x right, y
+/// down, z forward.
 struct Camera {
   double fx_px = 0.0;
   double fy_px = 0.0;
@@ -17,6 +25,9 @@ struct Camera {
   double cy_px = 0.0;
   int width_px = 0;
   int height_px = 0;
+  /// The lens, which the odometry takes out of its images first. The functions below know none.
+  Distortion distortion = Distortion::kNone;
+  std::array<double, 5> distortion_coefficients = {};  ///< those a model does not have are 0
 
   /// 3x3 intrinsics K.
   [[nodiscard]] Eigen::Matrix3d matrix() const {

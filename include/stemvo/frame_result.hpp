@@ -68,8 +68,8 @@ struct FrameResult {
   double homography_ratio = 0.0;   ///< R_H
   TwoViewModel model = TwoViewModel::kNone;
   ScaleState scale_state = ScaleState::kDisabled;
-  std::string_view road_reason;             ///< why the road was not measured, else empty
-  Camera camera;                            ///< with what was learnt so far (`camera.refine`)
+  std::string_view road_reason;  ///< why the road was not measured, else empty
+  Camera camera;  ///< without distortion, with what was learnt so far (`camera.refine`)
   std::optional<CameraSigma> camera_sigma;  ///< nullopt: it is not refined
   std::optional<double> scale_sigma;  ///< of log(metres per unit); nullopt: the road is not asked
   StageTimes times;

@@ -31,8 +31,10 @@ class Odometry {
   Odometry& operator=(Odometry&&) noexcept;
   ~Odometry();
 
-  /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size, without distortion.
-  /// The pixels are read before it returns. Error: another type or size; nothing changes then.
+  /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size.
+  /// The pixels are read before it returns. An image with distortion, or of over 1.5 megapixels, is
+  /// first made the one that FrameResult::camera takes; pixels in results are of that one. Error:
+  /// another type or size; nothing changes then.
   [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image, PixelOrder order);
   /// Call for a dropped frame; advances the motion model by one frame.
   FrameResult process_missing();

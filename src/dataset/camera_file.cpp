@@ -107,9 +107,9 @@ class Reader {
     }
     CameraFile result;
     set_body(result.body_from_camera);
-    set_size(result.lens.camera);
-    set_intrinsics(result.lens.camera);
-    set_distortion(result.lens);
+    set_size(result.camera);
+    set_intrinsics(result.camera);
+    set_distortion(result.camera);
     result.rate_hz = number("rate_hz", 1e-9, 1e5);
     result.camera_height_m = number("camera_height", 1e-9, 1000.0);
     return status_ ? Expected<CameraFile>(result) : status_.error();
@@ -270,7 +270,7 @@ class Reader {
     }
   }
 
-  void set_distortion(Lens& lens) {
+  void set_distortion(Camera& camera) {
     const std::string& key = format_.coefficients;
     std::string model = choice("distortion_model", format_.models);
     if (model.empty() && format_.is_of_matrices()) {
@@ -283,14 +283,14 @@ class Reader {
     } else if (model == "none" || has_none) {
       list(key, {0}, "[] for distortion_model none");
     } else if (model == "equidistant" || model == "fisheye") {
-      lens.distortion = Distortion::kEquidistant;
+      camera.distortion = Distortion::kEquidistant;
       numbers = list(key, {4}, "[k1, k2, k3, k4]");
     } else {
-      lens.distortion = Distortion::kRadialTangential;
+      camera.distortion = Distortion::kRadialTangential;
       numbers = list(key, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
     }
     if (status_) {
-      std::ranges::copy(numbers, lens.coefficients.begin());
+      std::ranges::copy(numbers, camera.distortion_coefficients.begin());
     }
   }
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "dataset/frame_view.hpp"
+#include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/rigid3.hpp"
 
@@ -12,7 +12,7 @@ namespace stemvo::dataset {
 
 /// Contents of a camera file.
 struct CameraFile {
-  Lens lens;
+  Camera camera;
   std::optional<double> rate_hz;
   std::optional<double> camera_height_m;   ///< above the road
   std::optional<Rigid3> body_from_camera;  ///< EuRoC's T_BS, or of Kalibr's T_cam_imu

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "dataset/ground_truth.hpp"
+#include "dataset/mask.hpp"
 
 namespace stemvo::dataset {
 
@@ -112,6 +113,11 @@ Status check_center(const Camera& camera) {
                    : Status(fail(fmt::format(
                          "expected a principal point inside images of {}x{} pixels, found ({}, {})",
                          camera.width_px, camera.height_px, camera.cx_px, camera.cy_px)));
+}
+
+Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
+  auto view = FrameView::create(camera);
+  return view ? view : fail(camera_file.string() + ": " + view.error().message);
 }
 
 Status add_view(FrameList& frames,

@@ -14,10 +14,10 @@
 
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_source.hpp"
-#include "dataset/frame_view.hpp"
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
+#include "odometry/frame_view.hpp"
 #include "stemvo/error.hpp"
 
 /// Parts that all frame sources share.
@@ -69,6 +69,10 @@ namespace stemvo::dataset {
 [[nodiscard]] Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                                 const CameraFile& camera,
                                                 const FrameSourceRequest& request);
+
+/// Error, naming the camera file: that of FrameView::create.
+[[nodiscard]] Expected<FrameView> view_of(const Camera& camera,
+                                          const std::filesystem::path& camera_file);
 
 /// Camera, size, mask and reader: `read_whole` gives the frames as they come, of the view's full
 /// size. Errors: those of make_mask.

@@ -93,11 +93,11 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
     }
   }
   const auto is_color =
-      check_images(frames.files, listing.folder, *camera_path, camera_file->lens.camera);
+      check_images(frames.files, listing.folder, *camera_path, camera_file->camera);
   if (!is_color) {
     return is_color.error();
   }
-  const auto view = FrameView::create(camera_file->lens, *camera_path);
+  const auto view = view_of(camera_file->camera, *camera_path);
   if (!view) {
     return view.error();
   }

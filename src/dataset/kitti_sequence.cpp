@@ -7,6 +7,7 @@
 
 #include "dataset/frame_files.hpp"
 #include "dataset/kitti_text.hpp"
+#include "dataset/mask.hpp"
 #include "dataset/sequence.hpp"
 #include "io/image_file.hpp"
 #include "text/text_file.hpp"

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include "dataset/mask.hpp"
+
 #include <algorithm>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "dataset/frame_view.hpp"
 #include "io/image_file.hpp"
 #include "text/text_file.hpp"
 

@@ -10,7 +10,7 @@
 namespace stemvo::dataset {
 namespace {
 
-/// The lens' image: the driver of a camera may give another size than it was asked for.
+/// The camera's image: the driver of a camera may give another size than it was asked for.
 Status check_stream_size(const cv::Size& size, const Camera& camera, const std::string& owner) {
   if (size != cv::Size(camera.width_px, camera.height_px)) {
     return fail(
@@ -44,8 +44,8 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const FrameSourceRequest& request) {
   const std::string owner = request.sequence_dir.string();
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
-  Status status = check_stream_size(stream->size(), camera.lens.camera, owner);
-  const auto view = FrameView::create(camera.lens, *request.camera_file);
+  Status status = check_stream_size(stream->size(), camera.camera, owner);
+  const auto view = view_of(camera.camera, *request.camera_file);
   if (status && !view) {
     status = view.error();
   }
@@ -85,7 +85,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
     };
   }
   status = add_view(
-      frames, *view, request.masks, [stream, owner, raw = camera.lens.camera](std::size_t index) {
+      frames, *view, request.masks, [stream, owner, raw = camera.camera](std::size_t index) {
         auto image = stream->read(index);
         const Status fits =
             image && !image->empty() ? check_stream_size(image->size(), raw, owner) : Status();
@@ -107,7 +107,7 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
     return camera.error();
   }
   const auto number = camera_number(request.sequence_dir);
-  const cv::Size size(camera->lens.camera.width_px, camera->lens.camera.height_px);
+  const cv::Size size(camera->camera.width_px, camera->camera.height_px);
   const auto stream = number ? VideoStream::open_camera(*number, size)
                              : VideoStream::open_file(request.sequence_dir);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {

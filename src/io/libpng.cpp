@@ -24,7 +24,8 @@ class LibpngReader {
     if (info_ == nullptr) {
       throw std::bad_alloc();
     }
-    png_set_chunk_malloc_max(png_, 1U << 23U);  // what a length claims is allocated before it is read
+    // libpng allocates what a chunk's length claims before it reads it.
+    png_set_chunk_malloc_max(png_, 1U << 23U);
     png_set_read_fn(png_, this, &give);
   }
   ~LibpngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }

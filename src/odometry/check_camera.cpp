@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/check_camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace stemvo {
 
@@ -22,6 +24,11 @@ Status check_camera(const Camera& camera) {
   if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px)) {
     return fail(fmt::format("camera: expected a finite principal point, found {}, {}", camera.cx_px,
                             camera.cy_px));
+  }
+  if (!std::ranges::all_of(camera.distortion_coefficients,
+                           [](double value) { return std::isfinite(value); })) {
+    return fail(fmt::format("camera: expected finite distortion coefficients, found [{}]",
+                            fmt::join(camera.distortion_coefficients, ", ")));
   }
   return {};
 }

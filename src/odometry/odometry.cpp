@@ -22,10 +22,10 @@ Status check_options(const Options& options) {
   return validate(options);
 }
 
-Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera) {
-  if (image.cols != camera.width_px || image.rows != camera.height_px) {
+Status check_image(const cv::Mat& image, PixelOrder order, const cv::Size& size) {
+  if (image.size() != size) {
     return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
-                            camera.width_px, camera.height_px, image.cols, image.rows));
+                            size.width, size.height, image.cols, image.rows));
   }
   const int channels = order == PixelOrder::kGray ? 1 : 3;
   if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
@@ -72,8 +72,8 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
 Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) {
-  const Camera& camera = impl_->odometry.frames().given_camera();
-  if (Status status = check_image(image, order, camera); !status) {
+  const cv::Size size = impl_->odometry.view().full_size();
+  if (Status status = check_image(image, order, size); !status) {
     return status.error();
   }
   if (order != PixelOrder::kBgr) {

@@ -12,29 +12,36 @@ namespace stemvo {
 Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
                                                 const Options& options,
                                                 const cv::Mat& mask) {
+  const Expected<FrameView> view = FrameView::create(camera);
+  if (!view) {
+    return fail("camera: " + view.error().message);
+  }
   Expected<Stem> stem = Stem::load(options.stem);
   if (!stem) {
     return stem.error();
   }
   // A network that cannot take this camera's images is found before work starts.
-  const cv::Mat blank(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(0));
-  const int zoom = stem->frame_zoom(choose_tracking_resolution(options.stem.tracking_resolution,
-                                                               options.features.method, camera));
+  const Camera& seen = view->camera();
+  const cv::Mat blank(seen.height_px, seen.width_px, CV_8UC1, cv::Scalar(0));
+  const int zoom = stem->frame_zoom(
+      choose_tracking_resolution(options.stem.tracking_resolution, options.features.method, seen));
   if (const Expected<Channel> channel = stem->apply(blank, zoom); !channel) {
     return channel.error();
   }
-  return PhasedOdometry(camera, options, mask, *std::move(stem), zoom);
+  return PhasedOdometry(*view, options, mask, *std::move(stem), zoom);
 }
 
 PhasedOdometry::PhasedOdometry(
-    const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
-    : stem_(std::move(stem)), zoom_(zoom), channel_odometry_(options, camera, mask) {}
+    const FrameView& view, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
+    : view_(view),
+      stem_(std::move(stem)),
+      zoom_(zoom),
+      channel_odometry_(options, view.camera(), view.apply_to_mask(mask)) {}
 
-Frame PhasedOdometry::prepare(const cv::Mat& image) {
-  const Camera& camera = channel_odometry_.given_camera();
-  STEMVO_CHECK(image.cols == camera.width_px && image.rows == camera.height_px,
-               "the image has the camera's size");
+Frame PhasedOdometry::prepare(const cv::Mat& given) {
+  STEMVO_CHECK(given.size() == view_.full_size(), "the image has the camera's size");
   Stopwatch watch;
+  const cv::Mat image = view_.apply(given);
   const Expected<Channel> channel = timed(Stage::kStem, [&] { return stem_.apply(image, zoom_); });
   const double stem_ms = watch.lap_ms();
   Frame frame;

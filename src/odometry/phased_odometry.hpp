@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "odometry/channel_odometry.hpp"
+#include "odometry/frame_view.hpp"
 #include "stem/stem.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
@@ -18,14 +19,14 @@ namespace stemvo {
 /// same.
 class PhasedOdometry {
  public:
-  /// As Odometry::create, for options and a camera that are valid. `mask`: as FrontEnd::set_mask.
+  /// As Odometry::create, for options, a camera and a mask that are valid.
   [[nodiscard]] static Expected<PhasedOdometry> create(const Camera& camera,
                                                        const Options& options,
                                                        const cv::Mat& mask = {});
 
   /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked). Frames are prepared in their order,
   /// one call at a time, which may run ahead of the others in another thread.
-  [[nodiscard]] Frame prepare(const cv::Mat& image);
+  [[nodiscard]] Frame prepare(const cv::Mat& given);
   /// Tracks the points to this frame, once the one before is localized.
   void track(Frame frame) { channel_odometry_.track(std::move(frame)); }
   /// Localizes the frame tracked, once the one before is optimized.
@@ -41,12 +42,15 @@ class PhasedOdometry {
 
   /// It holds the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }
+  /// What the camera's images are made before anything else sees them.
+  [[nodiscard]] const FrameView& view() const { return view_; }
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 
  private:
   PhasedOdometry(
-      const Camera& camera, const Options& options, const cv::Mat& mask, Stem stem, int zoom);
+      const FrameView& view, const Options& options, const cv::Mat& mask, Stem stem, int zoom);
 
+  FrameView view_;
   Stem stem_;
   int zoom_;  ///< Stem::frame_zoom
   ChannelOdometry channel_odometry_;

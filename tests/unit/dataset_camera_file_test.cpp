@@ -11,7 +11,6 @@
 namespace stemvo {
 namespace {
 
-using dataset::Distortion;
 using dataset::read_camera_file;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -58,15 +57,16 @@ class CameraFileTest : public ::testing::Test {
 TEST_F(CameraFileTest, ReadsEveryKey) {
   const auto file = read_camera_file(folder_.file("camera.yaml", kGood));
   ASSERT_TRUE(file) << file.error().message;
-  const Camera& camera = file->lens.camera;
+  const Camera& camera = file->camera;
   EXPECT_EQ(camera.width_px, 640);
   EXPECT_EQ(camera.height_px, 480);
   EXPECT_EQ(camera.fx_px, 520.9);
   EXPECT_EQ(camera.fy_px, 521.0);
   EXPECT_EQ(camera.cx_px, 325.1);
   EXPECT_EQ(camera.cy_px, 249.7);
-  EXPECT_EQ(file->lens.distortion, Distortion::kRadialTangential);
-  EXPECT_THAT(file->lens.coefficients, ElementsAre(0.2312, -0.7849, -0.0033, -0.0001, 0.9172));
+  EXPECT_EQ(file->camera.distortion, Distortion::kRadialTangential);
+  EXPECT_THAT(file->camera.distortion_coefficients,
+              ElementsAre(0.2312, -0.7849, -0.0033, -0.0001, 0.9172));
   EXPECT_EQ(file->rate_hz, 10.0);
   EXPECT_EQ(file->camera_height_m, 1.2);
 }
@@ -76,9 +76,9 @@ TEST_F(CameraFileTest, OptionalKeysMayBeAbsent) {
       "camera.yaml",
       "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: none\n"));
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->lens.camera.width_px, 64);
-  EXPECT_EQ(file->lens.camera.height_px, 48);
-  EXPECT_EQ(file->lens.distortion, Distortion::kNone);
+  EXPECT_EQ(file->camera.width_px, 64);
+  EXPECT_EQ(file->camera.height_px, 48);
+  EXPECT_EQ(file->camera.distortion, Distortion::kNone);
   EXPECT_FALSE(file->rate_hz);
   EXPECT_FALSE(file->camera_height_m);
 }
@@ -91,7 +91,7 @@ TEST_F(CameraFileTest, OtherNamesOfTheModels) {
   four.replace(four.find("radial-tangential"), 17, "equidistant");
   const auto file = read_camera_file(folder_.file("camera.yaml", four));
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->lens.distortion, Distortion::kEquidistant);
+  EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);
 }
 
 TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
@@ -104,8 +104,8 @@ TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
       "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";
   const auto file = read_camera_file(folder_.file("sensor.yaml", text));
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->lens.camera.width_px, 752);
-  EXPECT_THAT(file->lens.coefficients,
+  EXPECT_EQ(file->camera.width_px, 752);
+  EXPECT_THAT(file->camera.distortion_coefficients,
               ElementsAre(-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0));
   EXPECT_EQ(file->rate_hz, 20.0);
 }
@@ -114,13 +114,13 @@ TEST_F(CameraFileTest, ReadsTheSharedFiles) {
   STEMVO_NEEDS_SHARED_DATA();
   const auto handheld = read_camera_file(testing::shared_data() / "handheld/camera.yaml");
   ASSERT_TRUE(handheld) << handheld.error().message;
-  EXPECT_EQ(handheld->lens.camera.fx_px, 585.0);
-  EXPECT_EQ(handheld->lens.distortion, Distortion::kNone);
+  EXPECT_EQ(handheld->camera.fx_px, 585.0);
+  EXPECT_EQ(handheld->camera.distortion, Distortion::kNone);
   EXPECT_EQ(handheld->rate_hz, 30.0);
   const auto euroc = read_camera_file(testing::shared_data() / "euroc/mav0/cam0/sensor.yaml");
   ASSERT_TRUE(euroc) << euroc.error().message;
-  EXPECT_EQ(euroc->lens.camera.cy_px, 248.375);
-  EXPECT_EQ(euroc->lens.distortion, Distortion::kRadialTangential);
+  EXPECT_EQ(euroc->camera.cy_px, 248.375);
+  EXPECT_EQ(euroc->camera.distortion, Distortion::kRadialTangential);
 }
 
 TEST_F(CameraFileTest, NoFile) {
@@ -261,10 +261,10 @@ constexpr const char* kRos =
 TEST_F(CameraFileTest, KalibrsChain) {
   const auto file = read_camera_file(folder_.file("camchain.yaml", kKalibr));
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->lens.camera.fy_px, 191.0);
-  EXPECT_EQ(file->lens.camera.height_px, 511);
-  EXPECT_EQ(file->lens.distortion, Distortion::kEquidistant);
-  EXPECT_THAT(file->lens.coefficients, ElementsAre(0.1, 0.02, -0.003, 0.0004, 0.0));
+  EXPECT_EQ(file->camera.fy_px, 191.0);
+  EXPECT_EQ(file->camera.height_px, 511);
+  EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);
+  EXPECT_THAT(file->camera.distortion_coefficients, ElementsAre(0.1, 0.02, -0.003, 0.0004, 0.0));
   // The camera's centre in the body: -R^T t.
   ASSERT_TRUE(file->body_from_camera);
   EXPECT_LT((file->body_from_camera->translation - Eigen::Vector3d(0, -0.5, 0)).norm(), 1e-12);
@@ -284,22 +284,22 @@ TEST_F(CameraFileTest, OddRowsOfAMatrix) {
 }
 
 /// The camera of kOpenCv, kRos and message().
-void expect_their_camera(const dataset::Lens& lens) {
-  EXPECT_EQ(lens.camera.width_px, 640);
-  EXPECT_EQ(lens.camera.height_px, 480);
-  EXPECT_EQ(lens.camera.fx_px, 520.0);
-  EXPECT_EQ(lens.camera.fy_px, 521.0);
-  EXPECT_EQ(lens.camera.cx_px, 325.5);
-  EXPECT_EQ(lens.camera.cy_px, 249.5);
-  EXPECT_EQ(lens.distortion, Distortion::kRadialTangential);
-  EXPECT_THAT(lens.coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+void expect_their_camera(const Camera& camera) {
+  EXPECT_EQ(camera.width_px, 640);
+  EXPECT_EQ(camera.height_px, 480);
+  EXPECT_EQ(camera.fx_px, 520.0);
+  EXPECT_EQ(camera.fy_px, 521.0);
+  EXPECT_EQ(camera.cx_px, 325.5);
+  EXPECT_EQ(camera.cy_px, 249.5);
+  EXPECT_EQ(camera.distortion, Distortion::kRadialTangential);
+  EXPECT_THAT(camera.distortion_coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
 }
 
 TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
   for (const char* text : {kOpenCv, kRos}) {
     const auto file = read_camera_file(folder_.file("camera.yaml", text));
     ASSERT_TRUE(file) << file.error().message;
-    expect_their_camera(file->lens);
+    expect_their_camera(file->camera);
     EXPECT_FALSE(file->rate_hz);
   }
 }
@@ -322,11 +322,11 @@ TEST_F(CameraFileTest, AMessageOfRos) {
   for (const std::string& text : {message(five), first}) {
     const auto file = read_camera_file(folder_.file("camera.yaml", text));
     ASSERT_TRUE(file) << file.error().message;
-    expect_their_camera(file->lens);
+    expect_their_camera(file->camera);
   }
   const auto none = read_camera_file(folder_.file("camera.yaml", message("plumb_bob\nd: []\n")));
   ASSERT_TRUE(none) << none.error().message;
-  EXPECT_EQ(none->lens.distortion, Distortion::kNone);
+  EXPECT_EQ(none->camera.distortion, Distortion::kNone);
   expect_refused(message("rational_polynomial\nd: [1]\n"), {"camera.yaml:8: distortion_model"});
   expect_refused(message("plumb_bob\n"), {"d: [k1, k2, p1, p2]", "no such key"});
   std::string text = message(five);
@@ -345,7 +345,7 @@ TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
   text.replace(text.find("0.001,\n       0.9"), 17, "0.001");
   const auto fisheye = read_camera_file(folder_.file("camera.yaml", text));
   ASSERT_TRUE(fisheye) << fisheye.error().message;
-  EXPECT_EQ(fisheye->lens.distortion, Distortion::kEquidistant);
+  EXPECT_EQ(fisheye->camera.distortion, Distortion::kEquidistant);
   text = kRos;
   text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
   expect_refused(text, {"camera.yaml:8: distortion_model: expected one of plumb_bob",

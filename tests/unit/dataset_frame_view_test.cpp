@@ -5,7 +5,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "dataset/frame_view.hpp"
+#include "dataset/mask.hpp"
+#include "geometry/distortion.hpp"
+#include "odometry/frame_view.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo::dataset {
@@ -13,16 +15,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-Lens lens_of(int width_px, int height_px) {
-  Lens lens;
-  lens.camera = {0.9 * width_px, 0.9 * width_px, 0.5 * width_px - 0.5, 0.5 * height_px - 0.5};
-  lens.camera.width_px = width_px;
-  lens.camera.height_px = height_px;
-  return lens;
+Camera camera_of(int width_px, int height_px) {
+  return {0.9 * width_px,        0.9 * width_px, 0.5 * width_px - 0.5,
+          0.5 * height_px - 0.5, width_px,       height_px};
 }
 
 cv::Size working_size(int width_px, int height_px) {
-  const Camera camera = working_lens(lens_of(width_px, height_px)).camera;
+  const Camera camera = working_camera(camera_of(width_px, height_px));
   return {camera.width_px, camera.height_px};
 }
 
@@ -37,8 +36,8 @@ TEST(WorkingSize, OnlyLargeFramesAreMadeSmaller) {
 
 /// Where a dot is found in the small image is where the small camera sees its ray.
 TEST(WorkingSize, TheCameraShrinksWithTheImage) {
-  Lens lens = lens_of(2447, 2049);
-  const auto view = FrameView::create(lens, "camera.yaml");
+  Camera camera = camera_of(2447, 2049);
+  const auto view = FrameView::create(camera);
   ASSERT_TRUE(view) << view.error().message;
   cv::Mat image(2049, 2447, CV_8UC1, cv::Scalar(0));
   image(cv::Rect(300, 1500, 51, 51)) = 255;
@@ -46,7 +45,7 @@ TEST(WorkingSize, TheCameraShrinksWithTheImage) {
   ASSERT_EQ(small.cols, view->camera().width_px);
   const cv::Moments moments = cv::moments(small);
   const Eigen::Vector2d centre(moments.m10 / moments.m00, moments.m01 / moments.m00);
-  const Eigen::Vector2d ray = lens.camera.normalize({325.0, 1525.0});
+  const Eigen::Vector2d ray = camera.normalize({325.0, 1525.0});
   EXPECT_LT((view->camera().project({ray.x(), ray.y(), 1.0}) - centre).norm(), 0.02);
 }
 
@@ -81,10 +80,10 @@ TEST(Mask, WhatIsNone) {
 }
 
 TEST(Mask, GoesTheWayOfTheFrames) {
-  Lens lens = lens_of(1920, 1080);
-  lens.distortion = Distortion::kRadialTangential;
-  lens.coefficients = {-0.2, 0.05};
-  const auto view = FrameView::create(lens, "camera.yaml");
+  Camera camera = camera_of(1920, 1080);
+  camera.distortion = Distortion::kRadialTangential;
+  camera.distortion_coefficients = {-0.2, 0.05};
+  const auto view = FrameView::create(camera);
   ASSERT_TRUE(view) << view.error().message;
   const auto mask = make_mask({"0,900,1920,180"}, {1920, 1080});
   const cv::Mat seen = view->apply_to_mask(*mask);

@@ -290,7 +290,7 @@ TEST_F(ImageFolderTest, CoefficientsWithoutAView) {
   (void)temp_.file("camera.yaml",
                    "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 11.5]\nrate_hz: 10\n"
                    "distortion_model: radtan\ndistortion_coefficients: [-20, 0, 0, 0]\n");
-  EXPECT_THAT(error_of(), HasSubstr("camera.yaml: expected distortion_coefficients"));
+  EXPECT_THAT(error_of(), HasSubstr("camera.yaml: expected distortion coefficients"));
 }
 
 TEST_F(ImageFolderTest, KittisLayoutNeedsNoCameraFile) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "odometry/frame_view.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/synthetic_scene.hpp"
 #include "support/tiny_stem.hpp"
@@ -75,6 +76,30 @@ TEST(OdometryCreate, AMaskThatDoesNotFitIsRefusedAndOneThatDoesKeepsPointsAway) 
   for (const TrackedPoint& point : odometry->tracked_points()) {
     EXPECT_GE(point.uv.x(), 158.0);
   }
+}
+
+TEST(OdometryCreate, ALensIsTakenOutOfTheImagesAndTheMaskInside) {
+  Camera distorted = kCamera;
+  distorted.distortion = Distortion::kRadialTangential;
+  distorted.distortion_coefficients = {-0.2, 0.05};
+  cv::Mat mask(96, 320, CV_8UC1, cv::Scalar(255));
+  mask.rowRange(80, 96).setTo(0);
+  const FrameView view = FrameView::create(distorted).value();
+  Odometry of_raw = Odometry::create(distorted, {}, mask).value();
+  Odometry of_view = Odometry::create(view.camera(), {}, view.apply_to_mask(mask)).value();
+  for (int i = 0; i < 3; ++i) {
+    const FrameResult raw = of_raw.process(image_at(i), PixelOrder::kRgb).value();
+    const FrameResult seen = of_view.process(view.apply(image_at(i)), PixelOrder::kRgb).value();
+    EXPECT_EQ(raw.world_from_camera.matrix(), seen.world_from_camera.matrix());
+    EXPECT_EQ(raw.num_matches, seen.num_matches);
+    EXPECT_EQ(raw.camera.matrix(), view.camera().matrix());
+    EXPECT_EQ(raw.camera.distortion, Distortion::kNone);
+  }
+  ASSERT_GT(of_raw.tracked_points().size(), 20U);
+  distorted.distortion_coefficients = {50.0};
+  EXPECT_THAT(error_of({}, distorted), HasSubstr("camera: expected distortion coefficients"));
+  distorted.distortion_coefficients = {std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_THAT(error_of({}, distorted), HasSubstr("camera: expected finite distortion"));
 }
 
 TEST(OdometryCreate, StepsOfTheGroundTruthAreNotGuessed) {

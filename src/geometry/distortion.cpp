@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include "dataset/frame_view.hpp"
+#include "geometry/distortion.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <opencv2/imgproc.hpp>
 
-namespace stemvo::dataset {
+namespace stemvo {
 namespace {
 
 constexpr double kMaxPixels = 1.5e6;      ///< of a frame that is worked on as it is
@@ -28,9 +27,9 @@ double divisor_of(double num_pixels) {
 }
 
 /// Distance from the centre, without the tangential part, which is small and moves all around.
-double distorted_radius(const Lens& lens, double radius) {
-  const auto& [k1, k2, k3, k4, k5] = lens.coefficients;
-  switch (lens.distortion) {
+double distorted_radius(const Camera& camera, double radius) {
+  const auto& [k1, k2, k3, k4, k5] = camera.distortion_coefficients;
+  switch (camera.distortion) {
     case Distortion::kRadialTangential: {
       const double square = radius * radius;
       return radius * (1.0 + square * (k1 + square * (k2 + square * k5)));
@@ -48,11 +47,11 @@ double distorted_radius(const Lens& lens, double radius) {
 
 /// Whether the lens shows things farther out farther out, from the centre up to this distance on
 /// the plane z = 1. Polynomials turn around somewhere; there they show other things a second time.
-bool is_one_to_one(const Lens& lens, double radius) {
+bool is_one_to_one(const Camera& camera, double radius) {
   constexpr int kNumSteps = 256;
   double last = 0.0;
   for (int i = 1; i <= kNumSteps; ++i) {
-    const double next = distorted_radius(lens, radius * i / kNumSteps);
+    const double next = distorted_radius(camera, radius * i / kNumSteps);
     if (!(next > last)) {
       return false;
     }
@@ -67,18 +66,12 @@ Camera scaled(Camera camera, double scale) {
   return camera;
 }
 
-/// Where the lens' image shows a pixel of the view.
-Eigen::Vector2d source_of(const Lens& lens, const Camera& view, double u, double v) {
-  const Eigen::Vector2d xy = distort(lens, view.normalize({u, v}));
-  return lens.camera.project({xy.x(), xy.y(), 1.0});
-}
-
 /// Whether all pixels of the view come from inside the lens' image. Those of the rim decide.
-bool lies_inside(const Lens& lens, const Camera& view) {
+bool lies_inside(const Camera& camera, const Camera& view) {
   const double right = view.width_px - 1;
   const double bottom = view.height_px - 1;
   const auto is_inside = [&](double u, double v) {
-    const Eigen::Vector2d uv = source_of(lens, view, u, v);
+    const Eigen::Vector2d uv = source_pixel(camera, view, {u, v});
     return uv.x() >= 0.0 && uv.x() <= right && uv.y() >= 0.0 && uv.y() <= bottom;
   };
   double radius = 0.0;
@@ -87,7 +80,7 @@ bool lies_inside(const Lens& lens, const Camera& view) {
       radius = std::max(radius, view.normalize({u, v}).norm());
     }
   }
-  if (!is_one_to_one(lens, radius)) {
+  if (!is_one_to_one(camera, radius)) {
     return false;
   }
   for (int u = 0; u < view.width_px; ++u) {
@@ -104,42 +97,43 @@ bool lies_inside(const Lens& lens, const Camera& view) {
 }
 
 /// The smallest scale of the focal lengths whose view lies inside.
-Expected<double> find_scale(const Lens& lens) {
-  if (!lies_inside(lens, scaled(lens.camera, kMaxScale))) {
+Expected<double> find_scale(const Camera& camera, const Camera& view) {
+  if (!lies_inside(camera, scaled(view, kMaxScale))) {
     return fail(
-        fmt::format("expected distortion_coefficients that leave half of the image "
+        fmt::format("expected distortion coefficients that leave half of the image "
                     "usable, found [{}]",
-                    fmt::join(lens.coefficients, ", ")));
+                    fmt::join(camera.distortion_coefficients, ", ")));
   }
-  if (lies_inside(lens, scaled(lens.camera, kMinScale))) {
+  if (lies_inside(camera, scaled(view, kMinScale))) {
     return kMinScale;
   }
   double low = kMinScale;
   double high = kMaxScale;
   for (int i = 0; i < kNumHalvings; ++i) {
     const double middle = 0.5 * (low + high);
-    (lies_inside(lens, scaled(lens.camera, middle)) ? high : low) = middle;
+    (lies_inside(camera, scaled(view, middle)) ? high : low) = middle;
   }
   return high;
 }
 
-bool is_undistorted(const Lens& lens) {
-  return lens.distortion != Distortion::kEquidistant &&
-         std::all_of(lens.coefficients.begin(), lens.coefficients.end(),
-                     [](double coefficient) { return coefficient == 0.0; });
-}
-
 }  // namespace
 
-Eigen::Vector2d distort(const Lens& lens, const Eigen::Vector2d& xy) {
+bool is_distorted(const Camera& camera) {
+  return camera.distortion == Distortion::kEquidistant ||
+         (camera.distortion == Distortion::kRadialTangential &&
+          std::ranges::any_of(camera.distortion_coefficients,
+                              [](double coefficient) { return coefficient != 0.0; }));
+}
+
+Eigen::Vector2d distort(const Camera& camera, const Eigen::Vector2d& xy) {
   const double radius = xy.norm();
   if (!(radius > 0.0)) {
     return xy;
   }
-  Eigen::Vector2d result = distorted_radius(lens, radius) / radius * xy;
-  if (lens.distortion == Distortion::kRadialTangential) {
-    const double p1 = lens.coefficients[2];
-    const double p2 = lens.coefficients[3];
+  Eigen::Vector2d result = distorted_radius(camera, radius) / radius * xy;
+  if (camera.distortion == Distortion::kRadialTangential) {
+    const double p1 = camera.distortion_coefficients[2];
+    const double p2 = camera.distortion_coefficients[3];
     const double xx = xy.x() * xy.x();
     const double yy = xy.y() * xy.y();
     const double two_xy = 2.0 * xy.x() * xy.y();
@@ -149,11 +143,15 @@ Eigen::Vector2d distort(const Lens& lens, const Eigen::Vector2d& xy) {
   return result;
 }
 
-Lens working_lens(Lens lens) {
-  Camera& camera = lens.camera;
+Eigen::Vector2d source_pixel(const Camera& camera, const Camera& view, const Eigen::Vector2d& uv) {
+  const Eigen::Vector2d xy = distort(camera, view.normalize(uv));
+  return camera.project({xy.x(), xy.y(), 1.0});
+}
+
+Camera working_camera(Camera camera) {
   const double divisor = divisor_of(static_cast<double>(camera.width_px) * camera.height_px);
   if (divisor == 1.0) {
-    return lens;
+    return camera;
   }
   const int width_px = std::max(1, static_cast<int>(std::lround(camera.width_px / divisor)));
   const int height_px = std::max(1, static_cast<int>(std::lround(camera.height_px / divisor)));
@@ -165,49 +163,17 @@ Lens working_lens(Lens lens) {
   camera.cy_px = y_scale * (camera.cy_px + 0.5) - 0.5;
   camera.width_px = width_px;
   camera.height_px = height_px;
-  return lens;
+  return camera;
 }
 
-Expected<FrameView> FrameView::create(const Lens& lens, const std::filesystem::path& camera_file) {
-  const Lens working = working_lens(lens);
-  FrameView view;
-  view.full_size_ = {lens.camera.width_px, lens.camera.height_px};
-  view.camera_ = working.camera;
-  if (is_undistorted(working)) {
+Expected<Camera> undistorted_camera(const Camera& camera) {
+  Camera view = camera;
+  view.distortion = Distortion::kNone;
+  view.distortion_coefficients = {};
+  if (!is_distorted(camera)) {
     return view;
   }
-  const Expected<double> scale = find_scale(working);
-  if (!scale) {
-    return fail(fmt::format("{}: {}", camera_file.string(), scale.error().message));
-  }
-  view.camera_ = scaled(working.camera, *scale);
-  cv::Mat map(working.camera.height_px, working.camera.width_px, CV_32FC2);
-  for (int v = 0; v < map.rows; ++v) {
-    for (int u = 0; u < map.cols; ++u) {
-      const Eigen::Vector2d uv = source_of(working, view.camera_, u, v);
-      map.at<cv::Vec2f>(v, u) = {static_cast<float>(uv.x()), static_cast<float>(uv.y())};
-    }
-  }
-  cv::convertMaps(map, cv::noArray(), view.map_, view.map_fraction_, CV_16SC2);
-  return view;
+  return find_scale(camera, view).map([&](double scale) { return scaled(view, scale); });
 }
 
-cv::Mat FrameView::apply(const cv::Mat& image) const {
-  cv::Mat result = image;
-  if (const cv::Size size(camera_.width_px, camera_.height_px); size != full_size_) {
-    cv::resize(image, result, size, 0.0, 0.0, cv::INTER_AREA);
-  }
-  if (map_.empty()) {
-    return result;
-  }
-  // Cubic takes five times as long, and the path is no better for it.
-  cv::Mat straight;
-  cv::remap(result, straight, map_, map_fraction_, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  return straight;
-}
-
-cv::Mat FrameView::apply_to_mask(const cv::Mat& mask) const {
-  return mask.empty() ? mask : cv::Mat(apply(mask) == 255);
-}
-
-}  // namespace stemvo::dataset
+}  // namespace stemvo
