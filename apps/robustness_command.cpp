@@ -49,7 +49,7 @@ struct RobustnessArguments {
 Expected<int> run(RobustnessArguments& arguments) {
   robustness::RobustnessRequest& request = arguments.request;
   Config base;
-  base.scale.source = ScaleSource::kGroundTruth;
+  base.scale_choice = ScaleChoice::kGroundTruth;
   const Expected<Config> config = read_config(arguments.config, base);
   if (!config) {
     return config.error();

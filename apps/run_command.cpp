@@ -40,7 +40,8 @@ or a quoted pattern such as 'drive/left_*.png'. camera.yaml says whose they are:
 
 Also EuRoC's sensor.yaml, Kalibr's camchain.yaml, OpenCV's YAML and ROS' camera_info. Frames are
 undistorted, and over 1.5 megapixels made smaller. Without camera_height the path is up to scale
-(scale.source=none).
+(scale.source=none), but on KITTI folders, where it is 1.65; --set scale.camera_height_m=1.4 says it
+too.
 
 --out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and
 trajectory_tum.txt (the poses), report.html (all there is to look at, for a browser),

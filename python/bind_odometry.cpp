@@ -226,7 +226,8 @@ void make_odometry(SafeOdometry* self, const nb::object& camera, const nb::objec
     new (self)
         SafeOdometry(frames->camera, dataset::with_camera_height(config, *frames), frames->mask);
   } else if (nb::isinstance<Camera>(camera)) {
-    new (self) SafeOdometry(nb::cast<Camera>(camera), config, {});
+    const Camera& plain = nb::cast<const Camera&>(camera);
+    new (self) SafeOdometry(plain, dataset::with_camera_height(config, {}), {});
   } else {
     throw nb::type_error("camera: expected Camera, Recording or FrameView");
   }

@@ -20,10 +20,9 @@ enum class PixelOrder { kGray, kRgb, kBgr };
 /// for what a caller hands in.
 class Odometry {
  public:
-  /// Errors: a camera or an option out of range (named); scale.source ground_truth, which only the
-  /// program knows; a network that cannot be loaded or does not take images of the camera's size; a
-  /// mask that is not CV_8UC1 of that size.
-  /// `mask`: 0 where no points are wanted; empty: they are everywhere.
+  /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
+  /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where
+  /// no points are wanted; empty: they are everywhere.
   [[nodiscard]] static Expected<Odometry> create(const Camera& camera,
                                                  const Options& options = {},
                                                  const cv::Mat& mask = {});

@@ -113,16 +113,15 @@ struct CameraOptions {
 };
 
 enum class ScaleSource {
-  kNone,           ///< up to scale
+  kNone,           ///< up to scale: units, not metres
   kConstantSpeed,  ///< steps of the same length
   kCameraHeight,   ///< from the road, whose distance below the camera is known
-  kGroundTruth,    ///< of the program only, which rescales every step of the output
 };
 enum class RoadEstimators { kBoth, kDense /* aligned image */, kPoints /* tracked corners */ };
 
 /// Keys `scale.*`.
 struct ScaleOptions {
-  ScaleSource source = ScaleSource::kCameraHeight;
+  ScaleSource source = ScaleSource::kNone;
   double step_m = 1.0;            ///< per frame
   double camera_height_m = 1.65;  ///< above the road
   RoadEstimators estimators = RoadEstimators::kBoth;
@@ -131,6 +130,9 @@ struct ScaleOptions {
 
 /// Everything that steers the odometry. Defaults stand here, once.
 struct Options {
+  /// Of a camera on a vehicle, `height_m` above its road: metres.
+  [[nodiscard]] static Options driving(double height_m);
+
   StemOptions stem;
   FeatureOptions features;
   TwoViewOptions two_view;
@@ -140,6 +142,7 @@ struct Options {
   CameraOptions camera;
   ScaleOptions scale;
   std::uint64_t seed = 1;  ///< of every random number
+  int threads = 0;         ///< at work at a time; 0: one per core
 };
 
 /// Ranges of all members; infinite, NaN and undefined enumerators fail. The error names the key as

@@ -184,7 +184,8 @@ class Benchmark {
     one.out_dir = run_dir(sequence, run);
     one.config = config;
     const bool takes_truth = run["scale_source"] == "ground_truth";
-    one.config.scale.source = takes_truth ? ScaleSource::kGroundTruth : ScaleSource::kCameraHeight;
+    one.config.scale_choice = takes_truth ? ScaleChoice::kGroundTruth : ScaleChoice::kOptions;
+    one.config.scale.source = takes_truth ? ScaleSource::kNone : ScaleSource::kCameraHeight;
     one.num_threads = request_.num_threads;
     if (takes_truth && !truths_[text_of(sequence["name"])]) {
       run["state"] = "not possible";

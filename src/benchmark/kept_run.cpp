@@ -32,6 +32,8 @@ Json with_results(const fs::path& folder, Json hashes) {
 }  // namespace
 
 Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
+  Config config = run.config;
+  config.threads = 0;  // no result depends on them
   const auto program = search::hash_program();
   const auto model = search::hash_model(run.config.stem.model);
   const auto files =
@@ -39,7 +41,7 @@ Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence)
   if (!program || !model || !files) {
     return !program ? program.error() : !model ? model.error() : files.error();
   }
-  return Json{{"configuration", internal::sha256_hex(dump_config(run.config))},
+  return Json{{"configuration", internal::sha256_hex(dump_config(config))},
               {"program", *program},
               {"model", *model},
               {"frames", files->frames},

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "config/config.hpp"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
@@ -10,6 +12,10 @@ namespace stemvo {
 namespace {
 
 using options::Rule;
+
+constexpr std::string_view kScaleSource = "scale.source";
+constexpr std::string_view kAuto = "auto";
+constexpr std::string_view kGroundTruth = "ground_truth";
 
 /// The keys of the program, then those of the library.
 template <options::Is<Config> C, typename V>
@@ -24,11 +30,32 @@ void visit_keys(C& config, V&& v) {
   options::visit(config, v);
 }
 
+/// Nothing, or why the value is none of the program's.
+std::string read_scale_source(Config& config, const YAML::Node& node) {
+  std::vector<std::string_view> names = {kAuto, kGroundTruth};
+  names.insert(names.begin() + 1, options::kNames<ScaleSource>.begin(),
+               options::kNames<ScaleSource>.end());
+  std::string name;
+  std::string problem = config::parse(node, name);
+  problem = problem.empty() ? options::violation_of(name, Rule::one_of(names)) : problem;
+  if (problem.empty()) {
+    config.scale_choice = name == kAuto          ? ScaleChoice::kAuto
+                          : name == kGroundTruth ? ScaleChoice::kGroundTruth
+                                                 : ScaleChoice::kOptions;
+    config.scale.source = config.scale_choice == ScaleChoice::kOptions
+                              ? options::from_string<ScaleSource>(name)
+                              : ScaleSource::kNone;
+  }
+  return problem;
+}
+
 std::vector<config::Key> keys_of(Config& config) {
   std::vector<config::Key> keys;
   visit_keys(config,
              [&keys](std::string_view section, std::string_view key, auto& value, const Rule& rule,
                      std::string_view /*help*/) { keys.emplace_back(section, key, value, rule); });
+  const auto source = std::ranges::find(keys, kScaleSource, &config::Key::name);
+  source->read = [&config](const YAML::Node& node) { return read_scale_source(config, node); };
   return keys;
 }
 
@@ -79,6 +106,13 @@ Status validate(const Config& config) {
   return checker.status ? validate(static_cast<const Options&>(config)) : checker.status;
 }
 
+std::string_view scale_source(const Config& config) {
+  return config.scale_choice == ScaleChoice::kGroundTruth ? kGroundTruth
+         : config.scale_choice == ScaleChoice::kAuto && config.scale.source == ScaleSource::kNone
+             ? kAuto
+             : options::to_string(config.scale.source);
+}
+
 std::string dump_config(const Config& config) {
   std::string text;
   std::string_view last_section;
@@ -89,8 +123,9 @@ std::string dump_config(const Config& config) {
       text += text.empty() ? "" : "\n";
       text += section.empty() ? "" : fmt::format("{}:\n", section);
     }
+    const bool is_source = options::full_name(section, key) == kScaleSource;
     text += fmt::format("{0}# {1}\n{0}{2}: {3}\n", section.empty() ? "" : "  ", help, key,
-                        config::format(value));
+                        is_source ? std::string(scale_source(config)) : config::format(value));
   });
   return text;
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "evaluation/metrics.hpp"
 #include "stemvo/error.hpp"
@@ -16,10 +17,18 @@ struct InputOptions {
   std::string camera = "auto";
 };
 
+/// Where key scale.source, which has two values more in the program, stands.
+enum class ScaleChoice {
+  kAuto,         ///< nobody named a source: dataset::with_camera_height chooses
+  kOptions,      ///< in Options::scale
+  kGroundTruth,  ///< every step of the output is rescaled to its true length
+};
+
 /// The program's configuration, read from YAML; config/default.yaml is generated from the defaults.
 struct Config : Options {
   InputOptions input;
   EvaluationOptions evaluation;
+  ScaleChoice scale_choice = ScaleChoice::kAuto;
 
   std::filesystem::path file;  ///< that load_config read; empty: none
 
@@ -36,6 +45,8 @@ struct Config : Options {
 [[nodiscard]] Status apply_override(Config& config, const std::string& assignment);
 /// Ranges and choices of every key; written so that NaN fails.
 [[nodiscard]] Status validate(const Config& config);
+/// The value of key scale.source.
+[[nodiscard]] std::string_view scale_source(const Config& config);
 /// YAML with every key, exact (numbers round-trip).
 [[nodiscard]] std::string dump_config(const Config& config);
 

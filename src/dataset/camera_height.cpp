@@ -4,15 +4,20 @@
 namespace stemvo::dataset {
 
 Config with_camera_height(Config config, const FrameList& frames) {
-  constexpr const char* kSource = "scale.source";
-  const bool is_chosen = config.scale.source != ScaleSource::kCameraHeight ||
-                         config.keys_in_file.contains(kSource) ||
-                         config.keys_overridden.contains(kSource);
-  if (!frames.is_kitti && !frames.camera_height_m && !is_chosen) {
-    config.scale.source = ScaleSource::kNone;
+  constexpr const char* kHeight = "scale.camera_height_m";
+  // A file that names both keys is a dump of all, whose height is the default.
+  const bool is_given =
+      config.keys_overridden.contains(kHeight) ||
+      (config.keys_in_file.contains(kHeight) && !config.keys_in_file.contains("scale.source"));
+  if (config.scale_choice == ScaleChoice::kAuto && config.scale.source == ScaleSource::kNone &&
+      (frames.is_kitti || frames.camera_height_m || is_given)) {
+    config.scale.source = ScaleSource::kCameraHeight;
+  }
+  if (config.scale_choice == ScaleChoice::kAuto) {
+    config.scale_choice = ScaleChoice::kOptions;
   }
   // A file's height is some camera's, often the default; that of the camera file is this one's.
-  if (frames.camera_height_m && !config.keys_overridden.contains("scale.camera_height_m")) {
+  if (frames.camera_height_m && !config.keys_overridden.contains(kHeight)) {
     config.scale.camera_height_m = *frames.camera_height_m;
   }
   return config;

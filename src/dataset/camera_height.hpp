@@ -7,8 +7,8 @@
 namespace stemvo::dataset {
 
 /// The configuration for these frames. A camera file's camera_height sets scale.camera_height_m
-/// where --set did not; without one scale.source becomes none where neither --set nor a
-/// configuration file named it: another camera is not on KITTI's car.
+/// where --set did not. Where nobody named scale.source it becomes camera_height on a KITTI folder,
+/// with a camera file's height, and with one that was given without a source; else none.
 [[nodiscard]] Config with_camera_height(Config config, const FrameList& frames);
 
 }  // namespace stemvo::dataset

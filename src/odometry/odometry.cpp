@@ -12,16 +12,6 @@
 namespace stemvo {
 namespace {
 
-Status check_options(const Options& options) {
-  if (options.scale.source == ScaleSource::kGroundTruth) {
-    return fail(
-        "scale.source: expected none, constant_speed or camera_height, found ground_truth, for "
-        "which "
-        "the odometry has no poses");
-  }
-  return validate(options);
-}
-
 Status check_image(const cv::Mat& image, PixelOrder order, const cv::Size& size) {
   if (image.size() != size) {
     return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
@@ -54,7 +44,7 @@ Expected<Odometry> Odometry::create(const Camera& camera,
                                     const Options& options,
                                     const cv::Mat& mask) {
   Status status = check_camera(camera);
-  status = status ? check_options(options) : status;
+  status = status ? validate(options) : status;
   status = status ? check_mask(mask, camera) : status;
   if (!status) {
     return status.error();

@@ -67,6 +67,13 @@ std::string violation_of(const std::string& value, const Rule& rule) {
 
 namespace stemvo {
 
+Options Options::driving(double height_m) {
+  Options options;
+  options.scale.source = ScaleSource::kCameraHeight;
+  options.scale.camera_height_m = height_m;
+  return options;
+}
+
 Status validate(const Options& options) {
   options::Checker checker;
   options::visit(options, checker);

@@ -58,8 +58,8 @@ template <>
 inline constexpr std::array<std::string_view, 3> kNames<CameraRefinement>{"off", "principal_point",
                                                                           "all"};
 template <>
-inline constexpr std::array<std::string_view, 4> kNames<ScaleSource>{
-    "none", "constant_speed", "camera_height", "ground_truth"};
+inline constexpr std::array<std::string_view, 3> kNames<ScaleSource>{"none", "constant_speed",
+                                                                     "camera_height"};
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<RoadEstimators>{"both", "dense", "points"};
 
@@ -233,8 +233,9 @@ template <Is<ScaleOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("source", o.source, kAny,
     "length of a step: none, up to scale (1 unit; mode map: the first one); constant_speed, the "
-    "same in metres; camera_height, from the road; ground_truth, each output step rescaled (the "
-    "paper's protocol; needs the pose file)");
+    "same in metres; camera_height, from the road; the program alone: auto, camera_height on a "
+    "KITTI folder and where a height is given, else none; ground_truth, each output step rescaled "
+    "(the paper's protocol; needs the pose file)");
   v("step_m", o.step_m, Rule::between(1e-6, 1e6), "metres per frame, for constant_speed");
   v("camera_height_m", o.camera_height_m, Rule::between(0.01, 1000),
     "above the road, for camera_height");
@@ -261,6 +262,8 @@ void visit(O& o, V&& v) {
   visit(o.camera, section("camera"));
   visit(o.scale, section("scale"));
   v("", "seed", o.seed, kAny, "seed of every random number");
+  v("", "threads", o.threads, Rule::between(0, 1024),
+    "threads at work at a time, which no pose depends on; 0: one per core");
 }
 
 }  // namespace stemvo::options

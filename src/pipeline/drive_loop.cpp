@@ -117,7 +117,7 @@ class DriveLoop {
   /// The last pose as result files hold it: with scale.source=ground_truth its step has the true
   /// length.
   [[nodiscard]] Rigid3 as_written(std::size_t i, Rigid3 pose) const {
-    if (i > 0 && run_.request.config.scale.source == ScaleSource::kGroundTruth) {
+    if (i > 0 && run_.request.config.scale_choice == ScaleChoice::kGroundTruth) {
       const Trajectory& estimate = run_.odometry.frames().estimator().trajectory();
       pose.translation = drive_.trajectory.back().translation +
                          rescaled_step(estimate, *run_.sequence.ground_truth(), i);

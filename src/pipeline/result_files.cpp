@@ -156,7 +156,7 @@ class ResultWriter {
     report.model = config.stem.model;
     report.filter = run_.odometry.stem_info().filter;
     report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
-    report.scale_source = options::to_string(config.scale.source);
+    report.scale_source = scale_source(config);
     report.tracked_fraction =
         share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
     report.in_place_fraction = share_in_place(drive_.frames);
@@ -169,7 +169,7 @@ class ResultWriter {
     if (truth_) {
       // A trajectory without a scale has no error in metres until one is fitted.
       const Alignment alignment =
-          config.scale.source == ScaleSource::kNone ? Alignment::kSim3 : Alignment::kNone;
+          report.scale_source == "none" ? Alignment::kSim3 : Alignment::kNone;
       report.metrics = evaluate_aligned(take_poses(trajectory_, truth_->frames), truth_->poses,
                                         alignment, config.evaluation);
     }

@@ -25,7 +25,7 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
   FrameSourceRequest source = request;
   source.camera = request.config.input.camera;
   auto sequence = open_source(source);
-  if (!sequence || request.config.scale.source != ScaleSource::kGroundTruth) {
+  if (!sequence || request.config.scale_choice != ScaleChoice::kGroundTruth) {
     return sequence;
   }
   if (!sequence->has_ground_truth()) {
@@ -156,7 +156,8 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (request.write_map && request.config.odometry.mode != OdometryMode::kMap) {
     return fail("--map: expected odometry.mode map, which makes one, found two_frame");
   }
-  const pipeline::ThreadScope threads(request.num_threads);
+  const int threads = request.num_threads > 0 ? request.num_threads : request.config.threads;
+  const pipeline::ThreadScope scope(threads);
   const auto sequence = open_sequence(request);
   if (!sequence) {
     return sequence.error();

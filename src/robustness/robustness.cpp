@@ -240,7 +240,7 @@ class Robustness {
     }
     const Trajectory& truth = *source.ground_truth();
     add_states(states, estimate, truth, is_disturbed, outcome);
-    const bool has_true_steps = config.scale.source == ScaleSource::kGroundTruth;
+    const bool has_true_steps = config.scale_choice == ScaleChoice::kGroundTruth;
     add_errors(has_true_steps ? rescale_steps(estimate, truth) : estimate, truth, config.evaluation,
                outcome);
     ++num_done_;

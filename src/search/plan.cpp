@@ -122,11 +122,11 @@ Status check_request(const SearchRequest& request) {
   if (const Status valid = validate(request.config); !valid) {
     return valid;
   }
-  if (request.config.scale.source != ScaleSource::kGroundTruth) {
+  if (request.config.scale_choice != ScaleChoice::kGroundTruth) {
     return fail(fmt::format(
         "scale.source: expected ground_truth for a search, which ranks by t_rel with steps of the "
         "true length, found {}",
-        options::to_string(request.config.scale.source)));
+        scale_source(request.config)));
   }
   for (auto kind = request.kinds.begin(); kind != request.kinds.end(); ++kind) {
     if (robustness::find_disturbance(*kind) == nullptr ||
@@ -206,6 +206,7 @@ Expected<SearchPlan> make_plan(const SearchRequest& request) {
   Config common = request.config;
   common.stem.model = "default";  // the layers say which
   common.stem.filter = -1;
+  common.threads = 0;  // no result depends on them
   plan.identity.program = *program;
   plan.identity.configuration = dump_config(common);
   plan.identity.only_sequence = request.only_sequence;

@@ -146,7 +146,7 @@ Status write_joined(const fs::path& file,
 Config search_defaults() {
   Config config;
   config.odometry.mode = OdometryMode::kTwoFrame;
-  config.scale.source = ScaleSource::kGroundTruth;
+  config.scale_choice = ScaleChoice::kGroundTruth;
   config.features.max_features = 400;
   config.features.klt_window = 23;
   // The refinement behind it forgets which estimator brought the first guess.

@@ -183,7 +183,7 @@ TEST_F(BadInput, Configuration) {
                {"--set stem.filter: expected once", "'stem.filter=3'", "'stem.filter=4'"});
   expect_error(run({"--set", "stem.filtre=3"}), 1, {"--set stem.filtre: unknown key"});
   expect_error(run({"--set", "scale.source=gps"}), 1,
-               {"none, constant_speed, camera_height, ground_truth, found 'gps'"});
+               {"auto, none, constant_speed, camera_height, ground_truth, found 'gps'"});
   expect_error(run({"--set", "scale.step_m=nan"}), 1, {"scale.step_m", "nan"});
   expect_error(
       run({"--map", "--set", "odometry.mode=two_frame", "--set", "scale.source=constant_speed"}), 1,

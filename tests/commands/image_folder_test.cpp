@@ -132,6 +132,9 @@ TEST_F(ImageFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   expect_scale({"--set", "scale.source=constant_speed"}, "constant_speed", "1.65");
   expect_scale({"--config", folder_ / "my.yaml"}, "camera_height", "1.5");
   expect_scale({"--config", "fast"}, "none", "1.65");
+  expect_scale({"--config", STEMVO_SOURCE_DIR "/config/default.yaml"}, "none", "1.65");
+  expect_scale({"--set", "scale.camera_height_m=1.4"}, "camera_height", "1.4");
+  expect_scale({"--set", "scale.camera_height_m=1.4", "--set", "scale.source=none"}, "none", "1.4");
   write_file(camera_, height);
   expect_scale({}, "camera_height", "1.25");
   expect_scale({"--set", "scale.source=none"}, "none", "1.25");

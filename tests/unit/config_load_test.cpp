@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "config/config.hpp"
+#include "options/visit.hpp"
 
 namespace stemvo {
 namespace {
@@ -72,6 +73,18 @@ TEST_F(ConfigLoad, EmptyFileAndEmptySectionAreTheDefaults) {
   EXPECT_EQ(dump_config(load("stem:\n# filter: 3\n").value()), dump_config({}));
 }
 
+TEST_F(ConfigLoad, TheScaleHasSourcesThatTheLibraryDoesNotKnow) {
+  EXPECT_EQ(scale_source({}), "auto");
+  for (const char* name : {"auto", "none", "constant_speed", "camera_height", "ground_truth"}) {
+    const auto config = load(std::string("scale:\n  source: ") + name);
+    ASSERT_TRUE(config) << config.error().message;
+    EXPECT_EQ(scale_source(*config), name);
+    EXPECT_THAT(dump_config(*config), HasSubstr(std::string("  source: ") + name + "\n"));
+    const bool is_programs = *name == 'a' || *name == 'g';
+    EXPECT_EQ(options::to_string(config->scale.source), is_programs ? "none" : name);
+  }
+}
+
 TEST_F(ConfigLoad, TellsWhichKeysAFileSets) {
   const auto config = load_config(write("stem:\n  filter: 3\nscale:\n# source: none\nseed: 2\n"));
   ASSERT_TRUE(config) << config.error().message;
@@ -88,7 +101,7 @@ TEST_F(ConfigLoad, UnknownKeyNamesLineAndKnownKeys) {
               StartsWith(":3: stem.filtre: unknown key; known keys of stem: model, filter, "));
   EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"),
               StartsWith(":2: stm: unknown key; known keys: input, evaluation, stem, features, "));
-  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", scale, seed"));
+  EXPECT_THAT(error_of("\nstm:\n  filter: 3\n"), EndsWith(", scale, seed, threads"));
 }
 
 TEST_F(ConfigLoad, ARenamedKeyNamesItsNewName) {
@@ -112,7 +125,7 @@ TEST_F(ConfigLoad, ARenamedKeyNamesItsNewName) {
 
 TEST_F(ConfigLoad, ARenamedValueNamesItsNewName) {
   EXPECT_THAT(error_of("scale:\n  source: constant\n"),
-              AllOf(StartsWith(":2: scale.source: expected one of none, constant_speed, "),
+              AllOf(StartsWith(":2: scale.source: expected one of auto, none, constant_speed, "),
                     EndsWith("found 'constant'; its name is scale.source=constant_speed now")));
   Config config;
   EXPECT_THAT(apply_override(config, "stem.tracking_resolution=bicubic").error().message,
@@ -229,14 +242,13 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
   EXPECT_THAT(error_of("stem.filtre=1"),
               StartsWith("--set stem.filtre: unknown key; known keys of stem: model, "));
   EXPECT_THAT(error_of("stm=1"), AllOf(StartsWith("--set stm: unknown key; known keys: input, "),
-                                       EndsWith(", scale, seed")));
+                                       EndsWith(", scale, seed, threads")));
   EXPECT_THAT(error_of("stem=1"), StartsWith("--set stem: unknown key; known keys: input, "));
   EXPECT_THAT(error_of("stem.filter"), HasSubstr("expected key=value"));
   EXPECT_EQ(error_of("stem.filter=a"), "--set stem.filter: expected a whole number, found 'a'");
-  EXPECT_EQ(
-      error_of("scale.source=gps"),
-      "--set scale.source: expected one of none, constant_speed, camera_height, ground_truth, "
-      "found 'gps'");
+  EXPECT_EQ(error_of("scale.source=gps"),
+            "--set scale.source: expected one of auto, none, constant_speed, camera_height, "
+            "ground_truth, found 'gps'");
   EXPECT_EQ(error_of("stem.model="), "--set stem.model: expected a text, found nothing");
   EXPECT_EQ(
       error_of("evaluation.segment_lengths_m=[10,-20]"),

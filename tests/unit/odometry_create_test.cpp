@@ -102,10 +102,15 @@ TEST(OdometryCreate, ALensIsTakenOutOfTheImagesAndTheMaskInside) {
   EXPECT_THAT(error_of({}, distorted), HasSubstr("camera: expected finite distortion"));
 }
 
-TEST(OdometryCreate, StepsOfTheGroundTruthAreNotGuessed) {
+TEST(OdometryCreate, MetresAreClaimedOnlyWithAHeight) {
+  EXPECT_EQ(Options().scale.source, ScaleSource::kNone);
+  const Options driving = Options::driving(1.2);
+  EXPECT_EQ(driving.scale.source, ScaleSource::kCameraHeight);
+  EXPECT_EQ(driving.scale.camera_height_m, 1.2);
+  EXPECT_THAT(error_of(Options::driving(-1.0)), HasSubstr("scale.camera_height_m: expected"));
   Options options;
-  options.scale.source = ScaleSource::kGroundTruth;
-  EXPECT_THAT(error_of(options), HasSubstr("scale.source: expected none, constant_speed or"));
+  options.threads = -1;
+  EXPECT_THAT(error_of(options), HasSubstr("threads: expected a whole number from 0 to 1024"));
 }
 
 TEST(OdometryCreate, ACameraThatIsNoneIsAnError) {

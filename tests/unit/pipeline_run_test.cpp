@@ -107,10 +107,10 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
 
 TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
-  request_.config.scale.source = ScaleSource::kConstantSpeed;
+  request_.config.scale_choice = ScaleChoice::kOptions;
   ASSERT_TRUE(run_sequence(request_).value().written);
   const auto constant = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
-  request_.config.scale.source = ScaleSource::kGroundTruth;
+  request_.config.scale_choice = ScaleChoice::kGroundTruth;
   ASSERT_TRUE(run_sequence(request_).value().written);
   const auto rescaled = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   ASSERT_TRUE(constant && rescaled);
@@ -157,7 +157,7 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
 
 TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
-  request_.config.scale.source = ScaleSource::kNone;
+  request_.config.scale_choice = ScaleChoice::kOptions;
   request_.config.scale.step_m = 0.25;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -178,7 +178,7 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
   const fs::path truth = folder_ / "truth.txt";
   std::ofstream(truth) << "0.1 0 0 0.05 0 0 0 1\n0.4 0 0 0.2 0 0 0 1\n";
   request_.ground_truth = truth;
-  request_.config.scale.source = ScaleSource::kNone;
+  request_.config.scale_choice = ScaleChoice::kOptions;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   const nlohmann::json page = testing::report_content(read_file(request_.out_dir / "report.html"));
@@ -192,7 +192,7 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
 
 TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   request_.config.odometry.mode = OdometryMode::kMap;
-  request_.config.scale.source = ScaleSource::kGroundTruth;
+  request_.config.scale_choice = ScaleChoice::kGroundTruth;
   request_.write_map = true;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -303,7 +303,7 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
   request.config.stem.model = "nothing";
   EXPECT_THAT(error_of(request), HasSubstr("nothing"));
   request = request_;
-  request.config.scale.source = ScaleSource::kGroundTruth;
+  request.config.scale_choice = ScaleChoice::kGroundTruth;
   fs::remove(folder_ / "poses/07.txt");
   EXPECT_THAT(error_of(request), HasSubstr("poses/07.txt: expected a pose file"));
   EXPECT_FALSE(fs::exists(request_.out_dir));

@@ -22,7 +22,7 @@ class RobustnessRun : public testing::SmallDrive {
   RobustnessRun() {
     request_.sequence_dirs = {sequence_};
     request_.out_dir = folder_ / "out";
-    request_.config.scale.source = ScaleSource::kGroundTruth;
+    request_.config.scale_choice = ScaleChoice::kGroundTruth;
     request_.config.evaluation.segment_lengths_m = {2.0, 4.0};
     request_.kinds = {kUndisturbed, "sensor_noise", "every_nth"};
     request_.controls = {"gray", "default:2", "orb"};
