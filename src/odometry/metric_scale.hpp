@@ -37,6 +37,7 @@ class MetricScale {
  private:
   void keep(const RoadScaleEstimate& estimate);
 
+  ScaleFilter filter_;
   std::optional<RoadScale> road_;
   std::optional<double> sigma_;
   ScaleState state_ = ScaleState::kDisabled;

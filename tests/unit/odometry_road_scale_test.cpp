@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cmath>
-#include <limits>
-#include <random>
-#include <vector>
+#include <utility>
 
 #include <gtest/gtest.h>
 
-#include "odometry/road/filter.hpp"
+#include "odometry/road/path.hpp"
 #include "odometry/road/region.hpp"
 #include "odometry/road/scale.hpp"
 #include "support/road_scene.hpp"
@@ -17,72 +14,7 @@ namespace {
 
 using testing::RoadScene;
 
-TEST(RoadFilter, AveragesAndKnowsHowWell) {
-  RoadOptions options;
-  options.drift_sigma = 0.002;
-  RoadFilter filter{options};
-  std::mt19937_64 engine(3);
-  std::normal_distribution<double> noise(0.0, 0.03);
-  for (int i = 0; i < 200; ++i) {
-    filter.predict();
-    filter.update(0.7 + noise(engine), 0.01);
-  }
-  EXPECT_NEAR(filter.log_scale(), 0.7, 0.02);
-  EXPECT_LT(filter.sigma(), 0.015);
-}
-
-void measure(RoadFilter& filter, int num, double log_scale) {
-  for (int i = 0; i < num; ++i) {
-    filter.predict();
-    filter.update(log_scale, 0.01);
-  }
-}
-
-TEST(RoadFilter, OneWildMeasurementMovesLittleAsManyAsBeforeWin) {
-  for (const int num_before : {2, 8, 50}) {
-    RoadFilter filter{RoadOptions{}};
-    measure(filter, num_before, 0.0);
-    EXPECT_FALSE(filter.update(1.0, 0.01));
-    EXPECT_LT(std::abs(filter.log_scale()), num_before < 50 ? 0.1 : 0.02) << num_before;
-    measure(filter, std::min(num_before + 10, 40), 1.0);
-    EXPECT_NEAR(filter.log_scale(), 1.0, 0.02) << num_before;
-  }
-}
-
-/// In a tight turn the strip ahead lies off the road: whole rendered 00, frames 3394 to 3408.
-TEST(RoadFilter, WhatManyFramesSaidIsNotOverturnedByATurn) {
-  RoadFilter filter{RoadOptions{}};
-  measure(filter, 200, 0.0);
-  measure(filter, 20, -0.8);
-  EXPECT_GT(filter.log_scale(), -0.15);
-  measure(filter, 20, 0.0);
-  EXPECT_NEAR(filter.log_scale(), 0.0, 0.02);
-  measure(filter, 40, -0.8);
-  EXPECT_NEAR(filter.log_scale(), -0.8, 0.05);
-}
-
-TEST(RoadFilter, WithoutJoiningEachMeasurementStandsAlone) {
-  RoadOptions options;
-  options.join_frames = false;
-  RoadFilter filter(options);
-  for (const double log_scale : {0.0, 1.0, -0.5}) {
-    filter.predict();
-    EXPECT_TRUE(filter.update(log_scale, 0.01));
-    EXPECT_EQ(filter.log_scale(), log_scale);
-  }
-}
-
-TEST(RoadFilter, WithoutMeasurementsTheDoubtGrows) {
-  RoadFilter filter{RoadOptions{}};
-  filter.update(0.0, 0.01);
-  double last = filter.sigma();
-  for (int i = 0; i < 20; ++i) {
-    filter.predict();
-    EXPECT_GT(filter.sigma(), last);
-    last = filter.sigma();
-  }
-  EXPECT_EQ(filter.log_scale(), 0.0);
-}
+constexpr double kDriftSigma = 0.006;
 
 TEST(RoadRegion, FollowsTheTurn) {
   const RoadOptions options;
@@ -132,13 +64,24 @@ TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
   EXPECT_NEAR(rescaled.slope_rad, pitch_rad, 1e-3);
 }
 
+/// A road scale with a filter of its own.
+struct Scale {
+  explicit Scale(const RoadOptions& options = {}) : road(options) {}
+
+  RoadScaleEstimate update(RoadImage image, const Rigid3& motion) {
+    return road.update(std::move(image), motion, filter);
+  }
+  RoadScale road;
+  ScaleFilter filter{kDriftSigma};
+};
+
 /// Drives straight ahead over asphalt, 0.7 m a frame; the map's unit is 1 / kMetresPerUnit long.
 class Drive {
  public:
   static constexpr double kStep_m = 0.7;
   static constexpr double kMetresPerUnit = 3.0;
 
-  RoadScaleEstimate next(RoadScale& scale, bool has_road = true) {
+  RoadScaleEstimate next(Scale& scale, bool has_road = true) {
     scene_.has_road = has_road;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     const cv::Mat image =
@@ -147,7 +90,7 @@ class Drive {
     return scale.update(make_road_image({image, {}}, scene_.camera), step());
   }
   /// A frame that shows the last place again.
-  RoadScaleEstimate stand(RoadScale& scale) {
+  RoadScaleEstimate stand(Scale& scale) {
     --frame_;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     ++frame_;
@@ -166,7 +109,7 @@ class Drive {
 
 TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
   Drive drive;
-  RoadScale scale(RoadOptions{});
+  Scale scale;
   EXPECT_EQ(drive.next(scale).reason, "first frame");
   RoadScaleEstimate estimate;
   for (int i = 0; i < 12; ++i) {
@@ -180,7 +123,8 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
   EXPECT_EQ(standing.metres_per_unit, estimate.metres_per_unit);
   EXPECT_EQ(standing.sigma, estimate.sigma);
 
-  scale.rescale(2.0);
+  scale.road.rescale(2.0);
+  scale.filter.shift(-std::log(2.0));
   drive.metres_per_unit /= 2.0;
   estimate = drive.next(scale);
   EXPECT_TRUE(estimate.is_measured) << estimate.reason;
@@ -189,7 +133,7 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
 
 TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
   Drive drive;
-  RoadScale scale(RoadOptions{});
+  Scale scale;
   RoadScaleEstimate seen;
   for (int i = 0; i < 6; ++i) {
     seen = drive.next(scale);
@@ -217,7 +161,7 @@ double error_on_a_crest(const RoadOptions& options) {
     const double z = kCrestStep_m * (frame - kFrames);
     return Rigid3(so3_exp({-2.0 * kBend_per_m * z, 0.0, 0.0}), {0.0, kBend_per_m * z * z, z});
   };
-  RoadScale scale(options);
+  Scale scale(options);
   RoadScaleEstimate estimate;
   for (int frame = 0; frame <= kFrames; ++frame) {
     const Rigid3 camera_from_first = first_from_camera(frame).inverse();
@@ -240,11 +184,12 @@ TEST(RoadScale, ACrestIsNoBiasBecauseThePathTellsTheBend) {
 
 TEST(RoadScale, ARestartForgetsTheUnit) {
   Drive drive;
-  RoadScale scale(RoadOptions{});
+  Scale scale;
   for (int i = 0; i < 4; ++i) {
     drive.next(scale);
   }
-  scale.restart();
+  scale.road.restart();
+  scale.filter.restart();
   EXPECT_FALSE(drive.next(scale).is_initialized);
   EXPECT_TRUE(drive.next(scale).is_initialized);
 }

@@ -31,11 +31,7 @@ struct RoadOptions {
   bool use_points = true;
 
   // Joining over time.
-  bool join_frames = true;       ///< false: every measurement is believed as it comes
   double flatness_sigma = 0.03;  ///< error of log_scale that both estimators and neighbours share
-  /// Drift of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips,
-  /// steadily; a random walk must be loose enough to follow without lagging behind.
-  double drift_sigma = 0.006;
 
   // The estimators.
   double convergence = 3e-3;       ///< relative change of the plane that ends the refinement

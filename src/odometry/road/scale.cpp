@@ -18,13 +18,7 @@ constexpr double kStandingShare = 0.25;
 
 }  // namespace
 
-double RoadScale::skip() {
-  filter_.predict();
-  return filter_.sigma();
-}
-
 void RoadScale::rescale(double factor) {
-  filter_.shift(-std::log(factor));
   path_.rescale(factor);
   for (Past& past : past_) {
     past.now_from_past.translation *= factor;
@@ -32,20 +26,19 @@ void RoadScale::rescale(double factor) {
 }
 
 void RoadScale::restart() {
-  filter_.restart();
   past_.clear();
   path_.restart();
   frames_unmeasured_ = 0;
 }
 
-const RoadScale::Past* RoadScale::pick_past() const {
+const RoadScale::Past* RoadScale::pick_past(const ScaleFilter& filter) const {
   if (past_.empty() || !(past_.front().now_from_past.translation.norm() > 0.0)) {
     return nullptr;
   }
-  if (!filter_.is_initialized()) {
+  if (!filter.is_initialized()) {
     return &past_.front();
   }
-  const double metres_per_unit = std::exp(filter_.log_scale());
+  const double metres_per_unit = std::exp(filter.log_scale());
   const Past* best = nullptr;
   for (const Past& past : past_) {
     const double baseline_m = past.now_from_past.translation.norm() * metres_per_unit;
@@ -59,14 +52,14 @@ const RoadScale::Past* RoadScale::pick_past() const {
   return best;
 }
 
-RoadPrior RoadScale::make_prior(const Rigid3& motion) const {
+RoadPrior RoadScale::make_prior(const Rigid3& motion, const ScaleFilter& filter) const {
   RoadPrior prior;
   prior.roll_sigma = options_.roll_sigma_rad;
-  prior.log_scale = filter_.log_scale();
-  prior.log_scale_sigma = std::max(kMinPriorSigma, filter_.sigma());
-  if (!filter_.is_initialized()) {
+  prior.log_scale = filter.log_scale();
+  prior.log_scale_sigma = std::max(kMinPriorSigma, filter.sigma());
+  if (!filter.is_initialized()) {
     prior.log_scale = std::log(kTypicalStep_m / motion.translation.norm());
-    prior.log_scale_sigma = RoadFilter::kUnknownSigma;
+    prior.log_scale_sigma = ScaleFilter::kUnknownSigma;
   } else if (frames_unmeasured_ >= kFramesUntilSearch) {
     prior.log_scale_sigma = std::max(prior.log_scale_sigma, kSearchSigma);
   }
@@ -81,12 +74,12 @@ void RoadScale::remember(RoadImage image) {
   }
 }
 
-std::string_view RoadScale::measure(const Past& past, const RoadImage& image) {
-  RoadPrior prior = make_prior(past.now_from_past);
+std::string_view RoadScale::measure(const Past& past, const RoadImage& image, ScaleFilter& filter) {
+  RoadPrior prior = make_prior(past.now_from_past, filter);
   const RoadStep step{past.image, image, past.now_from_past, prior, options_};
   RoadMeasurement dense;
   RoadMeasurement points;
-  if (options_.use_dense || !filter_.is_initialized()) {  // the corners cannot search for a scale
+  if (options_.use_dense || !filter.is_initialized()) {  // the corners cannot search for a scale
     dense = measure_dense(step);
   }
   if (options_.use_points) {
@@ -95,8 +88,6 @@ std::string_view RoadScale::measure(const Past& past, const RoadImage& image) {
     }
     points = measure_points(step);
   }
-  // The filter's flatness_sigma is the error that they share: the same road, not quite as the
-  // model.
   double weight = 0.0;
   double sum = 0.0;
   for (const RoadMeasurement* road : {&dense, &points}) {
@@ -108,11 +99,15 @@ std::string_view RoadScale::measure(const Past& past, const RoadImage& image) {
   if (!(weight > 0.0)) {
     return options_.use_dense ? dense.reason : points.reason;
   }
-  const bool is_believed = filter_.update(sum / weight, 1.0 / std::sqrt(weight));
+  // They share the error of flatness_sigma: the same road, not quite as the model.
+  const double sigma = std::hypot(1.0 / std::sqrt(weight), options_.flatness_sigma);
+  const bool is_believed = filter.update(sum / weight, sigma, ScaleWitness::kRoad);
   return is_believed ? "" : "differs from the frames before";
 }
 
-RoadScaleEstimate RoadScale::update(RoadImage image, const Rigid3& cur_from_prev) {
+RoadScaleEstimate RoadScale::update(RoadImage image,
+                                    const Rigid3& cur_from_prev,
+                                    ScaleFilter& filter) {
   if (!past_.empty()) {
     path_.move(cur_from_prev);
   }
@@ -120,10 +115,10 @@ RoadScaleEstimate RoadScale::update(RoadImage image, const Rigid3& cur_from_prev
     past.now_from_past = cur_from_prev * past.now_from_past;
   }
   RoadScaleEstimate result;
-  const Past* past = pick_past();
+  const Past* past = pick_past(filter);
   if (past != nullptr) {
-    filter_.predict();
-    result.reason = measure(*past, image);
+    filter.predict();
+    result.reason = measure(*past, image, filter);
     result.is_measured = result.reason.empty();
     frames_unmeasured_ = result.is_measured ? 0 : frames_unmeasured_ + 1;
     remember(std::move(image));
@@ -133,9 +128,9 @@ RoadScaleEstimate RoadScale::update(RoadImage image, const Rigid3& cur_from_prev
   } else {
     result.reason = "standing still";
   }
-  result.is_initialized = filter_.is_initialized();
-  result.metres_per_unit = std::exp(filter_.log_scale());
-  result.sigma = filter_.sigma();
+  result.is_initialized = filter.is_initialized();
+  result.metres_per_unit = std::exp(filter.log_scale());
+  result.sigma = filter.sigma();
   return result;
 }
 

@@ -5,9 +5,10 @@
 #include <string_view>
 
 #include "odometry/road/estimators.hpp"
-#include "odometry/road/filter.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/road/model.hpp"
+#include "odometry/road/path.hpp"
+#include "odometry/scale_filter.hpp"
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo {
@@ -24,14 +25,12 @@ struct RoadScaleEstimate {
 /// Metres per unit of a monocular odometry from the road: joins the estimators, and frames.
 class RoadScale {
  public:
-  explicit RoadScale(const RoadOptions& options)
-      : options_(options), filter_(options), path_(options) {}
+  explicit RoadScale(const RoadOptions& options) : options_(options), path_(options) {}
 
   /// One call per frame with an image. `cur_from_prev`: the motion since the
-  /// last call, in units of the map (ignored at the first call and after restart()).
-  RoadScaleEstimate update(RoadImage image, const Rigid3& cur_from_prev);
-  /// A frame on which the road cannot be measured: the doubt grows. Returns the sigma.
-  double skip();
+  /// last call, in units of the map (ignored at the first call and after restart()). The filter,
+  /// which others measure for too, says what is known before, and takes what is measured.
+  RoadScaleEstimate update(RoadImage image, const Rigid3& cur_from_prev, ScaleFilter& filter);
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);
   /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
@@ -43,14 +42,13 @@ class RoadScale {
     Rigid3 now_from_past;
   };
   /// The nearest past frame that is far enough away; nullptr where the car did not move.
-  [[nodiscard]] const Past* pick_past() const;
-  [[nodiscard]] RoadPrior make_prior(const Rigid3& motion) const;
+  [[nodiscard]] const Past* pick_past(const ScaleFilter& filter) const;
+  [[nodiscard]] RoadPrior make_prior(const Rigid3& motion, const ScaleFilter& filter) const;
   void remember(RoadImage image);
   /// Both estimators, joined and given to the filter. Returns why nothing is believed, else empty.
-  std::string_view measure(const Past& past, const RoadImage& image);
+  std::string_view measure(const Past& past, const RoadImage& image, ScaleFilter& filter);
 
   RoadOptions options_;
-  RoadFilter filter_;
   RoadPath path_;
   std::deque<Past> past_;  ///< newest first
   int frames_unmeasured_ = 0;

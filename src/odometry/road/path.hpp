@@ -10,35 +10,6 @@
 
 namespace stemvo {
 
-/// Kalman filter of log(metres per unit), a random walk. A measurement far from the state counts
-/// little (Huber; still less beyond three sigmas), but several in a row on the same side, as many
-/// as were believed before, say that the state is wrong: it opens up.
-class RoadFilter {
- public:
-  explicit RoadFilter(const RoadOptions& options) : options_(options) {}
-
-  static constexpr double kUnknownSigma = 1.0;
-
-  /// One frame passes: the map may have drifted.
-  void predict();
-  /// Returns whether the measurement was believed; always where frames are not joined.
-  bool update(double log_scale, double sigma);
-  void shift(double log_factor) { log_scale_ += log_factor; }
-  void restart();
-
-  [[nodiscard]] bool is_initialized() const { return is_initialized_; }
-  [[nodiscard]] double log_scale() const { return log_scale_; }
-  [[nodiscard]] double sigma() const { return sigma_; }
-
- private:
-  RoadOptions options_;
-  bool is_initialized_ = false;
-  double log_scale_ = 0.0;
-  double sigma_ = kUnknownSigma;
-  int num_doubts_ = 0;    ///< measurements in a row on one side; the sign is the side
-  int num_believed_ = 0;  ///< since it opened up, as far as it counts
-};
-
 /// The way that the camera came: it lies above the road at the camera's height, but for the car's
 /// bouncing, and tells the slope and the bend of the road under the car, whatever the camera's
 /// pitch. Without it a crest ahead looks like a larger step (the plane through the road ahead

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "odometry/scale_filter.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr double kDriftSigma = 0.006;
+constexpr double kSigma = 0.03;
+constexpr ScaleWitness kRoad = ScaleWitness::kRoad;
+
+TEST(ScaleFilter, AveragesAndKnowsHowWell) {
+  ScaleFilter filter(0.002);
+  std::mt19937_64 engine(3);
+  std::normal_distribution<double> noise(0.0, 0.03);
+  for (int i = 0; i < 200; ++i) {
+    filter.predict();
+    filter.update(0.7 + noise(engine), kSigma, kRoad);
+  }
+  EXPECT_NEAR(filter.log_scale(), 0.7, 0.02);
+  EXPECT_LT(filter.sigma(), 0.015);
+}
+
+void measure(ScaleFilter& filter, int num, double log_scale, ScaleWitness witness = kRoad) {
+  for (int i = 0; i < num; ++i) {
+    filter.predict();
+    filter.update(log_scale, kSigma, witness);
+  }
+}
+
+TEST(ScaleFilter, OneWildMeasurementMovesLittleAsManyAsBeforeWin) {
+  for (const int num_before : {2, 8, 50}) {
+    ScaleFilter filter(kDriftSigma);
+    measure(filter, num_before, 0.0);
+    EXPECT_FALSE(filter.update(1.0, kSigma, kRoad));
+    EXPECT_LT(std::abs(filter.log_scale()), num_before < 50 ? 0.1 : 0.02) << num_before;
+    measure(filter, std::min(num_before + 10, 40), 1.0);
+    EXPECT_NEAR(filter.log_scale(), 1.0, 0.02) << num_before;
+  }
+}
+
+/// In a tight turn the strip ahead lies off the road: whole rendered 00, frames 3394 to 3408.
+TEST(ScaleFilter, WhatManyFramesSaidIsNotOverturnedByATurn) {
+  ScaleFilter filter(kDriftSigma);
+  measure(filter, 200, 0.0);
+  measure(filter, 20, -0.8);
+  EXPECT_GT(filter.log_scale(), -0.15);
+  measure(filter, 20, 0.0);
+  EXPECT_NEAR(filter.log_scale(), 0.0, 0.02);
+  measure(filter, 40, -0.8);
+  EXPECT_NEAR(filter.log_scale(), -0.8, 0.05);
+}
+
+TEST(ScaleFilter, WithoutJoiningEachMeasurementStandsAlone) {
+  ScaleFilter filter(kDriftSigma, /*joins_frames=*/false);
+  for (const double log_scale : {0.0, 1.0, -0.5}) {
+    filter.predict();
+    EXPECT_TRUE(filter.update(log_scale, kSigma, kRoad));
+    EXPECT_EQ(filter.log_scale(), log_scale);
+  }
+}
+
+TEST(ScaleFilter, WithoutMeasurementsTheDoubtGrows) {
+  ScaleFilter filter(kDriftSigma);
+  filter.update(0.0, kSigma, kRoad);
+  double last = filter.sigma();
+  for (int i = 0; i < 20; ++i) {
+    filter.predict();
+    EXPECT_GT(filter.sigma(), last);
+    last = filter.sigma();
+  }
+  EXPECT_EQ(filter.log_scale(), 0.0);
+}
+
+// Both in turn, each sure of itself: the road's plane may be a table, a way is one.
+TEST(ScaleFilter, AWayThatContradictsTheRoadWinsAndKeepsWinning) {
+  ScaleFilter filter(kDriftSigma);
+  measure(filter, 50, 0.0);
+  double last = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    measure(filter, 1, 0.0);
+    filter.update(1.0, 0.02, ScaleWitness::kWay);
+    last = filter.log_scale();
+    if (i >= 10) {
+      EXPECT_NEAR(last, 1.0, 0.05) << i;
+    }
+  }
+}
+
+TEST(ScaleFilter, BothCountByTheirSigmas) {
+  ScaleFilter filter(1e-6);
+  for (int i = 0; i < 400; ++i) {
+    filter.predict();
+    filter.update(0.0, 0.03, kRoad);
+    filter.update(0.03, 0.015, ScaleWitness::kWay);
+  }
+  EXPECT_NEAR(filter.log_scale(), 0.03 * 4.0 / 5.0, 0.001);
+}
+
+}  // namespace
+}  // namespace stemvo
