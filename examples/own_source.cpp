@@ -43,8 +43,9 @@ int main(int argc, char** argv) {
   auto odometry = stemvo::Odometry::create(camera, options);  // refuses a wrong size
   if (!odometry) return std::cerr << odometry.error().message << "\n", 1;
   RawFrames frames(std::cin, camera.width_px, camera.height_px);
+  double time_s = 0.0;
   while (const std::optional<cv::Mat> image = frames.next()) {
-    const auto frame = odometry->process(*image, stemvo::PixelOrder::kGray);
+    const auto frame = odometry->process(*image, stemvo::PixelOrder::kGray, time_s += 1.0 / 30.0);
     if (!frame) return std::cerr << frame.error().message << "\n", 1;
     std::cout << stemvo::to_string(frame->state) << " "
               << frame->world_from_camera.translation.transpose() << "\n";

@@ -50,11 +50,6 @@ void apply(Config& config, const nb::dict& values) {
   value_or_raise(validate(config));
 }
 
-struct Result {
-  FrameResult frame;
-  std::optional<double> timestamp;
-};
-
 /// Odometry is used by one thread at a time; Python may call from several.
 class SafeOdometry {
  public:
@@ -64,13 +59,10 @@ class SafeOdometry {
 
   [[nodiscard]] const std::string& scale_source() const { return scale_source_; }
 
-  Result process(const std::optional<AnyArray>& image, std::optional<double> timestamp) {
-    if (!image) {
-      return call([&](Odometry& o) { return Result{o.process_missing(), timestamp}; });
-    }
-    const ImageView view = value_or_raise(view_of(*image));
-    auto frame = call([&](Odometry& o) { return o.process(view.pixels, view.order); });
-    return {value_or_raise(std::move(frame)), timestamp};
+  FrameResult process(const AnyArray& image, double timestamp) {
+    const ImageView view = value_or_raise(view_of(image));
+    return value_or_raise(
+        call([&](Odometry& o) { return o.process(view.pixels, view.order, timestamp); }));
   }
   std::pair<DoubleArray, ByteArray> landmarks() {
     return arrays_of(call([](Odometry& o) { return o.landmarks(); }));
@@ -180,31 +172,31 @@ void bind_result(nb::module_& module) {
       .def("__repr__", [](const CameraSigma& s) {
         return fmt::format("CameraSigma(fx={}, cx={}, cy={})", s.fx_px, s.cx_px, s.cy_px);
       });
-  nb::class_<Result>(module, "Result", "A frame's pose and how it came about")
+  nb::class_<FrameResult>(module, "Result", "A frame's pose and how it came about")
       .def_prop_ro(
-          "world_from_camera", [](const Result& r) { return array_of(r.frame.world_from_camera); },
+          "world_from_camera", [](const FrameResult& r) { return array_of(r.world_from_camera); },
           nb::rv_policy::move, "4x4")
-      .def_prop_ro("state", [](const Result& r) { return std::string(to_string(r.frame.state)); })
-      .def_prop_ro("is_measured", [](const Result& r) { return is_measured(r.frame.state); })
-      .def_ro("timestamp", &Result::timestamp, "As given")
-      .def_prop_ro("num_matches", [](const Result& r) { return r.frame.num_matches; })
-      .def_prop_ro("num_inliers", [](const Result& r) { return r.frame.num_inliers; })
+      .def_prop_ro("state", [](const FrameResult& r) { return std::string(to_string(r.state)); })
+      .def_prop_ro("is_measured", [](const FrameResult& r) { return is_measured(r.state); })
+      .def_ro("timestamp", &FrameResult::time_s, "As given")
+      .def_prop_ro("num_matches", [](const FrameResult& r) { return r.num_matches; })
+      .def_prop_ro("num_inliers", [](const FrameResult& r) { return r.num_inliers; })
       .def_prop_ro("scale_state",
-                   [](const Result& r) { return std::string(to_string(r.frame.scale_state)); })
+                   [](const FrameResult& r) { return std::string(to_string(r.scale_state)); })
       .def_prop_ro(
-          "scale_sigma", [](const Result& r) { return r.frame.scale_sigma; },
+          "scale_sigma", [](const FrameResult& r) { return r.scale_sigma; },
           "Of log(metres per unit)")
       .def_prop_ro(
-          "camera", [](const Result& r) { return r.frame.camera; }, "With what was learnt so far")
+          "camera", [](const FrameResult& r) { return r.camera; }, "With what was learnt so far")
       .def_prop_ro(
-          "camera_sigma", [](const Result& r) { return r.frame.camera_sigma; },
+          "camera_sigma", [](const FrameResult& r) { return r.camera_sigma; },
           "None: the camera is not refined")
-      .def_prop_ro("problem", [](const Result& r) { return r.frame.problem; })
-      .def("__repr__", [](const Result& r) {
-        const auto& at = r.frame.world_from_camera.translation;
+      .def_prop_ro("problem", [](const FrameResult& r) { return r.problem; })
+      .def("__repr__", [](const FrameResult& r) {
+        const auto& at = r.world_from_camera.translation;
         return fmt::format("Result({}, {} of {} inliers, at {:.3f} {:.3f} {:.3f})",
-                           to_string(r.frame.state), r.frame.num_inliers, r.frame.num_matches,
-                           at.x(), at.y(), at.z());
+                           to_string(r.state), r.num_inliers, r.num_matches, at.x(), at.y(),
+                           at.z());
       });
 }
 
@@ -246,9 +238,8 @@ void bind_odometry(nb::module_& module) {
            "A Recording or a FrameView brings its mask and its camera's height with it")
       .def_prop_ro("scale_source", &SafeOdometry::scale_source,
                    "scale.source; 'none': the path is up to scale")
-      .def("process", &SafeOdometry::process, "image"_a.noconvert().none(),
-           "timestamp"_a = nb::none(),
-           "HxW gray or HxWx3 RGB, uint8, not copied; None: an image that never came")
+      .def("process", &SafeOdometry::process, "image"_a.noconvert(), "timestamp"_a,
+           "HxW gray or HxWx3 RGB, uint8, not copied; seconds, each later than the last")
       .def("landmarks", &SafeOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
       .def("tracked_points", &SafeOdometry::tracked_points,

@@ -84,6 +84,7 @@ Chain run_chain() {
     result.images.push_back(contrast.apply(result.channel));
     Frame frame;
     frame.number = i;
+    frame.time_s = frames().sequence.time_s(static_cast<std::size_t>(i));
     frame.image = pixels;
     frame.road = std::make_shared<RoadImage>(make_road_image(result.images.back(), result.camera));
     frame.matches = front_end->process(result.images.back(), i);

@@ -60,7 +60,13 @@ struct StageTimes {
 /// The pose of a frame and how it came about.
 struct FrameResult {
   FrameState state = FrameState::kFirst;
+  double time_s = 0.0;  ///< as given
   Rigid3 world_from_camera;
+  /// Of the motion between the poses of the last frame and this one, prev_from_cur: the true motion
+  /// is prev_from_cur * error. The error is x y z (the path's units, squared), then rotation about
+  /// x y z (rad^2), all in this frame's camera axes. Where the path is in metres the scale's sigma
+  /// is in it.
+  Eigen::Matrix<double, 6, 6> motion_covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int num_matches = 0;
   int num_inliers = 0;
   double homography_score = 0.0;   ///< S_H

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
 #include "stemvo/camera.hpp"
@@ -16,13 +18,24 @@ namespace stemvo {
 /// The order of a pixel's values. OpenCV's own imread and VideoCapture give kBgr.
 enum class PixelOrder { kGray, kRgb, kBgr };
 
+/// What else is known of a frame.
+struct FrameHints {
+  /// CV_8UC1 of the camera's size, 0 where this frame shows what moves by itself: tracks end there
+  /// and none begins. Empty: the mask of create() alone; else both count.
+  cv::Mat mask = {};
+  /// Rotation since the last frame given, from the camera now to the camera then, e.g. of a gyro:
+  /// where points are looked for first, and what a frame without a measurement goes on with. Never
+  /// a measurement.
+  std::optional<Eigen::Quaterniond> prev_from_cur = std::nullopt;
+};
+
 /// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
 /// for what a caller hands in.
 class Odometry {
  public:
   /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
   /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where
-  /// no points are wanted; empty: they are everywhere.
+  /// no points are wanted on any frame; empty: they are everywhere.
   [[nodiscard]] static Expected<Odometry> create(const Camera& camera,
                                                  const Options& options = {},
                                                  const cv::Mat& mask = {});
@@ -32,11 +45,14 @@ class Odometry {
 
   /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size.
   /// The pixels are read before it returns. An image with distortion, or of over 1.5 megapixels, is
-  /// first made the one that FrameResult::camera takes; pixels in results are of that one. Error:
-  /// another type or size; nothing changes then.
-  [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image, PixelOrder order);
-  /// Call for a dropped frame; advances the motion model by one frame.
-  FrameResult process_missing();
+  /// first made the one that FrameResult::camera takes; pixels in results are of that one.
+  /// `time_s`: when it was taken, seconds of any clock that runs on; frames need not be evenly
+  /// spaced, and one that was dropped is a gap. Errors: another type or size; a time that is not
+  /// after the last one; hints that do not fit. Nothing changes then.
+  [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image,
+                                              PixelOrder order,
+                                              double time_s,
+                                              const FrameHints& hints = {});
 
   /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
   /// when they left the window, or are now. Mode two_frame has none.

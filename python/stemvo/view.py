@@ -109,6 +109,9 @@ def show_live(rr, recording, options):
     view = View(rr, recording, odometry.scale_source)
     state = None
     for frame, (image, timestamp) in enumerate(recording):
+        if image is None:  # a gap in time; the path has a pose per frame
+            view.path.append(view.path[-1] if view.path else np.eye(4))
+            continue
         result = odometry.process(image, timestamp)
         view.at(frame, timestamp)
         view.pose(result.world_from_camera)

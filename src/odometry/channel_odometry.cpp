@@ -41,8 +41,13 @@ FrameResult ChannelOdometry::process(Frame frame) {
   return optimize();
 }
 
-Frame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& image) {
+Frame ChannelOdometry::prepare(const Channel& channel,
+                               const cv::Mat& image,
+                               double time_s,
+                               const FrameHints& hints) {
   Frame frame;
+  frame.time_s = time_s;
+  frame.hints = hints;
   frame.image = image;
   Stopwatch watch;
   const ChannelImage seen = timed(Stage::kContrast, [&] { return contrast_.apply(channel); });
@@ -58,6 +63,8 @@ Frame ChannelOdometry::prepare(const Channel& channel, const cv::Mat& image) {
 /// Uses the front end only: the frame before may be optimized meanwhile.
 void ChannelOdometry::track(Frame frame) {
   STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
+  STEMVO_CHECK(frame.time_s > last_time_s_, "times rise");
+  last_time_s_ = frame.time_s;
   frame.number = num_tracked_++;
   if (frame.has_image()) {
     Stopwatch watch;
@@ -92,6 +99,7 @@ FrameResult ChannelOdometry::optimize() {
     work.frame.pyramid = optimized_.frame.pyramid;
   }
   FrameResult& result = work.localized.result;
+  result.time_s = work.frame.time_s;
   result.times = work.frame.times;
   result.problem = work.frame.problem;
   optimized_ = std::move(work);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -27,7 +28,11 @@ class ChannelOdometry {
 
   /// The phases, as in PhasedOdometry. `image`, of the camera's size, is where landmarks get their
   /// colour; `times.stem_ms` is the contrast's alone.
-  [[nodiscard]] Frame prepare(const Channel& channel, const cv::Mat& image);
+  [[nodiscard]] Frame prepare(const Channel& channel,
+                              const cv::Mat& image,
+                              double time_s,
+                              const FrameHints& hints = {});
+  /// Frames come in the order of their times (checked).
   void track(Frame frame);
   void localize();
   FrameResult optimize();
@@ -60,9 +65,10 @@ class ChannelOdometry {
   std::unique_ptr<Estimator> estimator_;
 
   int num_tracked_ = 0;
-  std::optional<Frame> tracked_;          ///< not localized
-  std::optional<FrameInWork> localized_;  ///< not optimized
-  FrameInWork optimized_;                 ///< the last one
+  double last_time_s_ = -std::numeric_limits<double>::infinity();  ///< of the last one tracked
+  std::optional<Frame> tracked_;                                   ///< not localized
+  std::optional<FrameInWork> localized_;                           ///< not optimized
+  FrameInWork optimized_;                                          ///< the last one
 };
 
 }  // namespace stemvo

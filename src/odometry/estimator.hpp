@@ -15,6 +15,7 @@
 #include "geometry/bundle.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
+#include "stemvo/odometry.hpp"
 #include "stemvo/options.hpp"
 #include "stemvo/rigid3.hpp"
 
@@ -26,7 +27,9 @@ struct Frame {
   [[nodiscard]] bool has_image() const { return !image.empty(); }
 
   int number = 0;  ///< counted from 0, frames without an image among them
-  cv::Mat image;   ///< as given, gray or RGB: where landmarks get their colour
+  double time_s = 0.0;
+  FrameHints hints;
+  cv::Mat image;  ///< as given, gray or RGB: where landmarks get their colour
   std::shared_ptr<const ImagePyramid> pyramid;  ///< of the channel: where points are tracked
   std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
   Matches matches;                              ///< none on the first image

@@ -45,7 +45,7 @@ cv::Mat FrameView::apply(const cv::Mat& image) const {
 }
 
 cv::Mat FrameView::apply_to_mask(const cv::Mat& mask) const {
-  return mask.empty() ? mask : cv::Mat(apply(mask) == 255);
+  return mask.empty() ? mask : cv::Mat(apply(mask != 0) == 255);
 }
 
 }  // namespace stemvo

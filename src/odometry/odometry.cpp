@@ -3,41 +3,17 @@
 
 #include <utility>
 
-#include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "odometry/check_camera.hpp"
+#include "odometry/check_frame.hpp"
 #include "odometry/phased_odometry.hpp"
 
 namespace stemvo {
-namespace {
-
-Status check_image(const cv::Mat& image, PixelOrder order, const cv::Size& size) {
-  if (image.size() != size) {
-    return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
-                            size.width, size.height, image.cols, image.rows));
-  }
-  const int channels = order == PixelOrder::kGray ? 1 : 3;
-  if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
-    return fail(fmt::format("image: expected {} channel{} of 8 bit, found OpenCV's type {}",
-                            channels, channels == 1 ? "" : "s", cv::typeToString(image.type())));
-  }
-  return {};
-}
-
-Status check_mask(const cv::Mat& mask, const Camera& camera) {
-  const cv::Size size(camera.width_px, camera.height_px);
-  if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
-    return fail(fmt::format("mask: expected {}x{} pixels of CV_8UC1, found {}x{} of {}", size.width,
-                            size.height, mask.cols, mask.rows, cv::typeToString(mask.type())));
-  }
-  return {};
-}
-
-}  // namespace
 
 struct Odometry::Impl {
   PhasedOdometry odometry;
+  FrameCheck check;
 };
 
 Expected<Odometry> Odometry::create(const Camera& camera,
@@ -53,7 +29,7 @@ Expected<Odometry> Odometry::create(const Camera& camera,
   if (!odometry) {
     return odometry.error();
   }
-  return Odometry(std::make_unique<Impl>(Impl{*std::move(odometry)}));
+  return Odometry(std::make_unique<Impl>(Impl{*std::move(odometry), FrameCheck(camera)}));
 }
 
 Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -61,20 +37,20 @@ Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 Odometry::~Odometry() = default;
 
-Expected<FrameResult> Odometry::process(const cv::Mat& image, PixelOrder order) {
-  const cv::Size size = impl_->odometry.view().full_size();
-  if (Status status = check_image(image, order, size); !status) {
+Expected<FrameResult> Odometry::process(const cv::Mat& image,
+                                        PixelOrder order,
+                                        double time_s,
+                                        const FrameHints& hints) {
+  if (Status status = impl_->check.admit(image, order, time_s, hints); !status) {
     return status.error();
   }
-  if (order != PixelOrder::kBgr) {
-    return impl_->odometry.process(impl_->odometry.prepare(image));
+  cv::Mat seen = image;
+  if (order == PixelOrder::kBgr) {
+    seen = cv::Mat();  // of its own: the caller's pixels are not ours
+    cv::cvtColor(image, seen, cv::COLOR_BGR2RGB);
   }
-  cv::Mat rgb;  // of its own: the caller's pixels are not ours
-  cv::cvtColor(image, rgb, cv::COLOR_BGR2RGB);
-  return impl_->odometry.process(impl_->odometry.prepare(rgb));
+  return impl_->odometry.process(impl_->odometry.prepare(seen, time_s, hints));
 }
-
-FrameResult Odometry::process_missing() { return impl_->odometry.process({}); }
 
 std::vector<MapLandmark> Odometry::landmarks() const {
   const Estimator& estimator = impl_->odometry.frames().estimator();

@@ -38,7 +38,7 @@ PhasedOdometry::PhasedOdometry(
       zoom_(zoom),
       channel_odometry_(options, view.camera(), view.apply_to_mask(mask)) {}
 
-Frame PhasedOdometry::prepare(const cv::Mat& given) {
+Frame PhasedOdometry::prepare(const cv::Mat& given, double time_s, const FrameHints& hints) {
   STEMVO_CHECK(given.size() == view_.full_size(), "the image has the camera's size");
   Stopwatch watch;
   const cv::Mat image = view_.apply(given);
@@ -46,10 +46,12 @@ Frame PhasedOdometry::prepare(const cv::Mat& given) {
   const double stem_ms = watch.lap_ms();
   Frame frame;
   if (!channel) {
+    frame.time_s = time_s;
     frame.problem = channel.error().message;
     return frame;
   }
-  frame = channel_odometry_.prepare(*channel, image);
+  frame = channel_odometry_.prepare(*channel, image, time_s,
+                                    {view_.apply_to_mask(hints.mask), hints.prev_from_cur});
   frame.times.stem_ms += stem_ms;
   return frame;
 }

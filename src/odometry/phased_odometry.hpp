@@ -26,7 +26,7 @@ class PhasedOdometry {
 
   /// CV_8UC1 or CV_8UC3 (RGB), of the camera's size (checked). Frames are prepared in their order,
   /// one call at a time, which may run ahead of the others in another thread.
-  [[nodiscard]] Frame prepare(const cv::Mat& given);
+  [[nodiscard]] Frame prepare(const cv::Mat& given, double time_s, const FrameHints& hints = {});
   /// Tracks the points to this frame, once the one before is localized.
   void track(Frame frame) { channel_odometry_.track(std::move(frame)); }
   /// Localizes the frame tracked, once the one before is optimized.

@@ -24,12 +24,16 @@ void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const Fra
             Slot& slot = slot_of(index);
             slot.frame = {};
             slot.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
-            return !sequence.stream() || !slot.pixels || !slot.pixels->empty();
+            if (sequence.stream() && slot.pixels && slot.pixels->empty()) {
+              return false;
+            }
+            slot.frame.time_s = sequence.time_s(index);
+            return true;
           },
       .prepare =
           [&](std::size_t index) {
             if (Slot& slot = slot_of(index); slot.pixels) {
-              slot.frame = odometry.prepare(*slot.pixels);
+              slot.frame = odometry.prepare(*slot.pixels, slot.frame.time_s);
             }
           },
       .track = [&](std::size_t index) { odometry.track(std::move(slot_of(index).frame)); },

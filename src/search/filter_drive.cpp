@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -60,8 +61,12 @@ FilterDrive::FilterDrive(const Config& config, const FrameSource& sequence)
     : odometry_(config, sequence.camera()), config_(&config), sequence_(&sequence) {}
 
 void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
-  const FrameResult result =
-      odometry_.process(channel == nullptr ? Frame() : odometry_.prepare(*channel, frame));
+  Frame now;
+  now.time_s = sequence_->time_s(num_frames());
+  if (channel != nullptr) {
+    now = odometry_.prepare(*channel, frame, now.time_s);
+  }
+  const FrameResult result = odometry_.process(std::move(now));
   if (num_frames() <= 1) {
     return;
   }

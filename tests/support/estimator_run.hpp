@@ -59,6 +59,7 @@ class EstimatorRun {
   FrameResult add_matches(Matches matches, int i) {
     Frame frame;
     frame.number = static_cast<int>(results.size());
+    frame.time_s = next_time_s();
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.matches = std::move(matches);
@@ -82,6 +83,7 @@ class EstimatorRun {
   FrameResult add_missing() {
     Frame frame;
     frame.number = static_cast<int>(results.size());
+    frame.time_s = next_time_s();
     results.push_back(add_frame(estimator_, frame));
     return results.back();
   }
@@ -95,6 +97,7 @@ class EstimatorRun {
     return number;
   }
 
+  double interval_s = 0.1;                                    ///< before the next frame
   cv::Mat image;                                              ///< of the next frame
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::vector<FrameResult> results;
@@ -104,11 +107,14 @@ class EstimatorRun {
  private:
   static constexpr int kManyTracks = 1000000;
 
+  double next_time_s() { return time_s_ += interval_s; }
+
   Estimator& estimator_;
   const DriveTracks& drive_;
   std::map<int, int> num_rejected_;  ///< times, by point
   int last_ = -1;                    ///< frame of the drive
   int last_number_ = -1;             ///< its number for the estimator
+  double time_s_ = 0.0;              ///< of the last frame
 };
 
 /// Greatest distance from the truth after a fit of scale, rotation and place, over the path's

@@ -65,12 +65,12 @@ TEST(OdometryCreate, AMaskThatDoesNotFitIsRefusedAndOneThatDoesKeepsPointsAway) 
   EXPECT_THAT(error_of_mask(cv::Mat(95, 320, CV_8UC1)),
               HasSubstr("mask: expected 320x96 pixels of CV_8UC1, found 320x95 of CV_8UC1"));
   EXPECT_THAT(error_of_mask(cv::Mat(96, 320, CV_8UC3)), HasSubstr("found 320x96 of CV_8UC3"));
-  cv::Mat right_half(96, 320, CV_8UC1, cv::Scalar(255));
+  cv::Mat right_half(96, 320, CV_8UC1, cv::Scalar(1));
   right_half.colRange(0, 161).setTo(0);  // a point moves by two pixels
   auto odometry = Odometry::create(kCamera, {}, right_half);
   ASSERT_TRUE(odometry) << odometry.error().message;
   for (int i = 0; i < 2; ++i) {
-    ASSERT_TRUE(odometry->process(image_at(i), PixelOrder::kRgb));
+    ASSERT_TRUE(odometry->process(image_at(i), PixelOrder::kRgb, i));
   }
   ASSERT_FALSE(odometry->tracked_points().empty());
   for (const TrackedPoint& point : odometry->tracked_points()) {
@@ -88,8 +88,8 @@ TEST(OdometryCreate, ALensIsTakenOutOfTheImagesAndTheMaskInside) {
   Odometry of_raw = Odometry::create(distorted, {}, mask).value();
   Odometry of_view = Odometry::create(view.camera(), {}, view.apply_to_mask(mask)).value();
   for (int i = 0; i < 3; ++i) {
-    const FrameResult raw = of_raw.process(image_at(i), PixelOrder::kRgb).value();
-    const FrameResult seen = of_view.process(view.apply(image_at(i)), PixelOrder::kRgb).value();
+    const FrameResult raw = of_raw.process(image_at(i), PixelOrder::kRgb, i).value();
+    const FrameResult seen = of_view.process(view.apply(image_at(i)), PixelOrder::kRgb, i).value();
     EXPECT_EQ(raw.world_from_camera.matrix(), seen.world_from_camera.matrix());
     EXPECT_EQ(raw.num_matches, seen.num_matches);
     EXPECT_EQ(raw.camera.matrix(), view.camera().matrix());
@@ -145,7 +145,7 @@ TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
 TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
   Odometry odometry = Odometry::create(kCamera).value();
   const auto message = [&](const cv::Mat& image, PixelOrder order) {
-    const auto result = odometry.process(image, order);
+    const auto result = odometry.process(image, order, 1.0);
     return result ? "no error" : result.error().message;
   };
   EXPECT_THAT(message(cv::Mat3b(95, 320), PixelOrder::kRgb),
@@ -154,7 +154,36 @@ TEST(OdometryProcess, AnImageOfAnotherSizeOrTypeIsAnErrorAndChangesNothing) {
   EXPECT_THAT(message(cv::Mat1b(96, 320), PixelOrder::kBgr), HasSubstr("expected 3 channels"));
   EXPECT_THAT(message(cv::Mat3b(96, 320), PixelOrder::kGray), HasSubstr("expected 1 channel of"));
   EXPECT_THAT(message(cv::Mat1w(96, 320), PixelOrder::kGray), HasSubstr("CV_16U"));
-  EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb)->state, FrameState::kFirst);
+  EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb, 1.0)->state, FrameState::kFirst);
+}
+
+TEST(OdometryProcess, ATimeThatDoesNotRiseIsAnErrorThatNamesBothAndChangesNothing) {
+  Odometry odometry = Odometry::create(kCamera).value();
+  const auto message = [&](double time_s) {
+    const auto result = odometry.process(image_at(0), PixelOrder::kRgb, time_s);
+    return result ? std::string(to_string(result->state)) : result.error().message;
+  };
+  EXPECT_THAT(message(std::nan("")), HasSubstr("time: expected a finite number"));
+  EXPECT_EQ(message(-2.5), "first");
+  EXPECT_THAT(message(-2.5), AllOf(HasSubstr("after the last frame's, -2.5 s"), HasSubstr("-2.5")));
+  EXPECT_THAT(message(-3.0), AllOf(HasSubstr("-2.5 s"), HasSubstr("found -3 s")));
+  EXPECT_THAT(message(std::numeric_limits<double>::infinity()), HasSubstr("found inf"));
+  EXPECT_EQ(message(-2.4), "stationary");
+  EXPECT_EQ(odometry.process(image_at(0), PixelOrder::kRgb, 9.0)->time_s, 9.0);
+}
+
+TEST(OdometryProcess, HintsThatDoNotFitAreErrorsAndChangeNothing) {
+  Odometry odometry = Odometry::create(kCamera).value();
+  const auto message = [&](const FrameHints& hints) {
+    const auto result = odometry.process(image_at(0), PixelOrder::kRgb, 1.0, hints);
+    return result ? "no error" : result.error().message;
+  };
+  EXPECT_THAT(message({.mask = cv::Mat(96, 319, CV_8UC1)}), HasSubstr("mask: expected 320x96"));
+  EXPECT_THAT(message({.prev_from_cur = Eigen::Quaterniond(0.9, 0.0, 0.0, 0.0)}),
+              HasSubstr("prev_from_cur: expected a quaternion of length 1, found one of 0.9"));
+  EXPECT_THAT(message({.prev_from_cur = Eigen::Quaterniond(std::nan(""), 0.0, 0.0, 0.0)}),
+              HasSubstr("prev_from_cur"));
+  EXPECT_EQ(message({.prev_from_cur = Eigen::Quaterniond::Identity()}), "no error");
 }
 
 TEST(OdometryProcess, TinyImagesAreTrackedOrNotButNothingThrows) {
@@ -170,7 +199,7 @@ TEST(OdometryProcess, TinyImagesAreTrackedOrNotButNothingThrows) {
         const cv::Mat image = image_at(i)(cv::Rect(0, 0, std::min(size.width, 320), 4));
         cv::Mat tiny;
         cv::resize(image, tiny, size);
-        EXPECT_TRUE(odometry->process(tiny, PixelOrder::kRgb)) << size;
+        EXPECT_TRUE(odometry->process(tiny, PixelOrder::kRgb, i)) << size;
       }
     }
   }
@@ -184,9 +213,9 @@ TEST(OdometryProcess, BgrGivesTheChannelThatRgbGives) {
     const cv::Mat rgb = image_at(i);
     cv::Mat bgr;
     cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
-    ASSERT_TRUE(of_rgb.process(rgb, PixelOrder::kRgb));
-    ASSERT_TRUE(of_bgr.process(bgr, PixelOrder::kBgr));
-    ASSERT_TRUE(mistaken.process(bgr, PixelOrder::kRgb));
+    ASSERT_TRUE(of_rgb.process(rgb, PixelOrder::kRgb, i));
+    ASSERT_TRUE(of_bgr.process(bgr, PixelOrder::kBgr, i));
+    ASSERT_TRUE(mistaken.process(bgr, PixelOrder::kRgb, i));
     EXPECT_EQ(rgb.at<cv::Vec3b>(5, 5)[0], bgr.at<cv::Vec3b>(5, 5)[2]);  // neither is written to
     EXPECT_EQ(cv::norm(of_rgb.channel_image(), of_bgr.channel_image(), cv::NORM_INF), 0.0);
     EXPECT_GT(cv::norm(of_rgb.channel_image(), mistaken.channel_image(), cv::NORM_INF), 0.0);
@@ -202,8 +231,8 @@ TEST(OdometryProcess, TheBuiltInNetworkIsThatOfTheModelsFolder) {
     built_in.stem.filter = from_folder.stem.filter = filter;
     Odometry a = Odometry::create(kCamera, built_in).value();
     Odometry b = Odometry::create(kCamera, from_folder).value();
-    ASSERT_TRUE(a.process(image_at(0), PixelOrder::kRgb));
-    ASSERT_TRUE(b.process(image_at(0), PixelOrder::kRgb));
+    ASSERT_TRUE(a.process(image_at(0), PixelOrder::kRgb, 0.0));
+    ASSERT_TRUE(b.process(image_at(0), PixelOrder::kRgb, 0.0));
     EXPECT_EQ(cv::norm(a.channel_image(), b.channel_image(), cv::NORM_INF), 0.0) << filter;
   }
 }

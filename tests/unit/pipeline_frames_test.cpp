@@ -71,7 +71,9 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
   PhasedOdometry plain = odometry();
   for (std::size_t i = 0; i < sequence_->size(); ++i) {
     const Expected<cv::Mat> frame = sequence_->read(i);
-    expected.push_back(frame ? plain.process(plain.prepare(*frame)) : plain.process({}));
+    Frame missing;
+    missing.time_s = sequence_->time_s(i);
+    expected.push_back(plain.process(frame ? plain.prepare(*frame, missing.time_s) : missing));
   }
   EXPECT_EQ(expected[4].state, FrameState::kNoImage);
   EXPECT_EQ(expected.back().state, FrameState::kNoImage);
@@ -157,19 +159,21 @@ TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
 TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
   PhasedOdometry whole = odometry();
   PhasedOdometry parts = odometry();
+  const auto process_whole = [&](std::size_t i) {
+    return whole.process(whole.prepare(sequence_->read(i).value(), sequence_->time_s(i)));
+  };
   for (std::size_t i = 0; i < 3; ++i) {
     const cv::Mat frame = sequence_->read(i).value();
-    parts.track(parts.prepare(frame));
+    parts.track(parts.prepare(frame, sequence_->time_s(i)));
     if (i > 0) {  // of the frame before
-      EXPECT_EQ(parts.optimize().num_matches,
-                whole.process(whole.prepare(sequence_->read(i - 1).value())).num_matches);
+      EXPECT_EQ(parts.optimize().num_matches, process_whole(i - 1).num_matches);
     }
     parts.localize();
   }
   const FrameResult last = parts.optimize();
   EXPECT_GT(last.num_matches, 50);
-  EXPECT_EQ(last.world_from_camera.translation,
-            whole.process(whole.prepare(sequence_->read(2).value())).world_from_camera.translation);
+  EXPECT_EQ(last.time_s, sequence_->time_s(2));
+  EXPECT_EQ(last.world_from_camera.translation, process_whole(2).world_from_camera.translation);
 }
 
 }  // namespace

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/check_frame.hpp"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace stemvo {
+namespace {
+
+Status check_image(const cv::Mat& image, PixelOrder order, const Camera& camera) {
+  if (image.cols != camera.width_px || image.rows != camera.height_px) {
+    return fail(fmt::format("image: expected {}x{} pixels, as the camera has, found {}x{}",
+                            camera.width_px, camera.height_px, image.cols, image.rows));
+  }
+  const int channels = order == PixelOrder::kGray ? 1 : 3;
+  if (image.type() != CV_MAKETYPE(CV_8U, channels)) {
+    return fail(fmt::format("image: expected {} channel{} of 8 bit, found OpenCV's type {}",
+                            channels, channels == 1 ? "" : "s", cv::typeToString(image.type())));
+  }
+  return {};
+}
+
+Status check_time(double time_s, std::optional<double> last_s) {
+  if (!std::isfinite(time_s) || (last_s && time_s <= *last_s)) {
+    return fail(fmt::format("time: expected {}, found {} s",
+                            last_s ? fmt::format("one after the last frame's, {} s", *last_s)
+                                   : "a finite number of seconds",
+                            time_s));
+  }
+  return {};
+}
+
+Status check_rotation(const std::optional<Eigen::Quaterniond>& rotation) {
+  constexpr double kMaxOff = 0.01;  // single precision and a few products are within
+  if (rotation && !(std::abs(rotation->norm() - 1.0) < kMaxOff)) {
+    return fail(fmt::format("prev_from_cur: expected a quaternion of length 1, found one of {}",
+                            rotation->norm()));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status check_mask(const cv::Mat& mask, const Camera& camera) {
+  const cv::Size size(camera.width_px, camera.height_px);
+  if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
+    return fail(fmt::format("mask: expected {}x{} pixels of CV_8UC1, found {}x{} of {}", size.width,
+                            size.height, mask.cols, mask.rows, cv::typeToString(mask.type())));
+  }
+  return {};
+}
+
+Status FrameCheck::admit(const cv::Mat& image,
+                         PixelOrder order,
+                         double time_s,
+                         const FrameHints& hints) {
+  Status status = check_image(image, order, camera_);
+  status = status ? check_time(time_s, last_time_s_) : status;
+  status = status ? check_mask(hints.mask, camera_) : status;
+  status = status ? check_rotation(hints.prev_from_cur) : status;
+  if (status) {
+    last_time_s_ = time_s;
+  }
+  return status;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include <opencv2/core.hpp>
+
+#include "stemvo/camera.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/odometry.hpp"
+
+namespace stemvo {
+
+/// Error: a mask that is neither empty nor CV_8UC1 of the camera's size.
+[[nodiscard]] Status check_mask(const cv::Mat& mask, const Camera& camera);
+
+/// What a caller may hand in as the next frame.
+class FrameCheck {
+ public:
+  explicit FrameCheck(const Camera& camera) : camera_(camera) {}
+
+  /// Errors: an image that is not of the camera's size and the order's type; a time that is not
+  /// after the last one admitted; a mask as check_mask(); a rotation that is none.
+  [[nodiscard]] Status admit(const cv::Mat& image,
+                             PixelOrder order,
+                             double time_s,
+                             const FrameHints& hints);
+
+ private:
+  Camera camera_;
+  std::optional<double> last_time_s_;
+};
+
+}  // namespace stemvo
