@@ -30,7 +30,8 @@ struct FrameHints {
 };
 
 /// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
-/// for what a caller hands in.
+/// for what a caller hands in. Of one that was moved from, process() is an Error and the rest is
+/// empty.
 class Odometry {
  public:
   /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
@@ -53,6 +54,10 @@ class Odometry {
                                               PixelOrder order,
                                               double time_s,
                                               const FrameHints& hints = {});
+
+  /// A new world, as after create(): the same network and the given camera, whatever was learnt of
+  /// it; times may begin anew.
+  void reset();
 
   /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
   /// when they left the window, or are now. Mode two_frame has none.

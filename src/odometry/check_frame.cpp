@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
 
 namespace stemvo {
 namespace {
@@ -50,6 +51,17 @@ Status check_mask(const cv::Mat& mask, const Camera& camera) {
   }
   return {};
 }
+
+cv::Mat rgb_of(const cv::Mat& image, PixelOrder order) {
+  cv::Mat rgb = image;
+  if (order == PixelOrder::kBgr) {
+    rgb = cv::Mat();  // of its own: the caller's pixels are not ours
+    cv::cvtColor(image, rgb, cv::COLOR_BGR2RGB);
+  }
+  return rgb;
+}
+
+Error moved_from() { return fail("odometry: expected an object in use, found one moved from"); }
 
 Status FrameCheck::admit(const cv::Mat& image,
                          PixelOrder order,

@@ -14,6 +14,12 @@ namespace stemvo {
 /// Error: a mask that is neither empty nor CV_8UC1 of the camera's size.
 [[nodiscard]] Status check_mask(const cv::Mat& mask, const Camera& camera);
 
+/// The pixels as the odometry takes them; the same ones where they are already.
+[[nodiscard]] cv::Mat rgb_of(const cv::Mat& image, PixelOrder order);
+
+/// That of a call to an object that was moved from.
+[[nodiscard]] Error moved_from();
+
 /// What a caller may hand in as the next frame.
 class FrameCheck {
  public:
@@ -25,6 +31,8 @@ class FrameCheck {
                              PixelOrder order,
                              double time_s,
                              const FrameHints& hints);
+  /// The next frame may have any time.
+  void restart() { last_time_s_.reset(); }
 
  private:
   Camera camera_;

@@ -3,20 +3,32 @@
 
 #include <utility>
 
+#include <opencv2/core/utility.hpp>
+
 #include "internal_check.hpp"
+#include "odometry/check_camera.hpp"
+#include "odometry/check_frame.hpp"
 #include "odometry/stopwatch.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
 
 Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
-                                                const Options& options,
+                                                const Options& given,
                                                 const cv::Mat& mask) {
+  Status status = check_camera(camera);
+  status = status ? validate(given) : status;
+  status = status ? check_mask(mask, camera) : status;
+  if (!status) {
+    return status.error();
+  }
+  Options options = given;
+  options.threads = options.threads > 0 ? options.threads : cv::getNumberOfCPUs();
   const Expected<FrameView> view = FrameView::create(camera);
   if (!view) {
     return fail("camera: " + view.error().message);
   }
-  Expected<Stem> stem = Stem::load(options.stem);
+  Expected<Stem> stem = Stem::load(options.stem, options.threads);
   if (!stem) {
     return stem.error();
   }
@@ -28,15 +40,17 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   if (const Expected<Channel> channel = stem->apply(blank, zoom); !channel) {
     return channel.error();
   }
-  return PhasedOdometry(*view, options, mask, *std::move(stem), zoom);
+  return PhasedOdometry(options, *view, mask, *std::move(stem), zoom);
 }
 
 PhasedOdometry::PhasedOdometry(
-    const FrameView& view, const Options& options, const cv::Mat& mask, Stem stem, int zoom)
-    : view_(view),
+    const Options& options, const FrameView& view, const cv::Mat& mask, Stem stem, int zoom)
+    : options_(options),
+      view_(view),
+      mask_(view.apply_to_mask(mask)),
       stem_(std::move(stem)),
       zoom_(zoom),
-      channel_odometry_(options, view.camera(), view.apply_to_mask(mask)) {}
+      channel_odometry_(options_, view_.camera(), mask_) {}
 
 Frame PhasedOdometry::prepare(const cv::Mat& given, double time_s, const FrameHints& hints) {
   STEMVO_CHECK(given.size() == view_.full_size(), "the image has the camera's size");

@@ -19,7 +19,7 @@ namespace stemvo {
 /// same.
 class PhasedOdometry {
  public:
-  /// As Odometry::create, for options, a camera and a mask that are valid.
+  /// As Odometry::create.
   [[nodiscard]] static Expected<PhasedOdometry> create(const Camera& camera,
                                                        const Options& options,
                                                        const cv::Mat& mask = {});
@@ -40,6 +40,11 @@ class PhasedOdometry {
     return channel_odometry_.process(std::move(frame));
   }
 
+  /// A new world: as create() left it. No frame is between its phases.
+  void reset() { channel_odometry_ = ChannelOdometry(options_, view_.camera(), mask_); }
+
+  /// At least one.
+  [[nodiscard]] int num_threads() const { return options_.threads; }
   /// It holds the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }
   /// What the camera's images are made before anything else sees them.
@@ -48,9 +53,11 @@ class PhasedOdometry {
 
  private:
   PhasedOdometry(
-      const FrameView& view, const Options& options, const cv::Mat& mask, Stem stem, int zoom);
+      const Options& options, const FrameView& view, const cv::Mat& mask, Stem stem, int zoom);
 
+  Options options_;  ///< with the number of threads in place of 0
   FrameView view_;
+  cv::Mat mask_;  ///< of the view
   Stem stem_;
   int zoom_;  ///< Stem::frame_zoom
   ChannelOdometry channel_odometry_;

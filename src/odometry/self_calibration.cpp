@@ -7,7 +7,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <opencv2/core/utility.hpp>
 
 #include "timing/stage_timer.hpp"
 
@@ -45,8 +44,13 @@ bool is_plausible(const CameraMeasurement& found) {
 
 }  // namespace
 
-SelfCalibration::SelfCalibration(const Camera& given, CameraRefinement refinement)
-    : given_(given), camera_(given), refinement_(refinement) {
+SelfCalibration::SelfCalibration(const Camera& given,
+                                 CameraRefinement refinement,
+                                 bool may_begin_threads)
+    : given_(given),
+      camera_(given),
+      refinement_(refinement),
+      may_begin_threads_(may_begin_threads) {
   const Eigen::Map<const IntrinsicsDelta> sigma(
       refinement == CameraRefinement::kAll ? kWeakPriorSigma : kPriorSigma);
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
@@ -103,7 +107,7 @@ void SelfCalibration::begin_measuring(const BundleOptions& options) {
     return timed(Stage::kCamera, [&] { return measure_camera(run, camera, prior, options); });
   };
   const auto where =
-      cv::getNumThreads() > 1 ? std::launch::async | std::launch::deferred : std::launch::deferred;
+      may_begin_threads_ ? std::launch::async | std::launch::deferred : std::launch::deferred;
   measured_ = std::async(where, task).share();  // moved, it is gone where no thread could begin
   run_ = {};
 }

@@ -24,10 +24,10 @@ class SelfCalibration {
   /// a clip where 8 and 12 find -3 px +- 1.1, and 16 -2.8 +- 0.8.
   static constexpr int kNumKeyframes = 16;
 
-  SelfCalibration(const Camera& given, CameraRefinement refinement);
+  SelfCalibration(const Camera& given, CameraRefinement refinement, bool may_begin_threads = true);
 
   /// Takes the next keyframe, refined where the window is. A run that is long enough is measured
-  /// until the next call, in another thread where there may be one beside this (cv::setNumThreads),
+  /// until the next call, in another thread where it may begin one,
   /// and taken in then: the same on any number of threads.
   void observe(const Keyframe& keyframe, const BundleOptions& options);
   /// Rescales the run as the window is rescaled.
@@ -59,6 +59,7 @@ class SelfCalibration {
   Camera given_;
   Camera camera_;
   CameraRefinement refinement_;
+  bool may_begin_threads_;
   IntrinsicsDelta target_ =
       IntrinsicsDelta::Zero();  ///< significant part of mean_; camera_ goes there
   IntrinsicsDelta mean_ = IntrinsicsDelta::Zero();  ///< relative to the given camera

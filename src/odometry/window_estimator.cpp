@@ -35,7 +35,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config),
       scale_(config),
-      calibration_(camera, config.camera.refine),
+      calibration_(camera, config.camera.refine, config.threads != 1),
       speed_per_frame_(assumed_step(config.scale)) {
   window_options_.num_keyframes = config.window.num_keyframes;
   refinement_.loss_scale_px = config.ba.loss_px;

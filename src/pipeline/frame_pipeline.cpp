@@ -1,48 +1,26 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/frame_pipeline.hpp"
 
-#include <array>
 #include <utility>
 
-#include <opencv2/core/utility.hpp>
-
-#include "odometry/frame_loops.hpp"
+#include "odometry/odometry_loops.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo::pipeline {
 
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
-  struct Slot {
-    Expected<cv::Mat> pixels;
-    Frame frame;
-  };
-  std::array<Slot, kMaxInFlight> ring;
-  const auto slot_of = [&](std::size_t index) -> Slot& { return ring[index % kMaxInFlight]; };
-  const FrameStages stages = {
-      .read =
-          [&](std::size_t index) {
-            Slot& slot = slot_of(index);
-            slot.frame = {};
-            slot.pixels = timed(Stage::kRead, [&] { return sequence.read(index); });
-            if (sequence.stream() && slot.pixels && slot.pixels->empty()) {
-              return false;
-            }
-            slot.frame.time_s = sequence.time_s(index);
-            return true;
-          },
-      .prepare =
-          [&](std::size_t index) {
-            if (Slot& slot = slot_of(index); slot.pixels) {
-              slot.frame = odometry.prepare(*slot.pixels, slot.frame.time_s);
-            }
-          },
-      .track = [&](std::size_t index) { odometry.track(std::move(slot_of(index).frame)); },
-      .localize = [&](std::size_t) { odometry.localize(); },
-      .optimize =
-          [&](std::size_t index) {
-            return visit(index, slot_of(index).pixels, odometry.optimize());
-          }};
-  run_frame_loops(stages, sequence.size(), cv::getNumThreads());
+  std::size_t num_visited = 0;
+  OdometryLoops loops(odometry, [&](const GivenFrame& given, const FrameResult& result) {
+    return visit(num_visited++, given.image, result);
+  });
+  for (std::size_t i = 0; i < sequence.size(); ++i) {
+    Expected<cv::Mat> image = timed(Stage::kRead, [&] { return sequence.read(i); });
+    const bool has_ended = sequence.stream() && image && image->empty();
+    if (has_ended || !loops.push({std::move(image), sequence.time_s(i), {}})) {
+      break;
+    }
+  }
+  loops.finish();
 }
 
 }  // namespace stemvo::pipeline

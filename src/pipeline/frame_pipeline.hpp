@@ -14,15 +14,15 @@
 
 namespace stemvo::pipeline {
 
-/// Called for each frame, in order, one call at a time, from the thread of run_frames, while
-/// the odometry holds what it knows of this frame. `index` counts from 0; `frame` is the image or
+/// Called for each frame, in order, one call at a time, maybe from another thread, while the
+/// odometry holds what it knows of this frame. `index` counts from 0; `frame` is the image or
 /// the Error that names its file. False ends the run: frames already read ahead are dropped.
 using FrameVisitor =
     std::function<bool(std::size_t index, const Expected<cv::Mat>& frame, const FrameResult& pose)>;
 
-/// Takes the frames of a sequence through an odometry, in three loops beside each other where
-/// ThreadScope allows more than one thread; the poses do not depend on it. What a stage or the
-/// visitor throws leaves this function; frames behind the last one visited are dropped then.
+/// Takes the frames of a sequence through an odometry, read here and worked on in
+/// OdometryLoops. What a stage or the visitor throws leaves this function; frames behind the last
+/// one visited are dropped then.
 void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit);
 
 }  // namespace stemvo::pipeline

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/core/utility.hpp>
 
 #include "geometry/median.hpp"
 #include "options/visit.hpp"
@@ -263,7 +262,7 @@ Status write_results(const Run& run, const Drive& drive, MetricsReport& report) 
     report.timing = recorder->report();
     report.timing->fps = report.fps;
     report.timing->num_frames = report.num_frames;
-    report.timing->num_threads = cv::getNumThreads();
+    report.timing->num_threads = run.odometry.num_threads();
   }
   keep_first(written, write_metrics_json(run.request.out_dir / "metrics.json", report));
   keep_first(written, writer.write_page(report));

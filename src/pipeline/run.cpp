@@ -156,13 +156,16 @@ Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& 
   if (request.write_map && request.config.odometry.mode != OdometryMode::kMap) {
     return fail("--map: expected odometry.mode map, which makes one, found two_frame");
   }
-  const int threads = request.num_threads > 0 ? request.num_threads : request.config.threads;
-  const pipeline::ThreadScope scope(threads);
-  const auto sequence = open_sequence(request);
+  RunRequest resolved = request;
+  if (request.num_threads > 0) {
+    resolved.config.threads = request.num_threads;
+  }
+  const pipeline::ThreadScope scope(resolved.config.threads);
+  const auto sequence = open_sequence(resolved);
   if (!sequence) {
     return sequence.error();
   }
-  return run_source(request, *sequence, progress);
+  return run_source(std::move(resolved), *sequence, progress);
 }
 
 }  // namespace stemvo

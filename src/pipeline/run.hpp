@@ -51,7 +51,7 @@ using RunProgress = std::function<bool(std::size_t, std::size_t)>;
 /// cannot be written) is an error before work starts. A frame that cannot be read is a warning and
 /// gets a pose. When a result cannot be written the others still are; `written` says so. One run
 /// with measure_times at a time in a process. OpenCV is told, for the whole process, how many
-/// threads it may use.
+/// threads it may use. `progress` may be called from another thread.
 [[nodiscard]] Expected<RunSummary> run_sequence(const RunRequest& request,
                                                 const RunProgress& progress = {});
 

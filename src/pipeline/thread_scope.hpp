@@ -8,8 +8,8 @@
 
 namespace stemvo::pipeline {
 
-/// While it lives, OpenCV works on `num_threads` threads (0: one per core); with one, no loop of
-/// the odometry has a thread of its own.
+/// While it lives, OpenCV works on `num_threads` threads (0: one per core) in the whole process:
+/// the program's part of --threads. The library leaves OpenCV alone.
 class ThreadScope {
  public:
   explicit ThreadScope(int num_threads)

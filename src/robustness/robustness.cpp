@@ -208,7 +208,9 @@ class Robustness {
                const PlannedRow& planned,
                const std::string& what,
                Outcome& outcome) {
-    auto odometry = PhasedOdometry::create(source.camera(), config);
+    Options options = config;
+    options.threads = request_.num_threads > 0 ? request_.num_threads : options.threads;
+    auto odometry = PhasedOdometry::create(source.camera(), options);
     if (!odometry) {
       if (odometry.error().lacks_memory) {
         throw std::bad_alloc();  // of the contender it says nothing

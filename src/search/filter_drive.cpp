@@ -55,10 +55,16 @@ void add_dense_errors(const Trajectory& trajectory,
   score.block = dense.block;
 }
 
+/// Many drives run beside each other.
+Options on_one_thread(Options options) {
+  options.threads = 1;
+  return options;
+}
+
 }  // namespace
 
 FilterDrive::FilterDrive(const Config& config, const FrameSource& sequence)
-    : odometry_(config, sequence.camera()), config_(&config), sequence_(&sequence) {}
+    : odometry_(on_one_thread(config), sequence.camera()), config_(&config), sequence_(&sequence) {}
 
 void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
   Frame now;

@@ -20,8 +20,11 @@ constexpr int kStripOutputs = 7680;
 
 class NetworkLayer {
  public:
-  NetworkLayer(std::string label, OnnxSession session, const SamplingPlan& plan)
-      : label_(std::move(label)), session_(std::move(session)), plan_(plan) {}
+  NetworkLayer(std::string label, OnnxSession session, const SamplingPlan& plan, int num_threads)
+      : label_(std::move(label)),
+        session_(std::move(session)),
+        plan_(plan),
+        num_threads_(num_threads) {}
 
   [[nodiscard]] Expected<std::vector<Channel>> apply(const cv::Mat& frame, int first, int last) {
     if (Status status = check_size(frame.size()); !status) {
@@ -131,7 +134,7 @@ class NetworkLayer {
             done[static_cast<std::size_t>(i)] = run_pass(i, first, output, channels);
           }
         },
-        cv::getNumThreads());
+        num_threads_ > 0 ? num_threads_ : cv::getNumThreads());
     const auto failed = std::find_if(done.begin(), done.end(), [](const Status& s) { return !s; });
     return failed == done.end() ? Status() : *failed;
   }
@@ -192,6 +195,7 @@ class NetworkLayer {
   std::string label_;
   OnnxSession session_;
   SamplingPlan plan_;
+  int num_threads_;  ///< 0: all that OpenCV has
 
   // Buffers kept from frame to frame, of one call at a time.
   std::mutex mutex_;
@@ -209,9 +213,10 @@ class NetworkLayer {
 
 FilterBank make_network_layer(const std::string& label,
                               OnnxSession session,
-                              const SamplingPlan& plan) {
+                              const SamplingPlan& plan,
+                              int num_threads) {
   return
-      [layer = std::make_shared<NetworkLayer>(label, std::move(session), plan)](
+      [layer = std::make_shared<NetworkLayer>(label, std::move(session), plan, num_threads)](
           const cv::Mat& frame, int first, int last) { return layer->apply(frame, first, last); };
 }
 

@@ -85,9 +85,11 @@ struct SamplingPlan {
   }
 };
 
-/// The filters of a network's layer, sampled by `plan`. `label` is what messages call it.
+/// The filters of a network's layer, sampled by `plan`. `label` is what messages call it;
+/// `num_threads` as in Stem::load.
 [[nodiscard]] FilterBank make_network_layer(const std::string& label,
                                             OnnxSession session,
-                                            const SamplingPlan& plan);
+                                            const SamplingPlan& plan,
+                                            int num_threads);
 
 }  // namespace stemvo::internal

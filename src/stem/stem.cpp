@@ -85,7 +85,7 @@ void check_frame(const cv::Mat& frame) {
 
 }  // namespace
 
-Expected<Stem> Stem::create(const StemOptions& options, bool all_filters) {
+Expected<Stem> Stem::create(const StemOptions& options, bool all_filters, int num_threads) {
   if (auto hand_made = internal::hand_made_bank(options.model)) {
     const auto filter = choose_filter(options.filter, options.model, hand_made->num_filters, 0);
     const auto sampling = choose_sampling(options.sampling_px, 1, /*native_only=*/false);
@@ -122,18 +122,23 @@ Expected<Stem> Stem::create(const StemOptions& options, bool all_filters) {
         "found {}",
         info.stride_px, model->label, *sampling));
   }
-  return Stem({.model = options.model,
-               .layer = info.layer,
-               .filter = *filter,
-               .num_filters = info.num_filters,
-               .sampling_px = *sampling,
-               .takes_any_size = !has_one_size && !info.native_sampling_only},
-              internal::make_network_layer(model->label, std::move(model->session), plan),
-              /*has_all=*/!info.only_filter);
+  return Stem(
+      {.model = options.model,
+       .layer = info.layer,
+       .filter = *filter,
+       .num_filters = info.num_filters,
+       .sampling_px = *sampling,
+       .takes_any_size = !has_one_size && !info.native_sampling_only},
+      internal::make_network_layer(model->label, std::move(model->session), plan, num_threads),
+      /*has_all=*/!info.only_filter);
 }
 
-Expected<Stem> Stem::load(const StemOptions& options) { return create(options, false); }
-Expected<Stem> Stem::load_all(const StemOptions& options) { return create(options, true); }
+Expected<Stem> Stem::load(const StemOptions& options, int num_threads) {
+  return create(options, /*all_filters=*/false, num_threads);
+}
+Expected<Stem> Stem::load_all(const StemOptions& options) {
+  return create(options, /*all_filters=*/true, 0);
+}
 
 Expected<Channel> Stem::apply(const cv::Mat& frame, int zoom) const {
   check_frame(frame);

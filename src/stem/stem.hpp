@@ -34,7 +34,7 @@ using FilterBank =
 }  // namespace internal
 
 /// Filters of a layer of a network: frame in, channels out. Const and gives the same bytes whatever
-/// the number of threads (cv::setNumThreads). Frames are CV_8UC3 in RGB order, or CV_8UC1
+/// the number of threads. Frames are CV_8UC3 in RGB order, or CV_8UC1
 /// (replicated to three planes). Errors of all: the frame is smaller than the kernel, or the
 /// runtime refused it.
 class Stem {
@@ -43,7 +43,8 @@ class Stem {
   /// Errors: no such model, not ONNX, no metadata that say kernel, stride and padding, or others
   /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
   /// outside [0, C), sampling_px not a divisor of the stride (lists the allowed values).
-  [[nodiscard]] static Expected<Stem> load(const StemOptions& options);
+  /// `num_threads`: of OpenCV's, that may work on a frame at a time; 0: all it has.
+  [[nodiscard]] static Expected<Stem> load(const StemOptions& options, int num_threads = 0);
   /// The same with all filters, for `apply_all` and `apply_range` too.
   [[nodiscard]] static Expected<Stem> load_all(const StemOptions& options);
 
@@ -70,7 +71,9 @@ class Stem {
  private:
   Stem(StemInfo info, internal::FilterBank bank, bool has_all)
       : info_(std::move(info)), bank_(std::move(bank)), has_all_(has_all) {}
-  [[nodiscard]] static Expected<Stem> create(const StemOptions& options, bool all_filters);
+  [[nodiscard]] static Expected<Stem> create(const StemOptions& options,
+                                             bool all_filters,
+                                             int num_threads);
 
   StemInfo info_;
   internal::FilterBank bank_;

@@ -6,6 +6,7 @@
 #include <latch>
 #include <map>
 #include <mutex>
+#include <new>
 #include <random>
 #include <set>
 #include <stdexcept>
@@ -20,23 +21,22 @@
 namespace stemvo {
 namespace {
 
-enum Stage { kRead, kPrepare, kTrack, kLocalize, kOptimize };
-constexpr std::array kStages = {kRead, kPrepare, kTrack, kLocalize, kOptimize};
+enum Stage { kFill, kPrepare, kTrack, kLocalize, kOptimize };
+constexpr std::array kStages = {kFill, kPrepare, kTrack, kLocalize, kOptimize};
 
 /// Notes when each stage begins and ends a frame. `at` is called in between.
 class Notes {
  public:
   using At = std::function<void(Stage, std::size_t)>;
-  explicit Notes(std::size_t num_there, At at = nullptr)
-      : num_there_(num_there), at_(std::move(at)) {}
+  explicit Notes(At at = nullptr) : at_(std::move(at)) {}
 
   [[nodiscard]] FrameStages stages() {
-    return {.read = [this](std::size_t k) { return k < num_there_ && note(kRead, k); },
-            .prepare = [this](std::size_t k) { note(kPrepare, k); },
+    return {.prepare = [this](std::size_t k) { note(kPrepare, k); },
             .track = [this](std::size_t k) { note(kTrack, k); },
             .localize = [this](std::size_t k) { note(kLocalize, k); },
             .optimize = [this](std::size_t k) { return note(kOptimize, k) && k != stop_at; }};
   }
+  void fill(std::size_t k) { note(kFill, k); }
   [[nodiscard]] int begin(Stage stage, std::size_t k) const { return spans_.at({stage, k}).first; }
   [[nodiscard]] int end(Stage stage, std::size_t k) const { return spans_.at({stage, k}).second; }
   [[nodiscard]] std::size_t count(Stage stage) const {
@@ -62,7 +62,6 @@ class Notes {
     return true;
   }
 
-  std::size_t num_there_;
   At at_;
   std::mutex mutex_;
   int clock_ = 0;
@@ -77,11 +76,26 @@ void nap(Stage /*stage*/, std::size_t /*frame*/) {
   }
 }
 
+/// Pushes so many frames, or until the run ends.
+void push(FrameLoops& loops, Notes& notes, std::size_t num_frames) {
+  for (std::size_t i = 0; i < num_frames; ++i) {
+    if (!loops.push([&](std::size_t k) { notes.fill(k); })) {
+      return;
+    }
+  }
+}
+
+void run(Notes& notes, std::size_t num_frames, int num_threads) {
+  FrameLoops loops(notes.stages(), num_threads);
+  push(loops, notes, num_frames);
+  loops.finish();
+}
+
 TEST(FrameLoops, KeepTheOrderWhateverAStageTakes) {
   constexpr std::size_t kNumFrames = 150;
   for (const int num_threads : {1, 2, 4}) {
-    Notes notes(kNumFrames, nap);
-    run_frame_loops(notes.stages(), kNumFrames, num_threads);
+    Notes notes(nap);
+    run(notes, kNumFrames, num_threads);
     ASSERT_EQ(notes.count(kOptimize), kNumFrames);
     for (std::size_t k = 0; k < kNumFrames; ++k) {
       for (const Stage stage : {kPrepare, kTrack, kLocalize, kOptimize}) {
@@ -93,69 +107,94 @@ TEST(FrameLoops, KeepTheOrderWhateverAStageTakes) {
       EXPECT_TRUE(k == 0 || notes.end(kLocalize, k - 1) < notes.begin(kTrack, k));
       EXPECT_TRUE(k == 0 || notes.end(kOptimize, k - 1) < notes.begin(kLocalize, k));
       EXPECT_TRUE(k < kMaxInFlight ||
-                  notes.end(kOptimize, k - kMaxInFlight) < notes.begin(kRead, k))
+                  notes.end(kOptimize, k - kMaxInFlight) < notes.begin(kFill, k))
           << "more frames at work than there is room for";
     }
   }
 }
 
 TEST(FrameLoops, WithOneThreadAllRunsInTheCallingOne) {
-  Notes notes(5);
-  run_frame_loops(notes.stages(), 5, 1);
+  Notes notes;
+  run(notes, 5, 1);
   EXPECT_EQ(notes.threads(), std::set{std::this_thread::get_id()});
-  EXPECT_LT(notes.end(kOptimize, 0), notes.begin(kRead, 1));
+  EXPECT_LT(notes.end(kOptimize, 0), notes.begin(kFill, 1));
 }
 
 /// Each of the three waits for the others: without all three at a time the test would not end.
 TEST(FrameLoops, TheThreeLoopsRunBesideEachOther) {
   std::latch all(3);
-  Notes notes(6, [&](Stage stage, std::size_t k) {
+  Notes notes([&](Stage stage, std::size_t k) {
     if ((stage == kOptimize && k == 0) || (stage == kTrack && k == 1) ||
         (stage == kPrepare && k == 2)) {
       all.arrive_and_wait();
     }
   });
-  run_frame_loops(notes.stages(), 6, 2);
-  EXPECT_EQ(notes.threads().size(), 3U);
+  run(notes, 6, 2);
+  EXPECT_EQ(notes.threads().size(), 4U);  // this one fills
   EXPECT_EQ(notes.count(kOptimize), 6U);
 }
 
-TEST(FrameLoops, EndWhereAStreamDoes) {
+TEST(FrameLoops, WaitForAllThatWerePushedAndGoOn) {
   for (const int num_threads : {1, 2}) {
-    for (const std::size_t num_there : {0U, 1U, 4U, 9U}) {
-      Notes notes(num_there, nap);
-      run_frame_loops(notes.stages(), 1000000, num_threads);
-      EXPECT_EQ(notes.count(kOptimize), num_there);
+    Notes notes(nap);
+    FrameLoops loops(notes.stages(), num_threads);
+    EXPECT_TRUE(loops.wait_for_all());
+    for (const std::size_t num_done : {1U, 4U, 13U}) {
+      push(loops, notes, num_done - notes.count(kFill));
+      EXPECT_TRUE(loops.wait_for_all());
+      EXPECT_EQ(notes.count(kOptimize), num_done);
     }
+    loops.finish();
+    EXPECT_FALSE(loops.push([](std::size_t) { ADD_FAILURE(); }));
   }
 }
 
 TEST(FrameLoops, EndBehindTheFrameWhoseOptimizationSaysSo) {
   for (const int num_threads : {1, 2}) {
-    Notes notes(100, nap);
+    Notes notes(nap);
     notes.stop_at = 7;
-    run_frame_loops(notes.stages(), 100, num_threads);
+    run(notes, 100, num_threads);
     EXPECT_EQ(notes.count(kOptimize), 8U);
   }
 }
 
 TEST(FrameLoops, ThrowAgainWhatAStageThrows) {
   for (const int num_threads : {1, 2}) {
-    for (const Stage thrower : kStages) {
-      Notes notes(100, [&](Stage stage, std::size_t k) {
+    for (const Stage thrower : {kPrepare, kTrack, kLocalize, kOptimize}) {
+      Notes notes([&](Stage stage, std::size_t k) {
         nap(stage, k);
         if (stage == thrower && k == 11) {
           throw std::runtime_error("stage " + std::to_string(stage));
         }
       });
       try {
-        run_frame_loops(notes.stages(), 100, num_threads);
+        run(notes, 100, num_threads);
         ADD_FAILURE() << "nothing was thrown";
       } catch (const std::runtime_error& error) {
         EXPECT_EQ(error.what(), "stage " + std::to_string(thrower));
       }
       EXPECT_LE(notes.count(kOptimize), 12U);
     }
+  }
+}
+
+TEST(FrameLoops, AFrameThatCannotBeFilledWasNeverThere) {
+  for (const int num_threads : {1, 2}) {
+    Notes notes(nap);
+    FrameLoops loops(notes.stages(), num_threads);
+    push(loops, notes, 3);
+    EXPECT_THROW((void)loops.push([](std::size_t) { throw std::bad_alloc(); }), std::bad_alloc);
+    push(loops, notes, 3);
+    loops.finish();
+    EXPECT_EQ(notes.count(kOptimize), 6U);
+  }
+}
+
+TEST(FrameLoops, DropFramesBegunWhenTheyAreDestroyed) {
+  for (std::size_t num_frames = 0; num_frames < 10; ++num_frames) {
+    Notes notes(nap);
+    FrameLoops loops(notes.stages(), 2);
+    push(loops, notes, num_frames);
   }
 }
 

@@ -13,7 +13,6 @@
 
 #include "dataset/sequence.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "pipeline/thread_scope.hpp"
 
 namespace stemvo {
 namespace {
@@ -79,7 +78,7 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
   EXPECT_EQ(expected.back().state, FrameState::kNoImage);
   EXPECT_GT(expected[8].num_inliers, 50);
   for (const int num_threads : {1, 2, 4}) {
-    const pipeline::ThreadScope threads(num_threads);
+    config_.threads = num_threads;
     PhasedOdometry piped = odometry();
     std::size_t num_visited = 0;
     pipeline::run_frames(

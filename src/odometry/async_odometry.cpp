@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#include "stemvo/async_odometry.hpp"
+
+#include <atomic>
+#include <deque>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "odometry/answers.hpp"
+#include "odometry/check_frame.hpp"
+#include "odometry/odometry_loops.hpp"
+
+namespace stemvo {
+
+struct AsyncOdometry::Impl {
+  Impl(PhasedOdometry given, const Camera& camera, Callback on_result)
+      : odometry(std::move(given)),
+        check(camera),
+        callback(std::move(on_result)),
+        loops(odometry, [this](const GivenFrame&, const FrameResult& result) {
+          deliver(result);
+          return true;
+        }) {}
+
+  void deliver(const FrameResult& result) {
+    if (!callback) {
+      const std::lock_guard lock(results_mutex);
+      results.push_back(result);
+      return;
+    }
+    struct Delivering {
+      std::atomic<std::thread::id>& thread;
+      ~Delivering() { thread = std::thread::id(); }
+    };
+    const Delivering scope{delivering};
+    delivering = std::this_thread::get_id();
+    callback(result);
+  }
+
+  [[nodiscard]] Status check_not_in_callback(const char* name) const {
+    return delivering == std::this_thread::get_id()
+               ? Status(fail(std::string(name) +
+                             ": expected a call outside of the callback, found one in it"))
+               : Status();
+  }
+  /// Why the loops take no frame.
+  [[nodiscard]] Error ended() const {
+    return fail(loops.has_thrown()
+                    ? "the odometry has ended: an earlier frame or its callback failed, and "
+                      "finish() throws why"
+                    : "expected no frame after finish(), found one");
+  }
+
+  PhasedOdometry odometry;
+  std::mutex turn;  ///< of push, finish and reset
+  FrameCheck check;
+  Callback callback;
+  std::atomic<std::thread::id> delivering;  ///< the thread that is in the callback
+  std::mutex next_turn;
+  std::size_t num_taken = 0;  ///< by next
+  std::mutex results_mutex;
+  std::deque<FrameResult> results;
+  OdometryLoops loops;  ///< last, so that its threads end first
+};
+
+Expected<AsyncOdometry> AsyncOdometry::create(const Camera& camera,
+                                              const Options& options,
+                                              const cv::Mat& mask,
+                                              Callback callback) {
+  Expected<PhasedOdometry> odometry = PhasedOdometry::create(camera, options, mask);
+  if (!odometry) {
+    return odometry.error();
+  }
+  try {
+    return AsyncOdometry(std::make_unique<Impl>(*std::move(odometry), camera, std::move(callback)));
+  } catch (const std::system_error& error) {
+    return fail(std::string("threads: expected three more, found ") + error.what());
+  }
+}
+
+AsyncOdometry::AsyncOdometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+AsyncOdometry::AsyncOdometry(AsyncOdometry&&) noexcept = default;
+AsyncOdometry& AsyncOdometry::operator=(AsyncOdometry&&) noexcept = default;
+AsyncOdometry::~AsyncOdometry() = default;
+
+Status AsyncOdometry::push(const cv::Mat& image,
+                           PixelOrder order,
+                           double time_s,
+                           const FrameHints& hints) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  Status status = impl_->check_not_in_callback("push");
+  if (!status) {
+    return status;
+  }
+  const std::lock_guard lock(impl_->turn);
+  status = impl_->check.admit(image, order, time_s, hints);
+  if (!status) {
+    return status;
+  }
+  // A live camera writes its next image over this one.
+  GivenFrame given{order == PixelOrder::kBgr ? rgb_of(image, order) : image.clone(), time_s, hints};
+  given.hints.mask = hints.mask.clone();
+  return impl_->loops.push(std::move(given)) ? Status() : impl_->ended();
+}
+
+Expected<std::optional<FrameResult>> AsyncOdometry::next() {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  if (impl_->callback) {
+    return fail("next: expected results that wait, found a callback that took them");
+  }
+  const std::lock_guard lock(impl_->next_turn);
+  impl_->loops.wait_for(impl_->num_taken);
+  const std::lock_guard results_lock(impl_->results_mutex);
+  if (!impl_->results.empty()) {
+    std::optional<FrameResult> result = std::move(impl_->results.front());
+    impl_->results.pop_front();
+    ++impl_->num_taken;
+    return result;
+  }
+  if (impl_->loops.has_thrown()) {
+    return impl_->ended();
+  }
+  return std::optional<FrameResult>();
+}
+
+Status AsyncOdometry::finish() {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  Status status = impl_->check_not_in_callback("finish");
+  if (status) {
+    const std::lock_guard lock(impl_->turn);
+    impl_->loops.finish();
+  }
+  return status;
+}
+
+Status AsyncOdometry::reset() {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  Status status = impl_->check_not_in_callback("reset");
+  if (status) {
+    const std::lock_guard lock(impl_->turn);
+    status = impl_->loops.reset() ? status : impl_->ended();
+    impl_->check.restart();
+  }
+  return status;
+}
+
+std::vector<MapLandmark> AsyncOdometry::landmarks() const {
+  return impl_ ? impl_->loops.ask(landmarks_of) : std::vector<MapLandmark>();
+}
+std::vector<TrackedPoint> AsyncOdometry::tracked_points() const {
+  return impl_ ? impl_->loops.ask(tracked_points_of) : std::vector<TrackedPoint>();
+}
+cv::Mat AsyncOdometry::channel_image() const {
+  return impl_ ? impl_->loops.ask([](const auto& frames) { return frames.image().pixels; })
+               : cv::Mat();
+}
+
+}  // namespace stemvo

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: MIT
+#include <atomic>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "dataset/sequence.hpp"
+#include "stemvo/async_odometry.hpp"
+#include "support/small_drive.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// What a frame left, as far as it can be asked for.
+struct Left {
+  FrameResult result;
+  std::vector<TrackedPoint> points;
+  std::size_t num_landmarks = 0;
+  double channel_sum = 0.0;
+};
+
+template <typename SomeOdometry>
+Left left_by(const FrameResult& result, const SomeOdometry& odometry) {
+  return {result, odometry.tracked_points(), odometry.landmarks().size(),
+          cv::sum(odometry.channel_image())[0]};
+}
+
+void expect_same(const std::vector<Left>& found, const std::vector<Left>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const auto& [result, points, num_landmarks, channel_sum] = found[k];
+    EXPECT_EQ(result.state, expected[k].result.state) << k;
+    EXPECT_EQ(result.time_s, expected[k].result.time_s) << k;
+    EXPECT_EQ(result.num_inliers, expected[k].result.num_inliers) << k;
+    EXPECT_EQ(result.world_from_camera.matrix(), expected[k].result.world_from_camera.matrix())
+        << k;
+    EXPECT_EQ(num_landmarks, expected[k].num_landmarks) << k;
+    EXPECT_EQ(channel_sum, expected[k].channel_sum) << k;
+    ASSERT_EQ(points.size(), expected[k].points.size()) << k;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(points[i].uv, expected[k].points[i].uv) << k;
+    }
+  }
+}
+
+class Async : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    struct Drive : testing::SmallDrive {
+      Drive() : sequence(KittiSequence::open(sequence_, {}).value()) {}
+      void TestBody() override {}
+      KittiSequence sequence;
+    } const drive;
+    camera_ = drive.sequence.camera();
+    for (std::size_t i = 0; i < drive.sequence.size(); ++i) {
+      images_.push_back(drive.sequence.read(i).value());
+    }
+    order_ = images_.front().channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
+    Odometry odometry = Odometry::create(camera_).value();
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      plain_.push_back(left_by(odometry.process(images_[i], order_, time_s(i)).value(), odometry));
+    }
+  }
+  static double time_s(std::size_t i) { return 0.1 * static_cast<double>(i); }
+  static Options with_threads(int threads) {
+    Options options;
+    options.threads = threads;
+    return options;
+  }
+  static AsyncOdometry create(int threads, AsyncOdometry::Callback callback = {}) {
+    return AsyncOdometry::create(camera_, with_threads(threads), {}, std::move(callback)).value();
+  }
+  static Status push(AsyncOdometry& odometry, std::size_t i) {
+    return odometry.push(images_[i], order_, time_s(i));
+  }
+  static std::string error_of(const Status& status) {
+    return status ? "no error" : status.error().message;
+  }
+
+  static inline Camera camera_;
+  static inline std::vector<cv::Mat> images_;
+  static inline PixelOrder order_ = PixelOrder::kGray;
+  static inline std::vector<Left> plain_;  ///< by Odometry
+};
+
+TEST_F(Async, TheCallbackSeesWhatProcessLeavesForAnyNumberOfThreads) {
+  ASSERT_GT(plain_.back().num_landmarks, 20U);
+  for (const int threads : {0, 1, 2, 4}) {
+    std::optional<AsyncOdometry> odometry;
+    std::vector<Left> found;
+    std::thread::id caller;
+    odometry = create(threads, [&](const FrameResult& result) {
+      found.push_back(left_by(result, *odometry));
+      caller = std::this_thread::get_id();
+    });
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      cv::Mat image = images_[i].clone();
+      ASSERT_TRUE(odometry->push(image, order_, time_s(i)));
+      image.setTo(0);  // as a camera that writes the next one there
+    }
+    EXPECT_TRUE(odometry->finish());
+    expect_same(found, plain_);
+    EXPECT_EQ(caller == std::this_thread::get_id(), threads == 1);
+  }
+}
+
+TEST_F(Async, NextGivesTheSameResultsToAnotherThread) {
+  for (const int threads : {1, 3}) {
+    AsyncOdometry odometry = create(threads);
+    std::vector<Rigid3> poses;
+    std::jthread taker([&] {
+      while (const std::optional<FrameResult> result = odometry.next().value()) {
+        poses.push_back(result->world_from_camera);
+        EXPECT_GE(odometry.tracked_points().size(), 0U);  // of some frame: no race
+      }
+    });
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      ASSERT_TRUE(push(odometry, i));
+    }
+    EXPECT_TRUE(odometry.finish());
+    taker.join();
+    ASSERT_EQ(poses.size(), plain_.size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      EXPECT_EQ(poses[i].matrix(), plain_[i].result.world_from_camera.matrix());
+    }
+  }
+}
+
+/// Whoever pushes all before he takes any is not left waiting.
+TEST_F(Async, ResultsWaitUntilTheyAreTaken) {
+  AsyncOdometry odometry = create(2);
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    ASSERT_TRUE(push(odometry, i));
+  }
+  EXPECT_EQ((*odometry.next())->state, FrameState::kFirst);
+  EXPECT_TRUE(odometry.finish());
+  std::size_t num_taken = 1;
+  for (; odometry.next()->has_value(); ++num_taken) {
+  }
+  EXPECT_EQ(num_taken, images_.size());
+  EXPECT_FALSE(odometry.next()->has_value());
+  EXPECT_THAT(error_of(odometry.push(images_[0], order_, 1e6)), HasSubstr("after finish()"));
+}
+
+TEST_F(Async, AWrongFrameIsAnErrorOfPushAndChangesNothing) {
+  std::vector<Left> found;
+  std::optional<AsyncOdometry> odometry;
+  odometry =
+      create(2, [&](const FrameResult& result) { found.push_back(left_by(result, *odometry)); });
+  for (std::size_t i = 0; i < images_.size(); ++i) {
+    EXPECT_THAT(error_of(odometry->push(cv::Mat(7, 7, CV_8UC1), PixelOrder::kGray, 1e6)),
+                AllOf(HasSubstr("image: expected"), HasSubstr("found 7x7")));
+    ASSERT_TRUE(push(*odometry, i));
+    EXPECT_THAT(error_of(push(*odometry, i)), HasSubstr("time: expected"));
+  }
+  EXPECT_TRUE(odometry->finish());
+  expect_same(found, plain_);
+}
+
+TEST_F(Async, FinishThrowsWhatTheCallbackThrew) {
+  for (const int threads : {1, 2}) {
+    int num_called = 0;
+    AsyncOdometry odometry = create(threads, [&](const FrameResult&) {
+      if (++num_called == 3) {
+        throw std::runtime_error("disk on fire");
+      }
+    });
+    Status pushed;
+    for (std::size_t i = 0; i < images_.size() && pushed; ++i) {
+      pushed = push(odometry, i);
+    }
+    EXPECT_THAT(error_of(pushed), HasSubstr("finish() throws why"));
+    EXPECT_THROW((void)odometry.finish(), std::runtime_error);
+    EXPECT_EQ(num_called, 3);
+  }
+}
+
+TEST_F(Async, WhatWouldWaitForItselfInTheCallbackIsAnError) {
+  for (const int threads : {1, 2}) {
+    std::optional<AsyncOdometry> odometry;
+    std::vector<std::string> errors;
+    odometry = create(threads, [&](const FrameResult&) {
+      errors = {error_of(push(*odometry, 5)), error_of(odometry->finish()),
+                error_of(odometry->reset()), odometry->next().error().message};
+    });
+    ASSERT_TRUE(push(*odometry, 0));
+    EXPECT_TRUE(odometry->finish());
+    EXPECT_THAT(errors, ::testing::ElementsAre(HasSubstr("push"), HasSubstr("finish"),
+                                               HasSubstr("reset"), HasSubstr("next")));
+  }
+}
+
+TEST_F(Async, IsDestroyedInTheMiddle) {
+  for (const int threads : {1, 2}) {
+    for (const std::size_t num_frames : {0U, 1U, 2U, 7U, 12U}) {
+      std::atomic<std::size_t> num_called = 0;
+      AsyncOdometry odometry = create(threads, [&](const FrameResult&) { ++num_called; });
+      for (std::size_t i = 0; i < num_frames; ++i) {
+        ASSERT_TRUE(push(odometry, i));
+      }
+      {
+        const AsyncOdometry dropped = std::move(odometry);
+      }
+      EXPECT_LE(num_called, num_frames);
+    }
+  }
+}
+
+TEST_F(Async, AfterAResetTheWorldIsNew) {
+  for (const int threads : {1, 2}) {
+    std::optional<AsyncOdometry> odometry;
+    std::vector<Left> found;
+    odometry = create(
+        threads, [&](const FrameResult& result) { found.push_back(left_by(result, *odometry)); });
+    for (std::size_t i = 0; i < 9; ++i) {
+      ASSERT_TRUE(push(*odometry, images_.size() - 1 - i)) << "times fall: " << i;
+      ASSERT_TRUE(odometry->reset());
+    }
+    ASSERT_EQ(found.size(), 9U) << "frames before it are done";
+    found.clear();
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      ASSERT_TRUE(push(*odometry, i));
+    }
+    EXPECT_TRUE(odometry->finish());
+    expect_same(found, plain_);
+    EXPECT_THAT(error_of(odometry->reset()), HasSubstr("after finish()"));
+  }
+}
+
+TEST_F(Async, OneThatWasMovedFromIsAnError) {
+  AsyncOdometry odometry = create(2);
+  const AsyncOdometry other = std::move(odometry);
+  EXPECT_THAT(error_of(push(odometry, 0)), HasSubstr("moved"));
+  EXPECT_THAT(error_of(odometry.finish()), HasSubstr("moved"));
+  EXPECT_THAT(error_of(odometry.reset()), HasSubstr("moved"));
+  EXPECT_FALSE(odometry.next());
+  EXPECT_TRUE(odometry.landmarks().empty() && odometry.tracked_points().empty() &&
+              odometry.channel_image().empty());
+}
+
+}  // namespace
+}  // namespace stemvo
