@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -22,7 +23,8 @@ struct Error {
 }
 
 /// A value, or the Error that kept us from it (C++23's std::expected, as far as it is used here).
-/// value(), * and -> need a value, error() needs none: else std::bad_variant_access.
+/// value(), * and -> of an error throw std::runtime_error with its message; error() of a value
+/// throws std::bad_variant_access.
 /// An error is passed on by `return other.error();`.
 template <typename T>
 class [[nodiscard]] Expected {
@@ -30,6 +32,11 @@ class [[nodiscard]] Expected {
 
   std::variant<Value, Error> result_;
 
+  void require() const {
+    if (!has_value()) {
+      throw std::runtime_error(error().message);
+    }
+  }
   template <typename F>
   auto call(F& f) const {
     if constexpr (std::is_void_v<T>) {
@@ -53,9 +60,9 @@ class [[nodiscard]] Expected {
   [[nodiscard]] bool has_value() const { return result_.index() == 0; }
   explicit operator bool() const { return has_value(); }
 
-  [[nodiscard]] Value& value() & { return std::get<0>(result_); }
-  [[nodiscard]] const Value& value() const& { return std::get<0>(result_); }
-  [[nodiscard]] Value&& value() && { return std::get<0>(std::move(result_)); }
+  [[nodiscard]] Value& value() & { return require(), std::get<0>(result_); }
+  [[nodiscard]] const Value& value() const& { return require(), std::get<0>(result_); }
+  [[nodiscard]] Value&& value() && { return require(), std::get<0>(std::move(result_)); }
   [[nodiscard]] Value& operator*() & { return value(); }
   [[nodiscard]] const Value& operator*() const& { return value(); }
   [[nodiscard]] Value&& operator*() && { return std::move(*this).value(); }

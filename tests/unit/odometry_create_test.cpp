@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,6 +39,12 @@ cv::Mat image_at(int frame) {
 }
 
 TEST(OdometryCreate, NeedsNoFilesAndNoOptions) { EXPECT_EQ(error_of({}), "no error"); }
+
+TEST(OdometryCreate, AnErrorAskedForItsValueThrowsItsMessage) {
+  const auto odometry = Odometry::create({});
+  EXPECT_THAT([&] { return odometry.value().landmarks(); },
+              ::testing::ThrowsMessage<std::runtime_error>(odometry.error().message));
+}
 
 TEST(OdometryCreate, AnOptionOutOfRangeIsAnErrorThatNamesIt) {
   Options options;
