@@ -87,7 +87,7 @@ Chain run_chain() {
     frame.time_s = frames().sequence.time_s(static_cast<std::size_t>(i));
     frame.image = pixels;
     frame.road = std::make_shared<RoadImage>(make_road_image(result.images.back(), result.camera));
-    frame.matches = front_end->process(result.images.back(), i);
+    frame.matches = front_end->process(result.images.back(), {i, frame.time_s});
     if (i == last) {
       result.matches = frame.matches;
       result.last = std::move(frame);

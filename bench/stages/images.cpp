@@ -84,7 +84,7 @@ void contrast(State& state) {
 void pyramid(State& state) {
   const auto front_end = create_front_end(chain().config.features);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(front_end->prepare(chain().images.back()));
+    benchmark::DoNotOptimize(front_end->prepare(chain().images.back(), {}));
   }
 }
 

@@ -28,7 +28,7 @@ class Images {
   explicit Images(FeatureMethod method)
       : method_(method), front_end_(create_front_end(options_of(method))) {
     for (const ChannelImage& image : chain().images) {
-      prepared_.push_back(front_end_->prepare(image));
+      prepared_.push_back(front_end_->prepare(image, {}));
     }
   }
   /// To the next image; from the last one, to the second by way of the first (not measured).
@@ -36,7 +36,7 @@ class Images {
   void advance(const Measured& measured) {
     if (next_ == 0 || next_ == prepared_.size()) {
       front_end_ = create_front_end(options_of(method_));
-      static_cast<void>(front_end_->process(prepared_.front(), 0));
+      static_cast<void>(front_end_->process(prepared_.front(), {}));
       next_ = 1;
     }
     measured(*front_end_, prepared_[next_++]);
@@ -55,7 +55,7 @@ void run_tracker(State& state, FeatureMethod method, Stage stage) {
   Images images(method);
   run_stage(state, stage, [&] {
     images.advance([](FrontEnd& front_end, const Prepared& image) {
-      benchmark::DoNotOptimize(front_end.process(image, 0));
+      benchmark::DoNotOptimize(front_end.process(image, {}));
     });
   });
 }
@@ -95,7 +95,7 @@ void klt_forward(State& state) {
 void orb_detect_and_describe(State& state) {
   const auto front_end = create_front_end(options_of(FeatureMethod::kOrb));
   for (auto _ : state) {
-    benchmark::DoNotOptimize(front_end->prepare(chain().images.back()));
+    benchmark::DoNotOptimize(front_end->prepare(chain().images.back(), {}));
   }
 }
 
@@ -104,11 +104,11 @@ void orb_match(State& state) {
   std::size_t i = 0;
   run_stage(state, Stage::kTracking, [&] {
     if (i == 0) {
-      static_cast<void>(images.front_end().process(images.prepared().front(), 0));
+      static_cast<void>(images.front_end().process(images.prepared().front(), {}));
     }
     ++i;
     benchmark::DoNotOptimize(
-        images.front_end().process(images.prepared()[i % images.prepared().size()], 0));
+        images.front_end().process(images.prepared()[i % images.prepared().size()], {}));
   });
 }
 

@@ -35,11 +35,13 @@ bool is_stronger(const cv::KeyPoint& a, const cv::KeyPoint& b) {
 DescriptorFrontEnd::DescriptorFrontEnd(const FeatureOptions& options)
     : options_(options), feature_(create_feature(options)) {}
 
-std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(const ChannelImage& channel,
+                                                                const cv::Mat& mask) const {
   auto described = std::make_shared<Described>(channel);
+  described->mask = with_mask(mask);
   std::vector<cv::KeyPoint> found;
   timed(Stage::kDetection, [&] {
-    feature_->detect(channel.pixels, found, mask_of(channel.map, channel.pixels.size()));
+    feature_->detect(channel.pixels, found, described->mask_of(channel.map, channel.pixels.size()));
   });
   std::sort(found.begin(), found.end(), is_stronger);
   GridQuota quota(options_, channel.pixels.size());
@@ -61,7 +63,8 @@ std::shared_ptr<const ImagePyramid> DescriptorFrontEnd::prepare(const ChannelIma
   return described;
 }
 
-Matches DescriptorFrontEnd::process(std::shared_ptr<const ImagePyramid> prepared, int frame) {
+Matches DescriptorFrontEnd::process(std::shared_ptr<const ImagePyramid> prepared,
+                                    const ImageClue& clue) {
   auto current = std::static_pointer_cast<const Described>(std::move(prepared));
   Matches matches;
   matches.num_keypoints = static_cast<int>(current->uv.size());
@@ -78,7 +81,7 @@ Matches DescriptorFrontEnd::process(std::shared_ptr<const ImagePyramid> prepared
       matched_.push_back(to);
     }
   }
-  matches.prev_frame = std::exchange(last_frame_, frame);
+  matches.prev_frame = std::exchange(last_frame_, clue.frame);
   last_ = std::move(current);
   track_ids_ = std::move(track_ids);
   return matches;

@@ -17,9 +17,10 @@ class DescriptorFrontEnd : public FrontEnd {
   explicit DescriptorFrontEnd(const FeatureOptions& options);
 
   using FrontEnd::process;
-  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
-      const ChannelImage& channel) const override;
-  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
+                                                            const cv::Mat& mask) const override;
+  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image,
+                                const ImageClue& clue) override;
   void remove_outliers(const std::vector<char>& is_inlier) override;
 
  private:

@@ -9,15 +9,22 @@
 
 namespace stemvo {
 
-cv::Mat FrontEnd::mask_of(const PixelMap& map, cv::Size size) const {
-  cv::Mat mask;
-  if (!mask_.empty()) {
+cv::Mat ImagePyramid::mask_of(const PixelMap& map, cv::Size size) const {
+  cv::Mat result;
+  if (!mask.empty()) {
     const cv::Matx23d to_input(map.scale.x(), 0.0, map.offset_px.x(), 0.0, map.scale.y(),
                                map.offset_px.y());
-    cv::warpAffine(mask_, mask, to_input, size, cv::INTER_NEAREST | cv::WARP_INVERSE_MAP,
+    cv::warpAffine(mask, result, to_input, size, cv::INTER_NEAREST | cv::WARP_INVERSE_MAP,
                    cv::BORDER_REPLICATE);
   }
-  return mask;
+  return result;
+}
+
+cv::Mat FrontEnd::with_mask(const cv::Mat& mask) const {
+  if (mask_.empty() || mask.empty()) {
+    return mask.empty() ? mask_ : mask;
+  }
+  return (mask_ != 0) & (mask != 0);
 }
 
 std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {

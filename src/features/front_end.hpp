@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -33,9 +34,21 @@ struct Matches {
 struct ImagePyramid {
   explicit ImagePyramid(ChannelImage seen) : channel(std::move(seen)), levels{channel.pixels} {}
   virtual ~ImagePyramid() = default;
+  /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.
+  [[nodiscard]] cv::Mat mask_of(const PixelMap& map, cv::Size size) const;
 
   ChannelImage channel;
+  cv::Mat mask;                 ///< where points may be, as FrontEnd::set_mask(); of this image
   std::vector<cv::Mat> levels;  ///< the channel, then each half the size of the one before
+};
+
+/// When an image was taken, and what is known of it before it is looked at.
+struct ImageClue {
+  int frame = 0;        ///< its number, for Matches::prev_frame
+  double time_s = 0.0;  ///< images with one time: their intervals are not known
+  /// Where the image given before shows what is infinitely far, if it only turned: homogeneous
+  /// pixels of the input, cur_from_prev. A hint. nullopt: not known.
+  std::optional<Eigen::Matrix3d> turn = std::nullopt;
 };
 
 /// Finds correspondences between the last image it was given and the next one. Stateful (it holds
@@ -43,19 +56,19 @@ struct ImagePyramid {
 class FrontEnd {
  public:
   virtual ~FrontEnd() = default;
-  /// Where new points may be: CV_8UC1 of the input's size, 0 where none; empty: everywhere. Called
+  /// Where points may be: CV_8UC1 of the input's size, 0 where none; empty: everywhere. Called
   /// before the first image.
   void set_mask(const cv::Mat& mask) { mask_ = mask; }
   /// The part of process() that needs only the image: it may run ahead, in another thread than
-  /// the rest, one call at a time.
-  [[nodiscard]] virtual std::shared_ptr<const ImagePyramid> prepare(
-      const ChannelImage& channel) const = 0;
+  /// the rest, one call at a time. `mask`: as set_mask(), which counts as well; of this image.
+  [[nodiscard]] virtual std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
+                                                                    const cv::Mat& mask) const = 0;
   /// Matches from the previous image (none on the first). An image of another size starts over.
   /// `image` was prepared by this front end (not checked).
-  /// `frame` is the image's number for Matches::prev_frame.
-  [[nodiscard]] virtual Matches process(std::shared_ptr<const ImagePyramid> image, int frame) = 0;
-  [[nodiscard]] Matches process(const ChannelImage& image, int frame = 0) {
-    return process(prepare(image), frame);
+  [[nodiscard]] virtual Matches process(std::shared_ptr<const ImagePyramid> image,
+                                        const ImageClue& clue) = 0;
+  [[nodiscard]] Matches process(const ChannelImage& image, const ImageClue& clue = {}) {
+    return process(prepare(image, {}), clue);
   }
   /// Ends the tracks of the last matches that are no inliers (one flag per match).
   virtual void remove_outliers(const std::vector<char>& is_inlier) = 0;
@@ -65,8 +78,8 @@ class FrontEnd {
   virtual void expect_projections(Observations /*projections*/) {}  // NOLINT: an override keeps it
 
  protected:
-  /// The mask for an image of this size whose pixels lie there in the input; empty: everywhere.
-  [[nodiscard]] cv::Mat mask_of(const PixelMap& map, cv::Size size) const;
+  /// Both masks.
+  [[nodiscard]] cv::Mat with_mask(const cv::Mat& mask) const;
 
  private:
   cv::Mat mask_;

@@ -39,9 +39,11 @@ struct KltFrontEnd::KltPyramid : ImagePyramid {
   cv::Size window;
 };
 
-std::shared_ptr<const ImagePyramid> KltFrontEnd::prepare(const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> KltFrontEnd::prepare(const ChannelImage& channel,
+                                                         const cv::Mat& mask) const {
   const StageTimer timer(Stage::kPyramid);
   auto image = std::make_shared<KltPyramid>(channel);
+  image->mask = with_mask(mask);
   const double scale = channel.map.scale.minCoeff();
   const int half = options().klt_window / 2;
   const int reach = std::max(kMinReach_px, static_cast<int>(half / scale));

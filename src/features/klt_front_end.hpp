@@ -14,8 +14,8 @@ class KltFrontEnd final : public PointFrontEnd {
  public:
   explicit KltFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
 
-  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
-      const ChannelImage& channel) const override;
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
+                                                            const cv::Mat& mask) const override;
 
  private:
   /// With its pyramid and the derivatives of every level, which both directions use.

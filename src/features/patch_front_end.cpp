@@ -30,6 +30,10 @@ constexpr int kPredictedLevel = 1;
 /// Where fewer of the points are found, they have moved further than the levels asked for reach:
 /// those that are missing are looked for from one coarser level on.
 constexpr double kFewFound = 0.3;
+/// So many points say whether a hint of the turn leads to them.
+constexpr std::size_t kNumProbes = 40;
+/// A hint that moves a start by less changes nothing.
+constexpr float kSameStart_px = 1.0F;
 
 /// Motions of points between two images.
 class Motions {
@@ -78,16 +82,58 @@ cv::Point2f Motions::near(const cv::Point2f& uv) const {
   return {median(&cv::Point2f::x), median(&cv::Point2f::y)};
 }
 
+/// How far a turn, as ImageClue::turn, moves a pixel that shows what is far away.
+cv::Point2f shift_of(const Eigen::Matrix3d& turn, const PixelMap& map, const cv::Point2f& uv) {
+  constexpr double kMinDepth = 0.2;  // beyond 78 degrees of turn: out of view
+  const Eigen::Vector3d to = turn * map.to_input({uv.x, uv.y}).homogeneous();
+  if (!(to.z() > kMinDepth)) {
+    return {};
+  }
+  const Eigen::Vector2d there = map.from_input(to.hnormalized());
+  return cv::Point2f(static_cast<float>(there.x()), static_cast<float>(there.y())) - uv;
+}
+
 }  // namespace
+
+/// The motions that are expected of points between two images.
+class PatchFrontEnd::Outlook {
+ public:
+  Outlook(const View& from, const View& to)
+      : from_(from),
+        ratio_(from.interval_s > 0.0
+                   ? static_cast<float>((to.time_s - from.time_s) / from.interval_s)
+                   : 1.0F) {}
+
+  /// Of a point that came by `motion`, at the same speed.
+  [[nodiscard]] cv::Point2f on(const cv::Point2f& motion) const { return ratio_ * motion; }
+  [[nodiscard]] bool knows_turn() const { return from_.turn_to_newest.has_value(); }
+  /// By the turn alone.
+  [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv) const {
+    return shift_of(*from_.turn_to_newest, from_.image->channel.map, uv);
+  }
+  /// By the turn, and at the same speed what an earlier turn leaves of `motion`.
+  [[nodiscard]] cv::Point2f turned(const cv::Point2f& uv, const cv::Point2f& motion) const {
+    const PixelMap& map = from_.image->channel.map;
+    return turned(uv) + (from_.turn.has_value()
+                             ? on(motion - shift_of(*from_.turn, map, uv - motion))
+                             : cv::Point2f());
+  }
+
+ private:
+  const View& from_;
+  float ratio_;  ///< of the interval to the one before
+};
 
 struct PatchFrontEnd::PatchPyramid : ImagePyramid {
   using ImagePyramid::ImagePyramid;
   std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
 };
 
-std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& channel) const {
+std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& channel,
+                                                           const cv::Mat& mask) const {
   const StageTimer timer(Stage::kPyramid);
   auto image = std::make_shared<PatchPyramid>(channel);
+  image->mask = with_mask(mask);
   image->levels.clear();
   cv::Mat level = channel.pixels;
   const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
@@ -125,6 +171,31 @@ bool PatchFrontEnd::begin_track(const ImagePyramid& image, const Point& point) {
   return tracks_.insert(std::move(node)).inserted;
 }
 
+/// A hint may be wrong: it counts where it leads to as many points as no hint does.
+template <typename Align>
+bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
+                                    const View& from,
+                                    const Align& align,
+                                    int top) const {
+  int num_with = 0;
+  int num_without = 0;
+  const std::size_t step = std::max<std::size_t>(1, from.points.size() / kNumProbes);
+  for (std::size_t i = 0; i < from.points.size(); i += step) {
+    const Point& point = from.points[i];
+    const Track& track = tracks_.at(point.id);
+    const bool knows_motion = track.frame == from.frame;
+    const int level = knows_motion ? std::min(kPredictedLevel, top) : top;
+    const cv::Point2f with =
+        knows_motion ? outlook.turned(point.uv, track.motion) : outlook.turned(point.uv);
+    const cv::Point2f without = knows_motion ? outlook.on(track.motion) : cv::Point2f();
+    if (const cv::Point2f off = with - without; off.dot(off) > kSameStart_px * kSameStart_px) {
+      num_with += align(point, with, level).correlation >= kMinCorrelation ? 1 : 0;
+      num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
+    }
+  }
+  return num_with > 0 && num_with >= num_without;
+}
+
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
                                                                     const View& to) {
   const auto& image = static_cast<const PatchPyramid&>(*to.image);
@@ -139,13 +210,20 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     return align_patch(track.patch, pyramid, {start.x, start.y, track.warp.a, track.warp.b},
                        first_level);
   };
+  const Outlook outlook(from, to);
+  const bool is_turned = outlook.knows_turn() && leads_to_points(outlook, from, align, top);
+  const auto near = [&](const cv::Point2f& uv) {
+    return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
+  };
   // First the points that were tracked to here: they tell the others where to look.
   std::vector<PatchMatch> found(from.points.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Point& point = from.points[i];
     const Track& track = tracks_.at(point.id);
     if (track.frame == from.frame) {
-      found[i] = align(point, track.motion, predicted);
+      found[i] = align(
+          point, is_turned ? outlook.turned(point.uv, track.motion) : outlook.on(track.motion),
+          predicted);
       if (found[i].correlation >= kMinCorrelation) {
         motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
       }
@@ -156,7 +234,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     const Point& point = from.points[i];
     const Track& track = tracks_.at(point.id);
     if (found[i].correlation < kMinCorrelation) {
-      const cv::Point2f motion = motions.near(point.uv);
+      const cv::Point2f motion = near(point.uv);
       const bool is_predicted = track.frame != from.frame && !motions.empty();
       found[i] = align(point, motion, is_predicted ? predicted : top);
       if (found[i].correlation < kMinCorrelation && is_predicted) {
@@ -172,7 +250,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
     const Point& point = from.points[i];
     Track& track = tracks_.at(point.id);
     if (is_far && !is_found(found[i])) {
-      found[i] = align(point, motions.near(point.uv), coarsest);
+      found[i] = align(point, near(point.uv), coarsest);
       if (is_found(found[i])) {
         motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
       }

@@ -19,11 +19,12 @@ class PatchFrontEnd final : public PointFrontEnd {
  public:
   explicit PatchFrontEnd(const FeatureOptions& options) : PointFrontEnd(options) {}
 
-  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(
-      const ChannelImage& channel) const override;
+  [[nodiscard]] std::shared_ptr<const ImagePyramid> prepare(const ChannelImage& channel,
+                                                            const cv::Mat& mask) const override;
 
  private:
   struct PatchPyramid;
+  class Outlook;
   struct Track {
     Patch patch;
     Similarity warp;     ///< from the patch to the last image it was found in
@@ -34,6 +35,11 @@ class PatchFrontEnd final : public PointFrontEnd {
   [[nodiscard]] bool begin_track(const ImagePyramid& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
                                                                      const View& to) override;
+  template <typename Align>
+  [[nodiscard]] bool leads_to_points(const Outlook& outlook,
+                                     const View& from,
+                                     const Align& align,
+                                     int top) const;
   [[nodiscard]] std::optional<cv::Point2f> match_projection(const ImagePyramid& image,
                                                             const Point& point) override;
   void end_other_tracks(const std::vector<Point>& last,

@@ -21,21 +21,34 @@ Eigen::Vector2d to_input(const PixelMap& map, const cv::Point2f& uv) {
   return map.to_input({static_cast<double>(uv.x), static_cast<double>(uv.y)});
 }
 
+cv::Point pixel_of(const cv::Mat& image, const cv::Point2f& uv) {
+  return {std::clamp(cvRound(uv.x), 0, image.cols - 1),
+          std::clamp(cvRound(uv.y), 0, image.rows - 1)};
+}
+
+bool is_allowed(const cv::Mat& mask, const cv::Point2f& uv) {
+  return mask.empty() || mask.at<unsigned char>(pixel_of(mask, uv)) != 0;
+}
+
 }  // namespace
 
 int PointFrontEnd::num_levels(double scale) const {
   return std::max(1, options_.klt_levels - std::ilogb(scale));
 }
 
-Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, int frame) {
+Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
   if (last_.image != nullptr &&
       last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
     last_good_ = {};
     projections_.clear();
   }
+  for (std::optional<Eigen::Matrix3d>* turn : {&last_.turn_to_newest, &last_good_.turn_to_newest}) {
+    const bool is_known = clue.turn.has_value() && turn->has_value();
+    *turn = is_known ? std::optional<Eigen::Matrix3d>(*clue.turn * **turn) : std::nullopt;
+  }
   Matches matches;
-  View now{std::move(image), {}, frame};
+  View now{std::move(image), {}, clue.frame, clue.time_s};
   end_other_tracks(last_.points, last_good_.points, projections_);
   if (last_.image != nullptr) {
     replenish(last_);
@@ -60,7 +73,7 @@ void PointFrontEnd::track_from_last_good(View& now, Matches& matches) {
   if (last_good_.image == nullptr) {
     return;
   }
-  View again{now.image, {}, now.frame};
+  View again{now.image, {}, now.frame, now.time_s};
   Matches found = track(last_good_, again);
   if (!is_lost(found, last_good_)) {
     now = std::move(again);
@@ -94,9 +107,12 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   matches.num_keypoints = static_cast<int>(from.points.size());
   const std::vector<std::optional<cv::Point2f>> found =
       timed(Stage::kTracking, [&] { return track_points(from, to); });
+  to.interval_s = to.time_s - from.time_s;
+  to.turn = from.turn_to_newest;
+  const cv::Mat mask = to.image->mask_of(to.image->channel.map, to.image->channel.pixels.size());
   to.points.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
-    if (!found[i].has_value()) {
+    if (!found[i].has_value() || !is_allowed(mask, *found[i])) {
       continue;
     }
     const Point& point = from.points[i];
@@ -142,15 +158,14 @@ void PointFrontEnd::replenish(View& view) {
   GridQuota quota(options_, image.channel.pixels.size());
   PixelMap map = image.channel.map;
   map.scale *= to_pixels;
-  cv::Mat mask = mask_of(map, pixels.size());
+  cv::Mat mask = image.mask_of(map, pixels.size());
   if (mask.empty()) {
     mask = cv::Mat(pixels.size(), CV_8U, cv::Scalar(255));
   }
   std::vector<Point> kept;
   kept.reserve(view.points.size());
   for (const Point& point : view.points) {
-    const cv::Point center(std::min(cvRound(point.uv.x / to_pixels), mask.cols - 1),
-                           std::min(cvRound(point.uv.y / to_pixels), mask.rows - 1));
+    const cv::Point center = pixel_of(mask, point.uv / to_pixels);
     if (mask.at<unsigned char>(center) == 0) {
       continue;  // collides with another point, the older one is kept; or is behind the mask
     }

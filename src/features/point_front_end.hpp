@@ -17,7 +17,8 @@ namespace stemvo {
 class PointFrontEnd : public FrontEnd {
  public:
   using FrontEnd::process;
-  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image, int frame) override;
+  [[nodiscard]] Matches process(std::shared_ptr<const ImagePyramid> image,
+                                const ImageClue& clue) override;
   void remove_outliers(const std::vector<char>& is_inlier) override;
   void expect_projections(Observations projections) override {
     projections_ = std::move(projections);
@@ -33,6 +34,12 @@ class PointFrontEnd : public FrontEnd {
     std::shared_ptr<const ImagePyramid> image;
     std::vector<Point> points;  ///< ordered by id
     int frame = -1;
+    double time_s = 0.0;
+    double interval_s = 0.0;  ///< from the image where its points were before
+    std::optional<Eigen::Matrix3d> turn =
+        std::nullopt;  ///< the turn from there, as ImageClue::turn
+    /// The turn from here to the newest image.
+    std::optional<Eigen::Matrix3d> turn_to_newest = Eigen::Matrix3d::Identity();
   };
 
   explicit PointFrontEnd(const FeatureOptions& options) : options_(options) {}

@@ -48,11 +48,14 @@ Frame ChannelOdometry::prepare(const Channel& channel,
   Frame frame;
   frame.time_s = time_s;
   frame.hints = hints;
+  if (frame.hints.prev_from_cur) {
+    frame.hints.prev_from_cur->normalize();
+  }
   frame.image = image;
   Stopwatch watch;
   const ChannelImage seen = timed(Stage::kContrast, [&] { return contrast_.apply(channel); });
   frame.times.stem_ms = watch.lap_ms();
-  frame.pyramid = front_end_->prepare(seen);
+  frame.pyramid = front_end_->prepare(seen, hints.mask);
   if (asks_road_) {
     const StageTimer timer(Stage::kRoadImage);
     frame.road = std::make_shared<RoadImage>(make_road_image(seen, given_camera_));
@@ -66,12 +69,30 @@ void ChannelOdometry::track(Frame frame) {
   STEMVO_CHECK(frame.time_s > last_time_s_, "times rise");
   last_time_s_ = frame.time_s;
   frame.number = num_tracked_++;
+  const ImageClue clue = clue_of(frame);
   if (frame.has_image()) {
     Stopwatch watch;
-    frame.matches = front_end_->process(frame.pyramid, frame.number);
+    frame.matches = front_end_->process(frame.pyramid, clue);
     frame.times.features_ms = watch.lap_ms();
   }
   tracked_ = std::move(frame);
+}
+
+ImageClue ChannelOdometry::clue_of(const Frame& frame) {
+  const std::optional<Eigen::Quaterniond>& hint = frame.hints.prev_from_cur;
+  image_from_tracked_ = image_from_tracked_ && hint
+                            ? std::optional<Eigen::Quaterniond>(*image_from_tracked_ * *hint)
+                            : std::nullopt;
+  ImageClue clue{frame.number, frame.time_s};
+  if (image_from_tracked_) {
+    const Eigen::Matrix3d k = given_camera_.matrix();
+    const Eigen::Matrix3d cur_from_prev = image_from_tracked_->conjugate().toRotationMatrix();
+    clue.turn = k * cur_from_prev * k.inverse();
+  }
+  if (frame.has_image()) {
+    image_from_tracked_ = Eigen::Quaterniond::Identity();
+  }
+  return clue;
 }
 
 void ChannelOdometry::localize() {

@@ -64,11 +64,15 @@ class ChannelOdometry {
   std::unique_ptr<FrontEnd> front_end_;
   std::unique_ptr<Estimator> estimator_;
 
+  [[nodiscard]] ImageClue clue_of(const Frame& frame);
+
   int num_tracked_ = 0;
   double last_time_s_ = -std::numeric_limits<double>::infinity();  ///< of the last one tracked
-  std::optional<Frame> tracked_;                                   ///< not localized
-  std::optional<FrameInWork> localized_;                           ///< not optimized
-  FrameInWork optimized_;                                          ///< the last one
+  /// Since the last image, as the frames' hints say; nullopt: one did not.
+  std::optional<Eigen::Quaterniond> image_from_tracked_ = Eigen::Quaterniond::Identity();
+  std::optional<Frame> tracked_;          ///< not localized
+  std::optional<FrameInWork> localized_;  ///< not optimized
+  FrameInWork optimized_;                 ///< the last one
 };
 
 }  // namespace stemvo

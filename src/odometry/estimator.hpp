@@ -52,6 +52,27 @@ struct KeptLandmark {
   std::array<std::uint8_t, 3> rgb{};
 };
 
+/// Whether hints of the rotation since the last frame are to be believed where nothing is measured:
+/// once the last one that could be compared was right.
+class HintTrust {
+ public:
+  void compare(const FrameHints& hints, const Eigen::Quaterniond& measured_prev_from_cur) {
+    constexpr double kMaxOff_rad = 0.02;  // of one that is right, by timing and noise ..
+    constexpr double kMaxShare = 0.2;     // .. and this share of the rotation
+    if (hints.prev_from_cur) {
+      const double angle = Eigen::Quaterniond::Identity().angularDistance(measured_prev_from_cur);
+      is_trusted_ = hints.prev_from_cur->angularDistance(measured_prev_from_cur) <
+                    kMaxOff_rad + kMaxShare * angle;
+    }
+  }
+  [[nodiscard]] std::optional<Eigen::Quaterniond> trusted(const FrameHints& hints) const {
+    return is_trusted_ ? hints.prev_from_cur : std::nullopt;
+  }
+
+ private:
+  bool is_trusted_ = false;
+};
+
 /// Tracks in, poses out; the front end follows tracks to the next frame while a frame is optimized.
 /// Frames come in order, each through both halves.
 class Estimator {
@@ -74,14 +95,31 @@ class Estimator {
   [[nodiscard]] virtual std::vector<KeptLandmark> landmarks() const { return {}; }
 };
 
-/// Length of a step that nothing measures: one unit where no scale is asked for.
+/// Length of a step that nothing measures: one unit where no scale is asked for. A drive's first
+/// interval makes a speed of it.
 [[nodiscard]] inline double assumed_step(const ScaleOptions& scale) {
   return scale.source == ScaleSource::kNone ? 1.0 : scale.step_m;
 }
 
-/// An equal share of a motion that took several frames.
-[[nodiscard]] inline Rigid3 motion_of_one_frame(const Rigid3& motion, int num_frames) {
-  return {so3_exp(so3_log(motion.rotation) / num_frames), motion.translation / num_frames};
-}
+/// A motion that goes on evenly.
+class Velocity {
+ public:
+  Velocity() = default;
+  /// `motion`, prev_from_cur, took so long.
+  Velocity(const Rigid3& motion, double interval_s)
+      : rad_per_s_(so3_log(motion.rotation) / interval_s),
+        units_per_s_(motion.translation / interval_s) {}
+
+  /// prev_from_cur after so long. `turned`: its rotation where that is known from elsewhere.
+  [[nodiscard]] Rigid3 motion(double interval_s,
+                              const std::optional<Eigen::Quaterniond>& turned = {}) const {
+    return {turned.value_or(so3_exp(interval_s * rad_per_s_)), interval_s * units_per_s_};
+  }
+  [[nodiscard]] double speed() const { return units_per_s_.norm(); }
+
+ private:
+  Eigen::Vector3d rad_per_s_ = Eigen::Vector3d::Zero();  ///< a rotation vector
+  Eigen::Vector3d units_per_s_ = Eigen::Vector3d::Zero();
+};
 
 }  // namespace stemvo

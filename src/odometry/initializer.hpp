@@ -19,6 +19,7 @@ struct View {
   int frame = -1;
   Rigid3 world_from_camera;
   Observations points;
+  double time_s = 0.0;
   std::shared_ptr<const RoadImage> road = nullptr;  ///< null: the road is not asked, or not kept
 };
 

@@ -28,6 +28,13 @@ struct SeenLandmarks {
                                                   const Observations& frame,
                                                   const Camera& camera);
 
+/// Which of two world_from_camera the landmarks fit better, by the median of their distances to
+/// where they are seen; the first where both do alike.
+[[nodiscard]] Rigid3 nearer_pose(const Rigid3& first,
+                                 const Rigid3& second,
+                                 const SeenLandmarks& seen,
+                                 const Camera& camera);
+
 struct LocalizationOptions {
   double first_loss_px = 2.0;  ///< Cauchy scale of the first round: the prediction may be far off
   double loss_px = 0.2;        ///< of the second, on the inliers of the first

@@ -44,10 +44,21 @@ bool MotionChain::passes_gate(const Eigen::Vector3d& direction_in_prev,
           motion.runner_up_ratio < kReverseRunnerUp);
 }
 
+void MotionChain::advance_to(double time_s, const std::optional<Eigen::Quaterniond>& turned) {
+  turned_ = turned;
+  if (std::isnan(time_s_)) {
+    image_time_s_ = time_s;
+  } else {
+    interval_s_ = time_s - time_s_;
+    assumed_speed_ = assumed_speed_ > 0.0 ? assumed_speed_ : assumed_step_ / interval_s_;
+  }
+  time_s_ = time_s;
+}
+
 FrameState MotionChain::add(const MeasuredMotion& motion, double length) {
   const Rigid3 prev_from_cur = motion.cur_from_prev.inverse();
   const Eigen::Vector3d direction = prev_from_cur.translation;
-  const double full_length = length > 0.0 ? length : assumed_step_ * (frames_since_image_ + 1);
+  const double full_length = length > 0.0 ? length : assumed_speed_ * since_image_s();
   FrameState state = motion.state;
   if (state == FrameState::kTracking) {
     if (!passes_gate(direction, motion)) {
@@ -93,20 +104,17 @@ void MotionChain::apply(const Rigid3& prev_from_cur, double length) {
   const Eigen::Quaterniond rotation = options_.composition == Composition::kPaper
                                           ? prev_from_cur.rotation * world_from_image_.rotation
                                           : world_from_image_.rotation * prev_from_cur.rotation;
-  const int num_frames = frames_since_image_ + 1;
-  last_prev_from_cur_ = motion_of_one_frame({prev_from_cur.rotation, step_in_prev}, num_frames);
+  velocity_ = Velocity({prev_from_cur.rotation, step_in_prev}, since_image_s());
   world_from_image_ = {rotation, position};
   world_from_camera_ = world_from_image_;
-  frames_since_image_ = 0;
+  image_time_s_ = time_s_;
 }
 
 void MotionChain::extrapolate(bool has_image) {
-  world_from_camera_ = world_from_camera_ * last_prev_from_cur_;
+  world_from_camera_ = world_from_camera_ * velocity_.motion(interval_s_, turned_);
   if (has_image) {
     world_from_image_ = world_from_camera_;
-    frames_since_image_ = 0;
-  } else {
-    ++frames_since_image_;
+    image_time_s_ = time_s_;
   }
 }
 
@@ -114,21 +122,22 @@ PairEstimator::PairEstimator(const Options& config, const Camera& camera)
     : camera_(camera),
       two_view_(config),
       chain_(config.odometry, config.scale),
-      scale_(config, kSpeedSigma),
-      last_step_(assumed_step(config.scale)) {}
+      scale_(config, kSpeedSigma) {}
 
 LocalizedFrame PairEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
   const Matches& matches = frame.matches;
   motion_ = {};
+  chain_.advance_to(frame.time_s, trust_.trusted(frame.hints));
+  times_s_.push_back(frame.time_s);
   if (!frame.has_image()) {
     motion_.state = FrameState::kNoImage;
   } else if (last_image_ < 0) {
     motion_.state = FrameState::kFirst;
   } else {
     if (matches.prev_frame >= 0 && matches.prev_frame != last_image_) {
-      chain_.go_back(trajectory_[static_cast<std::size_t>(matches.prev_frame)],
-                     frame.number - matches.prev_frame);
+      const auto prev = static_cast<std::size_t>(matches.prev_frame);
+      chain_.go_back(trajectory_[prev], times_s_[prev]);
     }
     motion_ =
         two_view_.measure({matches.prev_uv, matches.cur_uv}, camera_, chain_.is_initializing());
@@ -150,6 +159,9 @@ void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
     scale_.restart(frame.road.get());
   } else {
     result.state = chain_.add(motion_, measure_length(frame));
+    if (motion_.state != FrameState::kLost && frame.matches.prev_frame == frame.number - 1) {
+      trust_.compare(frame.hints, motion_.cur_from_prev.rotation.conjugate());
+    }
   }
   last_image_ = frame.has_image() ? frame.number : last_image_;
   scale_.report(result);
@@ -169,12 +181,12 @@ double PairEstimator::measure_length(const Frame& frame) {
     return 0.0;
   }
   const bool has_length = motion_.state == FrameState::kTracking;
-  const int num_frames = has_length ? frame.number - frame.matches.prev_frame : 0;
+  const double interval_s = has_length ? chain_.since_image_s() : 0.0;
+  last_speed_ = last_speed_ > 0.0 ? last_speed_ : chain_.assumed_speed();
   const Rigid3& direction = motion_.cur_from_prev;
-  last_step_ *=
-      scale_.measure(frame.road.get(),
-                     Rigid3(direction.rotation, num_frames * last_step_ * direction.translation));
-  return num_frames * last_step_;
+  const Rigid3 motion(direction.rotation, interval_s * last_speed_ * direction.translation);
+  last_speed_ *= scale_.measure(frame.road.get(), motion);
+  return interval_s * last_speed_;
 }
 
 }  // namespace stemvo

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,17 +21,23 @@ class MotionChain {
   MotionChain(const OdometryOptions& odometry, const ScaleOptions& scale)
       : options_(odometry), assumed_step_(assumed_step(scale)) {}
 
+  /// A frame's time, before it is given; the first one's is that of the pose at the origin.
+  /// `turned`: its rotation since the frame before, for extrapolation; else that goes on.
+  void advance_to(double time_s, const std::optional<Eigen::Quaterniond>& turned = {});
   /// A measured motion from the last image to this one, and its length where it is known (0: it is
   /// not). Returns the state after the gate.
   FrameState add(const MeasuredMotion& motion, double length = 0.0);
   /// A frame without an image, or without a motion: the last motion goes on. With an image the next
   /// motion starts here, without one it starts at the last image.
   void extrapolate(bool has_image);
-  /// The next motion starts at an earlier image, `num_frames` before the next frame.
-  void go_back(const Rigid3& world_from_image, int num_frames) {
+  /// The next motion starts at an earlier image.
+  void go_back(const Rigid3& world_from_image, double image_time_s) {
     world_from_image_ = world_from_image;
-    frames_since_image_ = num_frames - 1;
+    image_time_s_ = image_time_s;
   }
+  [[nodiscard]] double since_image_s() const { return time_s_ - image_time_s_; }
+  /// Of a motion that nothing measures, units or metres per second; 0 before the second frame.
+  [[nodiscard]] double assumed_speed() const { return assumed_speed_; }
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }
   /// True until a first motion was accepted: decisive by the point test.
@@ -41,12 +49,16 @@ class MotionChain {
   void apply(const Rigid3& prev_from_cur, double length);
 
   OdometryOptions options_;
-  double assumed_step_;        ///< metres or units, per frame
-  Rigid3 world_from_image_;    ///< pose of the last image, where the matches start
-  Rigid3 world_from_camera_;   ///< pose of the last frame
-  Rigid3 last_prev_from_cur_;  ///< last motion of one frame; for extrapolation
+  double assumed_step_;  ///< metres or units, in the first interval
+  double assumed_speed_ = 0.0;
+  double time_s_ = std::numeric_limits<double>::quiet_NaN();  ///< of the frame in work
+  double interval_s_ = 0.0;                                   ///< since the frame before
+  double image_time_s_ = 0.0;
+  std::optional<Eigen::Quaterniond> turned_;
+  Rigid3 world_from_image_;   ///< pose of the last image, where the matches start
+  Rigid3 world_from_camera_;  ///< pose of the last frame
+  Velocity velocity_;         ///< of the last motion; for extrapolation
   Eigen::Vector3d last_direction_ = Eigen::Vector3d::UnitZ();  ///< of travel, in the camera
-  int frames_since_image_ = 0;
   bool is_initializing_ = true;
 };
 
@@ -66,11 +78,13 @@ class PairEstimator final : public Estimator {
   Camera camera_;
   TwoViewEstimator two_view_;
   MotionChain chain_;
+  HintTrust trust_;
   MetricScale scale_;
-  double last_step_;       ///< of one frame that was tracked; its length is the unit
-  int last_image_ = -1;    ///< number of the last frame that had one
-  MeasuredMotion motion_;  ///< of the frame in work
+  double last_speed_ = 0.0;  ///< of the last frame that was tracked: its unit; 0: none yet
+  int last_image_ = -1;      ///< number of the last frame that had one
+  MeasuredMotion motion_;    ///< of the frame in work
   std::vector<Rigid3> trajectory_;
+  std::vector<double> times_s_;  ///< of its frames
 };
 
 }  // namespace stemvo

@@ -36,7 +36,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       initializer_(config),
       scale_(config),
       calibration_(camera, config.camera.refine, config.threads != 1),
-      speed_per_frame_(assumed_step(config.scale)) {
+      assumed_step_(assumed_step(config.scale)) {
   window_options_.num_keyframes = config.window.num_keyframes;
   refinement_.loss_scale_px = config.ba.loss_px;
   refinement_.max_iterations = config.ba.max_iterations;
@@ -45,6 +45,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
 }
 
 LocalizedFrame WindowEstimator::localize(const Frame& frame) {
+  advance_to(frame.time_s);
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
@@ -60,13 +61,21 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   return localized;
 }
 
+void WindowEstimator::advance_to(double time_s) {
+  if (!times_s_.empty()) {
+    interval_s_ = time_s - times_s_.back();
+    speed_ = speed_ > 0.0 ? speed_ : assumed_step_ / interval_s_;
+  }
+  times_s_.push_back(time_s);
+}
+
 FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& localized) {
   if (!frame.has_image()) {
-    world_from_camera_ = world_from_camera_ * prev_from_cur_;
+    world_from_camera_ = predict(trust_.trusted(frame.hints));
     return FrameState::kNoImage;
   }
   if (last_.frame < 0) {
-    reset_reference({frame.number, world_from_camera_, {}, frame.road});
+    reset_reference({frame.number, world_from_camera_, {}, frame.time_s, frame.road});
     scale_.restart(frame.road.get());
     return FrameState::kFirst;
   }
@@ -79,9 +88,12 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
       return FrameState::kStationary;
     }
   }
-  const std::optional<Localization> found =
-      stemvo::localize(find_seen_landmarks(window_, now), world_from_camera_ * prev_from_cur_,
-                       camera(), localization_);
+  const SeenLandmarks seen = find_seen_landmarks(window_, now);
+  const Rigid3 start =
+      frame.hints.prev_from_cur
+          ? nearer_pose(predict(), predict(frame.hints.prev_from_cur), seen, camera())
+          : predict();
+  const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   return found.has_value() ? accept_localization(frame, *found, localized)
                            : measure_since_reference(frame, now, localized);
 }
@@ -102,7 +114,7 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
                                 localization_.inlier_bound_px);
   }
   world_from_camera_ = turned.value_or(world_from_camera_);
-  last_moving_ = {frame.number, world_from_camera_, std::move(now)};
+  last_moving_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
   if (!turned.has_value()) {
     return FrameState::kTracking;
   }
@@ -137,21 +149,21 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
                                           const MeasuredMotion& motion,
                                           LocalizedFrame& localized) {
   if (motion.state == FrameState::kLost) {  // the last motion goes on, and no track does
-    world_from_camera_ = world_from_camera_ * prev_from_cur_;
-    reset_reference({frame.number, world_from_camera_, {}, frame.road});
+    world_from_camera_ = predict(trust_.trusted(frame.hints));
+    reset_reference({frame.number, world_from_camera_, {}, frame.time_s, frame.road});
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
     return FrameState::kLost;
   }
-  // The length of the way since the reference is not known: as many steps as frames that moved.
+  // The length of the way since the reference is not known: the speed's in the time it moved.
   const View& reference = initializer_.reference();
   const Rigid3 direction = motion.cur_from_prev.inverse();
-  const double length = speed_per_frame_ * (frame.number - reference.frame - frames_still_);
+  const double length = speed_ * (frame.time_s - reference.time_s - still_s_);
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
   const bool is_tracking = motion.state == FrameState::kTracking;
   if (is_tracking && motion.is_decisive &&
-      open_window(
-          {frame.number, guess, current_points(frame.matches, motion.inlier_mask), frame.road})) {
+      open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
+                   frame.time_s, frame.road})) {
     return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
@@ -160,7 +172,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
       Rigid3(guess.rotation, goes_on ? guess.translation : world_from_camera_.translation);
   const bool is_still =
       motion.state == FrameState::kStationary || motion.state == FrameState::kRotating;
-  frames_still_ += is_still ? 1 : 0;
+  still_s_ += is_still ? interval_s_ : 0.0;
   return is_tracking ? FrameState::kInitializing : motion.state;
 }
 
@@ -168,7 +180,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
 /// map is: a frame may see it again.
 void WindowEstimator::reset_reference(View reference) {
   initializer_.start(std::move(reference));
-  frames_still_ = 0;
+  still_s_ = 0.0;
   is_initializing_ = true;
 }
 
@@ -178,6 +190,7 @@ void WindowEstimator::reset_reference_before(const Matches& matches) {
   reset_reference({frame,
                    trajectory_[static_cast<std::size_t>(frame)],
                    {},
+                   times_s_[static_cast<std::size_t>(frame)],
                    frame == last_.frame ? last_.road : nullptr});
 }
 
@@ -308,13 +321,17 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
     const bool has_opened = is_localized && state == FrameState::kInitializing;
     if (has_opened || (is_localized && is_last_localized_)) {
       const View& before = has_opened ? initializer_.reference() : last_;
-      prev_from_cur_ = motion_of_one_frame(before.world_from_camera.inverse() * world_from_camera_,
-                                           frame.number - before.frame);
-      const double step = prev_from_cur_.translation.norm();
-      speed_per_frame_ = step > 0.0 && state == FrameState::kTracking ? step : speed_per_frame_;
+      velocity_ = Velocity(before.world_from_camera.inverse() * world_from_camera_,
+                           frame.time_s - before.time_s);
+      if (before.frame == frame.number - 1) {
+        trust_.compare(frame.hints,
+                       before.world_from_camera.rotation.conjugate() * world_from_camera_.rotation);
+      }
+      const double speed = velocity_.speed();
+      speed_ = speed > 0.0 && state == FrameState::kTracking ? speed : speed_;
     }
     is_last_localized_ = is_localized;
-    last_ = {frame.number, world_from_camera_, {}, frame.road};
+    last_ = {frame.number, world_from_camera_, {}, frame.time_s, frame.road};
   }
   trajectory_.push_back(world_from_camera_);
   history_.end_frame(window_);

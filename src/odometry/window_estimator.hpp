@@ -52,6 +52,12 @@ class WindowEstimator final : public Estimator {
                            const MeasuredMotion& motion,
                            LocalizedFrame& localized);
 
+  /// The times of a frame that begins.
+  void advance_to(double time_s);
+  /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
+  [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
+    return world_from_camera_ * velocity_.motion(interval_s_, turned);
+  }
   void reset_reference(View reference);
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
@@ -81,17 +87,21 @@ class WindowEstimator final : public Estimator {
   WindowHistory history_;
   MetricScale scale_;
   SelfCalibration calibration_;
-  Rigid3 world_from_camera_;        ///< of the frame in work
-  Rigid3 prev_from_cur_;            ///< the last motion of one frame
-  double speed_per_frame_;          ///< length of the last step measured, per frame
+  Rigid3 world_from_camera_;  ///< of the frame in work
+  Velocity velocity_;         ///< of the last motion between localized frames
+  double assumed_step_;       ///< in the first interval, where nothing measures a length
+  HintTrust trust_;
+  double speed_ = 0.0;              ///< of the last step measured or assumed, units per second
+  double interval_s_ = 0.0;         ///< between the frame in work and the one before
   View last_;                       ///< the last frame with an image, without its points
   View last_moving_;                ///< the last frame that was not stationary
   Rigid3 road_pose_;                ///< of the last frame whose road was measured
   bool is_last_localized_ = false;  ///< last_ has a pose that was measured
   bool was_static_ = false;         ///< the last image did not show new motion
-  int frames_still_ = 0;            ///< since the initializer's reference: stationary, rotating
+  double still_s_ = 0.0;            ///< since the initializer's reference: stationary, rotating
   int keyframes_since_refinement_ = 0;
   std::vector<Rigid3> trajectory_;
+  std::vector<double> times_s_;  ///< of the frames so far, the one in work among them
 };
 
 }  // namespace stemvo

@@ -31,8 +31,8 @@ TEST_P(MaskedFrontEnd, FindsNoPointsThere) {
   const auto num_below = [&](const cv::Mat& mask) {
     const auto front_end = create_front_end(options);
     front_end->set_mask(mask);
-    (void)front_end->process(textured(0), 0);
-    const Matches matches = front_end->process(textured(1), 1);
+    (void)front_end->process(textured(0));
+    const Matches matches = front_end->process(textured(1));
     EXPECT_GT(matches.prev_uv.size(), 20U);
     return std::count_if(matches.prev_uv.begin(), matches.prev_uv.end(),
                          [](const Eigen::Vector2d& uv) { return uv.y() >= 202.0; });

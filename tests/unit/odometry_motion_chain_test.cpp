@@ -23,14 +23,34 @@ MeasuredMotion driven(const Eigen::Vector3d& direction,
   return motion;
 }
 
-MotionChain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
+/// Frames come every tenth of a second, or as they say.
+class Chain : public MotionChain {
+ public:
+  Chain(const OdometryOptions& options, const ScaleOptions& scale) : MotionChain(options, scale) {
+    advance_to(time_s_);
+  }
+  FrameState add(const MeasuredMotion& motion, double interval_s = 0.1) {
+    advance_to(time_s_ += interval_s);
+    return MotionChain::add(motion);
+  }
+  void add_missing(double interval_s = 0.1) {
+    advance_to(time_s_ += interval_s);
+    extrapolate(/*has_image=*/false);
+  }
+
+ private:
+  double time_s_ = 5.0;
+};
+
+Chain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
   ScaleOptions scale;
+  scale.source = ScaleSource::kConstantSpeed;
   scale.step_m = step_m;
   return {options, scale};
 }
 
 TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
-  MotionChain chain = make_chain({}, 0.7);
+  Chain chain = make_chain({}, 0.7);
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
@@ -40,14 +60,14 @@ TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
   ScaleOptions scale;
   scale.source = ScaleSource::kNone;
   scale.step_m = 0.7;
-  MotionChain chain({}, scale);
+  Chain chain({}, scale);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
 }
 
 TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
-  MotionChain chain = make_chain();
+  Chain chain = make_chain();
   MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);
   doubtful.is_decisive = false;
   EXPECT_EQ(chain.add(doubtful), FrameState::kInitializing);
@@ -60,8 +80,8 @@ TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   OdometryOptions paper;
   paper.composition = Composition::kPaper;
-  MotionChain right = make_chain();
-  MotionChain wrong = make_chain(paper);
+  Chain right = make_chain();
+  Chain wrong = make_chain(paper);
   Rigid3 truth;
   for (int i = 0; i < 36; ++i) {  // a right turn over a road that rolls
     const Eigen::Vector3d turn(0.01, 10.0 * kDeg, 0.05 * std::sin(0.5 * i));
@@ -78,7 +98,7 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
 }
 
 TEST(MotionChain, GateNeverDropsTheRotation) {
-  MotionChain chain = make_chain({.gate = ForwardGate::kTranslation});
+  Chain chain = make_chain({.gate = ForwardGate::kTranslation});
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 5.0 * kDeg, 1e-12);
@@ -88,7 +108,7 @@ TEST(MotionChain, GateNeverDropsTheRotation) {
 TEST(MotionChain, ThePapersGateDropsBoth) {
   OdometryOptions options;
   options.gate = ForwardGate::kPaper;
-  MotionChain chain = make_chain(options);
+  Chain chain = make_chain(options);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 0.0, 1e-12);
@@ -96,7 +116,7 @@ TEST(MotionChain, ThePapersGateDropsBoth) {
 }
 
 TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
-  MotionChain chain = make_chain({.gate = ForwardGate::kTranslation});
+  Chain chain = make_chain({.gate = ForwardGate::kTranslation});
   EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
   MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
   doubtful.runner_up_ratio = 0.9;
@@ -104,7 +124,7 @@ TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
 }
 
 TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
-  MotionChain chain = make_chain();
+  Chain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   MeasuredMotion low_parallax = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kLowParallax);
   low_parallax.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
@@ -118,15 +138,28 @@ TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
 }
 
 TEST(MotionChain, AMissingImageIsBridged) {
-  MotionChain chain = make_chain();
+  Chain chain = make_chain();
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
-  chain.extrapolate(/*has_image=*/false);
+  chain.add_missing();
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last image, two frames away
   EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.0, 1e-12);
   MeasuredMotion lost;
   EXPECT_EQ(chain.add(lost), FrameState::kLost);
   EXPECT_NEAR(chain.world_from_camera().angle_rad(), 6.0 * kDeg, 1e-9);  // half the turn more
+}
+
+TEST(MotionChain, AStepIsAsLongAsItsIntervalAndALostFrameTurnsOnForIt) {
+  Chain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));  // one step in 0.1 s
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0), 0.25);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.5, 1e-12);
+  EXPECT_EQ(chain.add({}, 0.05), FrameState::kLost);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 4.8 * kDeg, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.5 + 0.5 * std::cos(4.0 * kDeg), 1e-9);
+  chain.add_missing(0.1);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0), 0.1);  // from the lost frame on
+  EXPECT_NEAR(chain.world_from_camera().translation.norm(), 6.0, 0.02);
 }
 
 }  // namespace
