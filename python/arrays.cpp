@@ -78,15 +78,15 @@ std::string in_python(std::string message) {
   return message;
 }
 
-Expected<ImageView> view_of(const AnyArray& array) {
+Expected<ImageView> view_of(const AnyArray& array, const char* name) {
   const bool is_color = array.ndim() == 3 && array.shape(2) == 3;
   if (array.dtype() != nb::dtype<std::uint8_t>() || !(array.ndim() == 2 || is_color)) {
-    return fail(fmt::format("image: expected HxW (gray) or HxWx3 (RGB) uint8, found {} of {} bits",
-                            shape_of(array), array.dtype().bits));
+    return fail(fmt::format("{}: expected HxW (gray) or HxWx3 (RGB) uint8, found {} of {} bits",
+                            name, shape_of(array), array.dtype().bits));
   }
   if (std::max(array.shape(0), array.shape(1)) > std::size_t{kMaxImageSide_px}) {
-    return fail(fmt::format("image: expected at most {} pixels a side, found {}", kMaxImageSide_px,
-                            shape_of(array)));
+    return fail(fmt::format("{}: expected at most {} pixels a side, found {}", name,
+                            kMaxImageSide_px, shape_of(array)));
   }
   const auto height = static_cast<int>(array.shape(0));
   const auto width = static_cast<int>(array.shape(1));
@@ -96,15 +96,15 @@ Expected<ImageView> view_of(const AnyArray& array) {
       ((width > 1 && array.stride(1) != channels) || (is_color && array.stride(2) != 1) ||
        (height > 1 && array.stride(0) < width * channels))) {
     return fail(
-        "image: expected pixels side by side in memory, found a view that flips, skips or swaps "
-        "them "
-        "(numpy.ascontiguousarray makes a copy)");
+        fmt::format("{}: expected pixels side by side in memory, found a view that flips, "
+                    "skips or swaps them (numpy.ascontiguousarray makes a copy)",
+                    name));
   }
   const int type = is_color ? CV_8UC3 : CV_8UC1;
   if (is_empty) {
     return ImageView{cv::Mat(height, width, type), is_color ? PixelOrder::kRgb : PixelOrder::kGray};
   }
-  // cv::Mat has no constant pixels; process() only reads.
+  // cv::Mat has no constant pixels; the odometry only reads.
   auto* const pixels = const_cast<std::uint8_t*>(static_cast<const std::uint8_t*>(array.data()));
   const std::size_t step =
       height > 1 ? static_cast<std::size_t>(array.stride(0)) : cv::Mat::AUTO_STEP;
@@ -120,6 +120,10 @@ ByteArray array_of(const cv::Mat& image) {
   image.copyTo(copy);
   return image.channels() == 1 ? owned(std::move(data), {rows, columns})
                                : owned(std::move(data), {rows, columns, 3});
+}
+
+bool is_rotation(const Eigen::Matrix3d& matrix) {
+  return (matrix.transpose() * matrix).isIdentity(1e-3) && matrix.determinant() > 0.0;
 }
 
 Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& name) {
@@ -139,9 +143,7 @@ Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& nam
                                    row * array.stride(1) + column * array.stride(2)];
       }
     }
-    const Eigen::Matrix3d r = matrix.leftCols<3>();
-    if (!matrix.allFinite() || !((r.transpose() * r).isIdentity(1e-3)) ||
-        !(r.determinant() > 0.0)) {
+    if (!matrix.allFinite() || !is_rotation(matrix.leftCols<3>())) {
       return fail(
           fmt::format("{}[{}]: expected a rotation and a finite translation, found none", name, i));
     }
@@ -174,6 +176,12 @@ IndexArray array_of(std::span<const std::size_t> indices) {
   auto data = std::make_unique<std::int64_t[]>(indices.size());
   std::copy(indices.begin(), indices.end(), data.get());
   return owned(std::move(data), {indices.size()});
+}
+
+IndexArray array_of(std::span<const int> ids) {
+  auto data = std::make_unique<std::int64_t[]>(ids.size());
+  std::copy(ids.begin(), ids.end(), data.get());
+  return owned(std::move(data), {ids.size()});
 }
 
 std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks) {

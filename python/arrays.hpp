@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/Core>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <opencv2/core.hpp>
@@ -42,22 +43,26 @@ struct ImageView {
   PixelOrder order = PixelOrder::kGray;
 };
 /// HxW or HxWx3 uint8 whose rows may lie apart (a cropped view) but whose pixels may not. Else an
-/// error.
-[[nodiscard]] Expected<ImageView> view_of(const AnyArray& array);
+/// error that calls it `name`.
+[[nodiscard]] Expected<ImageView> view_of(const AnyArray& array, const char* name);
 /// A copy, HxW or HxWx3.
 [[nodiscard]] ByteArray array_of(const cv::Mat& image);
 
+[[nodiscard]] bool is_rotation(const Eigen::Matrix3d& matrix);  ///< false: NaN
 /// Nx4x4 or Nx3x4 float64, each a rigid motion. Else an error that calls it `name`.
 [[nodiscard]] Expected<Trajectory> trajectory_of(const AnyArray& array, const std::string& name);
 [[nodiscard]] DoubleArray array_of(const Rigid3& pose);                  ///< 4x4
 [[nodiscard]] DoubleArray array_of(std::span<const Rigid3> trajectory);  ///< Nx4x4
 [[nodiscard]] DoubleArray array_of(std::span<const double> numbers);
 [[nodiscard]] IndexArray array_of(std::span<const std::size_t> indices);
+[[nodiscard]] IndexArray array_of(std::span<const int> ids);
 /// In the world, Nx3, and their colours, Nx3.
 [[nodiscard]] std::pair<DoubleArray, ByteArray> arrays_of(std::span<const MapLandmark> landmarks);
 /// Last and present place in the image, Nx4 (u, v, u, v), and whether they fit the motion, N.
 [[nodiscard]] std::pair<DoubleArray, BoolArray> arrays_of(std::span<const TrackedPoint> points);
 
+void bind_options(nb::module_& module);
+void bind_results(nb::module_& module);
 void bind_odometry(nb::module_& module);
 void bind_recordings(nb::module_& module);
 void bind_evaluation(nb::module_& module);

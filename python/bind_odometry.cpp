@@ -1,225 +1,163 @@
 // SPDX-License-Identifier: MIT
-// Camera, Options, Odometry, Result: the public headers in Python.
-#include <algorithm>
-#include <array>
-#include <cstddef>
-#include <filesystem>
+// Odometry: the library's asynchronous one in Python.
 #include <mutex>
 #include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
-#include <nanobind/stl/filesystem.h>
+#include <nanobind/eigen/dense.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
-#include "config/config.hpp"
 #include "dataset/camera_height.hpp"
 #include "frames.hpp"
+#include "options.hpp"
 #include "options/visit.hpp"
+#include "stemvo/async_odometry.hpp"
 
 namespace stemvo::python {
 namespace {
 
 using namespace nb::literals;
 
-/// As --set takes it.
-std::string text_of(nb::handle value) {
-  if (value.is_none()) {
-    throw nb::value_error("options: expected a value, found None");
+FrameHints hints_of(const std::optional<AnyArray>& mask,
+                    const std::optional<Eigen::Matrix3d>& rotation_hint) {
+  FrameHints hints;
+  if (mask) {
+    hints.mask = value_or_raise(view_of(*mask, "mask")).pixels;
   }
-  return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false")
-                                   : nb::str(value).c_str();
-}
-
-void apply(Config& config, const nb::dict& values) {
-  for (const auto& [key, value] : values) {
-    const Status status =
-        apply_override(config, std::string(nb::str(key).c_str()) + "=" + text_of(value));
-    if (!status) {
-      throw nb::value_error(in_python(status.error().message).c_str());
+  if (rotation_hint) {
+    if (!is_rotation(*rotation_hint)) {
+      throw nb::value_error("rotation_hint: expected a rotation, found none");
     }
+    hints.prev_from_cur = Eigen::Quaterniond(*rotation_hint);
   }
-  value_or_raise(validate(config));
+  return hints;
 }
 
-/// Odometry is used by one thread at a time; Python may call from several.
-class SafeOdometry {
+/// Without the interpreter's lock.
+template <typename F>
+std::invoke_result_t<F> unlocked(F f) {
+  const nb::gil_scoped_release release;
+  return f();
+}
+
+/// Frames are pushed and their results taken; Python may call from several threads.
+class PythonOdometry {
+  /// The value, or a ValueError, of what no other thread does meanwhile.
+  template <typename F>
+  auto in_turn(F f) {
+    return value_or_raise(unlocked([&] {
+      const std::scoped_lock lock(mutex_);
+      return f();
+    }));
+  }
+
  public:
-  SafeOdometry(const Camera& camera, const Config& config, const cv::Mat& mask)
+  using Mask = std::optional<AnyArray>;
+  using RotationHint = std::optional<Eigen::Matrix3d>;
+
+  PythonOdometry(const Camera& camera, const Config& config, const cv::Mat& mask)
       : scale_source_(options::to_string(config.scale.source)),
         odometry_(create(camera, config, mask)) {}
 
   [[nodiscard]] const std::string& scale_source() const { return scale_source_; }
 
-  FrameResult process(const AnyArray& image, double timestamp) {
-    const ImageView view = value_or_raise(view_of(image));
-    return value_or_raise(
-        call([&](Odometry& o) { return o.process(view.pixels, view.order, timestamp); }));
+  FrameResult process(const AnyArray& image,
+                      double timestamp,
+                      const Mask& mask,
+                      const RotationHint& rotation_hint) {
+    const ImageView view = value_or_raise(view_of(image, "image"));
+    const FrameHints hints = hints_of(mask, rotation_hint);
+    return in_turn([&]() -> Expected<FrameResult> {
+      if (Status status = check_idle("process"); !status) {
+        return status.error();
+      }
+      if (Status status = push_frame(view, timestamp, hints); !status) {
+        return status.error();
+      }
+      return take_result();
+    });
   }
+  void push(const AnyArray& image,
+            double timestamp,
+            const Mask& mask,
+            const RotationHint& rotation_hint) {
+    const ImageView view = value_or_raise(view_of(image, "image"));
+    const FrameHints hints = hints_of(mask, rotation_hint);
+    in_turn([&] { return push_frame(view, timestamp, hints); });
+  }
+  FrameResult take() {
+    return in_turn([&] { return take_result(); });
+  }
+  /// Frames pushed whose results were not taken.
+  int num_at_work() {
+    return in_turn([&]() -> Expected<int> { return num_at_work_; });
+  }
+  void reset() {
+    in_turn([&] { return check_idle("reset").and_then([&] { return odometry_.reset(); }); });
+  }
+
   std::pair<DoubleArray, ByteArray> landmarks() {
-    return arrays_of(call([](Odometry& o) { return o.landmarks(); }));
+    return arrays_of(unlocked([&] { return odometry_.landmarks(); }));
   }
   std::pair<DoubleArray, BoolArray> tracked_points() {
-    return arrays_of(call([](Odometry& o) { return o.tracked_points(); }));
+    return arrays_of(unlocked([&] { return odometry_.tracked_points(); }));
   }
   ByteArray channel_image() {
-    return array_of(call([](Odometry& o) { return o.channel_image(); }));
+    return array_of(unlocked([&] { return odometry_.channel_image(); }));
   }
 
  private:
-  static Odometry create(const Camera& camera, const Config& config, const cv::Mat& mask) {
-    auto made = [&]() -> Expected<Odometry> {
-      const nb::gil_scoped_release release;
-      return Odometry::create(camera, config, mask);
-    }();
-    return value_or_raise(std::move(made));
+  static AsyncOdometry create(const Camera& camera, const Config& config, const cv::Mat& mask) {
+    return value_or_raise(unlocked([&] { return AsyncOdometry::create(camera, config, mask); }));
   }
-  template <typename F>
-  std::invoke_result_t<F, Odometry&> call(F f) {
-    const nb::gil_scoped_release release;
-    const std::scoped_lock lock(mutex_);
-    return f(odometry_);
+  Status push_frame(const ImageView& view, double timestamp, const FrameHints& hints) {
+    Status status = odometry_.push(view.pixels, view.order, timestamp, hints);
+    num_at_work_ += status ? 1 : 0;
+    return status;
+  }
+  Expected<FrameResult> take_result() {
+    auto result = odometry_.next();
+    if (!result) {
+      num_at_work_ = 0;
+      return odometry_.finish().and_then([&] { return Expected<FrameResult>(result.error()); });
+    }
+    --num_at_work_;
+    return result->value();
+  }
+  [[nodiscard]] Status check_idle(const char* name) const {
+    return num_at_work_ == 0
+               ? Status()
+               : fail(fmt::format("{}: expected a run that is over, found one with {} frames "
+                                  "at work",
+                                  name, num_at_work_));
   }
 
   std::string scale_source_;
   std::mutex mutex_;
-  Odometry odometry_;
+  int num_at_work_ = 0;
+  AsyncOdometry odometry_;
 };
 
-/// By the enumerator's number.
-constexpr std::array<const char*, 3> kDistortions = {"none", "radial-tangential", "equidistant"};
-
-void set_distortion(Camera& camera,
-                    const std::string& distortion,
-                    const std::vector<double>& coefficients) {
-  const auto found = std::ranges::find(kDistortions, distortion);
-  if (found == kDistortions.end() || coefficients.size() > camera.distortion_coefficients.size()) {
-    throw nb::value_error(
-        fmt::format("distortion: expected one of {} with at most {} coefficients, "
-                    "found '{}' with {}",
-                    fmt::join(kDistortions, ", "), camera.distortion_coefficients.size(),
-                    distortion, coefficients.size())
-            .c_str());
-  }
-  camera.distortion = static_cast<Distortion>(found - kDistortions.begin());
-  std::ranges::copy(coefficients, camera.distortion_coefficients.begin());
-}
-
-void bind_camera(nb::module_& module) {
-  nb::class_<Camera>(
-      module, "Camera",
-      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3) "
-      "or equidistant (k1 k2 k3 k4)")
-      .def(
-          "__init__",
-          [](Camera* self, double fx, double fy, double cx, double cy, int width, int height,
-             const std::string& distortion, const std::vector<double>& coefficients) {
-            new (self) Camera{fx, fy, cx, cy, width, height};
-            set_distortion(*self, distortion, coefficients);
-          },
-          "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a, "distortion"_a = "none",
-          "coefficients"_a = std::vector<double>())
-      .def_ro("fx", &Camera::fx_px)
-      .def_ro("fy", &Camera::fy_px)
-      .def_ro("cx", &Camera::cx_px)
-      .def_ro("cy", &Camera::cy_px)
-      .def_ro("width", &Camera::width_px)
-      .def_ro("height", &Camera::height_px)
-      .def_prop_ro(
-          "distortion",
-          [](const Camera& c) { return kDistortions.at(static_cast<std::size_t>(c.distortion)); })
-      .def_prop_ro("coefficients",
-                   [](const Camera& c) {
-                     return std::vector<double>(c.distortion_coefficients.begin(),
-                                                c.distortion_coefficients.end());
-                   })
-      .def("__repr__", [](const Camera& c) {
-        return fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})", c.fx_px,
-                           c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px);
-      });
-}
-
-void bind_options(nb::module_& module) {
-  nb::class_<Config>(module, "Options", "The keys of `stemvo --dump-config`")
-      .def(
-          "__init__",
-          [](Config* self, const nb::dict& values) {
-            Config config;
-            apply(config, values);
-            new (self) Config(std::move(config));
-          },
-          "values"_a = nb::dict(), "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
-      .def_static(
-          "load",
-          [](const std::filesystem::path& file) { return value_or_raise(load_config(file)); },
-          "file"_a, "A configuration file of the program")
-      .def("__str__", &dump_config, "All keys as YAML");
-}
-
-void bind_result(nb::module_& module) {
-  nb::class_<CameraSigma>(module, "CameraSigma", "Standard deviations of a camera, in pixels")
-      .def_ro("fx", &CameraSigma::fx_px)
-      .def_ro("cx", &CameraSigma::cx_px)
-      .def_ro("cy", &CameraSigma::cy_px)
-      .def("__repr__", [](const CameraSigma& s) {
-        return fmt::format("CameraSigma(fx={}, cx={}, cy={})", s.fx_px, s.cx_px, s.cy_px);
-      });
-  nb::class_<FrameResult>(module, "Result", "A frame's pose and how it came about")
-      .def_prop_ro(
-          "world_from_camera", [](const FrameResult& r) { return array_of(r.world_from_camera); },
-          nb::rv_policy::move, "4x4")
-      .def_prop_ro("state", [](const FrameResult& r) { return std::string(to_string(r.state)); })
-      .def_prop_ro("is_measured", [](const FrameResult& r) { return is_measured(r.state); })
-      .def_ro("timestamp", &FrameResult::time_s, "As given")
-      .def_prop_ro("num_matches", [](const FrameResult& r) { return r.num_matches; })
-      .def_prop_ro("num_inliers", [](const FrameResult& r) { return r.num_inliers; })
-      .def_prop_ro("scale_state",
-                   [](const FrameResult& r) { return std::string(to_string(r.scale_state)); })
-      .def_prop_ro(
-          "scale_sigma", [](const FrameResult& r) { return r.scale_sigma; },
-          "Of log(metres per unit)")
-      .def_prop_ro(
-          "camera", [](const FrameResult& r) { return r.camera; }, "With what was learnt so far")
-      .def_prop_ro(
-          "camera_sigma", [](const FrameResult& r) { return r.camera_sigma; },
-          "None: the camera is not refined")
-      .def_prop_ro("problem", [](const FrameResult& r) { return r.problem; })
-      .def("__repr__", [](const FrameResult& r) {
-        const auto& at = r.world_from_camera.translation;
-        return fmt::format("Result({}, {} of {} inliers, at {:.3f} {:.3f} {:.3f})",
-                           to_string(r.state), r.num_inliers, r.num_matches, at.x(), at.y(),
-                           at.z());
-      });
-}
-
-Config config_of(const nb::object& options) {
-  Config config;
-  if (nb::isinstance<Config>(options)) {
-    config = nb::cast<Config>(options);
-  } else if (nb::isinstance<nb::dict>(options)) {
-    apply(config, nb::cast<nb::dict>(options));
-  } else if (!options.is_none()) {
-    throw nb::type_error("options: expected Options or a dict");
-  }
-  return config;
-}
-
-void make_odometry(SafeOdometry* self, const nb::object& camera, const nb::object& options) {
+void make_odometry(PythonOdometry* self,
+                   const nb::object& camera,
+                   const nb::object& options,
+                   const std::optional<AnyArray>& mask) {
   const Config config = config_of(options);
+  const cv::Mat given = mask ? value_or_raise(view_of(*mask, "mask")).pixels : cv::Mat();
   if (const FrameList* frames = frames_of(camera)) {
-    new (self)
-        SafeOdometry(frames->camera, dataset::with_camera_height(config, *frames), frames->mask);
+    new (self) PythonOdometry(frames->camera, dataset::with_camera_height(config, *frames),
+                              mask ? given : frames->mask);
   } else if (nb::isinstance<Camera>(camera)) {
     const Camera& plain = nb::cast<const Camera&>(camera);
-    new (self) SafeOdometry(plain, dataset::with_camera_height(config, {}), {});
+    new (self) PythonOdometry(plain, dataset::with_camera_height(config, {}), given);
   } else {
     throw nb::type_error("camera: expected Camera, Recording or FrameView");
   }
@@ -228,23 +166,32 @@ void make_odometry(SafeOdometry* self, const nb::object& camera, const nb::objec
 }  // namespace
 
 void bind_odometry(nb::module_& module) {
-  bind_camera(module);
-  bind_options(module);
-  bind_result(module);
-  nb::class_<SafeOdometry>(module, "Odometry", "Images in, poses out, one at a time")
+  // stemvo.Odometry, which has run(), is made of it.
+  nb::class_<PythonOdometry>(module, "Odometry")
       .def("__init__", &make_odometry, "camera"_a, "options"_a = nb::none(),
+           "mask"_a.noconvert() = nb::none(),
            nb::sig("def __init__(self, camera: Camera | Recording | FrameView, "
-                   "options: Options | dict[str, typing.Any] | None = None) -> None"),
+                   "options: Options | dict[str, typing.Any] | None = None, "
+                   "mask: numpy.typing.NDArray[numpy.uint8] | None = None) -> None"),
            "A Recording or a FrameView brings its mask and its camera's height with it")
-      .def_prop_ro("scale_source", &SafeOdometry::scale_source,
+      .def_prop_ro("scale_source", &PythonOdometry::scale_source,
                    "scale.source; 'none': the path is up to scale")
-      .def("process", &SafeOdometry::process, "image"_a.noconvert(), "timestamp"_a,
-           "HxW gray or HxWx3 RGB, uint8, not copied; seconds, each later than the last")
-      .def("landmarks", &SafeOdometry::landmarks,
+      .def("process", &PythonOdometry::process, "image"_a.noconvert(), "timestamp"_a,
+           "mask"_a.noconvert() = nb::none(), "rotation_hint"_a = nb::none(),
+           "HxW gray or HxWx3 RGB, uint8; seconds, each later than the last. mask: HxW uint8, 0 "
+           "where this frame shows what moves; rotation_hint: 3x3, since the last frame, from the "
+           "camera now to the camera then")
+      .def("_push", &PythonOdometry::push, "image"_a.noconvert(), "timestamp"_a,
+           "mask"_a.noconvert() = nb::none(), "rotation_hint"_a = nb::none())
+      .def("_take", &PythonOdometry::take)
+      .def_prop_ro("_num_at_work", &PythonOdometry::num_at_work)
+      .def("reset", &PythonOdometry::reset,
+           "A new world: same network, camera and options; times may begin anew")
+      .def("landmarks", &PythonOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
-      .def("tracked_points", &SafeOdometry::tracked_points,
+      .def("tracked_points", &PythonOdometry::tracked_points,
            "Of the last image: Nx4 (u, v before; u, v now), and N: fits the motion")
-      .def("channel_image", &SafeOdometry::channel_image,
+      .def("channel_image", &PythonOdometry::channel_image,
            "What points of the last image were tracked on");
 }
 

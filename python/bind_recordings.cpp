@@ -104,7 +104,7 @@ CameraView view_of_file(const Path& camera_file, const std::vector<std::string>&
 }
 
 ByteArray apply(const CameraView& made, const AnyArray& image) {
-  const ImageView given = value_or_raise(view_of(image));
+  const ImageView given = value_or_raise(view_of(image, "image"));
   const cv::Size size = made.view.full_size();
   if (given.pixels.size() != size) {
     throw nb::value_error(fmt::format("image: expected {}x{} pixels, as the camera file says, "

@@ -46,6 +46,84 @@ print(json.dumps({"states": [[r.state, r.num_matches, r.num_inliers, r.scale_sta
                   "errors": errors or None, "true_frames": None if frames is None else frames.tolist()}))
 """
 
+# run() against process(), whatever becomes of the loop; what else a frame may bring; the map and its changes.
+RUN = """
+import gc, itertools, sys
+import numpy as np, stemvo
+recording = stemvo.read_recording(sys.argv[1])
+frames = list(recording)
+def same(found, expected):
+    for a, b in itertools.zip_longest(found, expected):
+        assert (a.timestamp, a.state, a.num_inliers, a.scale_sigma) == (b.timestamp, b.state, b.num_inliers, b.scale_sigma), (a, b)
+        assert np.array_equal(a.world_from_camera, b.world_from_camera) and np.array_equal(a.motion_covariance, b.motion_covariance), (a, b)
+def left(odometry):
+    return [*odometry.landmarks(), *odometry.tracked_points(), odometry.channel_image()]
+def raises(call, text):
+    try:
+        call()
+    except (ValueError, OSError) as error:
+        assert text in str(error), error
+    else:
+        raise SystemExit("expected " + text)
+def broken():
+    yield from frames[:5]
+    raise OSError("the cable")
+
+odometry = stemvo.Odometry(recording)
+plain = [odometry.process(*frame) for frame in frames]
+for threads in (1, 2, 4):
+    other = stemvo.Odometry(recording, {"threads": threads})
+    same(other.run(frames), plain)
+    assert all(map(np.array_equal, left(other), left(odometry))), threads
+gone = [frame for number, frame in enumerate(frames) if number not in (4, 5)]
+other.reset()
+rest = [other.process(*frame) for frame in gone]
+same(stemvo.Odometry(recording).run((None if number in (4, 5) else image, time) for number, (image, time) in enumerate(frames)), rest)
+
+odometry.reset()
+for result in odometry.run(frames):  # and leaves the loop
+    if result.timestamp == frames[2][1]:
+        break
+same(odometry.run(frames[8:]), plain[8:])
+for source, text, number in ((broken(), "the cable", 5), ([*frames[:4], frames[2]], "after the last frame's, 0.3 s, found 0.2 s", 4)):
+    odometry.reset()
+    found = []
+    raises(lambda: found.extend(odometry.run(source)), text)
+    same(found, plain[:number])
+odometry.reset()
+unfinished = odometry.run(frames)
+next(unfinished)
+for call in (lambda: odometry.process(*frames[9]), odometry.reset, lambda: next(odometry.run(frames))):
+    raises(call, "expected a run that is over, found one with 5 frames at work")
+unfinished.close()
+odometry.process(*frames[9])
+unfinished = stemvo.Odometry(recording).run(frames)
+next(unfinished)
+del unfinished
+gc.collect()
+
+masked = stemvo.Odometry(recording)
+half = np.zeros(frames[0][0].shape[:2], np.uint8)
+half[:, :310] = 255
+turn = np.eye(3)
+for image, time in frames:
+    result = masked.process(image, time, mask=half, rotation_hint=turn)
+    assert np.all(masked.tracked_points()[0][:, 2] < 310)
+raises(lambda: masked.process(*frames[0], rotation_hint=2 * turn), "rotation_hint: expected a rotation")
+raises(lambda: masked.process(image, time + 1.0, mask=half[1:]), "mask: expected")
+raises(lambda: masked.process(*frames[0], mask=half.astype(bool)), "mask: expected HxW")
+masked = stemvo.Odometry(recording, mask=half)
+for result in masked.run(frames):
+    assert np.all(masked.tracked_points()[0][:, 2] < 310)
+assert plain[-1].motion_covariance.shape == (6, 6)
+
+metres = stemvo.Odometry(recording.camera, stemvo.Options.driving(1.65))
+assert metres.scale_source == "camera_height"
+same(metres.run(frames), plain)  # as a KITTI folder has it
+last = stemvo.Odometry(recording).run(frames)  # unfinished when the interpreter ends
+next(last)
+"""
+
 # A video through OpenCV's package: made of the images of a folder; then tracked, as TRACK does it.
 VIDEO = """
 import pathlib, sys
@@ -327,6 +405,9 @@ class Package(unittest.TestCase):
             loaded = [line for line in done.stdout.splitlines() if name in line]
             self.assertTrue(loaded, name)
             self.assertTrue(all(str(self.folder) in line for line in loaded), loaded[0])
+
+    def test_run(self):
+        self.run_python(RUN, self.folder / "drive/sequences/00")
 
     def test_bad_input(self):
         self.run_python(BAD_INPUT)

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+// Camera and Options: what an odometry is made of.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "arrays.hpp"
+#include "options.hpp"
+
+namespace stemvo::python {
+namespace {
+
+using namespace nb::literals;
+
+/// As --set takes it.
+std::string text_of(nb::handle value) {
+  if (value.is_none()) {
+    throw nb::value_error("options: expected a value, found None");
+  }
+  return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false")
+                                   : nb::str(value).c_str();
+}
+
+void apply(Config& config, const nb::dict& values) {
+  for (const auto& [key, value] : values) {
+    const Status status =
+        apply_override(config, std::string(nb::str(key).c_str()) + "=" + text_of(value));
+    if (!status) {
+      throw nb::value_error(in_python(status.error().message).c_str());
+    }
+  }
+  value_or_raise(validate(config));
+}
+
+/// By the enumerator's number.
+constexpr std::array<const char*, 3> kDistortions = {"none", "radial-tangential", "equidistant"};
+
+void set_distortion(Camera& camera,
+                    const std::string& distortion,
+                    const std::vector<double>& coefficients) {
+  const auto found = std::ranges::find(kDistortions, distortion);
+  if (found == kDistortions.end() || coefficients.size() > camera.distortion_coefficients.size()) {
+    throw nb::value_error(
+        fmt::format("distortion: expected one of {} with at most {} coefficients, "
+                    "found '{}' with {}",
+                    fmt::join(kDistortions, ", "), camera.distortion_coefficients.size(),
+                    distortion, coefficients.size())
+            .c_str());
+  }
+  camera.distortion = static_cast<Distortion>(found - kDistortions.begin());
+  std::ranges::copy(coefficients, camera.distortion_coefficients.begin());
+}
+
+void bind_camera(nb::module_& module) {
+  nb::class_<Camera>(
+      module, "Camera",
+      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3) "
+      "or equidistant (k1 k2 k3 k4)")
+      .def(
+          "__init__",
+          [](Camera* self, double fx, double fy, double cx, double cy, int width, int height,
+             const std::string& distortion, const std::vector<double>& coefficients) {
+            new (self) Camera{fx, fy, cx, cy, width, height};
+            set_distortion(*self, distortion, coefficients);
+          },
+          "fx"_a, "fy"_a, "cx"_a, "cy"_a, "width"_a, "height"_a, "distortion"_a = "none",
+          "coefficients"_a = std::vector<double>())
+      .def_ro("fx", &Camera::fx_px)
+      .def_ro("fy", &Camera::fy_px)
+      .def_ro("cx", &Camera::cx_px)
+      .def_ro("cy", &Camera::cy_px)
+      .def_ro("width", &Camera::width_px)
+      .def_ro("height", &Camera::height_px)
+      .def_prop_ro(
+          "distortion",
+          [](const Camera& c) { return kDistortions.at(static_cast<std::size_t>(c.distortion)); })
+      .def_prop_ro("coefficients",
+                   [](const Camera& c) {
+                     return std::vector<double>(c.distortion_coefficients.begin(),
+                                                c.distortion_coefficients.end());
+                   })
+      .def("__repr__", [](const Camera& c) {
+        return fmt::format("Camera(fx={}, fy={}, cx={}, cy={}, width={}, height={})", c.fx_px,
+                           c.fy_px, c.cx_px, c.cy_px, c.width_px, c.height_px);
+      });
+}
+
+void bind_options_class(nb::module_& module) {
+  nb::class_<Config>(module, "Options", "The keys of `stemvo --dump-config`")
+      .def(
+          "__init__",
+          [](Config* self, const nb::dict& values) {
+            Config config;
+            apply(config, values);
+            new (self) Config(std::move(config));
+          },
+          "values"_a = nb::dict(), "E.g. {'stem.filter': 3}; ValueError: a bad key or value")
+      .def_static(
+          "driving",
+          [](double height_m) {
+            nb::dict values;
+            values["scale.source"] = "camera_height";
+            values["scale.camera_height_m"] = height_m;
+            Config config;
+            apply(config, values);
+            return config;
+          },
+          "height_m"_a, "Of a camera on a vehicle, so high above its road: metres")
+      .def_static(
+          "load",
+          [](const std::filesystem::path& file) { return value_or_raise(load_config(file)); },
+          "file"_a, "A configuration file of the program")
+      .def("__str__", &dump_config, "All keys as YAML");
+}
+
+}  // namespace
+
+Config config_of(const nb::object& options) {
+  Config config;
+  if (nb::isinstance<Config>(options)) {
+    config = nb::cast<Config>(options);
+  } else if (nb::isinstance<nb::dict>(options)) {
+    apply(config, nb::cast<nb::dict>(options));
+  } else if (!options.is_none()) {
+    throw nb::type_error("options: expected Options or a dict");
+  }
+  return config;
+}
+
+void bind_options(nb::module_& module) {
+  bind_camera(module);
+  bind_options_class(module);
+}
+
+}  // namespace stemvo::python

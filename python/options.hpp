@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include "config/config.hpp"
+
+namespace stemvo::python {
+
+/// Of Options, a dict of keys and values, or None: the defaults. TypeError, ValueError: of none.
+[[nodiscard]] Config config_of(const nanobind::object& options);
+
+}  // namespace stemvo::python
