@@ -105,7 +105,7 @@ class PythonOdometry {
   }
 
   std::pair<DoubleArray, ByteArray> landmarks() {
-    return arrays_of(unlocked([&] { return odometry_.landmarks(); }));
+    return arrays_of(unlocked([&] { return odometry_.landmarks_since(0).landmarks; }));
   }
   std::pair<DoubleArray, BoolArray> tracked_points() {
     return arrays_of(unlocked([&] { return odometry_.tracked_points(); }));

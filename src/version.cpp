@@ -5,6 +5,10 @@
 
 namespace stemvo {
 
+static_assert(internal::kBuildVersion.substr(0, internal::kBuildVersion.find('+')) ==
+                  STEMVO_VERSION,
+              "stemvo/version.hpp names the version of CMakeLists.txt");
+
 std::string_view version() { return internal::kBuildVersion; }
 
 }  // namespace stemvo

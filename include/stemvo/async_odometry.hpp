@@ -13,6 +13,7 @@
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
 #include "stemvo/options.hpp"
+#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -20,7 +21,7 @@ namespace stemvo {
 /// order, with the same bytes as Odometry's and up to six frames later. `options.threads`: above 1
 /// there are three threads of its own; with 1 there is none, and push() does the work. Moving it is
 /// for the time before the first frame.
-class AsyncOdometry {
+class STEMVO_EXPORT AsyncOdometry {
  public:
   /// Called once for each frame, in order, one call at a time, from a thread of ours (threads 1:
   /// from push). What is asked of the odometry in it belongs to the frame delivered. The next
@@ -37,6 +38,9 @@ class AsyncOdometry {
   AsyncOdometry& operator=(AsyncOdometry&&) noexcept;
   /// Drops frames that are not delivered; waits for a callback that runs.
   ~AsyncOdometry();
+
+  /// As Odometry's, before the first frame; called as the callback, before it.
+  void set_log(Log log);
 
   /// The next frame, as Odometry::process takes it. Its pixels are copied before this returns; it
   /// waits while six frames are at work. Errors: as process, and nothing changes then; after
@@ -56,7 +60,8 @@ class AsyncOdometry {
 
   /// As those of Odometry, from any thread. In the callback they belong to the frame delivered,
   /// elsewhere to some frame lately done.
-  [[nodiscard]] std::vector<MapLandmark> landmarks() const;
+  [[nodiscard]] MapChanges landmarks_since(int version) const;
+  [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
   [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
   [[nodiscard]] cv::Mat channel_image() const;
 

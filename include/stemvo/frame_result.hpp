@@ -6,12 +6,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
-#include "stemvo/two_view_model.hpp"
+#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -27,9 +28,12 @@ enum class FrameState {
   kLost,          ///< nothing measured: the last motion is continued
   kNoImage,       ///< nothing to be seen: the last motion is continued
 };
-[[nodiscard]] std::string_view to_string(FrameState state);
+[[nodiscard]] STEMVO_EXPORT std::string_view to_string(FrameState state);
 /// True except for kGated, kLost and kNoImage.
-[[nodiscard]] bool is_measured(FrameState state);
+[[nodiscard]] STEMVO_EXPORT bool is_measured(FrameState state);
+
+/// Which two-view model a motion came from.
+enum class TwoViewModel { kNone, kHomography, kEssential };
 
 /// How a frame's scale was measured from the road (`scale.source: camera_height`).
 enum class ScaleState {
@@ -39,7 +43,7 @@ enum class ScaleState {
   kMeasured,  ///< measured on this frame and believed
 };
 /// `disabled`, `none`, `held`, `measured`.
-[[nodiscard]] std::string_view to_string(ScaleState state);
+[[nodiscard]] STEMVO_EXPORT std::string_view to_string(ScaleState state);
 
 /// Standard deviations of a camera's estimate, to which the one in use goes step by step; of the
 /// focal length, too, where only the principal point does.
@@ -82,10 +86,27 @@ struct FrameResult {
   std::string problem;  ///< why the stem gave no channel (the frame counts as no_image), else empty
 };
 
-/// A landmark that a window of keyframes held.
+/// A landmark of a window of keyframes, placed by the pose that the last of them to see it came
+/// with.
 struct MapLandmark {
+  int id = 0;                                          ///< no other landmark's
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world, in the trajectory's units
   std::array<std::uint8_t, 3> rgb{};  ///< of the last view; gray where the camera is gray
+};
+
+/// What became of the map.
+struct MapChanges {
+  int version = 0;                     ///< to ask with the next time
+  std::vector<MapLandmark> landmarks;  ///< added or moved
+  std::vector<int> removed;            ///< ids, before that; maybe of some that were never given
+};
+
+/// A frame that landmarks were triangulated from.
+struct MapKeyframe {
+  int id = 0;     ///< counted from 0
+  int frame = 0;  ///< results before this one's
+  double time_s = 0.0;
+  Rigid3 world_from_camera;  ///< as it came
 };
 
 /// A point of the image, tracked from an earlier frame.

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -12,6 +14,7 @@
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
+#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -29,10 +32,14 @@ struct FrameHints {
   std::optional<Eigen::Quaterniond> prev_from_cur = std::nullopt;
 };
 
+enum class LogLevel { kInfo, kWarning };
+/// One line, with the frame's time.
+using Log = std::function<void(LogLevel level, const std::string& line)>;
+
 /// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
 /// for what a caller hands in. Of one that was moved from, process() is an Error and the rest is
 /// empty.
-class Odometry {
+class STEMVO_EXPORT Odometry {
  public:
   /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
   /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where
@@ -55,13 +62,20 @@ class Odometry {
                                               double time_s,
                                               const FrameHints& hints = {});
 
+  /// Is told in words when tracking begins, ends and recovers, when the scale is believed and when
+  /// no more, and why a frame could not be seen.
+  void set_log(Log log);
+
   /// A new world, as after create(): the same network and the given camera, whatever was learnt of
   /// it; times may begin anew.
   void reset();
 
-  /// Landmarks seen from at least 4 keyframes under at least 1.5 degrees of parallax, as they were
-  /// when they left the window, or are now. Mode two_frame has none.
-  [[nodiscard]] std::vector<MapLandmark> landmarks() const;
+  /// Landmarks that came, moved or went since `version` of the map; 0: all. They are seen from at
+  /// least 4 keyframes under at least 1.5 degrees of parallax, and move until they leave the
+  /// window. Mode two_frame has none.
+  [[nodiscard]] MapChanges landmarks_since(int version) const;
+  /// Those from id `first` on: they stay as they are.
+  [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
 
   /// The points tracked on the last image.
   [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;

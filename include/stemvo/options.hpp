@@ -5,6 +5,7 @@
 #include <string>
 
 #include "stemvo/error.hpp"
+#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -129,7 +130,7 @@ struct ScaleOptions {
 };
 
 /// Everything that steers the odometry. Defaults stand here, once.
-struct Options {
+struct STEMVO_EXPORT Options {
   /// Of a camera on a vehicle, `height_m` above its road: metres.
   [[nodiscard]] static Options driving(double height_m);
 
@@ -147,6 +148,6 @@ struct Options {
 
 /// Ranges of all members; infinite, NaN and undefined enumerators fail. The error names the key as
 /// in config/default.yaml, e.g. "stem.filter: expected ..., found ...".
-[[nodiscard]] Status validate(const Options& options);
+[[nodiscard]] STEMVO_EXPORT Status validate(const Options& options);
 
 }  // namespace stemvo

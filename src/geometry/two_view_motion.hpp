@@ -7,8 +7,8 @@
 
 #include "geometry/pixel_pairs.hpp"
 #include "stemvo/camera.hpp"
+#include "stemvo/frame_result.hpp"
 #include "stemvo/rigid3.hpp"
-#include "stemvo/two_view_model.hpp"
 
 namespace stemvo {
 

@@ -1,16 +1,33 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/answers.hpp"
 
+#include <algorithm>
+#include <span>
+#include <utility>
+
 namespace stemvo {
 
-std::vector<MapLandmark> landmarks_of(const ChannelOdometry& frames) {
+MapChanges landmarks_since(const ChannelOdometry& frames, int version) {
   const Estimator& estimator = frames.estimator();
-  std::vector<MapLandmark> landmarks;
-  for (const KeptLandmark& kept : estimator.landmarks()) {
+  LandmarkChanges changes = estimator.landmarks_since(version);
+  MapChanges placed{changes.version, {}, std::move(changes.removed)};
+  for (const KeptLandmark& kept : changes.landmarks) {
     const Rigid3& world_from_camera = estimator.trajectory()[static_cast<std::size_t>(kept.frame)];
-    landmarks.push_back({world_from_camera * kept.in_camera.cast<double>(), kept.rgb});
+    placed.landmarks.push_back(
+        {kept.id, world_from_camera * kept.in_camera.cast<double>(), kept.rgb});
   }
-  return landmarks;
+  return placed;
+}
+
+std::vector<MapKeyframe> keyframes_of(const ChannelOdometry& frames, int first) {
+  const std::span<const int> all = frames.estimator().keyframes();
+  std::vector<MapKeyframe> keyframes;
+  for (auto id = static_cast<std::size_t>(std::max(first, 0)); id < all.size(); ++id) {
+    const auto frame = static_cast<std::size_t>(all[id]);
+    keyframes.push_back({static_cast<int>(id), all[id], frames.times_s()[frame],
+                         frames.estimator().trajectory()[frame]});
+  }
+  return keyframes;
 }
 
 std::vector<TrackedPoint> tracked_points_of(const ChannelOdometry& frames) {

@@ -10,7 +10,8 @@ namespace stemvo {
 
 // The answers of Odometry and AsyncOdometry, out of what the frames left.
 
-[[nodiscard]] std::vector<MapLandmark> landmarks_of(const ChannelOdometry& frames);
+[[nodiscard]] MapChanges landmarks_since(const ChannelOdometry& frames, int version);
+[[nodiscard]] std::vector<MapKeyframe> keyframes_of(const ChannelOdometry& frames, int first);
 [[nodiscard]] std::vector<TrackedPoint> tracked_points_of(const ChannelOdometry& frames);
 
 }  // namespace stemvo

@@ -10,6 +10,7 @@
 
 #include "odometry/answers.hpp"
 #include "odometry/check_frame.hpp"
+#include "odometry/event_log.hpp"
 #include "odometry/odometry_loops.hpp"
 
 namespace stemvo {
@@ -25,18 +26,19 @@ struct AsyncOdometry::Impl {
         }) {}
 
   void deliver(const FrameResult& result) {
-    if (!callback) {
-      const std::lock_guard lock(results_mutex);
-      results.push_back(result);
-      return;
-    }
     struct Delivering {
       std::atomic<std::thread::id>& thread;
       ~Delivering() { thread = std::thread::id(); }
     };
     const Delivering scope{delivering};
     delivering = std::this_thread::get_id();
-    callback(result);
+    log.observe(result);
+    if (callback) {
+      callback(result);
+    } else {
+      const std::lock_guard lock(results_mutex);
+      results.push_back(result);
+    }
   }
 
   [[nodiscard]] Status check_not_in_callback(const char* name) const {
@@ -57,6 +59,7 @@ struct AsyncOdometry::Impl {
   std::mutex turn;  ///< of push, finish and reset
   FrameCheck check;
   Callback callback;
+  EventLog log;
   std::atomic<std::thread::id> delivering;  ///< the thread that is in the callback
   std::mutex next_turn;
   std::size_t num_taken = 0;  ///< by next
@@ -84,6 +87,12 @@ AsyncOdometry::AsyncOdometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)
 AsyncOdometry::AsyncOdometry(AsyncOdometry&&) noexcept = default;
 AsyncOdometry& AsyncOdometry::operator=(AsyncOdometry&&) noexcept = default;
 AsyncOdometry::~AsyncOdometry() = default;
+
+void AsyncOdometry::set_log(Log log) {
+  if (impl_ != nullptr) {
+    impl_->log.set(std::move(log));
+  }
+}
 
 Status AsyncOdometry::push(const cv::Mat& image,
                            PixelOrder order,
@@ -150,12 +159,20 @@ Status AsyncOdometry::reset() {
     const std::lock_guard lock(impl_->turn);
     status = impl_->loops.reset() ? status : impl_->ended();
     impl_->check.restart();
+    impl_->log.restart();
   }
   return status;
 }
 
-std::vector<MapLandmark> AsyncOdometry::landmarks() const {
-  return impl_ ? impl_->loops.ask(landmarks_of) : std::vector<MapLandmark>();
+MapChanges AsyncOdometry::landmarks_since(int version) const {
+  const auto ask = [version](const auto& frames) {
+    return stemvo::landmarks_since(frames, version);
+  };
+  return impl_ ? impl_->loops.ask(ask) : MapChanges();
+}
+std::vector<MapKeyframe> AsyncOdometry::keyframes(int first) const {
+  const auto ask = [first](const auto& frames) { return keyframes_of(frames, first); };
+  return impl_ ? impl_->loops.ask(ask) : std::vector<MapKeyframe>();
 }
 std::vector<TrackedPoint> AsyncOdometry::tracked_points() const {
   return impl_ ? impl_->loops.ask(tracked_points_of) : std::vector<TrackedPoint>();

@@ -120,7 +120,7 @@ FrameResult ChannelOdometry::optimize() {
     work.frame.pyramid = optimized_.frame.pyramid;
   }
   FrameResult& result = work.localized.result;
-  result.time_s = work.frame.time_s;
+  result.time_s = times_s_.emplace_back(work.frame.time_s);
   result.times = work.frame.times;
   result.problem = work.frame.problem;
   optimized_ = std::move(work);

@@ -42,6 +42,8 @@ class ChannelOdometry {
   FrameResult process(Frame frame);
 
   [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
+  /// One per frame optimized.
+  [[nodiscard]] const std::vector<double>& times_s() const { return times_s_; }
   /// It holds all frames optimized.
   [[nodiscard]] const Estimator& estimator() const { return *estimator_; }
 
@@ -67,6 +69,7 @@ class ChannelOdometry {
   [[nodiscard]] ImageClue clue_of(const Frame& frame);
 
   int num_tracked_ = 0;
+  std::vector<double> times_s_;
   double last_time_s_ = -std::numeric_limits<double>::infinity();  ///< of the last one tracked
   /// Since the last image, as the frames' hints say; nullopt: one did not.
   std::optional<Eigen::Quaterniond> image_from_tracked_ = Eigen::Quaterniond::Identity();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,7 @@ struct LocalizedFrame {
 /// A landmark in the camera of the last keyframe that saw it, in the units of its pose in the
 /// trajectory.
 struct KeptLandmark {
+  int id = 0;
   int frame = 0;  ///< of the keyframe
   Eigen::Vector3f in_camera = Eigen::Vector3f::Zero();
   std::array<std::uint8_t, 3> rgb{};
@@ -73,6 +75,13 @@ class HintTrust {
   bool is_trusted_ = false;
 };
 
+/// MapChanges, to be placed by the trajectory.
+struct LandmarkChanges {
+  int version = 0;
+  std::vector<KeptLandmark> landmarks;
+  std::vector<int> removed;
+};
+
 /// Tracks in, poses out; the front end follows tracks to the next frame while a frame is optimized.
 /// Frames come in order, each through both halves.
 class Estimator {
@@ -90,9 +99,10 @@ class Estimator {
   [[nodiscard]] virtual std::optional<CameraEstimate> camera_estimate() const {
     return std::nullopt;
   }
-  /// The landmarks of Odometry::landmarks(), to be placed by the trajectory; none where there is no
-  /// window.
-  [[nodiscard]] virtual std::vector<KeptLandmark> landmarks() const { return {}; }
+  /// As Odometry::landmarks_since; none where there is no window.
+  [[nodiscard]] virtual LandmarkChanges landmarks_since(int /*version*/) const { return {}; }
+  /// Numbers of the frames that are keyframes or were, in order.
+  [[nodiscard]] virtual std::span<const int> keyframes() const { return {}; }
 };
 
 /// Length of a step that nothing measures: one unit where no scale is asked for. A drive's first

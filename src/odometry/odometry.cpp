@@ -5,6 +5,7 @@
 
 #include "odometry/answers.hpp"
 #include "odometry/check_frame.hpp"
+#include "odometry/event_log.hpp"
 #include "odometry/phased_odometry.hpp"
 
 namespace stemvo {
@@ -12,6 +13,7 @@ namespace stemvo {
 struct Odometry::Impl {
   PhasedOdometry odometry;
   FrameCheck check;
+  EventLog log = {};
 };
 
 Expected<Odometry> Odometry::create(const Camera& camera,
@@ -40,18 +42,30 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
     return status.error();
   }
   PhasedOdometry& odometry = impl_->odometry;
-  return odometry.process(odometry.prepare(rgb_of(image, order), time_s, hints));
+  FrameResult result = odometry.process(odometry.prepare(rgb_of(image, order), time_s, hints));
+  impl_->log.observe(result);
+  return result;
+}
+
+void Odometry::set_log(Log log) {
+  if (impl_ != nullptr) {
+    impl_->log.set(std::move(log));
+  }
 }
 
 void Odometry::reset() {
   if (impl_ != nullptr) {
     impl_->odometry.reset();
     impl_->check.restart();
+    impl_->log.restart();
   }
 }
 
-std::vector<MapLandmark> Odometry::landmarks() const {
-  return impl_ ? landmarks_of(impl_->odometry.frames()) : std::vector<MapLandmark>();
+MapChanges Odometry::landmarks_since(int version) const {
+  return impl_ ? stemvo::landmarks_since(impl_->odometry.frames(), version) : MapChanges();
+}
+std::vector<MapKeyframe> Odometry::keyframes(int first) const {
+  return impl_ ? keyframes_of(impl_->odometry.frames(), first) : std::vector<MapKeyframe>();
 }
 std::vector<TrackedPoint> Odometry::tracked_points() const {
   return impl_ ? tracked_points_of(impl_->odometry.frames()) : std::vector<TrackedPoint>();

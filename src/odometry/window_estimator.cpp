@@ -337,10 +337,4 @@ void WindowEstimator::remember(const Frame& frame, FrameState state) {
   history_.end_frame(window_);
 }
 
-std::vector<KeptLandmark> WindowEstimator::landmarks() const {
-  WindowHistory history = history_;
-  history.close(window_);
-  return history.landmarks();
-}
-
 }  // namespace stemvo

@@ -31,7 +31,10 @@ class WindowEstimator final : public Estimator {
   void optimize(const Frame& frame, LocalizedFrame& localized) override;
 
   [[nodiscard]] const std::vector<Rigid3>& trajectory() const override { return trajectory_; }
-  [[nodiscard]] std::vector<KeptLandmark> landmarks() const override;
+  [[nodiscard]] LandmarkChanges landmarks_since(int version) const override {
+    return history_.changes_since(version, window_);
+  }
+  [[nodiscard]] std::span<const int> keyframes() const override { return history_.keyframes(); }
 
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();

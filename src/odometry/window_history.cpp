@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 namespace stemvo {
 namespace {
@@ -39,6 +40,7 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
     };
     const auto [found, is_new] = tracks_.try_emplace(observation.track_id);
     Track& track = found->second;
+    track.id = is_new ? num_landmarks_++ : track.id;
     // A new corner came to its first keyframe with the frame behind it.
     track.num_keyframes +=
         is_new ? static_cast<int>(std::ranges::count_if(window.keyframes, sees)) : 1;
@@ -51,6 +53,29 @@ void WindowHistory::observe(const Window& window, const cv::Mat& image) {
     track.max_parallax_rad =
         std::max(track.max_parallax_rad, parallax_rad(landmark->second, *oldest, newest));
   }
+  show(window);
+}
+
+/// Looks which landmarks of the window are well constrained.
+void WindowHistory::show(const Window& window) {
+  window_moved_at_ = now();
+  for (auto& [track_id, track] : tracks_) {
+    const bool is_shown = track.num_keyframes >= kMinKeyframes &&
+                          track.max_parallax_rad >= kMinParallax_rad &&
+                          window.landmarks.contains(track_id);
+    if (track.is_shown && !is_shown) {
+      removed_.push_back({now(), track.id});
+    }
+    track.is_shown = is_shown;
+  }
+}
+
+KeptLandmark WindowHistory::place(const Track& track,
+                                  const Keyframe& last_seen_from,
+                                  const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d in_camera = scale_of_keyframe_.at(last_seen_from.frame) / scale_ *
+                                    (last_seen_from.world_from_camera.inverse() * point);
+  return {track.id, last_seen_from.frame, in_camera.cast<float>(), track.rgb};
 }
 
 void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, int track_id) {
@@ -58,20 +83,20 @@ void WindowHistory::keep(const Window& window, const Keyframe& last_seen_from, i
   if (track == tracks_.end()) {
     return;
   }
-  const auto landmark = window.landmarks.find(track_id);
-  if (landmark != window.landmarks.end() && track->second.num_keyframes >= kMinKeyframes &&
-      track->second.max_parallax_rad >= kMinParallax_rad) {
-    const Eigen::Vector3d in_camera =
-        scale_of_keyframe_.at(last_seen_from.frame) / scale_ *
-        (last_seen_from.world_from_camera.inverse() * landmark->second);
-    landmarks_.push_back({last_seen_from.frame, in_camera.cast<float>(), track->second.rgb});
+  if (track->second.is_shown) {
+    left_.push_back({now(), place(track->second, last_seen_from, window.landmarks.at(track_id))});
   }
   tracks_.erase(track);
 }
 
 void WindowHistory::end_frame(const Window& window) {
+  ++num_frames_;
   for (const Keyframe& keyframe : window.keyframes) {
-    scale_of_keyframe_.try_emplace(keyframe.frame, scale_);
+    const bool is_new = scale_of_keyframe_.try_emplace(keyframe.frame, scale_).second;
+    // A new map may begin at a keyframe of the one before.
+    if (is_new && (keyframes_.empty() || keyframe.frame > keyframes_.back())) {
+      keyframes_.push_back(keyframe.frame);
+    }
   }
 }
 
@@ -90,6 +115,35 @@ void WindowHistory::close(const Window& window) {
   }
   tracks_.clear();
   scale_of_keyframe_.clear();
+}
+
+LandmarkChanges WindowHistory::changes_since(int version, const Window& window) const {
+  LandmarkChanges changes{num_frames_, {}, {}};
+  const auto after = [version](const auto& all) {
+    const auto version_of = [](const auto& change) { return change.version; };
+    return std::ranges::subrange(std::ranges::upper_bound(all, version, {}, version_of), all.end());
+  };
+  for (const Change<KeptLandmark>& change : after(left_)) {
+    changes.landmarks.push_back(change.what);
+  }
+  for (const Change<int>& change : after(removed_)) {
+    changes.removed.push_back(change.what);
+  }
+  if (window_moved_at_ <= version) {
+    return changes;
+  }
+  std::set<int> placed;
+  for (auto keyframe = window.keyframes.rbegin(); keyframe != window.keyframes.rend(); ++keyframe) {
+    for (const Observation& observation : keyframe->points) {
+      const auto track = tracks_.find(observation.track_id);
+      if (track != tracks_.end() && track->second.is_shown &&
+          placed.insert(observation.track_id).second) {
+        changes.landmarks.push_back(
+            place(track->second, *keyframe, window.landmarks.at(observation.track_id)));
+      }
+    }
+  }
+  return changes;
 }
 
 }  // namespace stemvo

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -20,31 +21,56 @@ namespace stemvo {
 /// ones, which are right already.
 class WindowHistory {
  public:
-  /// The newest keyframe of the window saw this image (the input, gray or RGB).
+  /// The newest keyframe of the window, which is adjusted to it, saw this image (the input, gray or
+  /// RGB).
   void observe(const Window& window, const cv::Mat& image);
 
   /// A keyframe is about to leave the window for the one that comes.
   void leave(const Window& window, std::size_t leaving, const Keyframe& coming);
   /// The window is put into other units.
-  void rescale(double factor) { scale_ *= factor; }
+  void rescale(double factor) {
+    scale_ *= factor;
+    window_moved_at_ = now();
+  }
   /// The frame's pose is final: new keyframes have theirs in today's units.
   void end_frame(const Window& window);
   /// The whole window is about to be dropped.
   void close(const Window& window);
 
-  /// Well-constrained landmarks that have left.
-  [[nodiscard]] const std::vector<KeptLandmark>& landmarks() const { return landmarks_; }
+  /// Changes of well-constrained landmarks, those that have left and those of the window. A version
+  /// is a number of frames that have ended.
+  [[nodiscard]] LandmarkChanges changes_since(int version, const Window& window) const;
+  /// Numbers of the frames that were keyframes, in order.
+  [[nodiscard]] std::span<const int> keyframes() const { return keyframes_; }
 
  private:
   /// A track that the window sees.
   struct Track {
+    int id = 0;  ///< of the landmark: a track may come again when its landmark has left
     int num_keyframes = 0;
     double max_parallax_rad = 0.0;
     std::array<std::uint8_t, 3> rgb{};
+    bool is_shown = false;  ///< among the window's landmarks
   };
+  template <typename T>
+  struct Change {
+    int version = 0;
+    T what;
+  };
+  /// The version that holds what happens now.
+  [[nodiscard]] int now() const { return num_frames_ + 1; }
+  [[nodiscard]] KeptLandmark place(const Track& track,
+                                   const Keyframe& last_seen_from,
+                                   const Eigen::Vector3d& point) const;
   void keep(const Window& window, const Keyframe& last_seen_from, int track_id);
+  void show(const Window& window);
 
-  std::vector<KeptLandmark> landmarks_;
+  std::vector<Change<KeptLandmark>> left_;  ///< only added to
+  std::vector<Change<int>> removed_;        ///< ids; only added to
+  std::vector<int> keyframes_;
+  int num_frames_ = 0;
+  int num_landmarks_ = 0;    ///< ids given
+  int window_moved_at_ = 0;  ///< version
   std::map<int, Track> tracks_;
   double scale_ = 1.0;                       ///< of the window, by all that rescaled it
   std::map<int, double> scale_of_keyframe_;  ///< when its pose went into the trajectory

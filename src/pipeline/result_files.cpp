@@ -179,7 +179,7 @@ class ResultWriter {
   [[nodiscard]] Status write_map() const {
     const Estimator& estimator = run_.odometry.frames().estimator();
     std::vector<ColoredPoint> points;
-    for (const KeptLandmark& landmark : estimator.landmarks()) {
+    for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
       const auto frame = static_cast<std::size_t>(landmark.frame);
       const Eigen::Vector3d in_camera = stretch_at(estimator.trajectory(), trajectory_, frame) *
                                         landmark.in_camera.cast<double>();

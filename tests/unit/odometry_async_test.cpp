@@ -30,7 +30,7 @@ struct Left {
 
 template <typename SomeOdometry>
 Left left_by(const FrameResult& result, const SomeOdometry& odometry) {
-  return {result, odometry.tracked_points(), odometry.landmarks().size(),
+  return {result, odometry.tracked_points(), odometry.landmarks_since(0).landmarks.size(),
           cv::sum(odometry.channel_image())[0]};
 }
 
@@ -243,8 +243,8 @@ TEST_F(Async, OneThatWasMovedFromIsAnError) {
   EXPECT_THAT(error_of(odometry.finish()), HasSubstr("moved"));
   EXPECT_THAT(error_of(odometry.reset()), HasSubstr("moved"));
   EXPECT_FALSE(odometry.next());
-  EXPECT_TRUE(odometry.landmarks().empty() && odometry.tracked_points().empty() &&
-              odometry.channel_image().empty());
+  EXPECT_TRUE(odometry.landmarks_since(0).landmarks.empty() && odometry.keyframes().empty() &&
+              odometry.tracked_points().empty() && odometry.channel_image().empty());
 }
 
 }  // namespace

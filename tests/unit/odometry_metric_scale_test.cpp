@@ -125,7 +125,7 @@ TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
   EXPECT_NEAR(step_m(run, num_frames - 1), kStep_m, 0.02 * kStep_m);
   int num_before = 0;
   int num_after = 0;
-  for (const KeptLandmark& landmark : estimator.landmarks()) {
+  for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
     const bool is_metric = landmark.frame >= first_road;
     const double unit_m = is_metric ? 1.0 : kStep_m;
     const double depth_m = testing::true_place(landmark, drive.tracks).z();
@@ -142,7 +142,7 @@ TEST(MetricScale, TheTrajectoryPlacesLandmarksInMetres) {
   EstimatorRun run(estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_all();
-  const std::vector<KeptLandmark> landmarks = estimator.landmarks();
+  const std::vector<KeptLandmark> landmarks = estimator.landmarks_since(0).landmarks;
   ASSERT_GT(landmarks.size(), 200U);
   for (const KeptLandmark& landmark : landmarks) {
     EXPECT_LT(testing::placing_error(landmark, estimator.trajectory(), 1.0, drive.tracks), 0.05)

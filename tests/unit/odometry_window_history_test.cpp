@@ -33,9 +33,10 @@ TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
   window.keyframes[3].points.clear();
   const Keyframe coming{4, Rigid3(Eigen::Quaterniond::Identity(), {4.0, 0.0, 0.0}), {}};
   history.leave(window, 1, coming);
-  ASSERT_EQ(history.landmarks().size(), 1U);
-  EXPECT_NEAR(history.landmarks().front().in_camera.z(), 4.0, 1e-6);
-  EXPECT_NEAR(history.landmarks().front().in_camera.x(), -1.0, 1e-6);
+  const LandmarkChanges kept = history.changes_since(0, window);
+  ASSERT_EQ(kept.landmarks.size(), 1U);
+  EXPECT_NEAR(kept.landmarks.front().in_camera.z(), 4.0, 1e-6);
+  EXPECT_NEAR(kept.landmarks.front().in_camera.x(), -1.0, 1e-6);
 }
 
 TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
@@ -50,7 +51,7 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   const std::vector<Rigid3>& poses = estimator.trajectory();
   const double unit_m = 1.0 / testing::length_ratio(poses, drive.world_from_camera, 0, 39);
   std::vector<double> errors;
-  for (const KeptLandmark& landmark : estimator.landmarks()) {
+  for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
     ASSERT_GE(landmark.frame, 0);
     ASSERT_LT(landmark.frame, drive.num_frames());
     errors.push_back(testing::placing_error(landmark, poses, unit_m, drive));

@@ -11,6 +11,9 @@ namespace {
 TEST(Version, IsTheProjectsVersionAndPerhapsACommit) {
   const std::string text(version());
   const std::string number = STEMVO_VERSION;
+  EXPECT_EQ(number, std::to_string(STEMVO_VERSION_MAJOR) + "." +
+                        std::to_string(STEMVO_VERSION_MINOR) + "." +
+                        std::to_string(STEMVO_VERSION_PATCH));
   ASSERT_EQ(text.substr(0, number.size()), number);
   const std::string commit = text.substr(number.size());
   if (!commit.empty()) {

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dataset/sequence.hpp"
+#include "odometry/event_log.hpp"
+#include "stemvo/odometry.hpp"
+#include "support/small_drive.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class OdometryAnswers : public testing::SmallDrive {
+ protected:
+  OdometryAnswers() : source_(KittiSequence::open(sequence_, {}).value()) {}
+
+  [[nodiscard]] Odometry create() const { return Odometry::create(source_.camera()).value(); }
+  FrameResult process(Odometry& odometry, std::size_t i) const {
+    const cv::Mat image = source_.read(i).value();
+    const PixelOrder order = image.channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
+    return odometry.process(image, order, source_.time_s(i)).value();
+  }
+
+  KittiSequence source_;
+};
+
+/// A map that follows the changes of every few frames.
+class Follower {
+ public:
+  void follow(const Odometry& odometry) {
+    const MapChanges changes = odometry.landmarks_since(version_);
+    for (const int id : changes.removed) {
+      places_.erase(id);
+    }
+    for (const MapLandmark& landmark : changes.landmarks) {
+      places_[landmark.id] = landmark.position;
+    }
+    num_told_ += changes.landmarks.size();
+    num_removed_ += changes.removed.size();
+    version_ = changes.version;
+  }
+  [[nodiscard]] const std::map<int, Eigen::Vector3d>& places() const { return places_; }
+  [[nodiscard]] std::size_t num_told() const { return num_told_; }
+  [[nodiscard]] std::size_t num_removed() const { return num_removed_; }
+
+ private:
+  std::map<int, Eigen::Vector3d> places_;
+  std::size_t num_told_ = 0;
+  std::size_t num_removed_ = 0;
+  int version_ = 0;
+};
+
+TEST_F(OdometryAnswers, WhoFollowsTheChangesHasTheWholeMap) {
+  Odometry odometry = create();
+  Follower every_frame;
+  Follower every_fifth;
+  for (std::size_t i = 0; i < source_.size(); ++i) {
+    process(odometry, i);
+    every_frame.follow(odometry);
+    if (i % 5 == 0) {
+      every_fifth.follow(odometry);
+    }
+    const MapChanges all = odometry.landmarks_since(0);
+    std::set<int> ids;
+    for (const MapLandmark& landmark : all.landmarks) {
+      ASSERT_TRUE(every_frame.places().contains(landmark.id)) << i;
+      EXPECT_EQ(every_frame.places().at(landmark.id), landmark.position) << i;
+      ids.insert(landmark.id);
+    }
+    EXPECT_EQ(ids.size(), all.landmarks.size()) << "an id twice";
+    EXPECT_EQ(ids.size(), every_frame.places().size()) << i;
+  }
+  every_fifth.follow(odometry);
+  EXPECT_EQ(every_fifth.places(), every_frame.places());
+  EXPECT_GT(every_frame.places().size(), 50U);
+  EXPECT_GT(every_frame.num_removed(), 0U);
+  const int version = odometry.landmarks_since(0).version;
+  EXPECT_THAT(odometry.landmarks_since(version).landmarks, IsEmpty());
+  EXPECT_THAT(odometry.landmarks_since(version).removed, IsEmpty());
+}
+
+TEST_F(OdometryAnswers, KeyframesAreFramesWithTheirTimesAndPoses) {
+  Odometry odometry = create();
+  std::vector<FrameResult> results;
+  std::vector<MapKeyframe> followed;
+  for (std::size_t i = 0; i < source_.size(); ++i) {
+    results.push_back(process(odometry, i));
+    for (const MapKeyframe& keyframe : odometry.keyframes(static_cast<int>(followed.size()))) {
+      followed.push_back(keyframe);
+    }
+  }
+  ASSERT_GT(followed.size(), 8U) << "some have left the window";
+  EXPECT_EQ(followed.size(), odometry.keyframes().size());
+  for (std::size_t id = 0; id < followed.size(); ++id) {
+    const auto frame = static_cast<std::size_t>(followed[id].frame);
+    EXPECT_EQ(followed[id].id, static_cast<int>(id));
+    EXPECT_TRUE(id == 0 || followed[id - 1].frame < followed[id].frame);
+    EXPECT_EQ(followed[id].time_s, results[frame].time_s);
+    EXPECT_EQ(followed[id].world_from_camera.matrix(), results[frame].world_from_camera.matrix());
+  }
+}
+
+TEST_F(OdometryAnswers, AfterAResetAllIsAsNew) {
+  Odometry used = create();
+  for (std::size_t i = 12; i < 20; ++i) {
+    process(used, i);
+  }
+  used.reset();
+  EXPECT_THAT(used.tracked_points(), IsEmpty());
+  EXPECT_THAT(used.keyframes(), IsEmpty());
+  EXPECT_EQ(used.landmarks_since(0).version, 0);
+  Odometry fresh = create();
+  for (std::size_t i = 0; i < 10; ++i) {
+    const FrameResult expected = process(fresh, i);
+    const FrameResult found = process(used, i);
+    EXPECT_EQ(found.state, expected.state);
+    EXPECT_EQ(found.world_from_camera.matrix(), expected.world_from_camera.matrix());
+    EXPECT_EQ(found.camera.cx_px, expected.camera.cx_px);
+  }
+}
+
+TEST_F(OdometryAnswers, OneThatWasMovedFromIsAnErrorOrEmpty) {
+  Odometry odometry = create();
+  process(odometry, 0);
+  Odometry other = std::move(odometry);
+  const auto result = odometry.process(source_.read(1).value(), PixelOrder::kGray, 9.0);
+  ASSERT_FALSE(result);
+  EXPECT_THAT(result.error().message, HasSubstr("moved from"));
+  odometry.reset();
+  odometry.set_log({});
+  EXPECT_TRUE(odometry.channel_image().empty());
+  EXPECT_THAT(odometry.tracked_points(), IsEmpty());
+  EXPECT_THAT(odometry.keyframes(), IsEmpty());
+  EXPECT_THAT(odometry.landmarks_since(0).landmarks, IsEmpty());
+  process(other, 1);
+}
+
+TEST_F(OdometryAnswers, TheLogSaysWhenTheMapWasOpened) {
+  Odometry odometry = create();
+  std::vector<std::string> lines;
+  odometry.set_log([&](LogLevel level, const std::string& line) {
+    EXPECT_EQ(level, LogLevel::kInfo);
+    lines.push_back(line);
+  });
+  for (std::size_t i = 0; i < 10; ++i) {
+    process(odometry, i);
+  }
+  EXPECT_THAT(lines, ElementsAre(HasSubstr("a map was opened")));
+}
+
+TEST(EventLog, SaysWhatChangesAndOnlyThen) {
+  std::vector<std::string> lines;
+  EventLog log;
+  log.set([&](LogLevel level, const std::string& line) {
+    lines.push_back((level == LogLevel::kWarning ? "warning " : "") + line);
+  });
+  double time_s = 0.0;
+  const auto see = [&](FrameState state, ScaleState scale, const char* problem = "") {
+    FrameResult result;
+    result.state = state;
+    result.time_s = time_s++;
+    result.scale_state = scale;
+    result.problem = problem;
+    log.observe(result);
+    return std::exchange(lines, {});
+  };
+  using enum FrameState;
+  using enum ScaleState;
+  EXPECT_THAT(see(kFirst, kNone), IsEmpty());
+  EXPECT_THAT(see(kInitializing, kNone), IsEmpty());
+  EXPECT_THAT(see(kTracking, kNone), ElementsAre("2.000 s: a map was opened"));
+  EXPECT_THAT(see(kTracking, kMeasured), ElementsAre(HasSubstr("believed: lengths are metres")));
+  EXPECT_THAT(see(kStationary, kHeld), IsEmpty());
+  EXPECT_THAT(see(kLost, kHeld), ElementsAre(HasSubstr("warning 5.000 s: lost")));
+  EXPECT_THAT(see(kLost, kHeld), IsEmpty());
+  EXPECT_THAT(see(kTracking, kHeld), ElementsAre(HasSubstr("recovered")));
+  EXPECT_THAT(see(kLost, kHeld).size(), 1U);
+  EXPECT_THAT(see(kInitializing, kNone), ElementsAre(HasSubstr("warning 9.000 s: the scale is")));
+  EXPECT_THAT(see(kTracking, kNone), ElementsAre(HasSubstr("a new map was opened")));
+  EXPECT_THAT(see(kNoImage, kNone, "too small"), ElementsAre("warning 11.000 s: too small"));
+  EXPECT_THAT(see(kNoImage, kNone, "too small"), IsEmpty());
+}
+
+}  // namespace
+}  // namespace stemvo
