@@ -1,5 +1,5 @@
-# `cmake --install`: the program, the static library, what they need at run time, and packages for CMake and pkg-config.
-#   bin/stemvo  lib/libstemvo.a  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
+# `cmake --install`: the program, the library, what they need at run time, and packages for CMake and pkg-config.
+#   bin/stemvo  lib/libstemvo.a (or .so)  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
 #   share/stemvo/config  share/doc/stemvo
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -11,7 +11,12 @@ install(DIRECTORY include/stemvo DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY config DESTINATION share/stemvo)
 install(FILES LICENSE DESTINATION share/doc/stemvo)
 
-install(TARGETS stemvo EXPORT stemvoTargets)
+set(library stemvo)
+if(BUILD_SHARED_LIBS)
+  set(library stemvo_shared)
+  set_target_properties(stemvo_shared PROPERTIES INSTALL_RPATH "$ORIGIN/stemvo")  # ONNX Runtime
+endif()
+install(TARGETS ${library} EXPORT stemvoTargets)
 install(EXPORT stemvoTargets NAMESPACE stemvo:: DESTINATION ${package_dir})
 
 if(TARGET stemvo_app)

@@ -13,7 +13,6 @@
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
 #include "stemvo/options.hpp"
-#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -21,7 +20,7 @@ namespace stemvo {
 /// order, with the same bytes as Odometry's and up to six frames later. `options.threads`: above 1
 /// there are three threads of its own; with 1 there is none, and push() does the work. Moving it is
 /// for the time before the first frame.
-class STEMVO_EXPORT AsyncOdometry {
+class AsyncOdometry {
  public:
   /// Called once for each frame, in order, one call at a time, from a thread of ours (threads 1:
   /// from push). What is asked of the odometry in it belongs to the frame delivered. The next

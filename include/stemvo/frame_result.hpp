@@ -12,7 +12,6 @@
 
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
-#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -28,9 +27,9 @@ enum class FrameState {
   kLost,          ///< nothing measured: the last motion is continued
   kNoImage,       ///< nothing to be seen: the last motion is continued
 };
-[[nodiscard]] STEMVO_EXPORT std::string_view to_string(FrameState state);
+[[nodiscard]] std::string_view to_string(FrameState state);
 /// True except for kGated, kLost and kNoImage.
-[[nodiscard]] STEMVO_EXPORT bool is_measured(FrameState state);
+[[nodiscard]] bool is_measured(FrameState state);
 
 /// Which two-view model a motion came from.
 enum class TwoViewModel { kNone, kHomography, kEssential };
@@ -43,7 +42,7 @@ enum class ScaleState {
   kMeasured,  ///< measured on this frame and believed
 };
 /// `disabled`, `none`, `held`, `measured`.
-[[nodiscard]] STEMVO_EXPORT std::string_view to_string(ScaleState state);
+[[nodiscard]] std::string_view to_string(ScaleState state);
 
 /// Standard deviations of a camera's estimate, to which the one in use goes step by step; of the
 /// focal length, too, where only the principal point does.

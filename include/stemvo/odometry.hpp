@@ -14,7 +14,6 @@
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
-#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -39,7 +38,7 @@ using Log = std::function<void(LogLevel level, const std::string& line)>;
 /// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
 /// for what a caller hands in. Of one that was moved from, process() is an Error and the rest is
 /// empty.
-class STEMVO_EXPORT Odometry {
+class Odometry {
  public:
   /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
   /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "stemvo/error.hpp"
-#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -130,7 +129,7 @@ struct ScaleOptions {
 };
 
 /// Everything that steers the odometry. Defaults stand here, once.
-struct STEMVO_EXPORT Options {
+struct Options {
   /// Of a camera on a vehicle, `height_m` above its road: metres.
   [[nodiscard]] static Options driving(double height_m);
 
@@ -148,6 +147,6 @@ struct STEMVO_EXPORT Options {
 
 /// Ranges of all members; infinite, NaN and undefined enumerators fail. The error names the key as
 /// in config/default.yaml, e.g. "stem.filter: expected ..., found ...".
-[[nodiscard]] STEMVO_EXPORT Status validate(const Options& options);
+[[nodiscard]] Status validate(const Options& options);
 
 }  // namespace stemvo

@@ -4,15 +4,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "stemvo/version.hpp"
-
 namespace stemvo {
 
 using Matrix34d = Eigen::Matrix<double, 3, 4>;
 
 /// Rigid motion `b_from_a`: x_in_b = rotation * x_in_a + translation. The quaternion is kept at
 /// unit length by every operation, so long chains stay orthonormal.
-struct STEMVO_EXPORT Rigid3 {
+struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
@@ -34,15 +32,14 @@ struct STEMVO_EXPORT Rigid3 {
 };
 
 /// c_from_a = c_from_b * b_from_a.
-[[nodiscard]] STEMVO_EXPORT Rigid3 operator*(const Rigid3& c_from_b, const Rigid3& b_from_a);
+[[nodiscard]] Rigid3 operator*(const Rigid3& c_from_b, const Rigid3& b_from_a);
 /// x_in_b = b_from_a * x_in_a.
-[[nodiscard]] STEMVO_EXPORT Eigen::Vector3d operator*(const Rigid3& b_from_a,
-                                                      const Eigen::Vector3d& x_in_a);
+[[nodiscard]] Eigen::Vector3d operator*(const Rigid3& b_from_a, const Eigen::Vector3d& x_in_a);
 
 /// Cross-product matrix: skew(a) * b == a x b.
-[[nodiscard]] STEMVO_EXPORT Eigen::Matrix3d skew(const Eigen::Vector3d& a);
+[[nodiscard]] Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 /// Rotation of |w| rad about w (Rodrigues); so3_log is its inverse, |result| <= pi.
-[[nodiscard]] STEMVO_EXPORT Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
-[[nodiscard]] STEMVO_EXPORT Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
+[[nodiscard]] Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
+[[nodiscard]] Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
 
 }  // namespace stemvo

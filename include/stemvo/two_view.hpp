@@ -11,7 +11,6 @@
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
 #include "stemvo/rigid3.hpp"
-#include "stemvo/version.hpp"
 
 namespace stemvo {
 
@@ -34,10 +33,9 @@ struct TwoViewResult {
 /// `odometry.*` and `seed` of the options). The same result for the same input. Error: a camera or
 /// options that are none, not as many points in one image as in the other, a point that is not
 /// finite.
-[[nodiscard]] STEMVO_EXPORT Expected<TwoViewResult> estimate_two_view(
-    std::span<const Eigen::Vector2d> prev_uv,
-    std::span<const Eigen::Vector2d> cur_uv,
-    const Camera& camera,
-    const Options& options = {});
+[[nodiscard]] Expected<TwoViewResult> estimate_two_view(std::span<const Eigen::Vector2d> prev_uv,
+                                                        std::span<const Eigen::Vector2d> cur_uv,
+                                                        const Camera& camera,
+                                                        const Options& options = {});
 
 }  // namespace stemvo

@@ -8,13 +8,10 @@
 #define STEMVO_VERSION_PATCH 0
 #define STEMVO_VERSION "0.1.0"
 
-/// A shared library shows what has it, and hides the rest.
-#define STEMVO_EXPORT __attribute__((visibility("default")))
-
 namespace stemvo {
 
 /// Version of the library, with the git commit it was built from where there was one (marked where
 /// the tree had changes): "0.1.0", "0.1.0+1a2b3c4d5e6f" or "0.1.0+1a2b3c4d5e6f.dirty".
-[[nodiscard]] STEMVO_EXPORT std::string_view version();
+[[nodiscard]] std::string_view version();
 
 }  // namespace stemvo

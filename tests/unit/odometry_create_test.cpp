@@ -42,7 +42,7 @@ TEST(OdometryCreate, NeedsNoFilesAndNoOptions) { EXPECT_EQ(error_of({}), "no err
 
 TEST(OdometryCreate, AnErrorAskedForItsValueThrowsItsMessage) {
   const auto odometry = Odometry::create({});
-  EXPECT_THAT([&] { return odometry.value().landmarks(); },
+  EXPECT_THAT([&] { return odometry.value().keyframes(); },
               ::testing::ThrowsMessage<std::runtime_error>(odometry.error().message));
 }
 
