@@ -97,7 +97,7 @@ if(NOT output STREQUAL positions_by_cmake)
   message(FATAL_ERROR "shared library: expected the same positions, found:\n${output}")
 endif()
 run("its names" nm -D -C --defined-only "${shared}")
-if(NOT output MATCHES "stemvo::AsyncOdometry::push" OR output MATCHES "PhasedOdometry|Estimator|cv::")
+if(NOT output MATCHES "stemvo::AsyncOdometry::push" OR output MATCHES "[A-Za-z] (stemvo::(PhasedOdometry|WindowEstimator|Stem)|cv)::")
   message(FATAL_ERROR "shared library: expected the public names alone, found:\n${output}")
 endif()
 
