@@ -5,6 +5,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -65,7 +66,12 @@ class PythonOdometry {
 
   PythonOdometry(const Camera& camera, const Config& config, const cv::Mat& mask)
       : scale_source_(options::to_string(config.scale.source)),
-        odometry_(create(camera, config, mask)) {}
+        odometry_(create(camera, config, mask)) {
+    odometry_.set_log([this](LogLevel level, const std::string& line) {
+      const std::scoped_lock lock(log_mutex_);
+      log_.emplace_back(level, line);
+    });
+  }
 
   [[nodiscard]] const std::string& scale_source() const { return scale_source_; }
 
@@ -75,7 +81,7 @@ class PythonOdometry {
                       const RotationHint& rotation_hint) {
     const ImageView view = value_or_raise(view_of(image, "image"));
     const FrameHints hints = hints_of(mask, rotation_hint);
-    return in_turn([&]() -> Expected<FrameResult> {
+    FrameResult result = in_turn([&]() -> Expected<FrameResult> {
       if (Status status = check_idle("process"); !status) {
         return status.error();
       }
@@ -84,6 +90,8 @@ class PythonOdometry {
       }
       return take_result();
     });
+    tell();
+    return result;
   }
   void push(const AnyArray& image,
             double timestamp,
@@ -94,7 +102,9 @@ class PythonOdometry {
     in_turn([&] { return push_frame(view, timestamp, hints); });
   }
   FrameResult take() {
-    return in_turn([&] { return take_result(); });
+    FrameResult result = in_turn([&] { return take_result(); });
+    tell();
+    return result;
   }
   /// Frames pushed whose results were not taken.
   int num_at_work() {
@@ -104,8 +114,14 @@ class PythonOdometry {
     in_turn([&] { return check_idle("reset").and_then([&] { return odometry_.reset(); }); });
   }
 
-  std::pair<DoubleArray, ByteArray> landmarks() {
-    return arrays_of(unlocked([&] { return odometry_.landmarks_since(0).landmarks; }));
+  MapChanges landmarks_since(int version) const {
+    return unlocked([&] { return odometry_.landmarks_since(version); });
+  }
+  std::pair<DoubleArray, ByteArray> landmarks() const {
+    return arrays_of(landmarks_since(0).landmarks);
+  }
+  std::vector<MapKeyframe> keyframes(int first) const {
+    return unlocked([&] { return odometry_.keyframes(first); });
   }
   std::pair<DoubleArray, BoolArray> tracked_points() {
     return arrays_of(unlocked([&] { return odometry_.tracked_points(); }));
@@ -132,6 +148,18 @@ class PythonOdometry {
     --num_at_work_;
     return result->value();
   }
+  /// Hands over what was logged. The threads that log never wait for the interpreter's lock.
+  void tell() {
+    std::vector<std::pair<LogLevel, std::string>> lines;
+    {
+      const std::scoped_lock lock(log_mutex_);
+      lines.swap(log_);
+    }
+    for (const auto& [level, line] : lines) {
+      nb::module_::import_("logging").attr("getLogger")("stemvo").attr(
+          level == LogLevel::kWarning ? "warning" : "info")(line);
+    }
+  }
   [[nodiscard]] Status check_idle(const char* name) const {
     return num_at_work_ == 0
                ? Status()
@@ -143,7 +171,9 @@ class PythonOdometry {
   std::string scale_source_;
   std::mutex mutex_;
   int num_at_work_ = 0;
-  AsyncOdometry odometry_;
+  std::mutex log_mutex_;
+  std::vector<std::pair<LogLevel, std::string>> log_;
+  AsyncOdometry odometry_;  ///< last, so that its threads end first
 };
 
 void make_odometry(PythonOdometry* self,
@@ -189,6 +219,9 @@ void bind_odometry(nb::module_& module) {
            "A new world: same network, camera and options; times may begin anew")
       .def("landmarks", &PythonOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
+      .def("landmarks_since", &PythonOdometry::landmarks_since, "version"_a,
+           "Those that came, moved or went since that version of the map; 0: all")
+      .def("keyframes", &PythonOdometry::keyframes, "first"_a = 0, "Those from this id on")
       .def("tracked_points", &PythonOdometry::tracked_points,
            "Of the last image: Nx4 (u, v before; u, v now), and N: fits the motion")
       .def("channel_image", &PythonOdometry::channel_image,

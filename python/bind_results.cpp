@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Result: what an odometry gives.
+// Result, MapChanges, Keyframe: what an odometry gives.
 #include <string>
 #include <vector>
 
@@ -56,8 +56,42 @@ void bind_result(nb::module_& module) {
       });
 }
 
+void bind_map(nb::module_& module) {
+  nb::class_<MapChanges>(module, "MapChanges", "Landmarks that came, moved or went")
+      .def_ro("version", &MapChanges::version, "To ask with the next time")
+      .def_prop_ro(
+          "ids",
+          [](const MapChanges& c) {
+            std::vector<int> ids;
+            for (const MapLandmark& landmark : c.landmarks) {
+              ids.push_back(landmark.id);
+            }
+            return array_of(ids);
+          },
+          nb::rv_policy::move, "N, of those that came or moved")
+      .def_prop_ro(
+          "positions", [](const MapChanges& c) { return arrays_of(c.landmarks).first; },
+          nb::rv_policy::move, "Nx3, in the world")
+      .def_prop_ro(
+          "colors", [](const MapChanges& c) { return arrays_of(c.landmarks).second; },
+          nb::rv_policy::move, "Nx3, RGB")
+      .def_prop_ro(
+          "removed", [](const MapChanges& c) { return array_of(c.removed); }, nb::rv_policy::move,
+          "Ids; some may never have been given");
+  nb::class_<MapKeyframe>(module, "Keyframe", "A frame that landmarks were triangulated from")
+      .def_ro("id", &MapKeyframe::id, "Counted from 0")
+      .def_ro("frame", &MapKeyframe::frame, "Results before its own")
+      .def_ro("timestamp", &MapKeyframe::time_s)
+      .def_prop_ro(
+          "world_from_camera", [](const MapKeyframe& k) { return array_of(k.world_from_camera); },
+          nb::rv_policy::move, "4x4, as it came");
+}
+
 }  // namespace
 
-void bind_results(nb::module_& module) { bind_result(module); }
+void bind_results(nb::module_& module) {
+  bind_result(module);
+  bind_map(module);
+}
 
 }  // namespace stemvo::python

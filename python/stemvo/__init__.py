@@ -5,9 +5,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from . import _core
-from ._core import Camera, CameraSigma, FrameView, Options, Recording, Result, __version__, align, evaluate, read_recording
+from ._core import (Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result, __version__, align, evaluate,
+                    read_recording)
 
-__all__ = ["Camera", "CameraSigma", "FrameView", "Odometry", "Options", "Recording", "Result", "__version__", "align", "evaluate", "read_recording"]
+__all__ = [
+    "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "evaluate",
+    "read_recording",
+]
 
 
 class Odometry(_core.Odometry):

@@ -105,6 +105,7 @@ class View:
 
 
 def show_live(rr, recording, options):
+    """By process(), not run(): points and channel must be this frame's."""
     odometry = stemvo.Odometry(recording, options)
     view = View(rr, recording, odometry.scale_source)
     state = None

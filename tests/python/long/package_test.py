@@ -48,7 +48,7 @@ print(json.dumps({"states": [[r.state, r.num_matches, r.num_inliers, r.scale_sta
 
 # run() against process(), whatever becomes of the loop; what else a frame may bring; the map and its changes.
 RUN = """
-import gc, itertools, sys
+import gc, itertools, logging, sys, types
 import numpy as np, stemvo
 recording = stemvo.read_recording(sys.argv[1])
 frames = list(recording)
@@ -57,7 +57,8 @@ def same(found, expected):
         assert (a.timestamp, a.state, a.num_inliers, a.scale_sigma) == (b.timestamp, b.state, b.num_inliers, b.scale_sigma), (a, b)
         assert np.array_equal(a.world_from_camera, b.world_from_camera) and np.array_equal(a.motion_covariance, b.motion_covariance), (a, b)
 def left(odometry):
-    return [*odometry.landmarks(), *odometry.tracked_points(), odometry.channel_image()]
+    changes = odometry.landmarks_since(0)
+    return [*odometry.landmarks(), *odometry.tracked_points(), odometry.channel_image(), changes.ids, changes.positions, changes.colors]
 def raises(call, text):
     try:
         call()
@@ -120,6 +121,21 @@ assert plain[-1].motion_covariance.shape == (6, 6)
 metres = stemvo.Odometry(recording.camera, stemvo.Options.driving(1.65))
 assert metres.scale_source == "camera_height"
 same(metres.run(frames), plain)  # as a KITTI folder has it
+changes = metres.landmarks_since(0)
+keyframes = metres.keyframes()
+assert [keyframe.id for keyframe in keyframes] == list(range(len(keyframes))) and len(keyframes) > 1
+for keyframe in keyframes:
+    assert plain[keyframe.frame].timestamp == keyframe.timestamp
+    assert np.array_equal(plain[keyframe.frame].world_from_camera, keyframe.world_from_camera)
+assert len(metres.keyframes(1)) == len(keyframes) - 1
+assert len(metres.landmarks_since(changes.version).ids) == 0 < len(changes.ids) == len(changes.positions) == len(changes.colors)
+lines = []
+logger = logging.getLogger("stemvo")
+logger.setLevel(logging.INFO)
+logger.addHandler(types.SimpleNamespace(level=logging.INFO, handle=lambda record: lines.append((record.levelname, record.getMessage()))))
+metres.reset()
+same(metres.run(frames), plain)
+assert [line for line in lines if line[0] == "INFO" and line[1].endswith(": a map was opened")], lines
 last = stemvo.Odometry(recording).run(frames)  # unfinished when the interpreter ends
 next(last)
 """
