@@ -171,12 +171,14 @@ bool PatchFrontEnd::begin_track(const ImagePyramid& image, const Point& point) {
   return tracks_.insert(std::move(node)).inserted;
 }
 
-/// A hint may be wrong: it counts where it leads to as many points as no hint does.
+/// A hint may be wrong: it counts where it leads to points, and to as many as no hint does. Patches
+/// are found in wrong places, too, now and then: few points say nothing.
 template <typename Align>
 bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
                                     const View& from,
                                     const Align& align,
                                     int top) const {
+  int num_probes = 0;
   int num_with = 0;
   int num_without = 0;
   const std::size_t step = std::max<std::size_t>(1, from.points.size() / kNumProbes);
@@ -189,11 +191,12 @@ bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
         knows_motion ? outlook.turned(point.uv, track.motion) : outlook.turned(point.uv);
     const cv::Point2f without = knows_motion ? outlook.on(track.motion) : cv::Point2f();
     if (const cv::Point2f off = with - without; off.dot(off) > kSameStart_px * kSameStart_px) {
+      ++num_probes;
       num_with += align(point, with, level).correlation >= kMinCorrelation ? 1 : 0;
       num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
     }
   }
-  return num_with > 0 && num_with >= num_without;
+  return num_probes > 0 && num_with >= std::max<double>(num_without, kFewFound * num_probes);
 }
 
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -55,7 +56,7 @@ struct KeptLandmark {
 };
 
 /// Whether hints of the rotation since the last frame are to be believed where nothing is measured:
-/// once the last one that could be compared was right.
+/// once the last few that could be compared were right.
 class HintTrust {
  public:
   void compare(const FrameHints& hints, const Eigen::Quaterniond& measured_prev_from_cur) {
@@ -63,16 +64,18 @@ class HintTrust {
     constexpr double kMaxShare = 0.2;     // .. and this share of the rotation
     if (hints.prev_from_cur) {
       const double angle = Eigen::Quaterniond::Identity().angularDistance(measured_prev_from_cur);
-      is_trusted_ = hints.prev_from_cur->angularDistance(measured_prev_from_cur) <
-                    kMaxOff_rad + kMaxShare * angle;
+      const bool is_right = hints.prev_from_cur->angularDistance(measured_prev_from_cur) <
+                            kMaxOff_rad + kMaxShare * angle;
+      num_right_ = is_right ? std::min(num_right_ + 1, kFew) : 0;
     }
   }
   [[nodiscard]] std::optional<Eigen::Quaterniond> trusted(const FrameHints& hints) const {
-    return is_trusted_ ? hints.prev_from_cur : std::nullopt;
+    return num_right_ == kFew ? hints.prev_from_cur : std::nullopt;
   }
 
  private:
-  bool is_trusted_ = false;
+  static constexpr int kFew = 5;
+  int num_right_ = 0;  ///< in a row, at most so many
 };
 
 /// MapChanges, to be placed by the trajectory.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -41,6 +42,34 @@ TEST_P(MaskedFrontEnd, FindsNoPointsThere) {
   mask.rowRange(200, 300) = 0;  // of the input
   EXPECT_GT(num_below({}), 10);
   EXPECT_EQ(num_below(mask), 0);
+}
+
+TEST_P(MaskedFrontEnd, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
+  FeatureOptions options;
+  options.method = GetParam();
+  const auto front_end = create_front_end(options);
+  cv::Mat all_but_left(300, 480, CV_8UC1, cv::Scalar(1));
+  all_but_left.colRange(0, 100) = 0;
+  front_end->set_mask(all_but_left);
+  cv::Mat all_but_bottom(300, 480, CV_8UC1, cv::Scalar(255));
+  all_but_bottom.rowRange(200, 300) = 0;
+  const auto num_bottom = [](const std::vector<Eigen::Vector2d>& points) {
+    return std::ranges::count_if(points, [](const Eigen::Vector2d& uv) { return uv.y() >= 202.0; });
+  };
+  const auto show = [&](int i, const cv::Mat& mask) {
+    const Matches matches = front_end->process(front_end->prepare(textured(i), mask), {.frame = i});
+    EXPECT_TRUE(std::ranges::all_of(matches.cur_uv, [](const Eigen::Vector2d& uv) {
+      return uv.x() > 96.0;
+    })) << i;
+    return matches;
+  };
+  static_cast<void>(show(0, {}));
+  EXPECT_GT(num_bottom(show(1, {}).cur_uv), 5);
+  const Matches ended = show(2, all_but_bottom);
+  EXPECT_GT(ended.cur_uv.size(), 20U);
+  EXPECT_EQ(num_bottom(ended.cur_uv), 0);
+  EXPECT_EQ(num_bottom(show(3, {}).prev_uv), 0);
+  EXPECT_GT(num_bottom(show(4, {}).prev_uv), 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods,

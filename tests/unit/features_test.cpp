@@ -215,6 +215,48 @@ TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
   EXPECT_LT(median_error_px(far, {-60.0, 0.0}), 0.05);
 }
 
+TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
+  const auto found_after_s = [](double interval_s) {
+    FeatureOptions options;
+    options.klt_levels = 3;
+    const auto front_end = create_front_end(options);
+    for (int i = 0; i < 3; ++i) {
+      static_cast<void>(front_end->process(image_of(wide_texture(30 * i)), {i, 0.1 * i}));
+    }
+    return front_end->process(image_of(wide_texture(180)), {3, 0.2 + interval_s});
+  };
+  const Matches found = found_after_s(0.4);  // three frames were dropped
+  EXPECT_GT(found.cur_uv.size(), 100U);
+  EXPECT_LT(median_error_px(found, {-120.0, 0.0}), 0.05);
+  EXPECT_LT(found_after_s(0.1).cur_uv.size(), found.cur_uv.size() / 2);
+}
+
+TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
+  const auto found_by = [](const std::optional<double>& last_shift_px) {
+    FeatureOptions options;
+    options.klt_levels = 3;
+    const auto front_end = create_front_end(options);
+    const auto show = [&](int shift_px, const std::optional<double>& turn_px) {
+      ImageClue clue;
+      if (turn_px) {
+        clue.turn = Eigen::Matrix3d::Identity();
+        (*clue.turn)(0, 2) = -*turn_px;
+      }
+      return front_end->process(image_of(wide_texture(shift_px)), clue);
+    };
+    for (int i = 0; i < 3; ++i) {
+      static_cast<void>(show(30 * i, 30.0));
+    }
+    return show(190, last_shift_px);
+  };
+  const Matches right = found_by(130.0);
+  EXPECT_GT(right.cur_uv.size(), 100U);
+  EXPECT_LT(median_error_px(right, {-130.0, 0.0}), 0.05);
+  const Matches unknown = found_by(std::nullopt);
+  EXPECT_LT(unknown.cur_uv.size(), right.cur_uv.size() / 2);
+  EXPECT_EQ(found_by(-200.0).track_ids, unknown.track_ids);
+}
+
 TEST(GridQuota, GivesEveryCellItsShare) {
   FeatureOptions options;
   options.max_features = 24;
