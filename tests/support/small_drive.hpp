@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
+#include "dataset/sequence.hpp"
+#include "stemvo/odometry.hpp"
 #include "support/temp_folder.hpp"
 #include "synth/synth.hpp"
 
@@ -23,5 +28,30 @@ class SmallDrive : public ::testing::Test {
   TempFolder folder_;
   std::filesystem::path sequence_ = folder_.path() / "sequences/00";
 };
+
+/// Its frames, rendered once in a process.
+struct SmallFrames {
+  Camera camera;
+  std::vector<cv::Mat> images;
+  PixelOrder order = PixelOrder::kGray;
+
+  [[nodiscard]] static double time_s(std::size_t i) { return 0.1 * static_cast<double>(i); }
+};
+inline const SmallFrames& small_frames() {
+  struct Drive : SmallDrive {
+    void TestBody() override {}
+    [[nodiscard]] SmallFrames read() const {
+      const KittiSequence sequence = KittiSequence::open(sequence_, {}).value();
+      SmallFrames frames{sequence.camera(), {}};
+      for (std::size_t i = 0; i < sequence.size(); ++i) {
+        frames.images.push_back(sequence.read(i).value());
+      }
+      frames.order = frames.images.front().channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
+      return frames;
+    }
+  };
+  static const SmallFrames frames = Drive().read();
+  return frames;
+}
 
 }  // namespace stemvo::testing

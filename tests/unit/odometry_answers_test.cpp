@@ -8,7 +8,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "dataset/sequence.hpp"
 #include "odometry/event_log.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/small_drive.hpp"
@@ -20,19 +19,12 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-class OdometryAnswers : public testing::SmallDrive {
- protected:
-  OdometryAnswers() : source_(KittiSequence::open(sequence_, {}).value()) {}
+Odometry create() { return Odometry::create(testing::small_frames().camera).value(); }
 
-  [[nodiscard]] Odometry create() const { return Odometry::create(source_.camera()).value(); }
-  FrameResult process(Odometry& odometry, std::size_t i) const {
-    const cv::Mat image = source_.read(i).value();
-    const PixelOrder order = image.channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
-    return odometry.process(image, order, source_.time_s(i)).value();
-  }
-
-  KittiSequence source_;
-};
+FrameResult process(Odometry& odometry, std::size_t i) {
+  const testing::SmallFrames& frames = testing::small_frames();
+  return odometry.process(frames.images[i], frames.order, frames.time_s(i)).value();
+}
 
 /// A map that follows the changes of every few frames.
 class Follower {
@@ -60,11 +52,11 @@ class Follower {
   int version_ = 0;
 };
 
-TEST_F(OdometryAnswers, WhoFollowsTheChangesHasTheWholeMap) {
+TEST(OdometryAnswers, WhoFollowsTheChangesHasTheWholeMap) {
   Odometry odometry = create();
   Follower every_frame;
   Follower every_fifth;
-  for (std::size_t i = 0; i < source_.size(); ++i) {
+  for (std::size_t i = 0; i < testing::small_frames().images.size(); ++i) {
     process(odometry, i);
     every_frame.follow(odometry);
     if (i % 5 == 0) {
@@ -89,11 +81,11 @@ TEST_F(OdometryAnswers, WhoFollowsTheChangesHasTheWholeMap) {
   EXPECT_THAT(odometry.landmarks_since(version).removed, IsEmpty());
 }
 
-TEST_F(OdometryAnswers, KeyframesAreFramesWithTheirTimesAndPoses) {
+TEST(OdometryAnswers, KeyframesAreFramesWithTheirTimesAndPoses) {
   Odometry odometry = create();
   std::vector<FrameResult> results;
   std::vector<MapKeyframe> followed;
-  for (std::size_t i = 0; i < source_.size(); ++i) {
+  for (std::size_t i = 0; i < testing::small_frames().images.size(); ++i) {
     results.push_back(process(odometry, i));
     for (const MapKeyframe& keyframe : odometry.keyframes(static_cast<int>(followed.size()))) {
       followed.push_back(keyframe);
@@ -110,7 +102,7 @@ TEST_F(OdometryAnswers, KeyframesAreFramesWithTheirTimesAndPoses) {
   }
 }
 
-TEST_F(OdometryAnswers, AfterAResetAllIsAsNew) {
+TEST(OdometryAnswers, AfterAResetAllIsAsNew) {
   Odometry used = create();
   for (std::size_t i = 12; i < 20; ++i) {
     process(used, i);
@@ -129,11 +121,11 @@ TEST_F(OdometryAnswers, AfterAResetAllIsAsNew) {
   }
 }
 
-TEST_F(OdometryAnswers, OneThatWasMovedFromIsAnErrorOrEmpty) {
+TEST(OdometryAnswers, OneThatWasMovedFromIsAnErrorOrEmpty) {
   Odometry odometry = create();
   process(odometry, 0);
   Odometry other = std::move(odometry);
-  const auto result = odometry.process(source_.read(1).value(), PixelOrder::kGray, 9.0);
+  const auto result = odometry.process(testing::small_frames().images[1], PixelOrder::kGray, 9.0);
   ASSERT_FALSE(result);
   EXPECT_THAT(result.error().message, HasSubstr("moved from"));
   odometry.reset();
@@ -145,7 +137,7 @@ TEST_F(OdometryAnswers, OneThatWasMovedFromIsAnErrorOrEmpty) {
   process(other, 1);
 }
 
-TEST_F(OdometryAnswers, TheLogSaysWhenTheMapWasOpened) {
+TEST(OdometryAnswers, TheLogSaysWhenTheMapWasOpened) {
   Odometry odometry = create();
   std::vector<std::string> lines;
   odometry.set_log([&](LogLevel level, const std::string& line) {
