@@ -60,6 +60,7 @@ class EstimatorRun {
     Frame frame;
     frame.number = static_cast<int>(results.size());
     frame.time_s = next_time_s();
+    frame.hints = std::exchange(hints, {});
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
     frame.matches = std::move(matches);
@@ -84,6 +85,7 @@ class EstimatorRun {
     Frame frame;
     frame.number = static_cast<int>(results.size());
     frame.time_s = next_time_s();
+    frame.hints = std::exchange(hints, {});
     results.push_back(add_frame(estimator_, frame));
     return results.back();
   }
@@ -98,6 +100,7 @@ class EstimatorRun {
   }
 
   double interval_s = 0.1;                                    ///< before the next frame
+  FrameHints hints;                                           ///< of the next frame alone
   cv::Mat image;                                              ///< of the next frame
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::vector<FrameResult> results;

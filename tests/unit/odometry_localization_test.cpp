@@ -50,6 +50,18 @@ TEST(Localization, APredictionThatIsWrongIsNoObstacle) {
   seen.expect_found(seen.from(behind), 0.02);
 }
 
+TEST(Localization, TheNearerOfTwoPredictionsIsKnownByTheLandmarks) {
+  const Seen seen(300, 0.2, 0.2);
+  const Rigid3 near = seen.world_from_camera * Rigid3(so3_exp({0.0, 0.05, 0.0}), {0.0, 0.1, 0.3});
+  const Rigid3 far = seen.world_from_camera * Rigid3(so3_exp({0.0, -0.5, 0.1}), {0.0, 0.1, 0.3});
+  const auto nearer = [&](const Rigid3& a, const Rigid3& b) {
+    return nearer_pose(a, b, seen.landmarks, seen.camera).matrix();
+  };
+  EXPECT_EQ(nearer(near, far), near.matrix());
+  EXPECT_EQ(nearer(far, near), near.matrix());
+  EXPECT_EQ(nearer_pose(far, near, {}, seen.camera).matrix(), far.matrix());
+}
+
 TEST(Localization, MostLandmarksMayBeWrong) {
   const Seen seen(300, 0.2, 0.6);
   seen.expect_found(seen.from(Rigid3()), 0.05);

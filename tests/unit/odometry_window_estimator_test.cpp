@@ -342,5 +342,48 @@ TEST(WindowEstimator, TheSameTracksGiveTheSamePoses) {
   }
 }
 
+TEST(WindowEstimator, AMissingFrameIsAsFarOnAsItsIntervalIsLong) {
+  Driven d(DriveTracks(20, 0.2, 7));
+  d.add_range(0, 15);
+  const double step = d.moved(13, 14);
+  d.run.interval_s = 0.25;
+  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
+  EXPECT_NEAR(d.moved(14, 15), 2.5 * step, 0.05 * step);
+  const double turn = d.pose(13).rotation.angularDistance(d.pose(14).rotation);
+  EXPECT_NEAR(d.pose(14).rotation.angularDistance(d.pose(15).rotation), 2.5 * turn, 0.1 * turn);
+}
+
+TEST(WindowEstimator, TheFirstIntervalIsAUnitLongWhateverItLasts) {
+  for (const double interval_s : {0.01, 0.1, 20.0}) {
+    Driven d(DriveTracks(12, 0.2, 7));
+    d.run.interval_s = interval_s;
+    d.add_range(0, 12);
+    EXPECT_NEAR(d.moved(10, 11), 1.0, 0.1) << interval_s;
+  }
+}
+
+TEST(WindowEstimator, AHintTurnsAFrameWithoutAnImageOnceHintsWereRight) {
+  for (const bool were_right : {true, false}) {
+    Driven d(DriveTracks(20, 0.2, 7));
+    const Eigen::Quaterniond off = so3_exp({0.0, were_right ? 0.005 : 0.5, 0.0});
+    for (int i = 0; i < 15; ++i) {
+      if (i > 0) {
+        d.run.hints.prev_from_cur =
+            (d.drive.pose(i - 1).inverse() * d.drive.pose(i)).rotation * off;
+      }
+      d.run.add(i);
+    }
+    d.run.hints.prev_from_cur = so3_exp({0.0, 0.3, 0.0});
+    d.run.add_missing();
+    const double turn = d.pose(14).rotation.angularDistance(d.pose(15).rotation);
+    EXPECT_NEAR(turn, were_right ? 0.3 : 0.0102, 1e-3);
+    EXPECT_NEAR(d.moved(14, 15), d.moved(13, 14), 0.05);  // the way goes on
+    EXPECT_EQ(d.run.add(15).state, FrameState::kTracking);
+    EXPECT_LT(
+        d.run.results.back().world_from_camera.rotation.angularDistance(d.drive.pose(15).rotation),
+        0.01);
+  }
+}
+
 }  // namespace
 }  // namespace stemvo
