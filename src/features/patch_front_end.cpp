@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
 #include "timing/stage_timer.hpp"
