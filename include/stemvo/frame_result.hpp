@@ -37,8 +37,8 @@ enum class TwoViewModel { kNone, kHomography, kEssential };
 /// How a frame's scale was measured from the road (`scale.source: camera_height`).
 enum class ScaleState {
   kDisabled,  ///< the scale comes from elsewhere
-  kNone,      ///< no road was measured since the map started: the scale is a guess
-  kHeld,      ///< measured before, not on this frame: the last scale is kept, its sigma grows
+  kNone,      ///< no road is believed: lengths are units, the scale is a guess
+  kHeld,      ///< believed, not measured on this frame: the scale is kept, its sigma grows
   kMeasured,  ///< measured on this frame and believed
 };
 /// `disabled`, `none`, `held`, `measured`.

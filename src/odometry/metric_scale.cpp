@@ -34,12 +34,14 @@ void MetricScale::restart(const RoadImage* road) {
   }
 }
 
-double MetricScale::measure(const RoadImage* road, const Rigid3& cur_from_prev) {
+double MetricScale::measure(const RoadImage* road,
+                            const Rigid3& cur_from_prev,
+                            const std::vector<RoadLandmark>& landmarks) {
   if (!road_.has_value() || road == nullptr) {
     return 1.0;
   }
-  const RoadScaleEstimate estimate =
-      timed(Stage::kRoadScale, [&] { return road_->update(*road, cur_from_prev, filter_); });
+  const RoadScaleEstimate estimate = timed(
+      Stage::kRoadScale, [&] { return road_->update(*road, cur_from_prev, filter_, landmarks); });
   keep(estimate);
   if (!estimate.is_initialized) {
     return 1.0;
@@ -52,7 +54,7 @@ double MetricScale::measure(const RoadImage* road, const Rigid3& cur_from_prev) 
 void MetricScale::keep_last(std::string_view reason) {
   if (road_.has_value()) {
     filter_.predict();
-    sigma_ = filter_.sigma();
+    sigma_ = road_->sigma(filter_);
     state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
     reason_ = reason;
   }
@@ -61,15 +63,16 @@ void MetricScale::keep_last(std::string_view reason) {
 void MetricScale::set_unknown(std::string_view reason) {
   if (road_.has_value()) {
     state_ = ScaleState::kNone;
+    sigma_ = ScaleFilter::kUnknownSigma;
     reason_ = reason;
   }
 }
 
 void MetricScale::keep(const RoadScaleEstimate& estimate) {
   sigma_ = estimate.sigma;
-  state_ = estimate.is_measured      ? ScaleState::kMeasured
-           : estimate.is_initialized ? ScaleState::kHeld
-                                     : ScaleState::kNone;
+  state_ = estimate.is_measured   ? ScaleState::kMeasured
+           : estimate.is_believed ? ScaleState::kHeld
+                                  : ScaleState::kNone;
   reason_ = estimate.reason;
 }
 

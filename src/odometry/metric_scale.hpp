@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "odometry/road/image.hpp"
 #include "odometry/road/scale.hpp"
@@ -25,7 +26,9 @@ class MetricScale {
   void restart(const RoadImage* road);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the
   /// factor that makes a unit a metre; the caller multiplies its lengths by it.
-  [[nodiscard]] double measure(const RoadImage* road, const Rigid3& cur_from_prev);
+  [[nodiscard]] double measure(const RoadImage* road,
+                               const Rigid3& cur_from_prev,
+                               const std::vector<RoadLandmark>& landmarks = {});
   /// A frame on which the road cannot be measured: the last scale is kept, its sigma grows.
   void keep_last(std::string_view reason);
   /// A frame without a map to scale.

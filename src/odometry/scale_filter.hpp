@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 namespace stemvo {
 
@@ -28,6 +29,8 @@ class ScaleFilter {
   void predict();
   /// Returns whether the measurement was believed; always where frames are not joined.
   bool update(double log_scale, double sigma, ScaleWitness witness);
+  /// The measurement's distance from the state, standard deviations; nullopt where there is none.
+  [[nodiscard]] std::optional<double> innovation(double log_scale, double sigma) const;
   void shift(double log_factor) { log_scale_ += log_factor; }
   void restart();
 

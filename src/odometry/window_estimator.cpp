@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "odometry/road_landmarks.hpp"
 #include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -301,7 +302,8 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
     const Eigen::Vector3d center = road_pose_.translation;
     const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
     const double factor =
-        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_);
+        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
+                       road_landmarks(window_, world_from_camera_, last_moving_.points, camera()));
     if (factor != 1.0) {
       rescale(window_, factor, center);
       history_.rescale(factor);

@@ -164,11 +164,13 @@ class ResultWriter {
       report.road_measured_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
         return frame.scale_state == ScaleState::kMeasured;
       });
+      report.road_believed_fraction = share_of(drive_.frames, [](const FrameResult& frame) {
+        return frame.scale_state == ScaleState::kMeasured || frame.scale_state == ScaleState::kHeld;
+      });
     }
     if (truth_) {
       // A trajectory without a scale has no error in metres until one is fitted.
-      const Alignment alignment =
-          report.scale_source == "none" ? Alignment::kSim3 : Alignment::kNone;
+      const Alignment alignment = report.is_up_to_scale() ? Alignment::kSim3 : Alignment::kNone;
       report.metrics = evaluate_aligned(take_poses(trajectory_, truth_->frames), truth_->poses,
                                         alignment, config.evaluation);
     }
@@ -202,7 +204,7 @@ class ResultWriter {
         plot.subtitle += fmt::format(", ground truth for {} of {} frames", truth_->frames.size(),
                                      trajectory_.size());
       }
-    } else if (report.scale_source == "none") {
+    } else if (report.is_up_to_scale()) {
       plot.unit = "units";
     }
     return plot;

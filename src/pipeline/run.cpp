@@ -110,6 +110,9 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   }
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
+  if (std::string warning = warn_of_road(report); !warning.empty()) {
+    done.warnings.push_back(std::move(warning));
+  }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};
 }

@@ -77,6 +77,7 @@ Json metrics_document(const MetricsReport& report) {
                {"in_place_fraction", report.in_place_fraction},
                {"camera", report.camera},
                {"road_measured_fraction", report.road_measured_fraction},
+               {"road_believed_fraction", report.road_believed_fraction},
                {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
   add_metrics(json, report.metrics);
   if (report.timing) {

@@ -34,18 +34,30 @@ struct MetricsReport {
   double in_place_fraction = 0.0;  ///< frames behind the first that measured no translation
   CameraReport camera;
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
+  /// Frames whose scale was in metres: `measured` or `held`; nullopt as above.
+  std::optional<double> road_believed_fraction;
   std::optional<Metrics> metrics;
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
+
+  /// Lengths are units: nobody gave metres, or the road that should was never believed.
+  [[nodiscard]] bool is_up_to_scale() const {
+    return scale_source == "none" || road_believed_fraction == 0.0;
+  }
 };
+
+/// Frames in metres are fewer than this share: a warning.
+inline constexpr double kFewBelieved = 0.5;
+/// What to say of a road that was believed never or on few frames; empty where all is well.
+[[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
 /// in_place_fraction camera{fx_px,fy_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px} (as it was
-/// known in the end; sigmas are null where it is not refined) road_measured_fraction (of all
-/// frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent,
-/// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
-/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
-/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg and, only where it was asked for,
-/// timing{threads fps peak_memory_mib cpu_s other_cpu_s
+/// known in the end; sigmas are null where it is not refined) road_measured_fraction
+/// road_believed_fraction (of all frames; null where the road is not asked) alignment (of
+/// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
+/// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
+/// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
+/// and, only where it was asked for, timing{threads fps peak_memory_mib cpu_s other_cpu_s
 /// stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers
 /// round-trip; a number that is not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,

@@ -14,12 +14,13 @@ constexpr double kInPlace = 0.95;  ///< a larger share of such frames is told
 
 std::string scale_explained(const MetricsReport& report) {
   const std::string& source = report.scale_source;
-  if (source == "none" && report.metrics) {
-    return source + " (files: up to scale; here: fitted to the true metres)";
+  const std::string shown = source == "none" ? source : source + ", no road believed";
+  if (report.is_up_to_scale() && report.metrics) {
+    return shown + " (files: up to scale; here: fitted to the true metres)";
   }
   return source == "ground_truth"     ? source + " (each step rescaled to its true length)"
          : source == "constant_speed" ? source + " (every step the same length: not metric)"
-         : source == "none"           ? source + " (up to scale: units, not metres)"
+         : report.is_up_to_scale()    ? shown + " (up to scale: units, not metres)"
                                       : source;
 }
 
@@ -48,8 +49,9 @@ std::string head(const MetricsReport& report) {
                                sigma->fx_px)});
   }
   if (report.road_measured_fraction) {
-    table.add({"road", fmt::format("measured on {:.1f} % of the frames",
-                                   100.0 * *report.road_measured_fraction)});
+    table.add({"road", fmt::format("measured on {:.1f} % of the frames, believed on {:.1f} %",
+                                   100.0 * *report.road_measured_fraction,
+                                   100.0 * report.road_believed_fraction.value_or(0.0))});
   }
   if (report.metrics) {
     table.add({"path", format_length(report.metrics->path_length_m, 1) + " m (ground truth)"});
@@ -80,7 +82,7 @@ std::string error_table(const MetricsReport& report) {
         std::pair(Alignment::kSe3, "rotation and shift fitted"),
         std::pair(Alignment::kSim3, "rotation, shift and scale fitted")}) {
     const bool is_scaled = alignment == Alignment::kScale || alignment == Alignment::kSim3;
-    if (report.scale_source == "none" && !is_scaled) {
+    if (report.is_up_to_scale() && !is_scaled) {
       continue;  // units against metres
     }
     table.add({"position ATE", format_length(m.ate_rmse.after_m(alignment), 2), "m",
@@ -94,6 +96,18 @@ std::string error_table(const MetricsReport& report) {
 }
 
 }  // namespace
+
+std::string warn_of_road(const MetricsReport& report) {
+  const double share = report.road_believed_fraction.value_or(1.0);
+  return share == 0.0 ? "scale: no road was believed at scale.camera_height_m below the camera; "
+                        "the path is in units, not metres"
+         : share < kFewBelieved
+             ? fmt::format(
+                   "scale: a road was believed on {:.1f} % of the frames only; the others' "
+                   "lengths are a guess (scale_state in frames.csv)",
+                   100.0 * share)
+             : "";
+}
 
 std::string format_metrics_table(const MetricsReport& report) {
   if (!report.metrics) {

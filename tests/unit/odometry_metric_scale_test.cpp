@@ -36,23 +36,29 @@ double step_m(const EstimatorRun& run, int i) {
 class MetricScaleOf : public ::testing::TestWithParam<OdometryMode> {};
 
 TEST_P(MetricScaleOf, WithoutARoadTheLastScaleIsKeptAndItsDoubtGrows) {
-  const RoadDrive drive(20);
+  const RoadDrive drive(26);
   const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
-  const int num_seen = 12;
+  const int num_seen = 18;
+  const int num_proven = 16;
+  bool is_proven = false;
   run.road = [&](int i) { return drive.road_image(i, i < num_seen); };
   run.add_all();
   const double unknown = run.results[0].scale_sigma.value();
   EXPECT_EQ(run.results[0].scale_state, ScaleState::kNone);
   EXPECT_EQ(run.results[0].road_reason, "first frame");
   double last_sigma = unknown;
-  for (int i = 1; i < 20; ++i) {
+  for (int i = 1; i < 26; ++i) {
     const FrameResult& result = run.results[static_cast<std::size_t>(i)];
     if (step_m(run, i) == 0.0) {  // waits for parallax
       EXPECT_LT(i, 5);
       EXPECT_EQ(result.state, FrameState::kInitializing) << i;
       EXPECT_EQ(result.scale_state, ScaleState::kNone) << i;
       EXPECT_EQ(result.road_reason, "no map") << i;
+    } else if (i < num_proven) {
+      is_proven = is_proven || result.scale_state == ScaleState::kMeasured;
+      EXPECT_EQ(result.scale_sigma == ScaleFilter::kUnknownSigma, !is_proven) << i;
+      EXPECT_EQ(result.scale_state, is_proven ? ScaleState::kMeasured : ScaleState::kNone) << i;
     } else if (i < num_seen) {
       EXPECT_EQ(result.scale_state, ScaleState::kMeasured) << i << ": " << result.road_reason;
       EXPECT_EQ(result.road_reason, "");
@@ -82,21 +88,21 @@ TEST_P(MetricScaleOf, ARoadThatIsNotAskedIsDisabled) {
 }
 
 TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
-  const RoadDrive drive(12);
+  const RoadDrive drive(20);
   const auto estimator = make_estimator(metric_config(GetParam()), drive.scene.camera);
   EstimatorRun run(*estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, true); };
-  run.add_range(0, 10);
+  run.add_range(0, 18);
   const FrameResult missing = run.add_missing();
   EXPECT_EQ(missing.state, FrameState::kNoImage);
   EXPECT_EQ(missing.scale_state, ScaleState::kHeld);
   EXPECT_EQ(missing.road_reason, "no image");
-  EXPECT_GT(missing.scale_sigma, run.results[9].scale_sigma);
-  EXPECT_NEAR(step_m(run, 10), kStep_m, 0.03 * kStep_m);  // the motion goes on
-  const FrameResult after = run.add(11);
+  EXPECT_GT(missing.scale_sigma, run.results[17].scale_sigma);
+  EXPECT_NEAR(step_m(run, 18), kStep_m, 0.03 * kStep_m);  // the motion goes on
+  const FrameResult after = run.add(19);
   EXPECT_EQ(after.scale_state, ScaleState::kMeasured) << after.road_reason;
   EXPECT_NEAR(
-      after.world_from_camera.translation.z() - run.results[9].world_from_camera.translation.z(),
+      after.world_from_camera.translation.z() - run.results[17].world_from_camera.translation.z(),
       2.0 * kStep_m, 0.05 * kStep_m);
 }
 
@@ -109,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(Modes,
 
 // The first road multiplies the window; landmarks stay in the units of the poses that place them.
 TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
-  const int num_frames = 44;
+  const int num_frames = 56;
   const int first_road = 32;
   RoadDrive drive(num_frames);
   drive.tracks.renew_tracks(12, 0);  // so that a keyframe leaves

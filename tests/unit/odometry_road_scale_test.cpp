@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -68,8 +69,10 @@ TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
 struct Scale {
   explicit Scale(const RoadOptions& options = {}) : road(options) {}
 
-  RoadScaleEstimate update(RoadImage image, const Rigid3& motion) {
-    return road.update(std::move(image), motion, filter);
+  RoadScaleEstimate update(RoadImage image,
+                           const Rigid3& motion,
+                           const std::vector<RoadLandmark>& landmarks = {}) {
+    return road.update(std::move(image), motion, filter, landmarks);
   }
   RoadScale road;
   ScaleFilter filter{kDriftSigma};
@@ -87,7 +90,7 @@ class Drive {
     const cv::Mat image =
         testing::render_road(scene_, camera_from_first, static_cast<std::uint64_t>(frame_));
     ++frame_;
-    return scale.update(make_road_image({image, {}}, scene_.camera), step());
+    return scale.update(make_road_image({image, {}}, scene_.camera), step(), landmarks);
   }
   /// A frame that shows the last place again.
   RoadScaleEstimate stand(Scale& scale) {
@@ -98,6 +101,7 @@ class Drive {
     return scale.update(make_road_image({image, {}}, scene_.camera), Rigid3{});
   }
   double metres_per_unit = kMetresPerUnit;
+  std::vector<RoadLandmark> landmarks;
 
  private:
   [[nodiscard]] Rigid3 step() const {
@@ -135,19 +139,52 @@ TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
   Drive drive;
   Scale scale;
   RoadScaleEstimate seen;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < 13; ++i) {
     seen = drive.next(scale);
   }
+  EXPECT_TRUE(seen.is_believed);
   RoadScaleEstimate lost;
   for (int i = 0; i < 6; ++i) {
     lost = drive.next(scale, false);
     EXPECT_FALSE(lost.is_measured);
     EXPECT_FALSE(lost.reason.empty());
+    EXPECT_TRUE(lost.is_believed);
   }
   EXPECT_EQ(lost.metres_per_unit, seen.metres_per_unit);
   EXPECT_GT(lost.sigma, seen.sigma);
   drive.next(scale);
   EXPECT_TRUE(drive.next(scale).is_measured);
+}
+
+/// Drives over asphalt with landmarks of a plane that is `ratio` times as far below the camera.
+RoadScaleEstimate drive_with_landmarks(double ratio, double noise) {
+  Drive drive;
+  Scale scale;
+  RoadScaleEstimate estimate;
+  const double height = ratio * RoadOptions().camera_height_m / Drive::kMetresPerUnit;
+  for (int i = 0; i < 20; ++i) {
+    for (int k = 0; k < 8; ++k) {
+      const double z = height * (5.0 + 0.8 * k);
+      drive.landmarks.push_back({{0.02 * k * height, height, z}, noise});
+    }
+    estimate = drive.next(scale);
+    drive.landmarks.clear();
+  }
+  return estimate;
+}
+
+TEST(RoadScale, LandmarksBelowOrAboveThePlaneSayThatItIsNoRoad) {
+  EXPECT_TRUE(drive_with_landmarks(1.0, 0.02).is_measured);
+  for (const double ratio : {1.6, 0.6}) {
+    const RoadScaleEstimate estimate = drive_with_landmarks(ratio, 0.02);
+    EXPECT_FALSE(estimate.is_believed) << ratio;
+    EXPECT_FALSE(estimate.is_measured) << ratio;
+    EXPECT_EQ(estimate.reason, "landmarks are not on it") << ratio;
+    EXPECT_EQ(estimate.sigma, ScaleFilter::kUnknownSigma) << ratio;
+    // A guess, the best there is.
+    EXPECT_NEAR(std::log(estimate.metres_per_unit / Drive::kMetresPerUnit), 0.0, 0.02) << ratio;
+  }
+  EXPECT_TRUE(drive_with_landmarks(1.6, 0.5).is_measured);  // nobody knows where they are
 }
 
 /// Error of log(metres per unit) after a drive over a crest, y = bend z^2, that ends at its top.

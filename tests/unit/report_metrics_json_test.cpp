@@ -40,6 +40,7 @@ MetricsReport example() {
           .tracked_fraction = 0.995,
           .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, CameraSigma{3.5, 0.5, 0.75}},
           .road_measured_fraction = 0.75,
+          .road_believed_fraction = 0.875,
           .metrics = metrics,
           .timing = {}};
 }
@@ -79,10 +80,11 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
   EXPECT_EQ(json["alignment"], "none");
   EXPECT_EQ(json["road_measured_fraction"], 0.75);
+  EXPECT_EQ(json["road_believed_fraction"], 0.875);
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
       "cx_px": 600.5, "cy_px": 180.25,
       "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_EQ(json.size(), 23U);
+  EXPECT_EQ(json.size(), 24U);
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {
@@ -122,6 +124,22 @@ TEST(MetricsJson, SurvivesNamesThatAreNotUtf8AndFoldersThatAreNotThere) {
   const Status status = write_metrics_json("/nonexistent/metrics.json", report);
   ASSERT_FALSE(status);
   EXPECT_THAT(status.error().message, HasSubstr("/nonexistent/metrics.json: cannot write"));
+}
+
+TEST(MetricsTable, SaysWhereARoadWasBelievedNeverOrSeldom) {
+  MetricsReport report = example();
+  EXPECT_EQ(warn_of_road(report), "");
+  EXPECT_FALSE(report.is_up_to_scale());
+  report.scale_source = "camera_height";
+  report.road_believed_fraction = 0.125;
+  EXPECT_THAT(warn_of_road(report), HasSubstr("12.5 % of the frames only"));
+  EXPECT_FALSE(report.is_up_to_scale());
+  report.road_believed_fraction = 0.0;
+  EXPECT_THAT(warn_of_road(report), HasSubstr("in units, not metres"));
+  EXPECT_TRUE(report.is_up_to_scale());
+  EXPECT_THAT(format_metrics_table(report), HasSubstr("camera_height, no road believed"));
+  report.road_believed_fraction.reset();
+  EXPECT_EQ(warn_of_road(report), "");
 }
 
 TEST(MetricsTable, NamesTheAlignmentAndTheNullRow) {

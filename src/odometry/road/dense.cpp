@@ -30,6 +30,8 @@ constexpr double kSearchScaleSigma =
 constexpr double kSearchStep = 0.03;
 constexpr double kMaxSearch = 1.8;
 constexpr int kMinTileSamples = 20;
+/// A plane so many times farther away does not move.
+constexpr double kNoPlane = 1e-6;
 /// Residuals beyond the images' own standard deviation count linearly.
 constexpr float kHuberResidual = 1.0F;
 
@@ -268,6 +270,12 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
     }
   }
   RoadMeasurement result = read_road(warp, covariance, step.options.camera_height_m);
+  // What agrees without the plane (far, blurred) proves none.
+  RoadWarp no_plane = warp;
+  no_plane.plane *= kNoPlane;
+  const Grid& sparse = grids.front();
+  result.correlation = correlation - std::max(0.0, correlate_road(sparse.prev, sparse.cur,
+                                                                  sparse.samples, no_plane));
   result.is_valid = correlation > kMinCorrelation && result.sigma < kMaxDenseSigma;
   result.reason = result.is_valid ? "" : "the images of the road hardly agree";
   return result;
@@ -280,7 +288,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     return no_road("no motion");
   }
   if (step.prev.full.values.empty() || step.cur.full.values.empty()) {
-    return no_road("the image ends above the road");
+    return no_road("the image ends above the road", false);
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
   const auto grid = [&](const RoadImage::Level& prev, const RoadImage::Level& cur, int step_u,
@@ -294,7 +302,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     const RoadImage::Level half_prev = make_half_level(step.prev);
     const RoadImage::Level half_cur = make_half_level(step.cur);
     if (half_prev.values.empty() || half_cur.values.empty()) {
-      return no_road("the image ends above the road");
+      return no_road("the image ends above the road", false);
     }
     const Grid sparse = grid(half_prev, half_cur, 2, 2);
     grids.push_back(sparse.samples.size() < kFewSamples ? grid(half_prev, half_cur, 1, 1) : sparse);
@@ -307,7 +315,7 @@ RoadMeasurement measure_dense(const RoadStep& step) {
     grids.back() = grid(step.prev.full, step.cur.full, 1, 1);
   }
   if (grids.back().samples.size() < kMinSamples) {
-    return no_road("too little road in sight");
+    return no_road("too little road in sight", false);
   }
   return refine(step, grids, warp);
 }

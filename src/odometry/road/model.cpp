@@ -81,8 +81,9 @@ RoadMeasurement read_road(const RoadWarp& warp,
   return result;
 }
 
-RoadMeasurement no_road(std::string_view reason) {
+RoadMeasurement no_road(std::string_view reason, bool is_in_sight) {
   RoadMeasurement result;
+  result.is_in_sight = is_in_sight;
   result.reason = reason;
   return result;
 }

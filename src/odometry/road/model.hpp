@@ -63,6 +63,8 @@ struct RoadMeasurement {
   double slope_rad = 0.0;
   double roll_rad = 0.0;
   double drop = 0.0;
+  double correlation = 0.0;      ///< dense: of the images, more than without the plane
+  bool is_in_sight = true;       ///< false where the strip is not in the image: that proves nothing
   std::string_view reason = "";  ///< why it is not valid
 };
 
@@ -124,6 +126,6 @@ struct RoadNormal {
                                         const RoadMatrix& covariance,
                                         double camera_height_m);
 /// A measurement that failed.
-[[nodiscard]] RoadMeasurement no_road(std::string_view reason);
+[[nodiscard]] RoadMeasurement no_road(std::string_view reason, bool is_in_sight = true);
 
 }  // namespace stemvo

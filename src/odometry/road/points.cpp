@@ -224,7 +224,7 @@ RoadMeasurement measure_points(const RoadStep& step) {
     return no_road("no motion");
   }
   if (step.cur.full.values.empty() || step.prev.pixels.size() != step.cur.pixels.size()) {
-    return no_road("the image ends above the road");
+    return no_road("the image ends above the road", false);
   }
   const RoadRegion region(step.cur_from_prev, step.prior, step.options);
   const Strip strip = find_strip(step.cur, region, step.options);

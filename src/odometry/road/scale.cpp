@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "odometry/road/region.hpp"
+
 namespace stemvo {
 
 namespace {
@@ -15,8 +17,43 @@ constexpr double kSearchSigma = 0.3;
 constexpr int kFramesUntilSearch = 5;
 /// Nearer than this share of the wanted baseline, a pair of frames is not worth looking at.
 constexpr double kStandingShare = 0.25;
+/// A landmark is off the plane beyond so many standard deviations of its inverse depth and of the
+/// road's, which is no plane.
+constexpr double kOffPlane = 2.5;
+constexpr double kPlaneSigma = 0.07;
+/// One that would be on a plane twice as far away as well proves nothing.
+constexpr double kMaxLandmarkSigma = 0.2;
+
+/// What the estimators that measured say together.
+struct Joined {
+  int num = 0;
+  double log_scale = 0.0;
+  double sigma = 0.0;
+};
+
+/// They share the error of flatness_sigma: the same road, not quite as the model.
+Joined join(const RoadMeasurement& dense, const RoadMeasurement& points, double flatness_sigma) {
+  Joined joined;
+  double weight = 0.0;
+  for (const RoadMeasurement* road : {&dense, &points}) {
+    if (road->is_valid) {
+      ++joined.num;
+      weight += 1.0 / (road->sigma * road->sigma);
+      joined.log_scale += road->log_scale / (road->sigma * road->sigma);
+    }
+  }
+  joined.log_scale /= weight;
+  joined.sigma = std::hypot(1.0 / std::sqrt(weight), flatness_sigma);
+  return joined;
+}
 
 }  // namespace
+
+double RoadScale::sigma(const ScaleFilter& filter) const {
+  const double sigma = belief_.sigma_factor() * filter.sigma();
+  return belief_.is_believed() ? std::min(ScaleFilter::kUnknownSigma, sigma)
+                               : ScaleFilter::kUnknownSigma;
+}
 
 void RoadScale::rescale(double factor) {
   path_.rescale(factor);
@@ -26,6 +63,7 @@ void RoadScale::rescale(double factor) {
 }
 
 void RoadScale::restart() {
+  belief_.restart();
   past_.clear();
   path_.restart();
   frames_unmeasured_ = 0;
@@ -74,12 +112,41 @@ void RoadScale::remember(RoadImage image) {
   }
 }
 
-std::string_view RoadScale::measure(const Past& past, const RoadImage& image, ScaleFilter& filter) {
-  RoadPrior prior = make_prior(past.now_from_past, filter);
+void RoadScale::count(const std::vector<RoadLandmark>& landmarks,
+                      const Rigid3& motion,
+                      const RoadPrior& road,
+                      RoadEvidence& evidence) const {
+  const RoadRegion region(motion, road, options_);
+  const RoadWarp warp(motion, road, options_.camera_height_m);
+  for (const RoadLandmark& landmark : landmarks) {
+    const Eigen::Vector3d ray = landmark.in_camera / landmark.in_camera.z();
+    const double on_plane = warp.inverse_depth(ray);
+    if (!(on_plane > 0.0) || !region.contains(region.on_ground(ray.head<2>()))) {
+      continue;
+    }
+    const double share = 1.0 / (landmark.in_camera.z() * on_plane);
+    const double sigma = std::hypot(landmark.sigma * share, kPlaneSigma);
+    const double nearer = (share - 1.0) / sigma;
+    if (std::abs(nearer) < kOffPlane && sigma > kMaxLandmarkSigma) {
+      continue;
+    }
+    ++(std::abs(nearer) < kOffPlane ? evidence.num_on
+       : nearer > 0.0               ? evidence.num_above
+                                    : evidence.num_below);
+  }
+}
+
+std::string_view RoadScale::measure(const Past& past,
+                                    const RoadImage& image,
+                                    ScaleFilter& filter,
+                                    const std::vector<RoadLandmark>& landmarks) {
+  const RoadPrior predicted = make_prior(past.now_from_past, filter);
+  RoadPrior prior = predicted;
   const RoadStep step{past.image, image, past.now_from_past, prior, options_};
-  RoadMeasurement dense;
-  RoadMeasurement points;
-  if (options_.use_dense || !filter.is_initialized()) {  // the corners cannot search for a scale
+  RoadMeasurement dense = no_road("", false);
+  RoadMeasurement points = no_road("", false);
+  const bool asks_dense = options_.use_dense || !filter.is_initialized();
+  if (asks_dense) {  // the corners cannot search for a scale
     dense = measure_dense(step);
   }
   if (options_.use_points) {
@@ -88,26 +155,43 @@ std::string_view RoadScale::measure(const Past& past, const RoadImage& image, Sc
     }
     points = measure_points(step);
   }
-  double weight = 0.0;
-  double sum = 0.0;
-  for (const RoadMeasurement* road : {&dense, &points}) {
-    if (road->is_valid) {
-      weight += 1.0 / (road->sigma * road->sigma);
-      sum += road->log_scale / (road->sigma * road->sigma);
+  const Joined joined = join(dense, points, options_.flatness_sigma);
+  RoadEvidence evidence;
+  evidence.is_in_sight = dense.is_in_sight || (points.is_in_sight && !asks_dense);
+  evidence.measured_share = static_cast<double>(joined.num) /
+                            ((asks_dense ? 1.0 : 0.0) + (options_.use_points ? 1.0 : 0.0));
+  prior = predicted;
+  if (joined.num > 0) {
+    evidence.innovation = filter.innovation(joined.log_scale, joined.sigma);
+    const RoadMeasurement& best = dense.is_valid ? dense : points;
+    const Eigen::Vector2d profile(best.slope_rad - prior.slope_rad, best.drop - prior.drop);
+    evidence.profile_chi2 = profile.dot(prior.profile_information * profile);
+    evidence.roll_chi2 = std::pow((best.roll_rad - prior.roll_rad) / prior.roll_sigma, 2);
+    if (dense.is_valid) {
+      evidence.correlation = dense.correlation;
     }
+    prior.log_scale = joined.log_scale;
+    prior.slope_rad = best.slope_rad;
+    prior.roll_rad = best.roll_rad;
+    prior.drop = best.drop;
   }
-  if (!(weight > 0.0)) {
+  count(landmarks, past.now_from_past, prior, evidence);
+  belief_.add(evidence);
+  const bool is_near =
+      joined.num > 0 && filter.update(joined.log_scale, joined.sigma, ScaleWitness::kRoad);
+  frames_unmeasured_ = is_near ? 0 : frames_unmeasured_ + 1;
+  if (joined.num == 0) {
     return options_.use_dense ? dense.reason : points.reason;
   }
-  // They share the error of flatness_sigma: the same road, not quite as the model.
-  const double sigma = std::hypot(1.0 / std::sqrt(weight), options_.flatness_sigma);
-  const bool is_believed = filter.update(sum / weight, sigma, ScaleWitness::kRoad);
-  return is_believed ? "" : "differs from the frames before";
+  return !is_near                 ? "differs from the frames before"
+         : !belief_.is_believed() ? belief_.doubt()
+                                  : "";
 }
 
 RoadScaleEstimate RoadScale::update(RoadImage image,
                                     const Rigid3& cur_from_prev,
-                                    ScaleFilter& filter) {
+                                    ScaleFilter& filter,
+                                    const std::vector<RoadLandmark>& landmarks) {
   if (!past_.empty()) {
     path_.move(cur_from_prev);
   }
@@ -118,9 +202,8 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
   const Past* past = pick_past(filter);
   if (past != nullptr) {
     filter.predict();
-    result.reason = measure(*past, image, filter);
+    result.reason = measure(*past, image, filter, landmarks);
     result.is_measured = result.reason.empty();
-    frames_unmeasured_ = result.is_measured ? 0 : frames_unmeasured_ + 1;
     remember(std::move(image));
   } else if (past_.empty()) {
     result.reason = "first frame";
@@ -130,7 +213,8 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
   }
   result.is_initialized = filter.is_initialized();
   result.metres_per_unit = std::exp(filter.log_scale());
-  result.sigma = filter.sigma();
+  result.is_believed = belief_.is_believed();
+  result.sigma = sigma(filter);
   return result;
 }
 

@@ -3,7 +3,9 @@
 
 #include <deque>
 #include <string_view>
+#include <vector>
 
+#include "odometry/road/belief.hpp"
 #include "odometry/road/estimators.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/road/model.hpp"
@@ -17,6 +19,7 @@ namespace stemvo {
 struct RoadScaleEstimate {
   double metres_per_unit = 1.0;  ///< metres = metres_per_unit * units of the given motions
   double sigma = 0.0;            ///< of log(metres_per_unit)
+  bool is_believed = false;      ///< it is the road; else metres_per_unit is a guess
   bool is_initialized = false;   ///< a road was seen since the start (or since restart())
   bool is_measured = false;      ///< this frame's road was measured and believed
   std::string_view reason = "";  ///< where is_measured is false
@@ -29,8 +32,14 @@ class RoadScale {
 
   /// One call per frame with an image. `cur_from_prev`: the motion since the
   /// last call, in units of the map (ignored at the first call and after restart()). The filter,
-  /// which others measure for too, says what is known before, and takes what is measured.
-  RoadScaleEstimate update(RoadImage image, const Rigid3& cur_from_prev, ScaleFilter& filter);
+  /// which others measure for too, says what is known before, and takes what is measured. The
+  /// landmarks, in the current camera, are witnesses of what is measured.
+  RoadScaleEstimate update(RoadImage image,
+                           const Rigid3& cur_from_prev,
+                           ScaleFilter& filter,
+                           const std::vector<RoadLandmark>& landmarks = {});
+  /// Of log(metres per unit) by this filter: unknown while no road is believed.
+  [[nodiscard]] double sigma(const ScaleFilter& filter) const;
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);
   /// Nothing connects the next frame with the ones before (lost, cut): units may be different ones.
@@ -46,10 +55,19 @@ class RoadScale {
   [[nodiscard]] RoadPrior make_prior(const Rigid3& motion, const ScaleFilter& filter) const;
   void remember(RoadImage image);
   /// Both estimators, joined and given to the filter. Returns why nothing is believed, else empty.
-  std::string_view measure(const Past& past, const RoadImage& image, ScaleFilter& filter);
+  std::string_view measure(const Past& past,
+                           const RoadImage& image,
+                           ScaleFilter& filter,
+                           const std::vector<RoadLandmark>& landmarks);
+  /// Counts the landmarks seen through the strip of `road`.
+  void count(const std::vector<RoadLandmark>& landmarks,
+             const Rigid3& motion,
+             const RoadPrior& road,
+             RoadEvidence& evidence) const;
 
   RoadOptions options_;
   RoadPath path_;
+  RoadBelief belief_;
   std::deque<Past> past_;  ///< newest first
   int frames_unmeasured_ = 0;
 };
