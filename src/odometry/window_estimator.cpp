@@ -301,9 +301,11 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
     const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
-    const double factor =
-        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
-                       road_landmarks(window_, world_from_camera_, last_moving_.points, camera()));
+    const auto landmarks = scale_.is_enabled() ? road_landmarks(window_, world_from_camera_,
+                                                                last_moving_.points, camera())
+                                               : std::vector<RoadLandmark>();
+    const double factor = scale_.measure(frame.road ? &road : nullptr,
+                                         world_from_camera_.inverse() * road_pose_, landmarks);
     if (factor != 1.0) {
       rescale(window_, factor, center);
       history_.rescale(factor);
