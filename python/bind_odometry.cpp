@@ -181,6 +181,10 @@ void make_odometry(PythonOdometry* self,
                    const nb::object& options,
                    const std::optional<AnyArray>& mask) {
   const Config config = config_of(options);
+  if (config.scale_choice == ScaleChoice::kGroundTruth) {
+    throw nb::value_error(
+        "scale.source: expected none, constant_speed or camera_height, found ground_truth");
+  }
   const cv::Mat given = mask ? value_or_raise(view_of(*mask, "mask")).pixels : cv::Mat();
   if (const FrameList* frames = frames_of(camera)) {
     new (self) PythonOdometry(frames->camera, dataset::with_camera_height(config, *frames),
