@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "geometry/cauchy_loss.hpp"
+#include "geometry/reprojection.hpp"
 #include "internal_check.hpp"
 #include "sampson.hpp"
 
@@ -18,7 +19,6 @@ namespace {
 /// A shorter step ends the minimization: rad, and units of length.
 constexpr double kMotionTolerance = 1e-10;
 constexpr double kPoseTolerance = 1e-7;
-constexpr double kMinDepth = 1e-6;
 /// Error of a point behind the camera, so that no step gains by pushing points behind it.
 constexpr double kBehindErrorPx = 1e3;
 
@@ -82,20 +82,13 @@ std::vector<RayPair> rays_of(const PixelPairs& pairs, const Camera& camera) {
 
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
-/// Two unit vectors that span the plane at right angles to a unit vector.
-Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& direction) {
-  Eigen::Matrix<double, 3, 2> basis;
-  basis.col(0) = direction.unitOrthogonal();
-  basis.col(1) = direction.cross(basis.col(0));
-  return basis;
-}
-
 QuadraticModel<5> linearize_motion(const Rigid3& motion,
                                    const std::vector<RayPair>& rays,
                                    const Camera& camera,
                                    double loss_scale_px) {
   const Eigen::Matrix3d rotation = motion.rotation_matrix();
-  const Eigen::Matrix<double, 2, 3> to_tangent = tangent_basis(motion.translation).transpose();
+  const Eigen::Matrix<double, 2, 3> to_tangent =
+      internal::tangent_basis(motion.translation).transpose();
   const Eigen::Vector3d squared_inverse_focal(1.0 / (camera.fx_px * camera.fx_px),
                                               1.0 / (camera.fy_px * camera.fy_px), 0.0);
   QuadraticModel<5> equations;
@@ -115,7 +108,7 @@ QuadraticModel<5> linearize_motion(const Rigid3& motion,
 }
 
 Rigid3 move_motion(const Rigid3& motion, const Vector5d& step) {
-  const Eigen::Vector3d tangent = tangent_basis(motion.translation) * step.tail<2>();
+  const Eigen::Vector3d tangent = internal::tangent_basis(motion.translation) * step.tail<2>();
   // The rotation that carries the direction along the tangent keeps it on the sphere.
   const Eigen::Vector3d moved = so3_exp(motion.translation.cross(tangent)) * motion.translation;
   return {so3_exp(step.head<3>()) * motion.rotation, moved.normalized()};
@@ -141,8 +134,6 @@ QuadraticModel<3> linearize_rotation(const Eigen::Quaterniond& rotation,
   return equations;
 }
 
-/// Residual projected - measured, px; its Jacobian by (w, v), x_in_camera <- exp(w) x_in_camera +
-/// v.
 QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
                                  std::span<const Eigen::Vector3d> points,
                                  std::span<const Eigen::Vector2d> uv,
@@ -153,22 +144,14 @@ QuadraticModel<6> linearize_pose(const Rigid3& camera_from_world,
   CauchyLoss loss(loss_scale_px);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d x = rotation * points[i] + camera_from_world.translation;
-    if (!(x.z() > kMinDepth)) {
+    if (!(x.z() > internal::kMinDepth)) {
       loss.add(kBehindErrorPx * kBehindErrorPx);
       continue;
     }
-    const double inverse_z = 1.0 / x.z();
-    const double u = x.x() * inverse_z;
-    const double v = x.y() * inverse_z;
-    const Eigen::Vector2d error =
-        Eigen::Vector2d(camera.fx_px * u + camera.cx_px, camera.fy_px * v + camera.cy_px) - uv[i];
-    const Eigen::Vector3d u_by_x = camera.fx_px * inverse_z * Eigen::Vector3d(1.0, 0.0, -u);
-    const Eigen::Vector3d v_by_x = camera.fy_px * inverse_z * Eigen::Vector3d(0.0, 1.0, -v);
-    Eigen::Matrix<double, 6, 2> jacobian;  // transposed
-    jacobian << x.cross(u_by_x), x.cross(v_by_x), u_by_x, v_by_x;
-    const Eigen::Matrix<double, 6, 2> weighted = loss.add(error.squaredNorm()) * jacobian;
-    equations.hessian.noalias() += weighted * jacobian.transpose();
-    equations.gradient.noalias() += weighted * error;
+    const internal::ReprojectionTerm at = internal::reprojection_term(x, uv[i], camera);
+    const Eigen::Matrix<double, 6, 2> weighted = loss.add(at.error.squaredNorm()) * at.jacobian;
+    equations.hessian.noalias() += weighted * at.jacobian.transpose();
+    equations.gradient.noalias() += weighted * at.error;
   }
   equations.cost = loss.sum();
   return equations;

@@ -15,6 +15,7 @@
 
 #include "features/front_end.hpp"
 #include "geometry/bundle.hpp"
+#include "geometry/pose_influence.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
@@ -44,6 +45,8 @@ struct LocalizedFrame {
   FrameResult result;             ///< all but the pose, and the road measurement
   std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
   Observations projections;       ///< of the landmarks without an inlier in this frame
+  /// Motions that two views tell: MeasuredMotion::covariance of what is added to the pose before.
+  std::optional<Matrix6d> two_view = std::nullopt;
 };
 
 /// A landmark in the camera of the last keyframe that saw it, in the units of its pose in the

@@ -35,7 +35,8 @@ std::optional<Localization> optimize_pose(const SeenLandmarks& seen,
                                             {.loss_scale_px = options.first_loss_px});
   const std::vector<char> mask = find_inliers(seen, first, camera, 2.0 * options.inlier_bound_px);
   const SeenLandmarks near{select<Eigen::Vector3d>(seen.points, mask),
-                           select<Eigen::Vector2d>(seen.uv, mask)};
+                           select<Eigen::Vector2d>(seen.uv, mask),
+                           select<int>(seen.track_ids, mask)};
   if (near.size() < options.min_landmarks) {
     return std::nullopt;
   }
@@ -68,6 +69,7 @@ SeenLandmarks find_seen_landmarks(const Window& window, const Observations& fram
     if (landmark != window.landmarks.end() && landmark->first == point.track_id) {
       seen.points.push_back(landmark->second);
       seen.uv.push_back(point.uv);
+      seen.track_ids.push_back(point.track_id);
     }
   }
   return seen;

@@ -17,6 +17,7 @@ namespace stemvo {
 struct SeenLandmarks {
   std::vector<Eigen::Vector3d> points;  ///< in the world
   std::vector<Eigen::Vector2d> uv;
+  std::vector<int> track_ids;  ///< rising
 
   [[nodiscard]] int size() const { return static_cast<int>(points.size()); }
 };

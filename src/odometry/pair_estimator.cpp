@@ -119,7 +119,8 @@ void MotionChain::extrapolate(bool has_image) {
 }
 
 PairEstimator::PairEstimator(const Options& config, const Camera& camera)
-    : camera_(camera),
+    : options_(config.odometry),
+      camera_(camera),
       two_view_(config),
       chain_(config.odometry, config.scale),
       scale_(config, kSpeedSigma) {}
@@ -167,6 +168,21 @@ void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   scale_.report(result);
   result.camera = camera_;
   result.world_from_camera = chain_.world_from_camera();
+  const double interval_s = times_s_.size() > 1 ? times_s_.back() - *(times_s_.end() - 2) : 0.0;
+  const double speed = last_speed_ > 0.0 ? last_speed_ : chain_.assumed_speed();
+  const MotionCovariance::Motion motion{
+      .state = result.state,
+      .is_localized = is_measured(result.state) || result.state == FrameState::kGated,
+      .prev_from_cur =
+          trajectory_.empty() ? Rigid3() : trajectory_.back().inverse() * result.world_from_camera,
+      .dt_s = interval_s,
+      .usual_step = speed * interval_s,
+      .hidden_px = options_.stationary_flow_px,
+      .two_view = motion_.covariance,
+      .camera = camera_,
+      .camera_sigma = std::nullopt,
+      .scale_sigma = metric_sigma(result).value_or(kSpeedSigma)};
+  result.motion_covariance = uncertainty_.finish(motion);
   trajectory_.push_back(result.world_from_camera);
 }
 

@@ -9,6 +9,7 @@
 
 #include "odometry/estimator.hpp"
 #include "odometry/metric_scale.hpp"
+#include "odometry/motion_covariance.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/options.hpp"
@@ -75,7 +76,9 @@ class PairEstimator final : public Estimator {
  private:
   [[nodiscard]] double measure_length(const Frame& frame);
 
+  OdometryOptions options_;
   Camera camera_;
+  MotionCovariance uncertainty_;
   TwoViewEstimator two_view_;
   MotionChain chain_;
   HintTrust trust_;

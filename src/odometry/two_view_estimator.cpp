@@ -145,6 +145,8 @@ void TwoViewEstimator::refine(const PixelPairs& pairs,
     result.state = FrameState::kLowParallax;
   } else {
     result.state = FrameState::kTracking;
+    result.covariance =
+        relative_pose_covariance(result.cur_from_prev, inliers, camera, options_.refine_loss_px);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "geometry/pixel_pairs.hpp"
+#include "geometry/pose_influence.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
@@ -20,6 +21,8 @@ struct MeasuredMotion {
   FrameState state = FrameState::kLost;
   Rigid3 cur_from_prev;  ///< |translation| is 1, or 0 (stationary, rotating, lost)
   TwoViewModel model = TwoViewModel::kNone;
+  /// The error of cur_from_prev^-1 (relative_pose_covariance); zero unless tracking.
+  Matrix6d covariance = Matrix6d::Zero();
   double homography_score = 0.0;   ///< S_H
   double fundamental_score = 0.0;  ///< S_F
   double homography_ratio = 0.0;   ///< R_H

@@ -149,7 +149,8 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
 FrameState WindowEstimator::accept_motion(const Frame& frame,
                                           const MeasuredMotion& motion,
                                           LocalizedFrame& localized) {
-  if (motion.state == FrameState::kLost) {  // the last motion goes on, and no track does
+  localized.two_view = 2.0 * motion.covariance;  // of both frames, each against the reference
+  if (motion.state == FrameState::kLost) {       // the last motion goes on, and no track does
     world_from_camera_ = predict(trust_.trusted(frame.hints));
     reset_reference({frame.number, world_from_camera_, {}, frame.time_s, frame.road});
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
@@ -236,6 +237,8 @@ void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& m
 void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
   if (!is_initializing_ && frame.has_image()) {
+    uncertainty_.localized(result.state, window_, last_moving_.points, world_from_camera_,
+                           trajectory_.back(), camera(), localization_.loss_px);
     Keyframe& newest = window_.keyframes.back();
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
@@ -245,11 +248,29 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
     }
   }
   measure_scale(frame, result.state);
-  remember(frame, result.state);
   scale_.report(result);
   result.camera = camera();
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
+  measure_covariance(frame, localized);
+  remember(frame, result.state);
+}
+
+void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& localized) {
+  FrameResult& result = localized.result;
+  const MotionCovariance::Motion motion{
+      .state = result.state,
+      .is_localized = frame.has_image() && !is_initializing_,
+      .prev_from_cur =
+          trajectory_.empty() ? Rigid3() : trajectory_.back().inverse() * world_from_camera_,
+      .dt_s = interval_s_,
+      .usual_step = speed_ * interval_s_,
+      .hidden_px = (result.state == FrameState::kStationary ? 1.0 : kTurnFlow) * min_flow_px(),
+      .two_view = localized.two_view,
+      .camera = result.camera,
+      .camera_sigma = result.camera_sigma,
+      .scale_sigma = metric_sigma(result)};
+  result.motion_covariance = uncertainty_.finish(motion);
 }
 
 bool WindowEstimator::is_keyframe(const View& view) const {
@@ -284,6 +305,8 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     last_moving_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera(), window_options_);
+  uncertainty_.adjusted(window_, last_moving_.points, world_from_camera_, trajectory_.back(),
+                        camera(), localization_.loss_px);
   // The newest keyframe but one: it has its new corners.
   calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
   history_.observe(window_, frame.image);

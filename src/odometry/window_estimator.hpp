@@ -11,6 +11,7 @@
 #include "odometry/initializer.hpp"
 #include "odometry/localization.hpp"
 #include "odometry/metric_scale.hpp"
+#include "odometry/motion_covariance.hpp"
 #include "odometry/self_calibration.hpp"
 #include "odometry/window.hpp"
 #include "odometry/window_history.hpp"
@@ -75,6 +76,7 @@ class WindowEstimator final : public Estimator {
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
   void measure_scale(const Frame& frame, FrameState state);
+  void measure_covariance(const Frame& frame, LocalizedFrame& localized);
   void remember(const Frame& frame, FrameState state);
 
   OdometryOptions options_;
@@ -90,6 +92,7 @@ class WindowEstimator final : public Estimator {
   WindowHistory history_;
   MetricScale scale_;
   SelfCalibration calibration_;
+  MotionCovariance uncertainty_;
   Rigid3 world_from_camera_;  ///< of the frame in work
   Velocity velocity_;         ///< of the last motion between localized frames
   double assumed_step_;       ///< in the first interval, where nothing measures a length

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/motion_covariance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+
+namespace stemvo {
+namespace {
+
+/// Squares of adjustments and of changes of velocity are means of so many: a window's length.
+constexpr int kMemory = 8;
+/// Keyframes that an adjustment spreads an error over: the newer half of the window, which it
+/// moves, and the one before.
+constexpr double kSpread = 5.0;
+/// However many runs SelfCalibration has seen, it misses the principal point by so much: tracks
+/// bend alike in turns to one side (measured on rendered drives, self_calibration.cpp).
+constexpr double kBend_px = 0.65;
+
+Matrix6d square(const Vector6d& value) { return value * value.transpose(); }
+
+Matrix6d transformed(const Matrix6d& covariance, const Matrix6d& by) {
+  return by * covariance * by.transpose();
+}
+
+void add_to_mean(const Matrix6d& value, Matrix6d& mean, int& count) {
+  count = std::min(count + 1, kMemory);
+  mean += (value - mean) / count;
+}
+
+Matrix6d diagonal(double translation, double rotation) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(translation), Eigen::Vector3d::Constant(rotation);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+PoseInfluences influences_at(const SeenLandmarks& seen,
+                             const Rigid3& world_from_camera,
+                             const Camera& camera,
+                             double loss_px) {
+  return pose_influences(world_from_camera.inverse(), seen.points, seen.uv, camera, loss_px);
+}
+
+bool is_held(FrameState state) {
+  return state == FrameState::kRotating || state == FrameState::kLowParallax;
+}
+
+/// A hidden motion moves the landmarks by less than `hidden_px`: uniform in that ellipsoid. Where
+/// the position is held, the rotation was found: it does what the translation makes it do.
+Matrix6d hidden_motion(const Matrix6d& flow, bool has_rotation, double hidden_px) {
+  const double square_px = hidden_px * hidden_px;
+  if (!has_rotation) {
+    return square_px / 8.0 * flow;  // 1 / (d + 2) in d dimensions
+  }
+  Matrix6d held = flow;
+  const Eigen::Matrix3d by_translation =
+      flow.bottomLeftCorner<3, 3>() * flow.topLeftCorner<3, 3>().inverse();
+  held.bottomRightCorner<3, 3>() = by_translation * flow.topRightCorner<3, 3>();
+  return square_px / 5.0 * held;
+}
+
+/// A shift of the principal point turns all poses alike.
+Matrix6d principal_point_term(const MotionCovariance::Motion& motion, const Matrix6d& to_cur) {
+  if (!motion.camera_sigma.has_value()) {
+    return Matrix6d::Zero();
+  }
+  Matrix6d turn = Matrix6d::Zero();
+  const CameraSigma& sigma = *motion.camera_sigma;
+  turn(3, 3) = std::pow(std::hypot(sigma.cy_px, kBend_px) / motion.camera.fy_px, 2);
+  turn(4, 4) = std::pow(std::hypot(sigma.cx_px, kBend_px) / motion.camera.fx_px, 2);
+  return transformed(turn, to_cur - Matrix6d::Identity());
+}
+
+Matrix6d scale_term(const MotionCovariance::Motion& motion) {
+  Vector6d error = Vector6d::Zero();
+  error.head<3>() = motion.scale_sigma.value_or(0.0) *
+                    (motion.prev_from_cur.rotation.conjugate() * motion.prev_from_cur.translation);
+  return square(error);
+}
+
+/// Two views know the rotation and, once they are tracking, the direction.
+Matrix6d two_view_motion(const MotionCovariance::Motion& motion) {
+  const Matrix6d pair = motion.two_view.value_or(Matrix6d::Zero());
+  const double length = motion.prev_from_cur.translation.norm();
+  if (motion.state == FrameState::kTracking) {
+    Vector6d scale;
+    scale << Eigen::Vector3d::Constant(length), Eigen::Vector3d::Ones();
+    return scale.asDiagonal() * pair * scale.asDiagonal();
+  }
+  Matrix6d unknown = diagonal(std::max(length, motion.usual_step),
+                              motion.hidden_px / motion.camera.mean_focal_px());
+  unknown.bottomRightCorner<3, 3>() += pair.bottomRightCorner<3, 3>();
+  return unknown;
+}
+
+}  // namespace
+
+void MotionCovariance::localized(FrameState state,
+                                 const Window& window,
+                                 const Observations& points,
+                                 const Rigid3& world_from_camera,
+                                 const Rigid3& world_from_prev,
+                                 const Camera& camera,
+                                 double loss_px) {
+  points_ = points;
+  const SeenLandmarks now = find_seen_landmarks(window, points);
+  influences_ = influences_at(now, world_from_camera, camera, loss_px);
+  if (state != FrameState::kTracking) {
+    const PoseInfluences even =
+        influences_at(now, world_from_camera, camera, std::numeric_limits<double>::infinity());
+    flow_ = even.num_points * even.covariance;
+  }
+  if (!is_prev_tracked_ || state != FrameState::kTracking) {
+    return;
+  }
+  const SeenLandmarks before = find_seen_landmarks(window, prev_points_);
+  const PoseInfluences prev = influences_at(before, world_from_prev, camera, loss_px);
+  const Matrix6d to_cur = adjoint(world_from_camera.inverse() * world_from_prev);
+  Matrix6d sum = Matrix6d::Zero();
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < now.track_ids.size(); ++i) {
+    for (; k < before.track_ids.size() && before.track_ids[k] < now.track_ids[i]; ++k) {
+      sum += square(to_cur * prev.of_point[k]);
+    }
+    Vector6d influence = -influences_.of_point[i];
+    if (k < before.track_ids.size() && before.track_ids[k] == now.track_ids[i]) {
+      influence += to_cur * prev.of_point[k++];
+    }
+    sum += square(influence);
+  }
+  for (; k < before.track_ids.size(); ++k) {
+    sum += square(to_cur * prev.of_point[k]);
+  }
+  track_noise_ = sum;
+}
+
+void MotionCovariance::adjusted(const Window& window,
+                                const Observations& points,
+                                const Rigid3& world_from_camera,
+                                const Rigid3& world_from_prev,
+                                const Camera& camera,
+                                double loss_px) {
+  if (!is_prev_tracked_) {
+    return;
+  }
+  const auto sum_at = [&](const Observations& seen, const Rigid3& pose) {
+    Vector6d sum = Vector6d::Zero();
+    for (const Vector6d& influence :
+         influences_at(find_seen_landmarks(window, seen), pose, camera, loss_px).of_point) {
+      sum += influence;
+    }
+    return sum;
+  };
+  const Matrix6d to_cur = adjoint(world_from_camera.inverse() * world_from_prev);
+  step_ = to_cur * sum_at(prev_points_, world_from_prev) - sum_at(points, world_from_camera);
+}
+
+Matrix6d MotionCovariance::finish(const Motion& motion) {
+  const bool goes_on = motion.state == FrameState::kLost || motion.state == FrameState::kNoImage;
+  const Matrix6d to_cur = adjoint(motion.prev_from_cur.inverse());
+  Matrix6d pose = transformed(prev_pose_, to_cur);  // until now: of the one before
+  Matrix6d covariance = Matrix6d::Zero();
+  if (goes_on) {
+    const Matrix6d change = changes_of_velocity(motion);
+    const double before_s = std::exchange(unmeasured_s_, unmeasured_s_ + motion.dt_s);
+    covariance = unmeasured_s_ * motion.dt_s * motion.dt_s * change;
+    pose += (std::pow(unmeasured_s_, 3) - std::pow(before_s, 3)) / 3.0 * change;
+  } else if (!motion.is_localized || motion.two_view.has_value()) {
+    covariance = two_view_motion(motion) + pose;
+    pose = motion.is_localized ? Matrix6d::Zero() : covariance;
+  } else {
+    const bool is_still = motion.state == FrameState::kStationary;
+    Matrix6d own = is_still ? Matrix6d::Zero() : influences_.squared_sum();
+    if (is_still || is_held(motion.state)) {
+      own += hidden_motion(flow_, !is_still, motion.hidden_px);
+    }
+    covariance = track_noise_.value_or(own + pose) + map_term(motion.state);
+    pose = own;
+  }
+  covariance += principal_point_term(motion, to_cur) + scale_term(motion);
+  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  covariance.diagonal() *= 1.0 + 1e-9;  // what rounding may cost
+  covariance += diagonal(1e-6 * motion.usual_step, 1e-6);
+
+  learn(motion);
+  prev_pose_ = pose;
+  const bool is_first = motion.state == FrameState::kFirst;
+  if (is_first) {
+    prev_pose_.setZero();
+  }
+  return is_first ? Matrix6d::Zero() : covariance;
+}
+
+Matrix6d MotionCovariance::changes_of_velocity(const Motion& motion) const {
+  if (num_changes_ > 0) {
+    return mean_change_;
+  }
+  // Nothing is known yet: a whole step, and as much of a turn as leaves anything in view.
+  const double half_view = std::atan(0.5 * motion.camera.width_px / motion.camera.fx_px);
+  return diagonal(motion.usual_step, half_view) / std::pow(motion.dt_s, 3);
+}
+
+/// An adjustment takes away the error that has grown since the last one, frame by frame the same
+/// way, but for the share of one of the keyframes it is spread over.
+Matrix6d MotionCovariance::map_term(FrameState state) {
+  if (!step_.has_value() && state != FrameState::kTracking) {
+    return Matrix6d::Zero();
+  }
+  const double num_frames = step_.has_value() ? kSpread : ++frames_since_step_ + 1.0;
+  Matrix6d result = mean_step_ / (num_frames * num_frames);
+  if (step_.has_value()) {
+    frames_since_step_ = 0;
+    result += square(*step_);
+    add_to_mean(square(*step_), mean_step_, num_steps_);
+  }
+  return result;
+}
+
+void MotionCovariance::learn(const Motion& motion) {
+  const bool is_tracked = motion.is_localized && motion.state == FrameState::kTracking;
+  is_prev_tracked_ = is_tracked || (motion.is_localized && motion.two_view.has_value());
+  prev_points_ = std::exchange(points_, {});
+  track_noise_.reset();
+  step_.reset();
+  unmeasured_s_ = motion.is_localized ? 0.0 : unmeasured_s_;
+  std::optional<Vector6d> velocity;
+  if (is_tracked) {
+    const Rigid3& step = motion.prev_from_cur;
+    velocity.emplace();
+    *velocity << step.rotation.conjugate() * step.translation, so3_log(step.rotation);
+    *velocity /= motion.dt_s;
+    if (prev_velocity_.has_value()) {
+      add_to_mean(square(*velocity - *prev_velocity_) / motion.dt_s, mean_change_, num_changes_);
+    }
+  }
+  prev_velocity_ = velocity;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "geometry/pose_influence.hpp"
+#include "odometry/localization.hpp"
+#include "odometry/window.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/frame_result.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// The scale's sigma where lengths are metres, nullopt where they are units.
+[[nodiscard]] inline std::optional<double> metric_sigma(const FrameResult& result) {
+  const bool is_metric = result.scale_state == ScaleState::kMeasured ||  //
+                         result.scale_state == ScaleState::kHeld;
+  return is_metric ? result.scale_sigma : std::nullopt;
+}
+
+/// How sure the motion from frame to frame is (FrameResult::motion_covariance), measured on the
+/// drive itself: no noise is assumed. Its terms:
+/// - Tracks: how far each moves the pose before and this one, as a difference, so that what both
+///   frames share cancels (a patch's own error, its landmark's).
+/// - The map: what an adjustment at a keyframe moves was an error until then.
+/// - A held position: what the least flow that counts as motion may hide.
+/// - A pose that goes on unmeasured: the changes of velocity so far, as a random walk.
+/// - The camera's principal point; the scale.
+class MotionCovariance {
+ public:
+  /// What the estimator knows of a frame's motion.
+  struct Motion {
+    FrameState state = FrameState::kFirst;
+    bool is_localized = false;  ///< the pose was measured where later ones are
+    Rigid3 prev_from_cur;       ///< between the poses as they are returned
+    double dt_s = 0.0;
+    double usual_step = 1.0;  ///< length of a motion of which nothing else is known
+    double hidden_px = 0.0;   ///< less flow, or parallax, counts as none
+    /// By two views instead of the map: covariance for a translation of length 1.
+    std::optional<Matrix6d> two_view;
+    Camera camera;
+    std::optional<CameraSigma> camera_sigma;
+    std::optional<double> scale_sigma;  ///< nullopt: the path is in units
+  };
+
+  /// A frame in the map, before its keyframe changes that; and after, where it did.
+  void localized(FrameState state,
+                 const Window& window,
+                 const Observations& points,
+                 const Rigid3& world_from_camera,
+                 const Rigid3& world_from_prev,
+                 const Camera& camera,
+                 double loss_px);
+  void adjusted(const Window& window,
+                const Observations& points,
+                const Rigid3& world_from_camera,
+                const Rigid3& world_from_prev,
+                const Camera& camera,
+                double loss_px);
+
+  /// Last, for every frame. Finite, symmetric, positive definite; zero for the first frame.
+  [[nodiscard]] Matrix6d finish(const Motion& motion);
+
+ private:
+  [[nodiscard]] Matrix6d changes_of_velocity(const Motion& motion) const;
+  [[nodiscard]] Matrix6d map_term(FrameState state);
+  void learn(const Motion& motion);
+
+  // The frame before.
+  Observations prev_points_;
+  bool is_prev_tracked_ = false;           ///< its pose was measured in the map, not held
+  Matrix6d prev_pose_ = Matrix6d::Zero();  ///< covariance of its pose in the map
+  std::optional<Vector6d> prev_velocity_;  ///< per second, where it was tracked
+
+  // The frame in work, where it is in the map.
+  Observations points_;
+  PoseInfluences influences_;
+  Matrix6d flow_ = Matrix6d::Zero();     ///< of motions that move the landmarks by 1 px (rms)
+  std::optional<Matrix6d> track_noise_;  ///< of the motion between two tracked frames
+  std::optional<Vector6d> step_;         ///< that an adjustment put between their poses
+
+  Matrix6d mean_step_ = Matrix6d::Zero();  ///< squares, of the last adjustments
+  int num_steps_ = 0;
+  int frames_since_step_ = 0;
+  Matrix6d mean_change_ = Matrix6d::Zero();  ///< of velocity: squares per second
+  int num_changes_ = 0;
+  double unmeasured_s_ = 0.0;  ///< since the last localized frame
+};
+
+}  // namespace stemvo

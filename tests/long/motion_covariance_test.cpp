@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "dataset/kitti_text.hpp"
+#include "evaluation/trajectory.hpp"
+#include "stemvo/odometry.hpp"
+#include "support/drives.hpp"
+#include "support/motion_errors.hpp"
+#include "support/state_drives.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// 90 degrees to either side at 7 m/s, radius 15 m and more.
+test::StateDrive bends() {
+  test::StateDrive drive;
+  Rigid3 pose;
+  for (int i = 0; i < 220; ++i) {
+    drive.world_from_camera.push_back(pose);
+    const double curvature = std::sin(2.0 * std::numbers::pi * 0.7 * i / 75.0) / 15.0;
+    pose = pose * Rigid3(so3_exp({0.0, 0.7 * curvature, 0.0}), {0.0, 0.0, 0.7});
+  }
+  return drive;
+}
+
+fs::path drive_of(const std::string& kind) {
+  if (kind == "street") {
+    return test::render_once("covariance_street",
+                             {"--frames", "200", "--width", "640", "--height", "194"});
+  }
+  if (kind == "turn") {
+    return test::rendered_along("covariance_turn", bends()).parent_path().parent_path();
+  }
+  return test::render_once("covariance_" + kind,
+                           {"--walk", "--frames", "240", "--width", "480", "--height", "360",
+                            "--seed", kind == "walk" ? "1" : "9"});
+}
+
+/// The drive's frames, with noise of so many gray levels on them.
+std::vector<FrameResult> results_of(const fs::path& drive, double noise) {
+  const fs::path sequence = drive / "sequences" / "00";
+  Camera camera = *dataset::read_kitti_camera(sequence / "calib.txt", 2);
+  std::optional<Odometry> odometry;
+  std::vector<FrameResult> results;
+  cv::RNG random(7);
+  for (int i = 0;; ++i) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    if (!fs::exists(sequence / name)) {
+      return results;
+    }
+    cv::Mat image = cv::imread((sequence / name).string());
+    cv::Mat values(image.size(), CV_16SC3);
+    random.fill(values, cv::RNG::NORMAL, 0.0, noise);
+    cv::Mat sum;
+    cv::add(image, values, sum, cv::noArray(), CV_16S);
+    sum.convertTo(image, CV_8U);
+    if (!odometry.has_value()) {
+      camera.width_px = image.cols;
+      camera.height_px = image.rows;
+      odometry = *Odometry::create(camera);
+    }
+    results.push_back(*odometry->process(image, PixelOrder::kBgr, 0.1 * i));
+  }
+}
+
+/// docs/accuracy.md has the table that this prints.
+TEST(MotionCovariance, IsHonestOnRenderedDrivesWithNoiseInTheImages) {
+  for (const char* kind : {"street", "turn", "walk", "courtyard"}) {
+    const fs::path drive = drive_of(kind);
+    const Trajectory truth = *read_kitti_trajectory(drive / "poses" / "00.txt");
+    for (const double noise : {0.0, 4.0, 8.0, 12.0}) {
+      const testing::MotionErrors errors = testing::errors_of(results_of(drive, noise), truth);
+      std::printf("%-9s noise %2.0f: %3d motions, mean %.2f, inside %.2f\n", kind, noise,
+                  errors.count, errors.mean, errors.inside);
+      EXPECT_GT(errors.count, 150) << kind << noise;
+      EXPECT_GT(errors.mean, 0.6) << kind << noise;
+      EXPECT_LT(errors.mean, 1.6) << kind << noise;
+      EXPECT_GE(errors.inside, 0.85) << kind << noise;
+      EXPECT_LE(errors.inside, 0.99) << kind << noise;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "odometry/motion_covariance.hpp"
+#include "odometry/pair_estimator.hpp"
+#include "odometry/window_estimator.hpp"
+#include "support/estimator_run.hpp"
+#include "support/motion_errors.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::config_without_scale;
+using testing::DriveTracks;
+using testing::EstimatorRun;
+
+/// Driving, standing, driving, turning on the spot, driving.
+std::vector<Rigid3> eventful_path() {
+  const Rigid3 ahead(so3_exp({0.0, 0.005, 0.001}), {0.02, 0.0, 0.8});
+  const Rigid3 turn(so3_exp({0.0, 0.02, 0.0}), Eigen::Vector3d::Zero());
+  std::vector<Rigid3> path(1);
+  for (const auto& [motion, count] :
+       {std::pair(ahead, 14), std::pair(Rigid3(), 4), std::pair(ahead, 8), std::pair(turn, 4),
+        std::pair(ahead, 10)}) {
+    for (int i = 0; i < count; ++i) {
+      path.push_back(path.back() * motion);
+    }
+  }
+  return path;
+}
+
+DriveTracks eventful_drive(double noise_px) {
+  const std::vector<Rigid3> path = eventful_path();
+  return {path, testing::points_along(path, 1500, 3), noise_px, 3};
+}
+
+double sigma_of_length(const FrameResult& result) {
+  return std::sqrt(result.motion_covariance.topLeftCorner<3, 3>().trace());
+}
+
+void expect_covariances(const std::vector<FrameResult>& results) {
+  EXPECT_EQ(results.front().motion_covariance, Matrix6d::Zero());
+  for (std::size_t i = 1; i < results.size(); ++i) {
+    const Matrix6d& covariance = results[i].motion_covariance;
+    EXPECT_TRUE(covariance.allFinite()) << i;
+    EXPECT_EQ(covariance, covariance.transpose()) << i;
+    EXPECT_EQ(covariance.llt().info(), Eigen::Success) << i << to_string(results[i].state);
+  }
+}
+
+TEST(MotionCovariance, IsHonestWhateverTheNoiseOfTheTracks) {
+  const Rigid3 bend(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, 1.0});
+  const std::vector<Rigid3> path = DriveTracks::repeat(bend, 80);
+  for (const double noise_px : {0.05, 0.2, 0.6}) {
+    const DriveTracks drive(path, testing::points_along(path, 3000, 8), noise_px, 8);
+    WindowEstimator estimator(config_without_scale(), drive.camera);
+    EstimatorRun run(estimator, drive);
+    run.add_all();
+    const testing::MotionErrors errors = testing::errors_of(run.results, path);
+    EXPECT_GT(errors.count, 60) << noise_px;
+    EXPECT_GT(errors.mean, 0.3) << noise_px;  // adjustments move much where tracks are bad
+    EXPECT_LT(errors.mean, 1.6) << noise_px;
+    EXPECT_GT(errors.inside, 0.85) << noise_px;
+  }
+}
+
+TEST(MotionCovariance, IsFiniteAndPositiveDefiniteInEveryState) {
+  std::set<FrameState> seen;
+  for (const OdometryMode mode : {OdometryMode::kMap, OdometryMode::kTwoFrame}) {
+    for (const double noise_px : {0.0, 0.05}) {
+      const DriveTracks drive = eventful_drive(noise_px);
+      std::unique_ptr<Estimator> estimator;
+      if (mode == OdometryMode::kMap) {
+        estimator = std::make_unique<WindowEstimator>(config_without_scale(mode), drive.camera);
+      } else {
+        estimator = std::make_unique<PairEstimator>(config_without_scale(mode), drive.camera);
+      }
+      EstimatorRun run(*estimator, drive);
+      run.add_range(0, 34);
+      run.add_missing();
+      run.add_missing();
+      run.add_range(36, 38);
+      run.add_matches({}, 38);
+      run.add_range(39, drive.num_frames());
+      expect_covariances(run.results);
+      for (const FrameResult& result : run.results) {
+        seen.insert(result.state);
+      }
+    }
+  }
+  for (const FrameState state :
+       {FrameState::kFirst, FrameState::kInitializing, FrameState::kTracking,
+        FrameState::kStationary, FrameState::kRotating, FrameState::kLost, FrameState::kNoImage}) {
+    EXPECT_TRUE(seen.contains(state)) << to_string(state);
+  }
+}
+
+TEST(MotionCovariance, GrowsFromFrameToFrameWhileNothingIsSeenAndOnceMoreAfterwards) {
+  const DriveTracks drive(30, 0.2, 5);
+  Options options = config_without_scale();
+  options.camera.refine = CameraRefinement::kOff;
+  WindowEstimator estimator(options, drive.camera);
+  EstimatorRun run(estimator, drive);
+  run.add_range(0, 20);
+  const double tracked = sigma_of_length(run.results.back());
+  const double first = sigma_of_length(run.add_missing());
+  const double second = sigma_of_length(run.add_missing());
+  const FrameResult found = run.add(22);
+  ASSERT_EQ(found.state, FrameState::kTracking);
+  EXPECT_GT(first, tracked);
+  EXPECT_GT(second, 1.2 * first);
+  EXPECT_GT(sigma_of_length(found), second);
+  EXPECT_LT(sigma_of_length(run.add(23)), first);
+}
+
+/// A tracked frame's motion that is known but for the term in question.
+MotionCovariance::Motion known_motion() {
+  MotionCovariance::Motion motion{.state = FrameState::kTracking,
+                                  .is_localized = true,
+                                  .prev_from_cur = {so3_exp({0.0, 0.1, 0.0}), {0.0, 0.0, 2.0}},
+                                  .dt_s = 0.1,
+                                  .usual_step = 2.0,
+                                  .hidden_px = 0.15,
+                                  .two_view = Matrix6d::Zero(),
+                                  .camera = testing::kitti_camera(),
+                                  .camera_sigma = std::nullopt,
+                                  .scale_sigma = std::nullopt};
+  return motion;
+}
+
+TEST(MotionCovariance, TheScaleStretchesTheStep) {
+  MotionCovariance::Motion motion = known_motion();
+  motion.scale_sigma = 0.03;
+  const Matrix6d covariance = MotionCovariance().finish(motion);
+  const Eigen::Vector3d along =
+      motion.prev_from_cur.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  const Eigen::Matrix3d of_step = covariance.topLeftCorner<3, 3>();
+  EXPECT_NEAR(std::sqrt(along.dot(of_step * along)), 0.06, 1e-4);
+  EXPECT_NEAR(of_step.trace(), 0.0036, 1e-5);
+}
+
+TEST(MotionCovariance, APrincipalPointThatIsOffTurnsTheStep) {
+  MotionCovariance::Motion motion = known_motion();
+  motion.prev_from_cur.rotation.setIdentity();
+  motion.camera_sigma = CameraSigma{.fx_px = 0.0, .cx_px = 2.0, .cy_px = 0.0};
+  const Matrix6d covariance = MotionCovariance().finish(motion);
+  EXPECT_NEAR(std::sqrt(covariance(0, 0)), 2.0 * 2.0 / motion.camera.fx_px, 1e-3);
+  EXPECT_LT(std::sqrt(covariance(2, 2)), 1e-4);
+}
+
+}  // namespace
+}  // namespace stemvo
