@@ -119,6 +119,8 @@ if(NOT output MATCHES "^0 first +0 +0 +0\n0.1 [a-z_]+ [^\n]+\n0.2 [a-z_]+ [^\n]+
   message(FATAL_ERROR "own_source: expected 4 times, states and positions, found:\n${output}")
 endif()
 
+run("fuse_speed" "${tests}/../build/venv/bin/python" "${CMAKE_CURRENT_LIST_DIR}/fuse_speed.py" "${work}/examples/fuse_speed" "${work}/drive")
+
 # Points 4 to 10 m away; the camera goes 0.5 m to the right: the points to the left.
 set(matches "")
 foreach(i RANGE 79)
