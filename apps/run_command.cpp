@@ -146,6 +146,11 @@ void add_options(CLI::App& command, RunArguments& arguments) {
                   "Of images: a time in seconds per image; default: the camera's rate_hz");
   add_file_option(command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
+  add_file_option(command, "--speed", request.speeds,
+                  "Speeds of the camera: rows of time, m/s [, sigma]; lengths are metres then");
+  add_file_option(command, "--gyro", request.gyro,
+                  "Turn rates: rows of time and rad/s about x, y, z, in the IMU's axes (T_cam_imu "
+                  "of a Kalibr file) or the camera's; or EuRoC's imu0/data.csv");
   command
       .add_option(
           "--mask", request.masks,

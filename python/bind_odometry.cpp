@@ -110,6 +110,12 @@ class PythonOdometry {
   int num_at_work() {
     return in_turn([&]() -> Expected<int> { return num_at_work_; });
   }
+  void add_speed(double time_s, double metres_per_s, double sigma) {
+    in_turn([&] { return odometry_.add_speed(time_s, metres_per_s, sigma); });
+  }
+  void add_distance(double from_s, double to_s, double metres, double sigma) {
+    in_turn([&] { return odometry_.add_distance(from_s, to_s, metres, sigma); });
+  }
   void reset() {
     in_turn([&] { return check_idle("reset").and_then([&] { return odometry_.reset(); }); });
   }
@@ -221,6 +227,10 @@ void bind_odometry(nb::module_& module) {
       .def_prop_ro("_num_at_work", &PythonOdometry::num_at_work)
       .def("reset", &PythonOdometry::reset,
            "A new world: same network, camera and options; times may begin anew")
+      .def("add_speed", &PythonOdometry::add_speed, "timestamp"_a, "metres_per_s"_a, "sigma"_a,
+           "Of the camera along its path, as wheels or GPS tell it; metres from then on")
+      .def("add_distance", &PythonOdometry::add_distance, "begin"_a, "end"_a, "metres"_a, "sigma"_a,
+           "The camera's way between two times, likewise")
       .def("landmarks", &PythonOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
       .def("landmarks_since", &PythonOdometry::landmarks_since, "version"_a,

@@ -48,6 +48,9 @@ class AsyncOdometry {
                             PixelOrder order,
                             double time_s,
                             const FrameHints& hints = {});
+  /// As those of Odometry: they count from the next frame pushed on.
+  [[nodiscard]] Status add_speed(double time_s, double metres_per_s, double sigma);
+  [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);
   /// The next result; waits for it. nullopt: finish() was called, and this was all. Error: there is
   /// a callback; a frame failed, see finish().
   [[nodiscard]] Expected<std::optional<FrameResult>> next();

@@ -34,9 +34,10 @@ enum class FrameState {
 /// Which two-view model a motion came from.
 enum class TwoViewModel { kNone, kHomography, kEssential };
 
-/// How a frame's scale was measured from the road (`scale.source: camera_height`).
+/// How a frame's scale was measured: by the road (`scale.source: camera_height`), or by speeds and
+/// distances that were added.
 enum class ScaleState {
-  kDisabled,  ///< the scale comes from elsewhere
+  kDisabled,  ///< nobody measures it
   kNone,      ///< no road is believed: lengths are units, the scale is a guess
   kHeld,      ///< believed, not measured on this frame: the scale is kept, its sigma grows
   kMeasured,  ///< measured on this frame and believed

@@ -61,6 +61,17 @@ class Odometry {
                                               double time_s,
                                               const FrameHints& hints = {});
 
+  /// The camera's speed along its path, from wheels, GPS and the like, 1-sigma of m/s; its sign
+  /// does not count. Lengths are metres from then on, with the road or without. Speeds are joined
+  /// by straight lines where they are at most 1.5 s apart, and count for frames at their times:
+  /// from those on, up to half a minute late or ahead. Their errors are taken for independent of
+  /// each other. Errors: scale.source constant_speed; numbers that are not finite; a time that is
+  /// not after the last speed's; a sigma that is not above 0.
+  [[nodiscard]] Status add_speed(double time_s, double metres_per_s, double sigma);
+  /// The way of the camera between two times, likewise; 1-sigma in metres. Errors: likewise, and a
+  /// time that is not after its beginning, or the end of the last; a distance below 0.
+  [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);
+
   /// Is told in words when tracking begins, ends and recovers, when the scale is believed and when
   /// no more, and why a frame could not be seen.
   void set_log(Log log);

@@ -16,6 +16,10 @@ struct CameraFile {
   std::optional<double> rate_hz;
   std::optional<double> camera_height_m;   ///< above the road
   std::optional<Rigid3> body_from_camera;  ///< EuRoC's T_BS, or of Kalibr's T_cam_imu
+
+  [[nodiscard]] std::optional<Eigen::Quaterniond> camera_from_imu() const {
+    return body_from_camera ? std::optional(body_from_camera->rotation.inverse()) : std::nullopt;
+  }
 };
 
 /// The format is told by its keys. Ours is YAML with the keys image_width and image_height or

@@ -62,7 +62,8 @@ struct FrameList {
   /// The calibration or camera file that was asked for; absent: calib.txt in the folder was read.
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
-  bool is_kitti = false;                  ///< whose camera is 1.65 m above a road
+  std::optional<Eigen::Quaterniond> camera_from_imu;  ///< where a camera file says it
+  bool is_kitti = false;                              ///< whose camera is 1.65 m above a road
   /// Index in `files` -> frame; several threads may call it. Of a stream, each frame once, in
   /// order; an empty image behind the last.
   std::function<Expected<cv::Mat>(std::size_t)> read;

@@ -105,6 +105,7 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   frames.name = listing.name;
   frames.given_calibration = camera_path;
   frames.camera_height_m = camera_file->camera_height_m;
+  frames.camera_from_imu = camera_file->camera_from_imu();
   const Status status =
       add_view(frames, *view, request.masks,
                [files = frames.files, is_color = *is_color, size = view->full_size()](

@@ -69,6 +69,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                  stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); }};
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
+  frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
     const auto truth = read_truth(*request.ground_truth, request.camera_file);
     if (!truth) {

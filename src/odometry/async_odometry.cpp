@@ -16,9 +16,10 @@
 namespace stemvo {
 
 struct AsyncOdometry::Impl {
-  Impl(PhasedOdometry given, const Camera& camera, Callback on_result)
+  Impl(PhasedOdometry given, const Camera& camera, ScaleSource source, Callback on_result)
       : odometry(std::move(given)),
         check(camera),
+        ways(source),
         callback(std::move(on_result)),
         loops(odometry, [this](const GivenFrame&, const FrameResult& result) {
           deliver(result);
@@ -58,6 +59,8 @@ struct AsyncOdometry::Impl {
   PhasedOdometry odometry;
   std::mutex turn;  ///< of push, finish and reset
   FrameCheck check;
+  std::mutex ways_mutex;
+  WayInput ways;
   Callback callback;
   EventLog log;
   std::atomic<std::thread::id> delivering;  ///< the thread that is in the callback
@@ -77,7 +80,8 @@ Expected<AsyncOdometry> AsyncOdometry::create(const Camera& camera,
     return odometry.error();
   }
   try {
-    return AsyncOdometry(std::make_unique<Impl>(*std::move(odometry), camera, std::move(callback)));
+    return AsyncOdometry(std::make_unique<Impl>(*std::move(odometry), camera, options.scale.source,
+                                                std::move(callback)));
   } catch (const std::system_error& error) {
     return fail(std::string("threads: expected three more, found ") + error.what());
   }
@@ -111,8 +115,13 @@ Status AsyncOdometry::push(const cv::Mat& image,
     return status;
   }
   // A live camera writes its next image over this one.
-  GivenFrame given{order == PixelOrder::kBgr ? rgb_of(image, order) : image.clone(), time_s, hints};
+  GivenFrame given{
+      order == PixelOrder::kBgr ? rgb_of(image, order) : image.clone(), time_s, hints, {}};
   given.hints.mask = hints.mask.clone();
+  {
+    const std::lock_guard ways_lock(impl_->ways_mutex);
+    given.ways = impl_->ways.take(time_s);
+  }
   return impl_->loops.push(std::move(given)) ? Status() : impl_->ended();
 }
 
@@ -160,8 +169,26 @@ Status AsyncOdometry::reset() {
     status = impl_->loops.reset() ? status : impl_->ended();
     impl_->check.restart();
     impl_->log.restart();
+    const std::lock_guard ways_lock(impl_->ways_mutex);
+    impl_->ways.restart();
   }
   return status;
+}
+
+Status AsyncOdometry::add_speed(double time_s, double metres_per_s, double sigma) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->ways_mutex);
+  return impl_->ways.add_speed(time_s, metres_per_s, sigma);
+}
+
+Status AsyncOdometry::add_distance(double from_s, double to_s, double metres, double sigma) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->ways_mutex);
+  return impl_->ways.add_distance(from_s, to_s, metres, sigma);
 }
 
 MapChanges AsyncOdometry::landmarks_since(int version) const {

@@ -17,6 +17,7 @@
 #include "geometry/bundle.hpp"
 #include "geometry/pose_influence.hpp"
 #include "odometry/road/image.hpp"
+#include "odometry/way.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
 #include "stemvo/options.hpp"
@@ -32,7 +33,8 @@ struct Frame {
   int number = 0;  ///< counted from 0, frames without an image among them
   double time_s = 0.0;
   FrameHints hints;
-  cv::Mat image;  ///< as given, gray or RGB: where landmarks get their colour
+  std::vector<Way> ways;  ///< that came before this frame did
+  cv::Mat image;          ///< as given, gray or RGB: where landmarks get their colour
   std::shared_ptr<const ImagePyramid> pyramid;  ///< of the channel: where points are tracked
   std::shared_ptr<const RoadImage> road;        ///< null: the road is not asked
   Matches matches;                              ///< none on the first image

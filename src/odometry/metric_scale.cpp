@@ -26,60 +26,98 @@ MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigm
   road_.emplace(options);
 }
 
-void MetricScale::restart(const RoadImage* road) {
-  if (road_.has_value() && road != nullptr) {
-    filter_.restart();
-    road_->restart();
-    keep(road_->update(*road, {}, filter_));
+void MetricScale::restart(const RoadImage* road, double time_s) {
+  ways_.restart(time_s);
+  if (!is_enabled() || (road_.has_value() && road == nullptr)) {
+    return;
   }
+  filter_.restart();
+  is_road_believed_ = false;
+  is_way_measured_ = false;
+  state_ = ScaleState::kNone;
+  if (road_.has_value()) {
+    road_->restart();
+    reason_ = road_->update(*road, {}, filter_).reason;
+  }
+}
+
+void MetricScale::add(const std::vector<Way>& ways) {
+  ways_.add(ways);
+  if (!ways.empty() && !is_enabled()) {
+    state_ = ScaleState::kNone;
+  }
+  has_ways_ = has_ways_ || !ways.empty();
 }
 
 double MetricScale::measure(const RoadImage* road,
                             const Rigid3& cur_from_prev,
+                            double time_s,
+                            double pixel_units,
                             const std::vector<RoadLandmark>& landmarks) {
-  if (!road_.has_value() || road == nullptr) {
+  ways_.move(cur_from_prev, time_s, pixel_units);
+  if (!has_ways_ && (!road_.has_value() || road == nullptr)) {
     return 1.0;
   }
-  const RoadScaleEstimate estimate = timed(
-      Stage::kRoadScale, [&] { return road_->update(*road, cur_from_prev, filter_, landmarks); });
-  keep(estimate);
-  if (!estimate.is_initialized) {
+  bool is_measured = false;
+  if (road_.has_value() && road != nullptr) {
+    ScaleFilter with_road = filter_;
+    const RoadScaleEstimate estimate = timed(Stage::kRoadScale, [&] {
+      return road_->update(*road, cur_from_prev, with_road, landmarks);
+    });
+    // A road that is not proven does not bend what ways have measured.
+    if (estimate.is_believed || !is_way_measured_) {
+      filter_ = with_road;
+    } else {
+      filter_.predict();
+    }
+    is_measured = estimate.is_measured;
+    is_road_believed_ = estimate.is_believed;
+    reason_ = estimate.reason;
+  } else {
+    filter_.predict();
+  }
+  const bool is_way_measured = ways_.measure(filter_);
+  is_way_measured_ = is_way_measured_ || is_way_measured;
+  state_ = is_measured || is_way_measured          ? ScaleState::kMeasured
+           : is_road_believed_ || is_way_measured_ ? ScaleState::kHeld
+                                                   : ScaleState::kNone;
+  if (!filter_.is_initialized()) {
     return 1.0;
   }
-  filter_.shift(-std::log(estimate.metres_per_unit));
-  road_->rescale(estimate.metres_per_unit);
-  return estimate.metres_per_unit;
+  const double metres_per_unit = std::exp(filter_.log_scale());
+  filter_.shift(-std::log(metres_per_unit));
+  ways_.rescale(metres_per_unit);
+  if (road_.has_value()) {
+    road_->rescale(metres_per_unit);
+  }
+  return metres_per_unit;
 }
 
 void MetricScale::keep_last(std::string_view reason) {
-  if (road_.has_value()) {
+  if (is_enabled()) {
     filter_.predict();
-    sigma_ = road_->sigma(filter_);
     state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
-    reason_ = reason;
+    reason_ = road_.has_value() ? reason : "";
   }
 }
 
 void MetricScale::set_unknown(std::string_view reason) {
-  if (road_.has_value()) {
+  if (is_enabled()) {
     state_ = ScaleState::kNone;
-    sigma_ = ScaleFilter::kUnknownSigma;
-    reason_ = reason;
+    is_road_believed_ = false;
+    is_way_measured_ = false;
+    reason_ = road_.has_value() ? reason : "";
   }
-}
-
-void MetricScale::keep(const RoadScaleEstimate& estimate) {
-  sigma_ = estimate.sigma;
-  state_ = estimate.is_measured   ? ScaleState::kMeasured
-           : estimate.is_believed ? ScaleState::kHeld
-                                  : ScaleState::kNone;
-  reason_ = estimate.reason;
 }
 
 void MetricScale::report(FrameResult& result) const {
   result.scale_state = state_;
   result.road_reason = reason_;
-  result.scale_sigma = sigma_;
+  if (is_enabled()) {
+    result.scale_sigma = is_way_measured_    ? filter_.sigma()
+                         : is_road_believed_ ? road_->sigma(filter_)
+                                             : ScaleFilter::kUnknownSigma;
+  }
 }
 
 }  // namespace stemvo

@@ -7,29 +7,41 @@
 
 #include "odometry/road/image.hpp"
 #include "odometry/road/scale.hpp"
+#include "odometry/scale_filter.hpp"
+#include "odometry/way_scale.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/options.hpp"
 #include "stemvo/rigid3.hpp"
 
 namespace stemvo {
 
-/// Metres per unit of an estimator, from the road (`scale.source: camera_height`; else disabled:
-/// every factor is 1), and what each frame's result says of it.
+/// Metres per unit of an estimator, from the road (`scale.source: camera_height`), from ways that
+/// somebody else measured, or from both; without either every factor is 1. And what each frame's
+/// result says of it.
 class MetricScale {
  public:
   /// `drift_sigma`: of log(metres per unit), per frame.
   explicit MetricScale(const Options& config, std::optional<double> drift_sigma = {});
 
-  [[nodiscard]] bool is_enabled() const { return road_.has_value(); }
+  /// Somebody measures.
+  [[nodiscard]] bool is_enabled() const { return road_.has_value() || has_ways_; }
+  [[nodiscard]] bool asks_road() const { return road_.has_value(); }
 
   /// The first image, or one that nothing connects with the ones before.
-  void restart(const RoadImage* road);
+  void restart(const RoadImage* road, double time_s);
+  /// Ways that came before this frame did.
+  void add(const std::vector<Way>& ways);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the
-  /// factor that makes a unit a metre; the caller multiplies its lengths by it.
+  /// factor that makes a unit a metre; the caller multiplies its lengths by it. `pixel_units`: as
+  /// WayScale::move.
   [[nodiscard]] double measure(const RoadImage* road,
                                const Rigid3& cur_from_prev,
+                               double time_s,
+                               double pixel_units,
                                const std::vector<RoadLandmark>& landmarks = {});
-  /// A frame on which the road cannot be measured: the last scale is kept, its sigma grows.
+  /// The next motion will not tell how far the camera went since the last one.
+  void cut_path(double time_s) { ways_.restart(time_s); }
+  /// A frame on which nothing can be measured: the last scale is kept, its sigma grows.
   void keep_last(std::string_view reason);
   /// A frame without a map to scale.
   void set_unknown(std::string_view reason);
@@ -38,13 +50,14 @@ class MetricScale {
   void report(FrameResult& result) const;
 
  private:
-  void keep(const RoadScaleEstimate& estimate);
-
   ScaleFilter filter_;
   std::optional<RoadScale> road_;
-  std::optional<double> sigma_;
+  WayScale ways_;
+  bool has_ways_ = false;
+  bool is_road_believed_ = false;
+  bool is_way_measured_ = false;  ///< since the last restart
   ScaleState state_ = ScaleState::kDisabled;
-  std::string_view reason_;
+  std::string_view reason_;  ///< of the road
 };
 
 }  // namespace stemvo

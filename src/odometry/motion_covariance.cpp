@@ -238,7 +238,7 @@ void MotionCovariance::learn(const Motion& motion) {
       add_to_mean(square(*velocity - *prev_velocity_) / motion.dt_s, mean_change_, num_changes_);
     }
   }
-  prev_velocity_ = velocity;
+  prev_velocity_ = std::move(velocity);
 }
 
 }  // namespace stemvo

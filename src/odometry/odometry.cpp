@@ -13,6 +13,7 @@ namespace stemvo {
 struct Odometry::Impl {
   PhasedOdometry odometry;
   FrameCheck check;
+  WayInput ways;
   EventLog log = {};
 };
 
@@ -23,7 +24,8 @@ Expected<Odometry> Odometry::create(const Camera& camera,
   if (!odometry) {
     return odometry.error();
   }
-  return Odometry(std::make_unique<Impl>(Impl{*std::move(odometry), FrameCheck(camera)}));
+  return Odometry(std::make_unique<Impl>(
+      Impl{*std::move(odometry), FrameCheck(camera), WayInput(options.scale.source)}));
 }
 
 Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -41,10 +43,19 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (Status status = impl_->check.admit(image, order, time_s, hints); !status) {
     return status.error();
   }
-  PhasedOdometry& odometry = impl_->odometry;
-  FrameResult result = odometry.process(odometry.prepare(rgb_of(image, order), time_s, hints));
+  Frame frame = impl_->odometry.prepare(rgb_of(image, order), time_s, hints);
+  frame.ways = impl_->ways.take(time_s);
+  FrameResult result = impl_->odometry.process(std::move(frame));
   impl_->log.observe(result);
   return result;
+}
+
+Status Odometry::add_speed(double time_s, double metres_per_s, double sigma) {
+  return impl_ ? impl_->ways.add_speed(time_s, metres_per_s, sigma) : moved_from();
+}
+
+Status Odometry::add_distance(double from_s, double to_s, double metres, double sigma) {
+  return impl_ ? impl_->ways.add_distance(from_s, to_s, metres, sigma) : moved_from();
 }
 
 void Odometry::set_log(Log log) {
@@ -58,6 +69,7 @@ void Odometry::reset() {
     impl_->odometry.reset();
     impl_->check.restart();
     impl_->log.restart();
+    impl_->ways.restart();
   }
 }
 

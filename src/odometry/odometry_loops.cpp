@@ -29,6 +29,7 @@ FrameStages OdometryLoops::stages() {
                                     : Frame();
                 frame.time_s = given.time_s;
                 frame.hints.prev_from_cur = given.hints.prev_from_cur;
+                frame.ways = std::move(given.ways);
               },
           .track = [this](std::size_t k) { odometry_.track(std::move(slot(k).frame)); },
           .localize =

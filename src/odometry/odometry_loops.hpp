@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <functional>
 #include <mutex>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "odometry/frame_loops.hpp"
 #include "odometry/phased_odometry.hpp"
+#include "odometry/way.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
 #include "stemvo/odometry.hpp"
@@ -22,6 +24,7 @@ struct GivenFrame {
   Expected<cv::Mat> image;
   double time_s = 0.0;
   FrameHints hints;
+  std::vector<Way> ways = {};  ///< that came before it did
 };
 
 /// Takes frames through an odometry in FrameLoops, on as many threads as its options say: the

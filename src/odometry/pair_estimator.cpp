@@ -153,11 +153,12 @@ LocalizedFrame PairEstimator::localize(const Frame& frame) {
 void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
   result.state = motion_.state;
+  scale_.add(frame.ways);
   if (motion_.state == FrameState::kNoImage) {
     chain_.extrapolate(/*has_image=*/false);
     scale_.keep_last("no image");
   } else if (motion_.state == FrameState::kFirst) {
-    scale_.restart(frame.road.get());
+    scale_.restart(frame.road.get(), frame.time_s);
   } else {
     result.state = chain_.add(motion_, measure_length(frame));
     if (motion_.state != FrameState::kLost && frame.matches.prev_frame == frame.number - 1) {
@@ -193,7 +194,7 @@ double PairEstimator::measure_length(const Frame& frame) {
   }
   const bool is_lost = motion_.state == FrameState::kLost;
   if (is_lost || frame.matches.prev_frame != last_image_) {  // the road was last seen elsewhere
-    scale_.restart(frame.road.get());
+    scale_.restart(frame.road.get(), frame.time_s);
     return 0.0;
   }
   const bool has_length = motion_.state == FrameState::kTracking;
@@ -201,7 +202,10 @@ double PairEstimator::measure_length(const Frame& frame) {
   last_speed_ = last_speed_ > 0.0 ? last_speed_ : chain_.assumed_speed();
   const Rigid3& direction = motion_.cur_from_prev;
   const Rigid3 motion(direction.rotation, interval_s * last_speed_ * direction.translation);
-  last_speed_ *= scale_.measure(frame.road.get(), motion);
+  last_speed_ *= scale_.measure(frame.road.get(), motion, frame.time_s, /*pixel_units=*/0.0);
+  if (!has_length) {
+    scale_.cut_path(frame.time_s);
+  }
   return interval_s * last_speed_;
 }
 

@@ -17,10 +17,16 @@ constexpr int kMinDoubts = 4;
 constexpr int kMaxDoubts = 32;
 /// A first measurement may be the wrong peak of a search over scales: others must confirm it.
 constexpr double kFirstSigma = 0.1;
+constexpr double kTrendKept = 0.99;  ///< of a trend that nothing confirms, per frame
 
 }  // namespace
 
-void ScaleFilter::predict() { sigma_ = std::min(std::hypot(sigma_, drift_sigma_), kUnknownSigma); }
+void ScaleFilter::predict() {
+  sigma_ = std::min(std::hypot(sigma_, drift_sigma_), kUnknownSigma);
+  log_scale_ += trend_;
+  trend_ *= kTrendKept;
+  ++frames_since_way_;
+}
 
 bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
   if (!is_initialized_) {
@@ -42,6 +48,15 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
   const double growth = std::max(1.0, distance / kHuber) * std::max(1.0, distance / kDoubt);
   const double variance = sigma * sigma * growth;
   const double gain = sigma_ * sigma_ / (sigma_ * sigma_ + variance);
+  if (witness == ScaleWitness::kRoad) {
+    frames_since_way_ = 0;
+    trend_ = 0.0;
+  } else {
+    // Critical damping; not from a state that is yet to be found.
+    const bool is_trend = sigma_ < sigma && frames_since_way_ > 0;
+    trend_ += is_trend ? 0.25 * gain * gain * innovation / frames_since_way_ : 0.0;
+    frames_since_way_ = 0;
+  }
   log_scale_ += gain * innovation;
   sigma_ *= std::sqrt(1.0 - gain);
   return distance < kDoubt;
@@ -67,6 +82,7 @@ double ScaleFilter::judge(double innovation, double sigma, ScaleWitness witness)
   }
   num_doubts = 0;
   num_believed = 0;
+  trend_ = 0.0;
   sigma_ = std::min(std::abs(innovation), kUnknownSigma);
   return std::abs(innovation) / std::hypot(sigma, sigma_);
 }

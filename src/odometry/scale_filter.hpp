@@ -52,6 +52,10 @@ class ScaleFilter {
   bool is_initialized_ = false;
   double log_scale_ = 0.0;
   double sigma_ = kUnknownSigma;
+  /// Of log_scale_, per frame: a map that stretches steadily would stay behind by as much as the
+  /// filter is slow. By ways alone, where no road says otherwise.
+  double trend_ = 0.0;
+  int frames_since_way_ = 0;       ///< since the last way, if no road came after it
   std::array<Record, 2> records_;  ///< by witness
 };
 

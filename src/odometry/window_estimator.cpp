@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "geometry/median.hpp"
 #include "odometry/road_landmarks.hpp"
 #include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
@@ -77,7 +78,7 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
   }
   if (last_.frame < 0) {
     reset_reference({frame.number, world_from_camera_, {}, frame.time_s, frame.road});
-    scale_.restart(frame.road.get());
+    scale_.restart(frame.road.get(), frame.time_s);
     return FrameState::kFirst;
   }
   std::optional<StageTimer> timer;
@@ -204,8 +205,9 @@ bool WindowEstimator::open_window(View view) {
   }
   history_.close(window_);
   window_ = std::move(*window);
-  const View& road_view = reference.road != nullptr ? reference : view;
-  scale_.restart(road_view.road.get());
+  const bool has_road = reference.road != nullptr || !scale_.asks_road();
+  const View& road_view = has_road ? reference : view;
+  scale_.restart(road_view.road.get(), road_view.time_s);
   calibration_.restart();
   road_pose_ = road_view.world_from_camera;
   is_initializing_ = false;
@@ -247,6 +249,7 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
+  scale_.add(frame.ways);
   measure_scale(frame, result.state);
   scale_.report(result);
   result.camera = camera();
@@ -312,6 +315,15 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
   history_.observe(window_, frame.image);
 }
 
+double WindowEstimator::pixel_units() const {
+  const Rigid3 camera_from_world = world_from_camera_.inverse();
+  std::vector<double> depths;
+  for (const Eigen::Vector3d& point : find_seen_landmarks(window_, last_moving_.points).points) {
+    depths.push_back((camera_from_world * point).z());
+  }
+  return depths.empty() ? 0.0 : median(std::move(depths)) / camera().mean_focal_px();
+}
+
 void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   if (!frame.has_image()) {
     scale_.keep_last("no image");
@@ -324,11 +336,12 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   } else {
     const Eigen::Vector3d center = road_pose_.translation;
     const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
-    const auto landmarks = scale_.is_enabled() ? road_landmarks(window_, world_from_camera_,
-                                                                last_moving_.points, camera())
-                                               : std::vector<RoadLandmark>();
-    const double factor = scale_.measure(frame.road ? &road : nullptr,
-                                         world_from_camera_.inverse() * road_pose_, landmarks);
+    const auto landmarks = scale_.asks_road() ? road_landmarks(window_, world_from_camera_,
+                                                               last_moving_.points, camera())
+                                              : std::vector<RoadLandmark>();
+    const double factor =
+        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
+                       frame.time_s, pixel_units(), landmarks);
     if (factor != 1.0) {
       rescale(window_, factor, center);
       history_.rescale(factor);

@@ -75,6 +75,8 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
+  /// Units of motion that move the median landmark in view by a pixel.
+  [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);
   void measure_covariance(const Frame& frame, LocalizedFrame& localized);
   void remember(const Frame& frame, FrameState state);

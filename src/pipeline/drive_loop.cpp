@@ -72,10 +72,12 @@ class DriveLoop {
   }
 
   Drive drive() {
-    run_frames(run_.sequence, run_.odometry,
-               [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-                 return visit(i, frame, pose);
-               });
+    run_frames(
+        run_.sequence, run_.odometry,
+        [this](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
+          return visit(i, frame, pose);
+        },
+        run_.beside);
     if (run_.sequence.stream()) {
       end_stream(*run_.sequence.stream());
     }

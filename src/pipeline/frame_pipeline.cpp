@@ -8,15 +8,30 @@
 
 namespace stemvo::pipeline {
 
-void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit) {
+void run_frames(const FrameSource& sequence,
+                PhasedOdometry& odometry,
+                const FrameVisitor& visit,
+                const BesideFrames& beside) {
   std::size_t num_visited = 0;
   OdometryLoops loops(odometry, [&](const GivenFrame& given, const FrameResult& result) {
     return visit(num_visited++, given.image, result);
   });
+  double last_s = 0.0;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     Expected<cv::Mat> image = timed(Stage::kRead, [&] { return sequence.read(i); });
     const bool has_ended = sequence.stream() && image && image->empty();
-    if (has_ended || !loops.push({std::move(image), sequence.time_s(i), {}})) {
+    if (has_ended) {
+      break;
+    }
+    const double time_s = sequence.time_s(i);
+    GivenFrame given{std::move(image), time_s, {}, {}};
+    if (i == 0) {
+      given.ways = beside.ways;
+    } else {
+      given.hints = beside.hints(last_s, time_s);
+    }
+    last_s = time_s;
+    if (!loops.push(std::move(given))) {
       break;
     }
   }

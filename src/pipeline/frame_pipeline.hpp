@@ -10,6 +10,7 @@
 #include "config/config.hpp"
 #include "dataset/frame_source.hpp"
 #include "odometry/phased_odometry.hpp"
+#include "pipeline/beside_frames.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
@@ -23,6 +24,9 @@ using FrameVisitor =
 /// Takes the frames of a sequence through an odometry, read here and worked on in
 /// OdometryLoops. What a stage or the visitor throws leaves this function; frames behind the last
 /// one visited are dropped then.
-void run_frames(const FrameSource& sequence, PhasedOdometry& odometry, const FrameVisitor& visit);
+void run_frames(const FrameSource& sequence,
+                PhasedOdometry& odometry,
+                const FrameVisitor& visit,
+                const BesideFrames& beside = {});
 
 }  // namespace stemvo::pipeline

@@ -156,6 +156,10 @@ class ResultWriter {
     report.filter = run_.odometry.stem_info().filter;
     report.fps = static_cast<double>(trajectory_.size()) / std::max(elapsed.count(), 1e-9);
     report.scale_source = scale_source(config);
+    if (has_speeds()) {
+      report.scale_source =
+          config.scale.source == ScaleSource::kNone ? "speed" : report.scale_source + " and speed";
+    }
     report.tracked_fraction =
         share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
     report.in_place_fraction = share_in_place(drive_.frames);
@@ -175,6 +179,14 @@ class ResultWriter {
                                         alignment, config.evaluation);
     }
     return report;
+  }
+
+  /// Speeds were given, and met the frames.
+  [[nodiscard]] bool has_speeds() const {
+    return !run_.beside.ways.empty() &&
+           std::ranges::any_of(drive_.frames, [](const FrameResult& frame) {
+             return frame.scale_state == ScaleState::kMeasured;
+           });
   }
 
   /// Landmarks and the camera's path among them. Where steps are rescaled, both are.

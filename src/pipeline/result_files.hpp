@@ -10,6 +10,7 @@
 #include "evaluation/trajectory.hpp"
 #include "html/page.hpp"
 #include "odometry/phased_odometry.hpp"
+#include "pipeline/beside_frames.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
@@ -25,6 +26,7 @@ struct Run {
   const RunRequest& request;
   const FrameSource& sequence;
   PhasedOdometry& odometry;
+  const BesideFrames& beside;
 };
 
 /// The loop over the frames leaves this behind.

@@ -88,12 +88,13 @@ std::string describe_size(const FrameSource& sequence) {
 
 /// Says what the input was taken for, and what is lost.
 void note_start(const Run& run, bool is_replacing) {
-  const auto& [request, sequence, odometry] = run;
+  const auto& [request, sequence, odometry, beside] = run;
   if (!request.note) {
     return;
   }
-  request.note(fmt::format("input: {} {}, {}, {}", sequence.kind(), sequence.name(),
-                           describe_size(sequence), describe_truth(request, sequence)));
+  request.note(fmt::format("input: {} {}, {}, {}{}", sequence.kind(), sequence.name(),
+                           describe_size(sequence), describe_truth(request, sequence),
+                           beside.note));
   if (is_replacing) {
     request.note(
         fmt::format("files of an earlier result in {} are replaced (another --out keeps them)",
@@ -121,6 +122,10 @@ Expected<RunSummary> run_source(RunRequest request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
   request.config = dataset::with_camera_height(request.config, sequence.frames());
+  const Expected<pipeline::BesideFrames> beside = pipeline::read_beside_frames(request, sequence);
+  if (!beside) {
+    return beside.error();
+  }
   // Lives longer than the odometry, whose thread that measures the camera may end last.
   std::optional<StageRecorder> recorder;
   Expected<PhasedOdometry> odometry =
@@ -135,10 +140,11 @@ Expected<RunSummary> run_source(RunRequest request,
     }
     request.out_dir = *folder;
   }
-  const Run run{request, sequence, *odometry};
+  const Run run{request, sequence, *odometry, *beside};
   const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
-  const auto lock = pipeline::open_out_folder(
-      request.out_dir, "run", pipeline::input_files(request, sequence, request.config));
+  auto inputs = pipeline::input_files(request, sequence, request.config);
+  inputs.insert(inputs.end(), {request.speeds.value_or(""), request.gyro.value_or("")});
+  const auto lock = pipeline::open_out_folder(request.out_dir, "run", inputs);
   const Status prepared = lock ? prepare_out_folder(run) : lock.error();
   if (!prepared) {
     return prepared.error();

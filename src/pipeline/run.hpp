@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,13 @@ namespace stemvo {
 struct RunRequest : FrameSourceRequest {
   std::filesystem::path out_dir;  ///< empty: a new results/NAME
   Config config;
-  int num_threads = 0;         ///< 0: all cores
-  int image_every = 0;         ///< 0: no per-frame images
-  bool write_map = false;      ///< map.ply; needs odometry.mode map
-  bool measure_times = false;  ///< RunSummary::report.timing
-  std::string command;         ///< that repeats the run, for report.html; may be empty
+  std::optional<std::filesystem::path> speeds;  ///< of the camera, as dataset::read_speeds
+  std::optional<std::filesystem::path> gyro;    ///< as dataset::read_gyro
+  int num_threads = 0;                          ///< 0: all cores
+  int image_every = 0;                          ///< 0: no per-frame images
+  bool write_map = false;                       ///< map.ply; needs odometry.mode map
+  bool measure_times = false;                   ///< RunSummary::report.timing
+  std::string command;  ///< that repeats the run, for report.html; may be empty
   /// Called before work starts, and of a stream's ground truth after it: what the input was taken
   /// for, a line each.
   std::function<void(const std::string&)> note;

@@ -73,6 +73,13 @@ if(NOT count EQUAL 4 OR NOT last MATCHES " ([0-9.]+)\n$" OR CMAKE_MATCH_1 LESS 1
   message(FATAL_ERROR "images_to_poses: expected 4 positions, the last 1 to 10 m ahead, found:\n${output}")
 endif()
 
+# At 10 m/s, ten frames a second; the path is metres once there is one.
+file(WRITE "${work}/speeds.txt" "0 10\n0.1 10\n0.2 10\n0.3 10\n")
+run("wheel_speed" "${work}/examples/wheel_speed" "${work}/speeds.txt" ${frames})
+if(NOT output MATCHES "\n(measured|held) [^\n]+ ([0-9.]+)\n$" OR CMAKE_MATCH_2 LESS 1 OR CMAKE_MATCH_2 GREATER 5)
+  message(FATAL_ERROR "wheel_speed: expected 3 m of metres, found:\n${output}")
+endif()
+
 # The same program by README's command, whose output of pkg-config the shell splits at spaces.
 file(CREATE_LINK "${prefix}" "${work}/prefix" SYMBOLIC)
 set(ENV{PKG_CONFIG_PATH} "${work}/prefix/lib/pkgconfig")

@@ -153,9 +153,10 @@ TEST_F(Run, AnyChannelAndFrontEndRuns) {
   for (const std::string model : {"gray", "input_layer", "default"}) {
     for (const std::string method : {"klt", "orb", "sift"}) {
       const std::string out = out_ + model + method;
-      const ProgramResult result = run_drive(sequence_, out,
-                                             {"--frames", "0:6", "--set", "stem.model=" + model,
-                                              "--set", "features.method=" + method, "--quiet"});
+      const ProgramResult result =
+          run_drive(sequence_, out,
+                    {"--frames", "0:6", "--set", "stem.model=" + model, "--set",
+                     "features.method=" + method, "--set", "scale.source=none", "--quiet"});
       EXPECT_EQ(result.exit_code, 0) << model << " " << method << ": " << result.err;
       EXPECT_THAT(result.out + result.err, IsEmpty());
       EXPECT_EQ(count_lines(read_file(out + "/trajectory_kitti.txt")), 6);

@@ -162,8 +162,8 @@ TEST(MetricScale, DisabledItChangesNothing) {
   config.scale.source = ScaleSource::kNone;
   MetricScale scale(config);
   const auto image = drive.road_image(0, true);
-  scale.restart(image.get());
-  EXPECT_EQ(scale.measure(image.get(), Rigid3()), 1.0);
+  scale.restart(image.get(), 0.0);
+  EXPECT_EQ(scale.measure(image.get(), Rigid3(), 1.0, 0.01), 1.0);
   scale.keep_last("no image");
   FrameResult result;
   scale.report(result);
@@ -175,7 +175,7 @@ TEST(MetricScale, DisabledItChangesNothing) {
 TEST(MetricScale, AFrameWithoutARoadImageKeepsTheUnit) {
   const RoadDrive drive(2);
   MetricScale scale(metric_config());
-  EXPECT_EQ(scale.measure(nullptr, Rigid3()), 1.0);
+  EXPECT_EQ(scale.measure(nullptr, Rigid3(), 1.0, 0.01), 1.0);
 }
 
 }  // namespace

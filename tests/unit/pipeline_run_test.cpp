@@ -88,6 +88,7 @@ class PipelineRun : public ::testing::Test {
 };
 
 TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
+  request_.config.scale_choice = ScaleChoice::kOptions;
   request_.image_every = 4;
   const Expected<RunSummary> summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -286,6 +287,7 @@ TEST_F(PipelineRun, StoppingAfterTheLastFrameIsNoInterrupt) {
 }
 
 TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
+  request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
@@ -313,6 +315,7 @@ TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
 }
 
 TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
+  request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
   const auto summary = run_sequence(request_, [&](std::size_t, std::size_t) {
     fs::create_directories(request_.out_dir / "trajectory_tum.txt.unfinished");

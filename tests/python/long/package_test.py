@@ -129,6 +129,17 @@ for keyframe in keyframes:
     assert np.array_equal(plain[keyframe.frame].world_from_camera, keyframe.world_from_camera)
 assert len(metres.keyframes(1)) == len(keyframes) - 1
 assert len(metres.landmarks_since(changes.version).ids) == 0 < len(changes.ids) == len(changes.positions) == len(changes.colors)
+truth = recording.ground_truth[:, :3, 3]
+steps = np.linalg.norm(np.diff(truth, axis=0), axis=1)
+wheels = stemvo.Odometry(recording.camera)
+def rolling():  # at the mean speed of the step to come
+    for (image, time), step in zip(frames, [*steps, steps[-1]]):
+        wheels.add_speed(time, step / 0.1, 0.02 * step / 0.1)
+        yield image, time
+ends = [result.world_from_camera[:3, 3] for result in wheels.run(rolling())][-2:]
+assert abs(np.linalg.norm(ends[1] - ends[0]) / steps[-1] - 1.0) < 0.05, (ends, steps[-1])
+raises(lambda: wheels.add_speed(0.5, 1.0, 0.1), "speed: expected")
+raises(lambda: wheels.add_distance(2.0, 1.0, 1.0, 0.1), "distance: expected a time after its beginning")
 lines = []
 logger = logging.getLogger("stemvo")
 logger.setLevel(logging.INFO)

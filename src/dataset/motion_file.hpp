@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "stemvo/error.hpp"
+
+namespace stemvo::dataset {
+
+/// A row of a file of speeds.
+struct SpeedRow {
+  double time_s = 0.0;
+  double metres_per_s = 0.0;
+  double sigma = 0.0;
+};
+
+/// A row of a file of turn rates.
+struct GyroRow {
+  double time_s = 0.0;
+  Eigen::Vector3d rad_per_s = Eigen::Vector3d::Zero();
+};
+
+/// Rows `time, m/s` or `time, m/s, sigma`, between commas or blanks, `#` before comments; times in
+/// seconds rise. A row without a sigma has 2 % of its speed, and at least 0.05 m/s. Errors, naming
+/// file and line: unreadable, other rows, a sigma that is not above 0, no row.
+[[nodiscard]] Expected<std::vector<SpeedRow>> read_speeds(const std::filesystem::path& file);
+
+/// Rows `time, x, y, z` in rad/s, likewise; or EuRoC's imu0/data.csv, whose comment says [ns], with
+/// the accelerations behind them.
+[[nodiscard]] Expected<std::vector<GyroRow>> read_gyro(const std::filesystem::path& file);
+
+/// Rotation prev_from_cur of the gyro's own axes between two times: rates change evenly from row to
+/// row. nullopt: the rows leave 0.1 s or more of it out.
+[[nodiscard]] std::optional<Eigen::Quaterniond> integrate_gyro(const std::vector<GyroRow>& rows,
+                                                               double from_s,
+                                                               double to_s);
+
+}  // namespace stemvo::dataset

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#include "pipeline/beside_frames.hpp"
+
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace stemvo::pipeline {
+namespace {
+
+Status add_speeds(const RunRequest& request, BesideFrames& beside) {
+  if (request.config.scale_choice == ScaleChoice::kGroundTruth) {
+    return fail("--speed: expected scale.source none or camera_height, found ground_truth");
+  }
+  const auto rows = dataset::read_speeds(*request.speeds);
+  if (!rows) {
+    return rows.error();
+  }
+  WayInput input(request.config.scale.source);
+  for (const dataset::SpeedRow& row : *rows) {
+    if (Status status = input.add_speed(row.time_s, row.metres_per_s, row.sigma); !status) {
+      return fail("--speed: " + status.error().message);
+    }
+  }
+  beside.ways = input.take(std::numeric_limits<double>::infinity());
+  beside.note += fmt::format(", {} speeds", rows->size());
+  return {};
+}
+
+Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFrames& beside) {
+  auto rows = dataset::read_gyro(*request.gyro);
+  if (!rows) {
+    return rows.error();
+  }
+  const auto& camera_from_imu = sequence.frames().camera_from_imu;
+  for (dataset::GyroRow& row : *rows) {
+    row.rad_per_s = camera_from_imu.value_or(Eigen::Quaterniond::Identity()) * row.rad_per_s;
+  }
+  beside.note += fmt::format(", {} turn rates{}", rows->size(),
+                             camera_from_imu ? "" : " (taken for about the camera's own axes)");
+  beside.gyro = *std::move(rows);
+  return {};
+}
+
+}  // namespace
+
+FrameHints BesideFrames::hints(double last_s, double time_s) const {
+  FrameHints hints;
+  if (!gyro.empty()) {
+    hints.prev_from_cur = dataset::integrate_gyro(gyro, last_s, time_s);
+  }
+  return hints;
+}
+
+Expected<BesideFrames> read_beside_frames(const RunRequest& request, const FrameSource& sequence) {
+  BesideFrames beside;
+  Status status = request.speeds ? add_speeds(request, beside) : Status();
+  status = status && request.gyro ? add_gyro(request, sequence, beside) : status;
+  return status ? Expected<BesideFrames>(std::move(beside)) : status.error();
+}
+
+}  // namespace stemvo::pipeline

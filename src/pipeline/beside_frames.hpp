@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dataset/frame_source.hpp"
+#include "dataset/motion_file.hpp"
+#include "odometry/way.hpp"
+#include "pipeline/run.hpp"
+#include "stemvo/error.hpp"
+#include "stemvo/odometry.hpp"
+
+namespace stemvo::pipeline {
+
+/// What is known of a recording's motion beside its frames.
+struct BesideFrames {
+  std::vector<Way> ways;               ///< by speeds
+  std::vector<dataset::GyroRow> gyro;  ///< in the camera's axes
+  std::string note;                    ///< what there is, for the line of the input; may be empty
+
+  /// For the frame of this time, behind one of that time.
+  [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
+};
+
+/// Reads the files that were asked for. Errors: theirs; speeds beside a scale.source that leaves no
+/// room for them.
+[[nodiscard]] Expected<BesideFrames> read_beside_frames(const RunRequest& request,
+                                                        const FrameSource& sequence);
+
+}  // namespace stemvo::pipeline

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "dataset/motion_file.hpp"
+#include "stemvo/rigid3.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo::dataset {
+namespace {
+
+using ::testing::HasSubstr;
+
+class MotionFile : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path write(const std::string& text) const {
+    return folder_.file("motion.txt", text);
+  }
+  std::string speed_error(const std::string& text) {
+    const auto speeds = read_speeds(write(text));
+    return speeds ? "no error" : speeds.error().message;
+  }
+  testing::TempFolder folder_;
+};
+
+TEST_F(MotionFile, SpeedsStandBetweenCommasOrBlanksAndBringTheirSigma) {
+  const auto speeds = read_speeds(write("# time, m/s\n0.1,10\n\n0.2  -1.0 # back\n0.3 4 0.25\n"));
+  ASSERT_TRUE(speeds) << speeds.error().message;
+  ASSERT_EQ(speeds->size(), 3U);
+  EXPECT_EQ((*speeds)[0].sigma, 0.2);
+  EXPECT_EQ((*speeds)[1].metres_per_s, -1.0);
+  EXPECT_EQ((*speeds)[1].sigma, 0.05);
+  EXPECT_EQ((*speeds)[2].sigma, 0.25);
+}
+
+TEST_F(MotionFile, WhatIsNoRowIsRefusedWithItsLine) {
+  EXPECT_THAT(speed_error("0 1\n1\n"),
+              HasSubstr("motion.txt:2: expected a time, m/s and maybe a sigma, found 1 words"));
+  EXPECT_THAT(speed_error("time speed\n"), HasSubstr("motion.txt:1: expected"));
+  EXPECT_THAT(speed_error("1 1\n\n1 2\n"), HasSubstr("motion.txt:3: expected a time after 1 s"));
+  EXPECT_THAT(speed_error("0 1\n1 1 0\n"), HasSubstr("expected a sigma above 0 at 1 s, found 0"));
+  EXPECT_THAT(speed_error("0 nan\n"), HasSubstr("motion.txt:1"));
+  EXPECT_THAT(speed_error("# nothing\n"), HasSubstr("expected rows of a time, m/s"));
+  const auto gyro = read_gyro(write("0 1 2\n"));
+  ASSERT_FALSE(gyro);
+  EXPECT_THAT(gyro.error().message, HasSubstr("motion.txt:1: expected a time and rad/s"));
+}
+
+TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
+  const auto gyro = read_gyro(
+      write("#timestamp [ns],w_x [rad s^-1],w_y,w_z,a_x,a_y,a_z\n2500000000,0.1,0.2,0.3,9,8,7\n"));
+  ASSERT_TRUE(gyro) << gyro.error().message;
+  EXPECT_NEAR(gyro->front().time_s, 2.5, 1e-12);
+  EXPECT_EQ(gyro->front().rad_per_s, Eigen::Vector3d(0.1, 0.2, 0.3));
+}
+
+TEST(Gyro, RatesBecomeTheRotationBetweenTwoTimes) {
+  std::vector<GyroRow> rows;  // faster and faster about x
+  for (int i = 0; i <= 40; ++i) {
+    rows.push_back({0.05 * i, Eigen::Vector3d(0.5 * 0.05 * i, 0.0, 0.0)});
+  }
+  const auto turned = integrate_gyro(rows, 0.52, 0.97);
+  ASSERT_TRUE(turned);
+  const double angle = 0.25 * (0.97 * 0.97 - 0.52 * 0.52);
+  EXPECT_LT(turned->angularDistance(so3_exp({angle, 0.0, 0.0})), 1e-9);
+  EXPECT_FALSE(integrate_gyro(rows, 1.9, 2.2)) << "behind the last";
+  EXPECT_FALSE(integrate_gyro({}, 0.0, 0.1));
+  rows.erase(rows.begin() + 15, rows.begin() + 20);
+  EXPECT_FALSE(integrate_gyro(rows, 0.6, 1.1)) << "a gap";
+  EXPECT_TRUE(integrate_gyro(rows, 1.1, 1.4));
+}
+
+// Turns do not commute: first about y, then about the new z.
+TEST(Gyro, TurnsAreTakenInTheirOrder) {
+  std::vector<GyroRow> rows;
+  for (int i = 0; i <= 200; ++i) {
+    const bool is_first = i < 100;
+    rows.push_back({0.001 * i, is_first ? Eigen::Vector3d(0, 5, 0) : Eigen::Vector3d(0, 0, 5)});
+  }
+  const auto turned = integrate_gyro(rows, 0.0, 0.2);
+  ASSERT_TRUE(turned);
+  EXPECT_LT(turned->angularDistance(so3_exp({0.0, 0.5, 0.0}) * so3_exp({0.0, 0.0, 0.5})), 0.005);
+}
+
+}  // namespace
+}  // namespace stemvo::dataset

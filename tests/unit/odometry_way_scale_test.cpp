@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "odometry/metric_scale.hpp"
+#include "odometry/way.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kPixelUnits = 0.01;
+
+/// A drive whose map drifts, at 10 frames a second: what the scale is told, and what comes out.
+struct PlantedDrive {
+  std::function<double(double)> speed = [](double) { return 8.0; };  ///< m/s, by time
+  double drift = 0.001;      ///< of log(metres per unit), per frame
+  double interval_s = 0.1;   ///< between frames
+  double place_noise = 0.0;  ///< of the camera's place, units of the guess
+  Options options;
+  WayInput ways{ScaleSource::kNone};
+
+  double path_m = 0.0;   ///< true, from the first frame on that the scale was measured
+  double found_m = 0.0;  ///< the same, as the scale has it
+  double largest_step_error = 0.0;
+  double units_per_m = 0.3;  ///< at first a guess
+  FrameResult result;
+
+  /// `give` adds what is measured before the frame of this time is.
+  void run(int num_frames, const std::function<void(double)>& give) {
+    MetricScale scale(options);
+    std::mt19937_64 engine(5);
+    std::normal_distribution<double> noise(0.0, place_noise);
+    Eigen::Vector3d error = Eigen::Vector3d::Zero();
+    scale.restart(nullptr, 0.0);
+    for (int i = 1; i < num_frames; ++i) {
+      const double now_s = interval_s * i;
+      give(now_s);
+      scale.add(ways.take(now_s));
+      const double step_m = interval_s * speed(now_s - 0.5 * interval_s);
+      units_per_m *= std::exp(-drift);
+      const Eigen::Vector3d next_error(noise(engine), noise(engine), noise(engine));
+      const Eigen::Vector3d step =
+          Eigen::Vector3d(0.0, 0.0, -step_m * units_per_m) + next_error - error;
+      error = next_error;
+      const double factor =
+          scale.measure(nullptr, Rigid3(Eigen::Quaterniond::Identity(), step), now_s, kPixelUnits);
+      units_per_m *= factor;
+      scale.report(result);
+      if (result.scale_state == ScaleState::kMeasured || path_m > 0.0) {
+        path_m += step_m;
+        found_m += factor * step.norm();
+        largest_step_error = std::max(largest_step_error, std::abs(std::log(units_per_m)));
+      }
+    }
+  }
+  [[nodiscard]] double error() const { return found_m / path_m - 1.0; }
+};
+
+/// Speeds with this error at frames' times.
+std::function<void(double)> speeds(PlantedDrive& drive, double noise, double bias = 0.0) {
+  auto engine = std::make_shared<std::mt19937_64>(7);
+  return [&drive, noise, bias, engine](double now_s) {
+    const double true_speed = drive.speed(now_s);
+    std::normal_distribution<double> error(bias, noise);
+    ASSERT_TRUE(drive.ways.add_speed(now_s, true_speed * (1.0 + error(*engine)),
+                                     std::max(1e-3, noise * true_speed)));
+  };
+}
+
+TEST(WayScale, NoiseOfSpeedsAveragesAndADriftingMapIsFollowed) {
+  PlantedDrive drive;
+  drive.run(800, speeds(drive, 0.02));
+  EXPECT_EQ(drive.result.scale_state, ScaleState::kMeasured);
+  EXPECT_NEAR(drive.error(), 0.0, 0.006);
+  EXPECT_LT(drive.largest_step_error, 0.04) << "a walk of steps";
+  EXPECT_LT(drive.result.scale_sigma.value(), 0.015);
+}
+
+TEST(WayScale, ABiasOfSpeedsIsTheBiasOfThePath) {
+  PlantedDrive drive;
+  drive.run(800, speeds(drive, 0.02, 0.05));
+  EXPECT_NEAR(drive.error(), 0.05, 0.007);
+}
+
+TEST(WayScale, ACameraThatStandsTellsNothing) {
+  PlantedDrive drive;
+  drive.speed = [](double now_s) {  // from 20 to 50 s
+    return 5.0 * std::clamp(std::abs(now_s - 35.0) - 15.0, 0.0, 1.0);
+  };
+  drive.drift = 0.0;
+  drive.place_noise = 0.05 * kPixelUnits;
+  drive.run(700, [&](double now_s) {
+    ASSERT_TRUE(drive.ways.add_speed(now_s, drive.speed(now_s) + 0.005, 0.02));
+  });
+  EXPECT_NEAR(drive.error(), 0.001, 0.002);
+  EXPECT_LT(drive.largest_step_error, 0.05);
+}
+
+TEST(WayScale, AShortStepWaitsForOthers) {
+  PlantedDrive drive;  // by 0.15 pixels a frame
+  drive.speed = [](double) { return 0.05; };
+  drive.drift = 0.0;
+  drive.place_noise = 0.05 * kPixelUnits;
+  drive.run(1500, speeds(drive, 0.02));
+  EXPECT_LT(drive.largest_step_error, 0.06);
+}
+
+TEST(WayScale, SpeedsOfAnotherRateAndOtherTimesLateOnes) {
+  for (const double interval_s : {0.01, 0.23, 1.0}) {
+    PlantedDrive drive;
+    drive.speed = [](double now_s) { return 6.0 + 2.0 * std::sin(0.3 * now_s); };
+    drive.drift = 0.0;
+    double next_s = -0.037;
+    drive.run(600, [&](double now_s) {
+      for (; next_s <= now_s - 0.3; next_s += interval_s) {  // three frames late
+        ASSERT_TRUE(drive.ways.add_speed(next_s, drive.speed(next_s), 0.05));
+      }
+    });
+    EXPECT_NEAR(drive.error(), 0.0, 0.01) << interval_s;
+  }
+}
+
+TEST(WayScale, DistancesCountAsSpeedsDo) {
+  PlantedDrive drive;
+  drive.drift = 0.0;
+  drive.run(400, [&](double now_s) {
+    const int frame = static_cast<int>(std::lround(now_s / drive.interval_s));
+    if (frame % 10 == 0) {
+      ASSERT_TRUE(drive.ways.add_distance(now_s - 1.0, now_s, 8.0, 0.05));
+    }
+  });
+  EXPECT_NEAR(drive.error(), 0.0, 0.005);
+}
+
+// The first frames already have the unit, though nothing was measured from one to the other yet.
+TEST(WayScale, TheLastSpeedIsTheFirstGuess) {
+  PlantedDrive drive;
+  drive.run(4, [&](double now_s) {
+    if (now_s < 0.15) {
+      ASSERT_TRUE(drive.ways.add_speed(0.05, 8.0, 0.1));
+    }
+  });
+  EXPECT_NEAR(drive.units_per_m, 1.0, 0.01);
+  EXPECT_EQ(drive.result.scale_state, ScaleState::kNone);
+}
+
+TEST(WayInput, RefusesWhatIsNoMeasurementAndSaysWhy) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  WayInput ways(ScaleSource::kNone);
+  const auto speed = [&](double time_s, double metres_per_s, double sigma) {
+    const Status status = ways.add_speed(time_s, metres_per_s, sigma);
+    return status ? std::string("no error") : status.error().message;
+  };
+  EXPECT_THAT(speed(kNan, 1.0, 0.1), HasSubstr("speed: expected a finite time, found nan"));
+  EXPECT_THAT(speed(0.0, kNan, 0.1), HasSubstr("expected a number of m/s, found nan"));
+  EXPECT_THAT(speed(0.0, 1.0, 0.0), HasSubstr("expected a sigma above 0, found 0"));
+  EXPECT_THAT(speed(0.0, 1.0, kNan), HasSubstr("expected a sigma above 0, found nan"));
+  EXPECT_EQ(speed(1.0, -1.0, 0.1), "no error");
+  EXPECT_THAT(speed(1.0, 1.0, 0.1), HasSubstr("after the last one's, 1 s, found 1 s"));
+  EXPECT_EQ(speed(1.5, 1.0, 0.1), "no error");
+  ASSERT_EQ(ways.take(1.5).size(), 1U);
+  EXPECT_EQ(speed(9.0, 1.0, 0.1), "no error");  // too far from the one before
+  EXPECT_TRUE(ways.take(9.0).empty());
+  const auto distance = [&](double from_s, double to_s, double metres, double sigma) {
+    const Status status = ways.add_distance(from_s, to_s, metres, sigma);
+    return status ? std::string("no error") : status.error().message;
+  };
+  EXPECT_THAT(distance(2.0, 1.0, 1.0, 0.1), HasSubstr("its beginning, 2 s, found 1 s"));
+  EXPECT_THAT(distance(1.0, 2.0, -1.0, 0.1), HasSubstr("expected at least 0 m, found -1"));
+  EXPECT_THAT(distance(1.0, 2.0, 1.0, -0.1), HasSubstr("expected a sigma above 0, found -0.1"));
+  EXPECT_EQ(distance(1.0, 2.0, 1.0, 0.1), "no error");
+  EXPECT_THAT(distance(0.0, 2.0, 1.0, 0.1), HasSubstr("after the last one's, 2 s, found 2 s"));
+  WayInput constant(ScaleSource::kConstantSpeed);
+  const Status refused = constant.add_speed(0.0, 1.0, 0.1);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("scale.source: expected none or camera_height"));
+}
+
+}  // namespace
+}  // namespace stemvo
