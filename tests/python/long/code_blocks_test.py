@@ -150,8 +150,7 @@ class CodeBlocks(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_programs_are_examples_that_are_compiled(self):
-        listed = (ROOT / "examples/CMakeLists.txt").read_text()
-        compiled = {file.read_text().split("\n", 1)[1] for file in (ROOT / "examples").glob("*.cpp") if f" {file.name})" in listed}
+        compiled = {file.read_text().split("\n", 1)[1] for file in (ROOT / "examples").glob("*.cpp")}  # CMake takes them all
         for block in documented.blocks("cpp"):
             self.assertIn(block.text, compiled, f"{block.place}: no program of examples/, which the test `package` compiles and runs")
 

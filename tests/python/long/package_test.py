@@ -164,7 +164,7 @@ view = stemvo.FrameView(sys.argv[3], masks=sys.argv[4:])
 odometry, video = stemvo.Odometry(view), cv2.VideoCapture(sys.argv[2])
 while (read := video.read())[0]:
     image = view.apply(cv2.cvtColor(read[1], cv2.COLOR_BGR2RGB))
-    pose = odometry.process(image, video.get(cv2.CAP_PROP_POS_MSEC) / 1000).world_from_camera
+    pose = odometry.process(image, video.get(cv2.CAP_PROP_POS_MSEC) * 1e-3).world_from_camera
     print(*(f"{value + 0.0:.12e}" for value in pose[:3].ravel()))
 """
 
