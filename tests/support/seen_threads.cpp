@@ -46,11 +46,11 @@ class SeenThreads : public cv::parallel::ParallelForAPI {
   int num_threads_ = kNumThreads;
 };
 
-/// Before each test: a run of the pipeline sets OpenCV's own back.
+/// Before each suite and each test: a run of the pipeline sets OpenCV's own back.
 class UseSeenThreads : public ::testing::EmptyTestEventListener {
-  void OnTestStart(const ::testing::TestInfo&) override {
-    cv::parallel::setParallelForBackend(std::make_shared<SeenThreads>(), false);
-  }
+  void OnTestSuiteStart(const ::testing::TestSuite&) override { use(); }
+  void OnTestStart(const ::testing::TestInfo&) override { use(); }
+  static void use() { cv::parallel::setParallelForBackend(std::make_shared<SeenThreads>(), false); }
 };
 
 [[maybe_unused]] const bool is_used = [] {
