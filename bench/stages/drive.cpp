@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "dataset/camera_height.hpp"
 #include "odometry/road/image.hpp"
 #include "synth/synth.hpp"
 
@@ -72,6 +73,7 @@ Frames load_frames() {
 Chain run_chain() {
   Chain result;
   result.camera = frames().sequence.camera();
+  result.config = dataset::with_camera_height({}, frames().sequence.frames());
   const Config& config = result.config;
   const Stem stem = load_stem(config.stem);
   ContrastNormalization contrast(config.stem);
