@@ -7,6 +7,7 @@
 
 #include "odometry/metric_scale.hpp"
 #include "odometry/pair_estimator.hpp"
+#include "odometry/way.hpp"
 #include "odometry/window_estimator.hpp"
 #include "support/road_drive.hpp"
 
@@ -104,6 +105,37 @@ TEST_P(MetricScaleOf, AnImageThatIsMissingHoldsTheScale) {
   EXPECT_NEAR(
       after.world_from_camera.translation.z() - run.results[17].world_from_camera.translation.z(),
       2.0 * kStep_m, 0.05 * kStep_m);
+}
+
+/// Metres per metre of a drive whose speed is given, beside a road that lies lower than its height
+/// says. Landmarks lie `ratio` times as far below the camera as the road does.
+double scale_beside_a_road(double ratio) {
+  constexpr int kNumFrames = 30;
+  const RoadDrive drive(kNumFrames);
+  Options config = metric_config();
+  const double height_m = config.scale.camera_height_m;
+  config.scale.camera_height_m = 1.08 * height_m;
+  MetricScale scale(config);
+  WayInput input{ScaleSource::kCameraHeight};
+  double units_per_m = 1.0;
+  scale.restart(drive.road_image(0, true).get(), 0.0);
+  for (int i = 1; i < kNumFrames; ++i) {
+    EXPECT_TRUE(input.add_speed(0.1 * (i - 0.5), 10.0 * kStep_m, 0.4));
+    scale.add(input.take(0.1 * i));
+    std::vector<RoadLandmark> landmarks;
+    const double below = ratio * height_m * units_per_m;
+    for (int k = 0; k < 8; ++k) {
+      landmarks.push_back({{0.02 * k * below, below, (5.0 + 0.8 * k) * below}, 0.02});
+    }
+    const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * units_per_m});
+    units_per_m *= scale.measure(drive.road_image(i, true).get(), motion, 0.1 * i, 0.01, landmarks);
+  }
+  return units_per_m;
+}
+
+TEST(MetricScale, ARoadThatIsNotProvenDoesNotBendWhatSpeedsMeasure) {
+  EXPECT_NEAR(scale_beside_a_road(1.6), 1.0, 0.01);
+  EXPECT_GT(scale_beside_a_road(1.0), 1.02) << "one that is believed is joined with them";
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes,
