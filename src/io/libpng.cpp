@@ -2,6 +2,7 @@
 // The part of png.hpp that libpng does: unusual kinds of PNG, and writing.
 #include <algorithm>
 #include <csetjmp>
+#include <cstdlib>
 #include <new>
 #include <vector>
 
@@ -19,13 +20,18 @@ class LibpngReader {
  public:
   explicit LibpngReader(Bytes bytes)
       : rest_(bytes),
-        png_(png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, &fail, [](auto...) {})),
+        png_(png_create_read_struct_2(
+            PNG_LIBPNG_VER_STRING,
+            nullptr,
+            &fail,
+            [](auto...) {},
+            nullptr,
+            &allocate,
+            [](png_structp, png_voidp memory) { std::free(memory); })),
         info_(png_ != nullptr ? png_create_info_struct(png_) : nullptr) {
     if (info_ == nullptr) {
       throw std::bad_alloc();
     }
-    // libpng allocates what a chunk's length claims before it reads it.
-    png_set_chunk_malloc_max(png_, 1U << 23U);
     png_set_read_fn(png_, this, &give);
   }
   ~LibpngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
@@ -64,6 +70,12 @@ class LibpngReader {
     }
     png_set_interlace_handling(png_);
     png_read_update_info(png_, info_);
+  }
+  /// libpng 1.6.39 allocates what a chunk's length claims before it reads it, and only warns where
+  /// that is over png_set_chunk_malloc_max. Rows of the widest image take half a MiB.
+  static png_voidp allocate(png_structp /*png*/, png_alloc_size_t size) {
+    constexpr png_alloc_size_t kMaxSize = 1U << 23U;
+    return size > kMaxSize ? nullptr : std::malloc(size);
   }
   [[noreturn]] static void fail(png_structp png, png_const_charp /*message*/) {
     png_longjmp(png, 1);
