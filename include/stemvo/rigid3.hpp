@@ -36,6 +36,28 @@ struct Rigid3 {
 /// x_in_b = b_from_a * x_in_a.
 [[nodiscard]] Eigen::Vector3d operator*(const Rigid3& b_from_a, const Eigen::Vector3d& x_in_a);
 
+/// Rigid motion and change of lengths `b_from_a`: x_in_b = scale * (rotation * x_in_a) +
+/// translation. One of `a` is `scale` of `b`.
+struct Similarity3 {
+  double scale = 1.0;
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Similarity3() = default;
+  Similarity3(double scale_in,
+              const Eigen::Quaterniond& rotation_in,
+              const Eigen::Vector3d& translation_in)
+      : scale(scale_in), rotation(rotation_in.normalized()), translation(translation_in) {}
+  explicit Similarity3(const Rigid3& rigid)
+      : rotation(rigid.rotation), translation(rigid.translation) {}
+
+  [[nodiscard]] Similarity3 inverse() const;
+};
+[[nodiscard]] Similarity3 operator*(const Similarity3& c_from_b, const Similarity3& b_from_a);
+[[nodiscard]] Eigen::Vector3d operator*(const Similarity3& b_from_a, const Eigen::Vector3d& x_in_a);
+/// A camera's pose among the points that the similarity moves: lengths are b's.
+[[nodiscard]] Rigid3 operator*(const Similarity3& b_from_a, const Rigid3& a_from_camera);
+
 /// Cross-product matrix: skew(a) * b == a x b.
 [[nodiscard]] Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 /// Rotation of |w| rad about w (Rodrigues); so3_log is its inverse, |result| <= pi.

@@ -37,12 +37,10 @@ std::vector<double> distances_m(std::span<const Rigid3> poses) {
 }
 
 Trajectory transform(const Similarity3& by, std::span<const Rigid3> poses) {
-  const Eigen::Quaterniond rotation(by.rotation);
   Trajectory result;
   result.reserve(poses.size());
   for (const Rigid3& pose : poses) {
-    result.emplace_back(rotation * pose.rotation,
-                        by.scale * (rotation * pose.translation) + by.translation);
+    result.push_back(by * pose);
   }
   return result;
 }

@@ -80,11 +80,11 @@ Similarity3 umeyama(std::span<const Eigen::Vector3d> source,
     if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) {
       signs.z() = -1.0;
     }
-    result.rotation = best_rotation(svd, signs);
+    result.rotation = Eigen::Quaterniond(best_rotation(svd, signs)).normalized();
     const double scale = svd.singularValues().dot(signs) / source_variance;
     result.scale = with_scale && scale > 0.0 ? scale : 1.0;
   }
-  result.translation = target_mean - result.scale * result.rotation * source_mean;
+  result.translation = target_mean - result.scale * (result.rotation * source_mean);
   return result;
 }
 

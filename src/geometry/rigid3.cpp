@@ -55,6 +55,24 @@ Eigen::Vector3d operator*(const Rigid3& b_from_a, const Eigen::Vector3d& x_in_a)
   return b_from_a.rotation * x_in_a + b_from_a.translation;
 }
 
+Similarity3 Similarity3::inverse() const {
+  const Eigen::Quaterniond inverse_rotation = rotation.conjugate();
+  return {1.0 / scale, inverse_rotation, -(inverse_rotation * translation) / scale};
+}
+
+Similarity3 operator*(const Similarity3& c_from_b, const Similarity3& b_from_a) {
+  return {c_from_b.scale * b_from_a.scale, c_from_b.rotation * b_from_a.rotation,
+          c_from_b * b_from_a.translation};
+}
+
+Eigen::Vector3d operator*(const Similarity3& b_from_a, const Eigen::Vector3d& x_in_a) {
+  return b_from_a.scale * (b_from_a.rotation * x_in_a) + b_from_a.translation;
+}
+
+Rigid3 operator*(const Similarity3& b_from_a, const Rigid3& a_from_camera) {
+  return {b_from_a.rotation * a_from_camera.rotation, b_from_a * a_from_camera.translation};
+}
+
 Eigen::Matrix3d skew(const Eigen::Vector3d& a) {
   Eigen::Matrix3d result;
   result << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;

@@ -134,8 +134,7 @@ inline double fitted_error_share(std::span<const Rigid3> poses, std::span<const 
   const Similarity3 fit = align_positions(from, to, Alignment::kSim3);
   double worst = 0.0;
   for (std::size_t i = 0; i < from.size(); ++i) {
-    const Eigen::Vector3d fitted = fit.scale * (fit.rotation * from[i]) + fit.translation;
-    worst = std::max(worst, (fitted - to[i]).norm());
+    worst = std::max(worst, (fit * from[i] - to[i]).norm());
   }
   return worst / length;
 }

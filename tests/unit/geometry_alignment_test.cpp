@@ -29,14 +29,14 @@ Points random_points(SceneRandom& random, int n) {
 }
 
 Similarity3 random_similarity(SceneRandom& random, double scale) {
-  return {scale, so3_exp(random.uniform(0.0, 3.1) * random.direction()).toRotationMatrix(),
+  return {scale, so3_exp(random.uniform(0.0, 3.1) * random.direction()),
           random.uniform(0.0, 100.0) * random.direction()};
 }
 
 Points transform(const Similarity3& similarity, const Points& points) {
   Points result;
   for (const Eigen::Vector3d& point : points) {
-    result.emplace_back(similarity.scale * similarity.rotation * point + similarity.translation);
+    result.push_back(similarity * point);
   }
   return result;
 }
@@ -54,13 +54,12 @@ void expect_sound(const Similarity3& s) {
   EXPECT_TRUE(std::isfinite(s.scale));
   EXPECT_GT(s.scale, 0.0);
   EXPECT_TRUE(s.translation.allFinite());
-  EXPECT_THAT(s.rotation * s.rotation.transpose(), IsNear(Eigen::Matrix3d::Identity(), 1e-12));
-  EXPECT_NEAR(s.rotation.determinant(), 1.0, 1e-12);
+  EXPECT_NEAR(s.rotation.norm(), 1.0, 1e-12);
 }
 
 void expect_identity(const Similarity3& s) {
   EXPECT_EQ(s.scale, 1.0);
-  EXPECT_EQ(s.rotation, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  EXPECT_EQ(s.rotation.coeffs(), Eigen::Quaterniond::Identity().coeffs());
   EXPECT_EQ(s.translation, Eigen::Vector3d(Eigen::Vector3d::Zero()));
 }
 
@@ -71,7 +70,8 @@ TEST(AlignPositions, FindsThePlantedSimilarity) {
     const Similarity3 planted = random_similarity(random, random.uniform(0.1, 10.0));
     const Similarity3 found = align_positions(source, transform(planted, source), Alignment::kSim3);
     EXPECT_NEAR(found.scale, planted.scale, 1e-9);
-    EXPECT_THAT(found.rotation, IsNear(planted.rotation, 1e-9));
+    EXPECT_THAT(found.rotation.toRotationMatrix(),
+                IsNear(planted.rotation.toRotationMatrix(), 1e-9));
     EXPECT_THAT(found.translation, IsNear(planted.translation, 1e-7));
   }
 }
@@ -82,12 +82,13 @@ TEST(AlignPositions, Se3LeavesTheScale) {
   const Similarity3 planted = random_similarity(random, 1.0);
   const Similarity3 found = align_positions(source, transform(planted, source), Alignment::kSe3);
   EXPECT_EQ(found.scale, 1.0);
-  EXPECT_THAT(found.rotation, IsNear(planted.rotation, 1e-9));
+  EXPECT_THAT(found.rotation.toRotationMatrix(), IsNear(planted.rotation.toRotationMatrix(), 1e-9));
   Similarity3 larger = planted;
   larger.scale = 3.0;
   const Similarity3 of_larger = align_positions(source, transform(larger, source), Alignment::kSe3);
   EXPECT_EQ(of_larger.scale, 1.0);
-  EXPECT_THAT(of_larger.rotation, IsNear(planted.rotation, 1e-9));
+  EXPECT_THAT(of_larger.rotation.toRotationMatrix(),
+              IsNear(planted.rotation.toRotationMatrix(), 1e-9));
 }
 
 TEST(AlignPositions, NoSmallChangeFitsNoisyPointsBetter) {
@@ -146,7 +147,7 @@ TEST(AlignPositions, PlanarTrajectoriesAlignExactly) {
   }
   const Similarity3 planted = random_similarity(random, 4.0);
   const Similarity3 found = align_positions(flat, transform(planted, flat), Alignment::kSim3);
-  EXPECT_THAT(found.rotation, IsNear(planted.rotation, 1e-9));
+  EXPECT_THAT(found.rotation.toRotationMatrix(), IsNear(planted.rotation.toRotationMatrix(), 1e-9));
   EXPECT_NEAR(found.scale, 4.0, 1e-9);
 }
 
@@ -162,10 +163,10 @@ TEST(AlignPositions, StraightLineTakesTheSmallestTurn) {
   EXPECT_NEAR(found.scale, 2.0, 1e-12);
   const Eigen::Matrix3d quarter_turn =
       Eigen::AngleAxisd(0.5 * 3.14159265358979323846, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  EXPECT_THAT(found.rotation, IsNear(quarter_turn, 1e-12));
+  EXPECT_THAT(found.rotation.toRotationMatrix(), IsNear(quarter_turn, 1e-12));
   EXPECT_NEAR(squared_error(found, forward, right), 0.0, 1e-18);
   // Onto itself: nothing turns.
-  EXPECT_THAT(align_positions(forward, forward, Alignment::kSe3).rotation,
+  EXPECT_THAT(align_positions(forward, forward, Alignment::kSe3).rotation.toRotationMatrix(),
               IsNear(Eigen::Matrix3d::Identity(), 1e-12));
   // Two points are a line, driving the other way is one as well.
   Points backward = forward;
@@ -190,7 +191,7 @@ TEST(AlignPositions, ObliqueLineTakesTheSmallestTurn) {
     }
     const Similarity3 found = align_positions(source, target, Alignment::kSim3);
     EXPECT_NEAR(squared_error(found, source, target), 0.0, 1e-18);
-    const double turn_rad = Rigid3::from_matrix(found.rotation, found.translation).angle_rad();
+    const double turn_rad = Rigid3(found.rotation, found.translation).angle_rad();
     EXPECT_NEAR(turn_rad, testing::direction_error_rad(from, to), 1e-7);
   }
 }
@@ -202,7 +203,7 @@ TEST(AlignPositions, EqualPointsOnlyMove) {
     for (const Alignment alignment : {Alignment::kSe3, Alignment::kSim3}) {
       const Similarity3 found = align_positions(Points(n, from), Points(n, to), alignment);
       EXPECT_EQ(found.scale, 1.0);
-      EXPECT_EQ(found.rotation, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+      EXPECT_EQ(found.rotation.coeffs(), Eigen::Quaterniond::Identity().coeffs());
       EXPECT_THAT(found.translation, IsNear(to - from, 1e-12));
     }
   }
@@ -217,7 +218,7 @@ TEST(AlignPositions, ScaleIsAboutTheOrigin) {
   const Points target = {{0.0, 0.0, 0.0}, {3.0, 1.0, 0.0}, {0.0, 5.0, 4.0}};
   const Similarity3 found = align_positions(source, target, Alignment::kScale);
   EXPECT_DOUBLE_EQ(found.scale, (3.0 + 8.0) / (1.0 + 4.0));
-  EXPECT_EQ(found.rotation, Eigen::Matrix3d(Eigen::Matrix3d::Identity()));
+  EXPECT_EQ(found.rotation.coeffs(), Eigen::Quaterniond::Identity().coeffs());
   EXPECT_EQ(found.translation, Eigen::Vector3d(Eigen::Vector3d::Zero()));
   expect_identity(align_positions(Points(3, Eigen::Vector3d::Zero()), target, Alignment::kScale));
 }
