@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/pose_graph.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <vector>
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include "internal_check.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A loop that is off by more sigmas, all seven errors together, loses its pull.
+constexpr double kLoopLoss = 3.0;
+/// Far more than drift brings.
+constexpr double kNoLoss = 1e6;
+
+/// A similarity as Ceres moves it: log scale, quaternion (x, y, z, w), translation.
+using Node = std::array<double, 8>;
+using NodeManifold = ceres::ProductManifold<ceres::EuclideanManifold<1>,
+                                            ceres::EigenQuaternionManifold,
+                                            ceres::EuclideanManifold<3>>;
+
+Node node_of(const Similarity3& at) {
+  const Eigen::Quaterniond& q = at.rotation;
+  const Eigen::Vector3d& t = at.translation;
+  return {std::log(at.scale), q.x(), q.y(), q.z(), q.w(), t.x(), t.y(), t.z()};
+}
+
+Similarity3 similarity_of(const Node& node) {
+  return {std::exp(node[0]), Eigen::Quaterniond(&node[1]), Eigen::Vector3d(&node[5])};
+}
+
+/// Errors of a motion in its sigmas: scale, rotation, translation in the unit of `from`.
+struct MotionError {
+  const MapEdge& edge;
+
+  template <typename T>
+  bool operator()(const T* from, const T* to, T* residual) const {
+    using Quaternion = Eigen::Quaternion<T>;
+    using Vector = Eigen::Matrix<T, 3, 1>;
+    const Eigen::Map<const Quaternion> map_from_from(from + 1);
+    const Eigen::Map<const Quaternion> map_from_to(to + 1);
+    const Vector way = Eigen::Map<const Vector>(to + 5) - Eigen::Map<const Vector>(from + 5);
+    residual[0] = (to[0] - from[0] - std::log(edge.from_to.scale)) / edge.sigma_log_scale;
+    const Quaternion turn = edge.from_to.rotation.conjugate().template cast<T>() *
+                            (map_from_from.conjugate() * map_from_to);
+    const T wxyz[] = {turn.w(), turn.x(), turn.y(), turn.z()};
+    ceres::QuaternionToAngleAxis(wxyz, residual + 1);
+    Eigen::Map<Vector>(residual + 4) = map_from_from.conjugate() * way * exp(-from[0]) -
+                                       edge.from_to.translation.template cast<T>();
+    for (int i = 1; i < 7; ++i) {
+      residual[i] /= i < 4 ? edge.sigma_rad : edge.sigma_translation;
+    }
+    return true;
+  }
+};
+
+/// The unit of a keyframe as it was measured.
+struct LengthError {
+  const MapLength& length;
+
+  template <typename T>
+  bool operator()(const T* node, T* residual) const {
+    residual[0] = (node[0] - length.log_metres_per_unit) / length.sigma;
+    return true;
+  }
+};
+
+/// The graph as Ceres sees it. `map` outlives it.
+class Graph {
+ public:
+  explicit Graph(const KeptMap& map);
+
+  /// With loops that are off by `loop_loss` sigmas losing their pull; false: not solved.
+  bool solve(double loop_loss);
+  [[nodiscard]] std::vector<Similarity3> similarities() const;
+
+ private:
+  void add(const MapEdge& edge, ceres::LossFunction* loss);
+
+  std::vector<Node> nodes_;
+  NodeManifold manifold_;
+  ceres::SubsetManifold scale_alone_{8, {1, 2, 3, 4, 5, 6, 7}};
+  ceres::LossFunctionWrapper loop_loss_{nullptr, ceres::TAKE_OWNERSHIP};
+  ceres::Problem problem_;
+};
+
+ceres::Problem::Options shared_parts() {
+  ceres::Problem::Options options;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
+Graph::Graph(const KeptMap& map) : problem_(shared_parts()) {
+  std::ranges::transform(map.map_from_keyframe, std::back_inserter(nodes_), node_of);
+  for (Node& node : nodes_) {
+    problem_.AddParameterBlock(node.data(), 8, &manifold_);
+  }
+  problem_.SetManifold(nodes_.front().data(), &scale_alone_);
+  if (map.lengths.empty()) {
+    problem_.SetParameterBlockConstant(nodes_.front().data());
+  }
+  for (const MapEdge& edge : map.motions) {
+    add(edge, nullptr);
+  }
+  for (const Loop& loop : map.loops) {
+    add(loop, &loop_loss_);
+  }
+  for (const MapLength& length : map.lengths) {
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<LengthError, 1, 8>(new LengthError{length}), nullptr,
+        nodes_.at(static_cast<std::size_t>(length.keyframe)).data());
+  }
+}
+
+void Graph::add(const MapEdge& edge, ceres::LossFunction* loss) {
+  STEMVO_CHECK(edge.from != edge.to && edge.sigma_rad > 0.0 && edge.sigma_translation > 0.0 &&
+                   edge.sigma_log_scale > 0.0,
+               "an edge connects two keyframes and has sigmas");
+  problem_.AddResidualBlock(
+      new ceres::AutoDiffCostFunction<MotionError, 7, 8, 8>(new MotionError{edge}), loss,
+      nodes_.at(static_cast<std::size_t>(edge.from)).data(),
+      nodes_.at(static_cast<std::size_t>(edge.to)).data());
+}
+
+bool Graph::solve(double loop_loss) {
+  loop_loss_.Reset(new ceres::CauchyLoss(loop_loss), ceres::TAKE_OWNERSHIP);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // same bytes with any BLAS
+  options.max_num_iterations = 50;
+  options.function_tolerance = 1e-4;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem_, &summary);
+  return summary.IsSolutionUsable();
+}
+
+std::vector<Similarity3> Graph::similarities() const {
+  std::vector<Similarity3> result;
+  std::ranges::transform(nodes_, std::back_inserter(result), similarity_of);
+  return result;
+}
+
+}  // namespace
+
+bool solve_pose_graph(KeptMap& map) {
+  STEMVO_CHECK(map.map_from_keyframe.size() == map.keyframes.size(), "each keyframe has a node");
+  if (map.keyframes.size() < 2 || (map.loops.empty() && map.lengths.empty())) {
+    return false;
+  }
+  Graph graph(map);
+  // From far away the loss would let go of true loops: drift is many sigmas of a loop.
+  if (!graph.solve(kNoLoss) || !graph.solve(kLoopLoss)) {
+    return false;
+  }
+  map.map_from_keyframe = graph.similarities();
+  return true;
+}
+
+}  // namespace stemvo
