@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "../support/small_map.hpp"
 #include "config/config.hpp"
 #include "evaluation/trajectory.hpp"
 #include "report/metrics_json.hpp"
@@ -143,6 +144,12 @@ void records(const fs::path& out) {
   Corpus::done(file ? file->append({record}) : Status(file.error()));
 }
 
+void maps(const fs::path& out) {
+  const Corpus corpus(out, "map_file");
+  Corpus::done(stemvo::write_map_file(corpus / "small", stemvo::testing::small_map()));
+  Corpus::done(stemvo::write_map_file(corpus / "empty", {}));
+}
+
 cv::Mat picture(int type, int rows, int cols) {
   cv::Mat image(rows, cols, type);
   cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 255);
@@ -199,6 +206,7 @@ int main(int num_arguments, char** arguments) {
   recordings(out);
   metrics(out);
   records(out);
+  maps(out);
   configurations(out);
   images(out);
   return 0;

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/map_trajectory.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+
+#include "internal_check.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Part of the way from a to b, which are near each other.
+Similarity3 between(const Similarity3& a, const Similarity3& b, double share) {
+  const Similarity3 a_from_b = a.inverse() * b;
+  return a * Similarity3(std::pow(a_from_b.scale, share),
+                         so3_exp(share * so3_log(a_from_b.rotation)), share * a_from_b.translation);
+}
+
+}  // namespace
+
+std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_camera,
+                                          std::span<const double> times_s,
+                                          const KeptMap& map) {
+  STEMVO_CHECK(world_from_camera.size() == times_s.size(), "a time per pose");
+  const std::span<const KeptKeyframe> keyframes = map.keyframes;
+  const auto frame_of = [](const KeptKeyframe& keyframe) { return keyframe.frame; };
+  const auto begin = std::ranges::lower_bound(keyframes, 0, {}, frame_of);
+  std::vector<Similarity3> map_from_camera;
+  for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
+    const auto by = [&](auto keyframe) {
+      const auto number = static_cast<std::size_t>(std::distance(keyframes.begin(), keyframe));
+      return map.map_from_keyframe[number] *
+             Similarity3(keyframe->world_from_camera.inverse() * world_from_camera[i]);
+    };
+    const auto after =
+        std::ranges::lower_bound(begin, keyframes.end(), static_cast<int>(i), {}, frame_of);
+    if (begin == keyframes.end()) {
+      map_from_camera.emplace_back(world_from_camera[i]);
+    } else if (after == keyframes.end() || after == begin) {
+      map_from_camera.push_back(by(after == begin ? begin : std::prev(after)));
+    } else {
+      const auto before = std::prev(after);
+      const double share = (times_s[i] - before->time_s) / (after->time_s - before->time_s);
+      map_from_camera.push_back(between(by(before), by(after), share));
+    }
+  }
+  return map_from_camera;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "mapping/map_file.hpp"
+#include "support/small_map.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::read_all;
+using testing::small_map;
+using ::testing::StartsWith;
+using testing::TempFolder;
+
+constexpr std::size_t kHeaderBytes = 34;  // magic, version, number of bytes, checksum
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+class MapFiles : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string bytes_of(const MapFile& map) const {
+    EXPECT_TRUE(write_map_file(folder_ / "written", map));
+    return read_all(folder_ / "written");
+  }
+  /// Why a file of these bytes is refused; "" where it is not.
+  [[nodiscard]] std::string refusal(const std::string& bytes) const {
+    const auto read = read_map_file(folder_.file("read", bytes));
+    return read ? "" : read.error().message;
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(MapFiles, ComeBackToTheLastBit) {
+  const std::string bytes = bytes_of(small_map());
+  const auto read = read_map_file(folder_ / "written");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(read->channel, "default");
+  const KeptMap& map = read->map;
+  ASSERT_EQ(map.keyframes.size(), 2U);
+  EXPECT_EQ(map.keyframes[1].frame, 5);
+  EXPECT_EQ(map.keyframes[1].time_s, 0.5);
+  EXPECT_EQ(map.keyframes[1].world_from_camera.translation.z(), 1.0 / 3.0);
+  EXPECT_EQ(map.keyframes[1].camera.fy_px, 101.0);
+  EXPECT_EQ(map.keyframes[0].corners[0].in_camera, Eigen::Vector3f(0.25F, -0.5F, 4.0F));
+  EXPECT_FALSE(map.keyframes[0].corners[1].has_landmark());
+  EXPECT_EQ(map.keyframes[0].descriptors[0][3], 0xffffffffffffffffU);
+  EXPECT_EQ(map.map_from_keyframe[1].scale, 1.25);
+  EXPECT_EQ(map.motions[0].sigma_translation, 2e-3);
+  EXPECT_EQ(map.loops[0].corners, (std::vector<std::pair<int, int>>{{0, 1}}));
+  EXPECT_EQ(map.lengths[0].sigma, 0.05);
+  EXPECT_EQ(bytes_of(*read), bytes);
+}
+
+TEST_F(MapFiles, OfNoKeyframesAreRead) { EXPECT_EQ(refusal(bytes_of({})), ""); }
+
+TEST_F(MapFiles, CutAnywhereAreRefused) {
+  const std::string bytes = bytes_of(small_map());
+  for (std::size_t size = 0; size < bytes.size(); size += 7) {
+    EXPECT_THAT(refusal(bytes.substr(0, size)), StartsWith((folder_ / "read").string() + ": "));
+  }
+  EXPECT_THAT(refusal(bytes + "x"), HasSubstr("bytes behind the header, found"));
+}
+
+TEST_F(MapFiles, DamagedAnywhereAreRefused) {
+  const std::string bytes = bytes_of(small_map());
+  for (std::size_t i = 0; i < bytes.size(); i += 7) {
+    std::string damaged = bytes;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x10);
+    EXPECT_NE(refusal(damaged), "") << "byte " << i;
+  }
+}
+
+TEST_F(MapFiles, SayWhatTheyAreInstead) {
+  EXPECT_THAT(refusal("ply\nformat ascii"), HasSubstr("expected a map of stemvo, found another"));
+  std::string other = bytes_of(small_map());
+  other[14] = 9;
+  EXPECT_THAT(refusal(other), HasSubstr("expected a map of version 1, found version 9"));
+  const auto missing = read_map_file(folder_ / "nothing");
+  ASSERT_FALSE(missing);
+  EXPECT_THAT(missing.error().message, HasSubstr("nothing: cannot read"));
+}
+
+/// Each of the contents' bytes in turn claims a list as long as can be.
+TEST_F(MapFiles, TakeNoListsWordForItsLength) {
+  const std::string contents = bytes_of(small_map()).substr(kHeaderBytes);
+  for (std::size_t i = 0; i + 8 <= contents.size(); i += 4) {
+    std::string claims = contents;
+    claims.replace(i, 8, 8, '\x7f');
+    (void)refusal(sealed_map(claims));  // no more memory than the file
+  }
+  std::string claims = contents;
+  claims.replace(0, 8, 8, '\x7f');
+  EXPECT_THAT(refusal(sealed_map(claims)), HasSubstr("expected lists as long as they say"));
+  EXPECT_THAT(refusal(sealed_map(contents + "12")), HasSubstr("an end before or behind theirs"));
+}
+
+TEST_F(MapFiles, ThatContradictThemselvesAreRefused) {
+  struct Case {
+    std::string expected;
+    std::function<void(KeptMap&)> spoil;
+  };
+  const std::vector<Case> cases = {
+      {"a place for each of 2 keyframes, found 1", [](auto& m) { m.map_from_keyframe.pop_back(); }},
+      {"in the order of their frames", [](auto& m) { m.keyframes[1].frame = 0; }},
+      {"keyframe 1: expected a finite time", [](auto& m) { m.keyframes[1].time_s = kNaN; }},
+      {"keyframe 0: expected a camera", [](auto& m) { m.keyframes[0].camera.fx_px = 0.0; }},
+      {"expected a pose", [](auto& m) { m.keyframes[0].world_from_camera.rotation.w() = 1.1; }},
+      {"expected finite corners",
+       [](auto& m) { m.keyframes[0].corners[0].in_camera.y() = static_cast<float>(kNaN); }},
+      {"in the order of their tracks", [](auto& m) { m.keyframes[0].corners[0].track_id = 8; }},
+      {"one per corner", [](auto& m) { m.keyframes[0].descriptors.pop_back(); }},
+      {"place of keyframe 1: expected a similarity",
+       [](auto& m) { m.map_from_keyframe[1].scale = 0.0; }},
+      {"motion 0: expected two keyframes", [](auto& m) { m.motions[0].to = 2; }},
+      {"motion 0: expected two keyframes", [](auto& m) { m.motions[0].from = -1; }},
+      {"motion 0: expected two keyframes", [](auto& m) { m.motions[0].from = 1; }},
+      {"motion 0: expected a similarity", [](auto& m) { m.motions[0].from_to.scale = kNaN; }},
+      {"expected standard deviations", [](auto& m) { m.motions[0].sigma_log_scale = kNaN; }},
+      {"expected standard deviations", [](auto& m) { m.motions[0].sigma_rad = 0.0; }},
+      {"loop 0: expected corners of its keyframes",
+       [](auto& m) { m.loops[0].corners[0].second = 2; }},
+      {"loop 0: expected corners of its keyframes",
+       [](auto& m) { m.loops[0].corners[0].first = -1; }},
+      {"loop 0: expected two keyframes", [](auto& m) { m.loops[0].to = 7; }},
+      {"length 0: expected a keyframe", [](auto& m) { m.lengths[0].keyframe = 2; }},
+      {"length 0: expected a length and its sigma", [](auto& m) { m.lengths[0].sigma = 0.0; }},
+  };
+  for (const Case& one : cases) {
+    MapFile spoilt = small_map();
+    one.spoil(spoilt.map);
+    EXPECT_THAT(refusal(bytes_of(spoilt)), HasSubstr(one.expected));
+  }
+}
+
+}  // namespace
+}  // namespace stemvo

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "mapping/map_trajectory.hpp"
+#include "support/matchers.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::IsNear;
+using testing::IsNearMotion;
+
+/// A camera that goes forward one unit and turns a little with each frame, a tenth of a second.
+struct Path {
+  explicit Path(int num_frames) {
+    const Rigid3 step(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.0, 1.0});
+    for (int i = 0; i < num_frames; ++i) {
+      poses.push_back(i > 0 ? poses.back() * step : Rigid3());
+      times_s.push_back(100.0 + 0.1 * i);
+    }
+  }
+  /// The frame is a keyframe, which the map moves by the correction.
+  void keep(int frame, const Similarity3& map_from_world) {
+    const auto i = static_cast<std::size_t>(frame);
+    KeptKeyframe keyframe;
+    keyframe.frame = frame;
+    keyframe.time_s = times_s[i];
+    keyframe.world_from_camera = poses[i];
+    map.keyframes.push_back(keyframe);
+    map.map_from_keyframe.push_back(map_from_world * Similarity3(poses[i]));
+  }
+  [[nodiscard]] std::vector<Similarity3> placed() const {
+    return place_trajectory(poses, times_s, map);
+  }
+
+  std::vector<Rigid3> poses;
+  std::vector<double> times_s;
+  KeptMap map;
+};
+
+Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.translation}; }
+
+const Similarity3 kCorrection(1.2, so3_exp({0.05, -0.1, 0.02}), {3.0, -1.0, 2.0});
+
+TEST(MapTrajectory, IsTheWorldsWhereNothingIsKept) {
+  const Path path(3);
+  const auto placed = path.placed();
+  ASSERT_EQ(placed.size(), 3U);
+  EXPECT_THAT(pose_of(placed[2]), IsNearMotion(path.poses[2], 1e-14));
+  EXPECT_EQ(placed[2].scale, 1.0);
+}
+
+TEST(MapTrajectory, MovesAllFramesAsOneCorrectionDoes) {
+  Path path(40);
+  for (const int frame : {5, 12, 30}) {
+    path.keep(frame, kCorrection);
+  }
+  const auto placed = path.placed();
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    EXPECT_THAT(pose_of(placed[i]), IsNearMotion(kCorrection * path.poses[i], 1e-10));
+    EXPECT_NEAR(placed[i].scale, 1.2, 1e-12);
+  }
+}
+
+TEST(MapTrajectory, GoesFromOneCorrectionToTheNextByTime) {
+  Path path(31);
+  path.keep(10, {});
+  path.keep(20, {1.44, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()});
+  path.times_s[12] = 100.0 + 0.1 * 15.0;  // half-way in time
+  const auto placed = path.placed();
+  EXPECT_THAT(pose_of(placed[4]), IsNearMotion(path.poses[4], 1e-10));
+  EXPECT_THAT(pose_of(placed[10]), IsNearMotion(path.poses[10], 1e-10));
+  EXPECT_NEAR(placed[12].scale, 1.2, 1e-9);
+  EXPECT_THAT(placed[20].translation, IsNear(1.44 * path.poses[20].translation, 1e-9));
+  EXPECT_THAT(placed[30].translation, IsNear(1.44 * path.poses[30].translation, 1e-9));
+}
+
+/// No step of the placed path is another one than its neighbours: nothing jumps at a keyframe.
+TEST(MapTrajectory, HasNoJumps) {
+  Path path(100);
+  path.keep(0, {});
+  path.keep(49, {1.02, so3_exp({0.0, 0.02, 0.0}), {-0.5, 0.1, 0.3}});
+  path.keep(99, {1.03, so3_exp({0.01, 0.03, 0.0}), {-1.0, 0.2, 0.0}});
+  const auto placed = path.placed();
+  for (std::size_t i = 1; i < placed.size(); ++i) {
+    EXPECT_NEAR((placed[i].translation - placed[i - 1].translation).norm(), 1.0, 0.08) << i;
+  }
+}
+
+TEST(MapTrajectory, LeavesKeyframesOfAnotherRecordingAlone) {
+  Path path(20);
+  path.keep(0, {50.0, Eigen::Quaterniond::Identity(), {7.0, 8.0, 9.0}});
+  path.map.keyframes[0].frame = -4;
+  const auto alone = path.placed();
+  EXPECT_THAT(pose_of(alone[9]), IsNearMotion(path.poses[9], 1e-12));
+  path.keep(10, kCorrection);
+  const auto placed = path.placed();
+  EXPECT_THAT(pose_of(placed[9]), IsNearMotion(kCorrection * path.poses[9], 1e-10));
+}
+
+}  // namespace
+}  // namespace stemvo
