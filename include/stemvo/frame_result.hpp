@@ -64,8 +64,12 @@ struct StageTimes {
 /// The pose of a frame and how it came about.
 struct FrameResult {
   FrameState state = FrameState::kFirst;
-  double time_s = 0.0;  ///< as given
-  Rigid3 world_from_camera;
+  double time_s = 0.0;       ///< as given
+  Rigid3 world_from_camera;  ///< of a path without jumps, but where a camera finds itself again
+  /// The correction so far, by places that were recognized: where the frame is in the map is
+  /// map_from_world * world_from_camera.
+  Similarity3 map_from_world;
+  int recognized_frame = -1;  ///< the frame whose place this one was recognized to show; -1: none
   /// Of the motion between the poses of the last frame and this one, prev_from_cur: the true motion
   /// is prev_from_cur * error. The error is x y z (the path's units, squared), then rotation about
   /// x y z (rad^2), all in this frame's camera axes. Where the path is in metres the scale's sigma

@@ -89,6 +89,7 @@ struct OdometryOptions {
   int min_inliers = 20;              ///< fewer: the frame is lost
   double stationary_flow_px = 0.15;  ///< median flow below it: stationary
   double min_parallax_px = 0.6;      ///< median rotation-free flow below it: low parallax
+  bool loops = true;  ///< map: places are remembered and recognized, after a loss too
 };
 
 /// Keys `window.*`: the keyframes that frames are localized against (mode map).

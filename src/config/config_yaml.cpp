@@ -202,8 +202,8 @@ std::string parse(const YAML::Node& node, std::string& value) {
 std::string parse(const YAML::Node& node, bool& value) {
   std::string text;
   const std::string problem = parse(node, text);
-  value = text == "true";
-  return !problem.empty() || value || text == "false"
+  value = text == "true" || text == "on";
+  return !problem.empty() || value || text == "false" || text == "off"
              ? problem
              : fmt::format("expected true or false, found {}", options::quote(text));
 }

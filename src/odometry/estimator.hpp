@@ -16,6 +16,7 @@
 #include "features/front_end.hpp"
 #include "geometry/bundle.hpp"
 #include "geometry/pose_influence.hpp"
+#include "mapping/kept_map.hpp"
 #include "odometry/road/image.hpp"
 #include "odometry/way.hpp"
 #include "stemvo/frame_result.hpp"
@@ -109,6 +110,9 @@ class Estimator {
   }
   /// As Odometry::landmarks_since; none where there is no window.
   [[nodiscard]] virtual LandmarkChanges landmarks_since(int /*version*/) const { return {}; }
+  /// What is remembered, the keyframes of the window among it; nothing where there is no window or
+  /// loops are off.
+  [[nodiscard]] virtual KeptMap kept_map() const { return {}; }
   /// Numbers of the frames that are keyframes or were, in order.
   [[nodiscard]] virtual std::span<const int> keyframes() const { return {}; }
 };

@@ -36,6 +36,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       refine_every_(config.ba.every_n_keyframes),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config),
+      mapper_(config),
       scale_(config),
       calibration_(camera, config.camera.refine, config.threads != 1),
       assumed_step_(assumed_step(config.scale)) {
@@ -203,6 +204,7 @@ bool WindowEstimator::open_window(View view) {
   if (!window.has_value()) {
     return false;
   }
+  mapper_.close(window_view());
   history_.close(window_);
   window_ = std::move(*window);
   const bool has_road = reference.road != nullptr || !scale_.asks_road();
@@ -255,6 +257,7 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   result.camera = camera();
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
+  result.map_from_world = mapper_.map_from_world();
   measure_covariance(frame, localized);
   remember(frame, result.state);
 }
@@ -295,7 +298,9 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
   Keyframe keyframe{frame.number, world_from_camera_, last_moving_.points};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
-    history_.leave(window_, leaving_keyframe(window_, keyframe), keyframe);
+    const std::size_t leaving = leaving_keyframe(window_, keyframe);
+    mapper_.leave(window_view(), leaving);
+    history_.leave(window_, leaving, keyframe);
   }
   stemvo::add_keyframe(window_, std::move(keyframe), window_options_);
   triangulate_landmarks(window_, camera(), window_options_);
@@ -312,6 +317,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
                         camera(), localization_.loss_px);
   // The newest keyframe but one: it has its new corners.
   calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
+  mapper_.observe(window_view());
   history_.observe(window_, frame.image);
 }
 

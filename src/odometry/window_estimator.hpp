@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "mapping/mapper.hpp"
 #include "odometry/bundle_adjustment.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/initializer.hpp"
@@ -37,6 +38,7 @@ class WindowEstimator final : public Estimator {
   }
   [[nodiscard]] std::span<const int> keyframes() const override { return history_.keyframes(); }
 
+  [[nodiscard]] KeptMap kept_map() const override { return mapper_.map(window_view()); }
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();
   }
@@ -65,6 +67,9 @@ class WindowEstimator final : public Estimator {
   void reset_reference(View reference);
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
+  [[nodiscard]] WindowView window_view() const {
+    return {window_, history_, camera(), trajectory_, times_s_};
+  }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
   /// Least flow that counts as motion.
@@ -92,6 +97,7 @@ class WindowEstimator final : public Estimator {
   bool is_initializing_ = true;
   Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;
+  Mapper mapper_;
   MetricScale scale_;
   SelfCalibration calibration_;
   MotionCovariance uncertainty_;

@@ -73,8 +73,8 @@ void WindowHistory::show(const Window& window) {
 KeptLandmark WindowHistory::place(const Track& track,
                                   const Keyframe& last_seen_from,
                                   const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d in_camera = scale_of_keyframe_.at(last_seen_from.frame) / scale_ *
-                                    (last_seen_from.world_from_camera.inverse() * point);
+  const Eigen::Vector3d in_camera =
+      units(last_seen_from.frame) * (last_seen_from.world_from_camera.inverse() * point);
   return {track.id, last_seen_from.frame, in_camera.cast<float>(), track.rgb};
 }
 

@@ -32,6 +32,9 @@ class WindowHistory {
     scale_ *= factor;
     window_moved_at_ = now();
   }
+  /// The window's unit in that of a keyframe's pose in the trajectory; a keyframe of the window
+  /// whose frame has ended.
+  [[nodiscard]] double units(int frame) const { return scale_of_keyframe_.at(frame) / scale_; }
   /// The frame's pose is final: new keyframes have theirs in today's units.
   void end_frame(const Window& window);
   /// The whole window is about to be dropped.

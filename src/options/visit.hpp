@@ -204,6 +204,8 @@ void visit(O& o, V&& v) {
   v("min_parallax_px", o.min_parallax_px, Rule::between(0, 1000),
     "median flow without the rotation's below it: low parallax, too little to see a direction, "
     "input pixels");
+  v("loops", o.loops, kAny,
+    "map: places are remembered and recognized, when the camera comes back and after a loss");
 }
 
 template <Is<KeyframeWindowOptions> O, typename V>

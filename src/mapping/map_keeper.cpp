@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/map_keeper.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <vector>
+
+#include "geometry/median.hpp"
+#include "geometry/pose_influence.hpp"
+#include "odometry/localization.hpp"
+
+namespace stemvo {
+namespace {
+
+/// Errors of a track's points are alike: so many times the sigmas of independent ones.
+constexpr double kSigmaFactor = 3.0;
+/// Least standard deviations of a motion, of rotation and, in shares of the depth, of translation.
+constexpr double kMinSigma_rad = 1e-4;
+constexpr double kMinSigma = 1e-4;
+/// Standard deviations of what connects two maps: nothing but a guess.
+constexpr double kGuess_rad = 1.0;
+constexpr double kGuessLogScale = 1.0;
+
+Similarity3 scaled(double factor, const Rigid3& motion) {
+  return {1.0, motion.rotation, factor * motion.translation};
+}
+
+double parallax_rad(const Eigen::Vector3d& point, const Rigid3& a, const Rigid3& b) {
+  const Eigen::Vector3d from_a = point - a.translation;
+  const Eigen::Vector3d from_b = point - b.translation;
+  return std::atan2(from_a.cross(from_b).norm(), from_a.dot(from_b));
+}
+
+/// How well the landmarks that both keyframes see carry the scale over: each by the parallax that
+/// its depth comes from, of points with a noise of 1 px.
+double log_scale_sigma(const Window& window,
+                       const Keyframe& from,
+                       const Keyframe& to,
+                       double f_px) {
+  const SeenLandmarks shared = find_seen_landmarks(window, from.points);
+  ObservationWalk walk(window);
+  double information = 0.0;
+  for (std::size_t i = 0; i < shared.points.size(); ++i) {
+    if (find_point(to.points, shared.track_ids[i]) == nullptr) {
+      continue;
+    }
+    const auto seen = walk.seek(shared.track_ids[i]);
+    const double parallax_px =
+        f_px * parallax_rad(shared.points[i],
+                            window.keyframes[seen.front().keyframe].world_from_camera,
+                            window.keyframes[seen.back().keyframe].world_from_camera);
+    information += parallax_px * parallax_px;
+  }
+  return 1.0 / std::sqrt(std::max(information, 1.0));
+}
+
+/// The motion from `from` to `to` with its sigmas; each keyframe has its own unit.
+MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyframe& to) {
+  const double units_of_from = view.history.units(from.frame);
+  const double units_of_to = view.history.units(to.frame);
+  const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
+  MapEdge edge;
+  edge.from_to = scaled(units_of_from, from_to);
+  edge.from_to.scale = units_of_from / units_of_to;
+  const SeenLandmarks seen = find_seen_landmarks(view.window, to.points);
+  const Rigid3 camera_from_world = to.world_from_camera.inverse();
+  std::vector<double> errors;
+  std::vector<double> depths;
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Vector3d point = camera_from_world * seen.points[i];
+    errors.push_back((view.camera.project(point) - seen.uv[i]).norm());
+    depths.push_back(point.z());
+  }
+  const double depth = depths.empty() ? from_to.translation.norm() : median(std::move(depths));
+  // Lengths of noise with equal sigmas in u and v have Rayleigh's distribution.
+  const double noise_px = errors.empty() ? 1.0 : median(std::move(errors)) / 1.1774;
+  const Matrix6d pose =
+      pose_influences(camera_from_world, seen.points, seen.uv, view.camera, noise_px).squared_sum();
+  edge.sigma_rad =
+      kMinSigma_rad + kSigmaFactor * std::sqrt(pose.bottomRightCorner<3, 3>().trace() / 3.0);
+  edge.sigma_translation =
+      units_of_from *
+      (kMinSigma * depth + kSigmaFactor * std::sqrt(pose.topLeftCorner<3, 3>().trace() / 3.0));
+  edge.sigma_log_scale =
+      kSigmaFactor * noise_px * log_scale_sigma(view.window, from, to, view.camera.mean_focal_px());
+  return edge;
+}
+
+/// What connects the first keyframe of a new map with the last one of the map before.
+MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to) {
+  const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
+  MapEdge edge;
+  edge.from_to = Similarity3(from_to);
+  edge.sigma_rad = kGuess_rad;
+  edge.sigma_translation = std::max(1.0, from_to.translation.norm());
+  edge.sigma_log_scale = kGuessLogScale;
+  return edge;
+}
+
+}  // namespace
+
+int MapKeeper::node_of(int frame) const {
+  const auto node = nodes_.find(frame);
+  return node == nodes_.end() ? -1 : node->second;
+}
+
+void MapKeeper::add_nodes(const WindowView& view) {
+  for (const Keyframe& keyframe : view.window.keyframes) {
+    if (node_of(keyframe.frame) < 0 && keyframe.frame < static_cast<int>(view.trajectory.size())) {
+      add_node(view, keyframe);
+    }
+  }
+}
+
+void MapKeeper::add_node(const WindowView& view, const Keyframe& keyframe) {
+  const auto frame = static_cast<std::size_t>(keyframe.frame);
+  KeptKeyframe kept;
+  kept.frame = keyframe.frame;
+  kept.time_s = view.times_s[frame];
+  kept.camera = view.camera;
+  kept.world_from_camera = view.trajectory[frame];
+  const int node = static_cast<int>(map_.keyframes.size());
+  if (nodes_.empty() && node > 0) {
+    MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
+    edge.from = node - 1;
+    edge.to = node;
+    map_.motions.push_back(edge);
+  }
+  nodes_[keyframe.frame] = node;
+  map_.map_from_keyframe.push_back(map_from_world_ * Similarity3(kept.world_from_camera));
+  map_.keyframes.push_back(std::move(kept));
+}
+
+void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
+  const Keyframe& keyframe = view.window.keyframes[leaving];
+  const int node = node_of(keyframe.frame);
+  if (node < 0) {
+    return;
+  }
+  KeptKeyframe& kept = map_.keyframes[static_cast<std::size_t>(node)];
+  const double units = view.history.units(keyframe.frame);
+  const Rigid3 camera_from_world = keyframe.world_from_camera.inverse();
+  kept.corners.clear();
+  for (const Observation& point : keyframe.points) {
+    KeptCorner& corner = kept.corners.emplace_back();
+    corner.track_id = point.track_id;
+    corner.uv = point.uv.cast<float>();
+    const auto landmark = view.window.landmarks.find(point.track_id);
+    if (landmark != view.window.landmarks.end()) {
+      corner.in_camera = (units * (camera_from_world * landmark->second)).cast<float>();
+    }
+  }
+  // The motions to the nodes before and after, where those are in the window still.
+  for (const Keyframe& other : view.window.keyframes) {
+    const int neighbour = node_of(other.frame);
+    if (neighbour < 0 || std::abs(neighbour - node) != 1) {
+      continue;
+    }
+    const bool is_before = neighbour < node;
+    MapEdge edge =
+        is_before ? motion_between(view, other, keyframe) : motion_between(view, keyframe, other);
+    edge.from = std::min(node, neighbour);
+    edge.to = std::max(node, neighbour);
+    map_.motions.push_back(edge);
+  }
+}
+
+void MapKeeper::leave(const WindowView& view, std::size_t leaving) {
+  keep(view, leaving);
+  nodes_.erase(view.window.keyframes[leaving].frame);
+}
+
+void MapKeeper::close(const WindowView& view) {
+  add_nodes(view);
+  for (std::size_t i = 0; i < view.window.keyframes.size(); ++i) {
+    leave(view, i);
+  }
+}
+
+}  // namespace stemvo
