@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "odometry/frame_clock.hpp"
 #include "stemvo/rigid3.hpp"
 #include "text/text_file.hpp"
 
@@ -65,7 +66,7 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
     return after == rows.end() ? rows.back().rad_per_s : after->rad_per_s;
   }
   const GyroRow& before = *(after - 1);
-  const double share = (time_s - before.time_s) / (after->time_s - before.time_s);
+  const double share = whole_us(time_s - before.time_s) / whole_us(after->time_s - before.time_s);
   return before.rad_per_s + share * (after->rad_per_s - before.rad_per_s);
 }
 
@@ -108,7 +109,7 @@ std::optional<Eigen::Quaterniond> integrate_gyro(const std::vector<GyroRow>& row
   double done_s = from_s;
   const auto add_until = [&](double time_s) {
     const Eigen::Vector3d mean = 0.5 * (rate_at(rows, done_s) + rate_at(rows, time_s));
-    prev_from_cur = prev_from_cur * so3_exp((time_s - done_s) * mean);
+    prev_from_cur = prev_from_cur * so3_exp(whole_us(time_s - done_s) * mean);
     done_s = time_s;
   };
   auto row = std::ranges::upper_bound(rows, from_s, {}, &GyroRow::time_s);

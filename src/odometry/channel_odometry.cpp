@@ -66,8 +66,12 @@ Frame ChannelOdometry::prepare(const Channel& channel,
 /// Uses the front end only: the frame before may be optimized meanwhile.
 void ChannelOdometry::track(Frame frame) {
   STEMVO_CHECK(!tracked_.has_value(), "the frame before is localized");
-  STEMVO_CHECK(frame.time_s > last_time_s_, "times rise");
-  last_time_s_ = frame.time_s;
+  frame.given_time_s = frame.time_s;
+  frame.time_s = clock_.advance(frame.given_time_s);
+  for (Way& way : frame.ways) {
+    way.from_s = clock_.since_first(way.from_s);
+    way.to_s = clock_.since_first(way.to_s);
+  }
   frame.number = num_tracked_++;
   const ImageClue clue = clue_of(frame);
   if (frame.has_image()) {
@@ -120,7 +124,7 @@ FrameResult ChannelOdometry::optimize() {
     work.frame.pyramid = optimized_.frame.pyramid;
   }
   FrameResult& result = work.localized.result;
-  result.time_s = times_s_.emplace_back(work.frame.time_s);
+  result.time_s = times_s_.emplace_back(work.frame.given_time_s);
   result.times = work.frame.times;
   result.problem = work.frame.problem;
   optimized_ = std::move(work);

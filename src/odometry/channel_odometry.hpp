@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "features/front_end.hpp"
 #include "odometry/estimator.hpp"
+#include "odometry/frame_clock.hpp"
 #include "stem/stem.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
@@ -70,7 +70,7 @@ class ChannelOdometry {
 
   int num_tracked_ = 0;
   std::vector<double> times_s_;
-  double last_time_s_ = -std::numeric_limits<double>::infinity();  ///< of the last one tracked
+  FrameClock clock_;  ///< of the frames tracked
   /// Since the last image, as the frames' hints say; nullopt: one did not.
   std::optional<Eigen::Quaterniond> image_from_tracked_ = Eigen::Quaterniond::Identity();
   std::optional<Frame> tracked_;          ///< not localized

@@ -31,8 +31,9 @@ namespace stemvo {
 struct Frame {
   [[nodiscard]] bool has_image() const { return !image.empty(); }
 
-  int number = 0;  ///< counted from 0, frames without an image among them
-  double time_s = 0.0;
+  int number = 0;             ///< counted from 0, frames without an image among them
+  double time_s = 0.0;        ///< as given; once it is tracked: since the first frame (FrameClock)
+  double given_time_s = 0.0;  ///< once it is tracked
   FrameHints hints;
   std::vector<Way> ways;  ///< that came before this frame did
   cv::Mat image;          ///< as given, gray or RGB: where landmarks get their colour

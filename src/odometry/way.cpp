@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "odometry/frame_clock.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -56,7 +58,7 @@ Status WayInput::add_speed(double time_s, double metres_per_s, double sigma) {
   if (last_speed_ && time_s - last_speed_->time_s <= kMaxGap_s) {
     // Each speed counts in two ways: with half of its error in each, their errors would pass for
     // independent ones.
-    const double duration_s = time_s - last_speed_->time_s;
+    const double duration_s = whole_us(time_s - last_speed_->time_s);
     ways_.push_back({last_speed_->time_s, time_s,
                      0.5 * duration_s * (last_speed_->metres_per_s + now.metres_per_s),
                      duration_s * std::hypot(last_speed_->sigma, sigma) / std::sqrt(2.0),
@@ -87,7 +89,7 @@ Status WayInput::add_distance(double from_s, double to_s, double metres, double 
 
 std::vector<Way> WayInput::take(double time_s) {
   std::vector<Way> ways = std::exchange(ways_, {});
-  const double held_s = last_speed_ ? time_s - last_speed_->time_s : -1.0;
+  const double held_s = last_speed_ ? whole_us(time_s - last_speed_->time_s) : -1.0;
   if (held_s > 0.0 && held_s <= kMaxGap_s) {
     ways.push_back({last_speed_->time_s, time_s, held_s * last_speed_->metres_per_s,
                     held_s * last_speed_->sigma, Way::Kind::kHeld});

@@ -81,11 +81,8 @@ try_package() {
   for input in "drive.avi --camera camera.yaml" euroc tum bag; do
     as_someone "stemvo run $input --quiet"
   done
-  for name in euroc tum bag; do  # the same frames, but for what seconds since 1970 leave a double: 0.2 us
-    paste -d ' ' "$HOME_DIR"/results/{drive,"$name"}/trajectory_kitti.txt | awk -v name="$name" '
-      NF != 24 { bad = 1 }
-      { for (i = 1; i <= 12; ++i) if (($i - $(i + 12)) ^ 2 > 1e-8) bad = 1 }
-      END { if (bad || NR == 0) { print name ": expected the path of drive to 1e-4, found another"; exit 1 } }'
+  for name in euroc tum bag; do  # the same frames
+    cmp "$HOME_DIR"/results/{drive,"$name"}/trajectory_kitti.txt
   done
 }
 
