@@ -152,6 +152,14 @@ std::vector<Similarity3> Graph::similarities() const {
 
 }  // namespace
 
+double sigmas_off(const KeptMap& map, const MapEdge& edge) {
+  const Node from = node_of(map.map_from_keyframe.at(static_cast<std::size_t>(edge.from)));
+  const Node to = node_of(map.map_from_keyframe.at(static_cast<std::size_t>(edge.to)));
+  Eigen::Matrix<double, 7, 1> error;
+  MotionError{edge}(from.data(), to.data(), error.data());
+  return error.norm();
+}
+
 bool solve_pose_graph(KeptMap& map) {
   STEMVO_CHECK(map.map_from_keyframe.size() == map.keyframes.size(), "each keyframe has a node");
   if (map.keyframes.size() < 2 || (map.loops.empty() && map.lengths.empty())) {

@@ -17,4 +17,8 @@ namespace stemvo {
 /// False: nothing to do, or not solved; the map is unchanged.
 bool solve_pose_graph(KeptMap& map);
 
+/// How far map_from_keyframe is from what an edge measured: the length of its seven errors in their
+/// sigmas. Of a true one, whose sigmas hold, the square is 7 on average.
+[[nodiscard]] double sigmas_off(const KeptMap& map, const MapEdge& edge);
+
 }  // namespace stemvo

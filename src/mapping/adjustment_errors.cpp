@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/adjustment_errors.hpp"
+
+namespace stemvo::internal {
+namespace {
+
+/// Of a point that is scaled to the length of its ray in the anchor.
+constexpr double kNearest = 1e-3;
+constexpr double kBehindSigmas = 100.0;
+
+using Matrix23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
+using Matrix26 = Eigen::Matrix<double, 2, 6, Eigen::RowMajor>;
+
+/// d exp(w) x = -[exp(w) x]_x * this * dw.
+Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
+  const double angle = w.norm();
+  if (angle < 1e-5) {
+    return Eigen::Matrix3d::Identity() + 0.5 * skew(w);
+  }
+  const Eigen::Vector3d axis = w / angle;
+  const double sine = std::sin(angle) / angle;
+  return sine * Eigen::Matrix3d::Identity() + (1.0 - sine) * axis * axis.transpose() +
+         (1.0 - std::cos(angle)) / angle * skew(axis);
+}
+
+/// Behind, a corner is off by a constant: its pull ends, the solver's step does not fail.
+bool behind(double* residuals, double** jacobians) {
+  residuals[0] = residuals[1] = kBehindSigmas;
+  constexpr int kSizes[] = {3, 6, 6};
+  for (int i = 0; jacobians != nullptr && i < 3; ++i) {
+    if (jacobians[i] != nullptr) {
+      std::fill_n(jacobians[i], 2 * kSizes[i], 0.0);
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+bool CornerError::Evaluate(double const* const* parameters,
+                           double* residuals,
+                           double** jacobians) const {
+  const Eigen::Map<const Eigen::Vector3d> at(parameters[0]);
+  const Eigen::Vector3d w(parameters[1]);
+  const double* change = parameters[2];
+  const Eigen::Matrix3d rotation = so3_exp(w).toRotationMatrix() * pose_.rotation;
+  const Eigen::Vector3d translation = pose_.translation + Eigen::Vector3d(parameters[1] + 3);
+  const Eigen::Matrix3d by_ray = rotation * point_.map_from_anchor.rotation.toRotationMatrix();
+  const Eigen::Vector3d by_inverse_depth =
+      rotation * point_.map_from_anchor.translation + translation;
+  const Eigen::Vector3d x = by_ray * Eigen::Vector3d(at[0], at[1], 1.0) + by_inverse_depth * at[2];
+  if (!(x.z() > kNearest)) {
+    return behind(residuals, jacobians);
+  }
+  const double u = x.x() / x.z();
+  const double v = x.y() / x.z();
+  const double r_sq = u * u + v * v;
+  const double stretch = 1.0 + r_sq * (change[3] + r_sq * change[4]);
+  const double fx = camera_.fx_px * (1.0 + change[2]) / sigma_px_;
+  const double fy = camera_.fy_px * (1.0 + change[2]) / sigma_px_;
+  residuals[0] = fx * u * stretch + (camera_.cx_px + change[0] - uv_.x()) / sigma_px_;
+  residuals[1] = fy * v * stretch + (camera_.cy_px + change[1] - uv_.y()) / sigma_px_;
+  if (jacobians == nullptr) {
+    return true;
+  }
+  const double bend = 2.0 * (change[3] + 2.0 * r_sq * change[4]);
+  Eigen::Matrix2d by_uv;
+  by_uv << fx * (stretch + u * u * bend), fx * u * v * bend, fy * u * v * bend,
+      fy * (stretch + v * v * bend);
+  Matrix23 by_x;
+  by_x << 1.0, 0.0, -u, 0.0, 1.0, -v;
+  by_x = by_uv * by_x / x.z();
+  if (jacobians[0] != nullptr) {
+    Eigen::Map<Matrix23> by_point(jacobians[0]);
+    by_point.leftCols<2>() = by_x * by_ray.leftCols<2>();
+    by_point.col(2) = by_x * by_inverse_depth;
+  }
+  if (jacobians[1] != nullptr) {
+    Eigen::Map<Matrix26> by_pose(jacobians[1]);
+    by_pose.leftCols<3>() = -by_x * skew(x - translation * at[2]) * left_jacobian(w);
+    by_pose.rightCols<3>() = by_x * at[2];
+  }
+  if (jacobians[2] != nullptr) {
+    const double fx_u = camera_.fx_px * u / sigma_px_;
+    const double fy_v = camera_.fy_px * v / sigma_px_;
+    const double longer = 1.0 + change[2];
+    Eigen::Map<Matrix26> by_camera(jacobians[2]);
+    by_camera << 1.0 / sigma_px_, 0.0, fx_u * stretch, fx_u * longer * r_sq,
+        fx_u * longer * r_sq * r_sq, 0.0, 0.0, 1.0 / sigma_px_, fy_v * stretch,
+        fy_v * longer * r_sq, fy_v * longer * r_sq * r_sq, 0.0;
+  }
+  return true;
+}
+
+}  // namespace stemvo::internal

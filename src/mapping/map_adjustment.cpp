@@ -1,0 +1,450 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/map_adjustment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
+
+#include "geometry/median.hpp"
+#include "internal_check.hpp"
+#include "mapping/adjustment_errors.hpp"
+
+namespace stemvo {
+namespace {
+
+using internal::AdjustedPoint;
+using internal::AdjustedPose;
+using internal::CornerError;
+using internal::DistanceError;
+using internal::EdgeError;
+
+/// Two keyframes with fewer landmarks in common are held by their motion as well, and loops with
+/// fewer corners by theirs.
+constexpr int kFewLandmarks = 15;
+/// Most observations of a map; beyond, the shortest tracks are left out.
+constexpr std::size_t kMaxObservations = 250'000;
+constexpr std::size_t kMinObservationsOfKeyframe = 60;
+/// Least Cauchy scale, px, and over the median error, as in the window.
+constexpr double kMinLoss_px = 0.2;
+constexpr double kLossShare = 2.0;
+constexpr double kLooseLoop = 3.0;
+/// Lengths of errors with equal sigmas in u and v have Rayleigh's distribution.
+constexpr double kMedianOfRayleigh = 1.1774;
+constexpr double kMinSigma_px = 0.01;
+/// Errors of a track's corners are alike: they tell less than as many independent ones.
+constexpr double kLikeErrors = 2.0;
+/// Forward motion biases all tracks alike.
+constexpr double kFocalSigmaFactor = 3.0;
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+auto distance_from_first(const KeptMap& map) {
+  return [&map](const Similarity3& at) {
+    return (at.translation - map.map_from_keyframe.front().translation).norm();
+  };
+}
+
+/// The point nearest to what its views show, from their poses: linear in the inverse depth of the
+/// first view's ray. False: a view has it behind.
+bool triangulate(const std::vector<AdjustedPose>& poses,
+                 const MapTrack& track,
+                 const std::vector<Eigen::Vector2d>& rays,
+                 AdjustedPoint& point) {
+  point.map_from_anchor = poses[index(track.front().keyframe)].camera_from_map().inverse();
+  point.at = {rays.front().x(), rays.front().y(), 0.0};
+  double a = 0.0;
+  double b = 0.0;
+  std::vector<std::pair<double, double>> depths;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const Rigid3 camera_from_anchor =
+        poses[index(track[i].keyframe)].camera_from_map() * point.map_from_anchor;
+    const Eigen::Vector3d at_infinity = camera_from_anchor.rotation * rays.front().homogeneous();
+    const Eigen::Vector3d& t = camera_from_anchor.translation;
+    const Eigen::Vector2d by_inverse_depth = t.head<2>() - rays[i] * t.z();
+    const Eigen::Vector2d off = at_infinity.head<2>() - rays[i] * at_infinity.z();
+    a += by_inverse_depth.squaredNorm();
+    b -= by_inverse_depth.dot(off);
+    depths.emplace_back(at_infinity.z(), t.z());
+  }
+  point.at[2] = a > 0.0 ? b / a : 0.0;
+  return std::ranges::all_of(
+      depths, [&](const auto& depth) { return depth.first + depth.second * point.at[2] > 0.05; });
+}
+
+/// The longest tracks, so many that each keyframe has its share of all.
+std::vector<MapTrack> chosen_tracks(const KeptMap& map) {
+  std::vector<MapTrack> tracks = tracks_of(map);
+  const std::size_t share =
+      std::max(kMinObservationsOfKeyframe, kMaxObservations / map.keyframes.size());
+  std::ranges::stable_sort(tracks, std::ranges::greater{}, &MapTrack::size);
+  std::vector<std::size_t> num(map.keyframes.size());
+  std::erase_if(tracks, [&](const MapTrack& track) {
+    const auto count = [&](const MapView& view) -> std::size_t& {
+      return num[index(view.keyframe)];
+    };
+    if (std::ranges::all_of(track, [&](const MapView& view) { return count(view) >= share; })) {
+      return true;
+    }
+    std::ranges::for_each(track, [&](const MapView& view) { ++count(view); });
+    return false;
+  });
+  return tracks;
+}
+
+/// The unknowns of a map and Ceres's problem of them. `map` and `options` outlive it.
+class Adjustment {
+ public:
+  Adjustment(const KeptMap& map, const MapAdjustmentOptions& options);
+
+  bool solve();
+  [[nodiscard]] MapAdjustment result();
+
+ private:
+  struct Corner {
+    const CornerError* error;
+    std::array<const double*, 3> at;
+  };
+
+  [[nodiscard]] const Camera& base_camera(int keyframe) const {
+    return keyframe < options_.num_of_other_camera ? map_.keyframes[index(keyframe)].camera
+                                                   : options_.camera;
+  }
+  [[nodiscard]] double* camera_change(int keyframe) {
+    return keyframe < options_.num_of_other_camera ? no_change_.data() : camera_.data();
+  }
+  [[nodiscard]] Eigen::Vector2d uv(const MapView& view) const {
+    return map_.keyframes[index(view.keyframe)].corners[index(view.corner)].uv.cast<double>();
+  }
+  [[nodiscard]] Eigen::Vector2d ray(const MapView& view);
+
+  void place_points();
+  void add_corners();
+  void add_edges();
+  void add_lengths();
+  void add_camera();
+  template <int kSize, typename Error>
+  void add(const Error& error, int from, int to, ceres::LossFunction* loss = nullptr);
+  [[nodiscard]] int num_common_landmarks(const MapEdge& edge) const;
+
+  void measure_errors();
+  bool minimize(double tolerance);
+  void keep_length();
+  void read_landmarks(MapAdjustment& result) const;
+  void read_poses(MapAdjustment& result) const;
+  void read_covariances(MapAdjustment& result);
+
+  const KeptMap& map_;
+  const MapAdjustmentOptions& options_;
+  std::vector<AdjustedPose> poses_;  ///< one per keyframe
+  std::vector<MapTrack> tracks_;
+  std::vector<AdjustedPoint> points_;     ///< one per track
+  std::array<double, 6> camera_ = {};     ///< IntrinsicsDelta of options_.camera, and nothing
+  std::array<double, 6> no_change_ = {};  ///< of other recordings' cameras
+  double median_error_px_ = 0.0;
+  double sigma_px_ = 1.0;
+  std::vector<Corner> corners_;
+  ceres::LossFunctionWrapper corner_loss_{nullptr, ceres::TAKE_OWNERSHIP};
+  ceres::CauchyLoss loop_loss_{kLooseLoop};
+  ceres::Problem problem_;
+};
+
+ceres::Problem::Options shared_losses() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;
+  return options;
+}
+
+Adjustment::Adjustment(const KeptMap& map, const MapAdjustmentOptions& options)
+    : map_(map), options_(options), problem_(shared_losses()) {
+  for (const Similarity3& at : map.map_from_keyframe) {
+    poses_.emplace_back(Rigid3(at.rotation, at.translation).inverse());
+  }
+  if (options.camera_sigma) {
+    const Camera& last = map.keyframes.back().camera;
+    camera_ = {last.cx_px - options.camera.cx_px, last.cy_px - options.camera.cy_px,
+               last.fx_px / options.camera.fx_px - 1.0};
+  }
+  place_points();
+  add_corners();
+  add_edges();
+  add_lengths();
+  add_camera();
+  if (problem_.HasParameterBlock(poses_.front().delta.data())) {
+    problem_.SetParameterBlockConstant(poses_.front().delta.data());
+  }
+}
+
+Eigen::Vector2d Adjustment::ray(const MapView& view) {
+  const Camera& camera = base_camera(view.keyframe);
+  const double* change = camera_change(view.keyframe);
+  return camera.normalize(uv(view) - Eigen::Vector2d(change[0], change[1])) / (1.0 + change[2]);
+}
+
+void Adjustment::place_points() {
+  for (MapTrack& track : chosen_tracks(map_)) {
+    std::vector<Eigen::Vector2d> rays;
+    std::ranges::transform(track, std::back_inserter(rays),
+                           [&](const MapView& view) { return ray(view); });
+    if (AdjustedPoint point; triangulate(poses_, track, rays, point)) {
+      points_.push_back(point);
+      tracks_.push_back(std::move(track));
+    }
+  }
+}
+
+void Adjustment::add_corners() {
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    for (const MapView& view : tracks_[i]) {
+      AdjustedPose& pose = poses_[index(view.keyframe)];
+      auto* error =
+          new CornerError(uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
+      double* camera = camera_change(view.keyframe);
+      problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(), pose.delta.data(),
+                                camera);
+      corners_.push_back({error, {points_[i].at.data(), pose.delta.data(), camera}});
+    }
+  }
+}
+
+template <int kSize, typename Error>
+void Adjustment::add(const Error& error, int from, int to, ceres::LossFunction* loss) {
+  problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<Error, kSize, 6, 6>(new Error(error)),
+                            loss, poses_[index(from)].delta.data(), poses_[index(to)].delta.data());
+}
+
+int Adjustment::num_common_landmarks(const MapEdge& edge) const {
+  const auto sees = [](const MapTrack& track, int keyframe) {
+    return std::ranges::binary_search(track, keyframe, {}, &MapView::keyframe);
+  };
+  return static_cast<int>(std::ranges::count_if(tracks_, [&](const MapTrack& track) {
+    return sees(track, edge.from) && sees(track, edge.to);
+  }));
+}
+
+void Adjustment::add_edges() {
+  std::vector<int> num_common(map_.keyframes.size());  // with the next keyframe
+  for (const MapTrack& track : tracks_) {
+    for (std::size_t i = 0; i + 1 < track.size(); ++i) {
+      num_common[index(track[i].keyframe)] += track[i].keyframe + 1 == track[i + 1].keyframe;
+    }
+  }
+  const auto add_edge = [&](const MapEdge& edge, ceres::LossFunction* loss) {
+    add<6>(EdgeError(edge, map_.map_from_keyframe[index(edge.from)].scale, poses_[index(edge.from)],
+                     poses_[index(edge.to)]),
+           edge.from, edge.to, loss);
+  };
+  for (const MapEdge& edge : map_.motions) {
+    if (edge.from + 1 != edge.to || num_common[index(edge.from)] < kFewLandmarks) {
+      add_edge(edge, nullptr);
+    }
+  }
+  for (const Loop& loop : map_.loops) {
+    if (num_common_landmarks(loop) < kFewLandmarks) {
+      add_edge(loop, &loop_loss_);
+    }
+  }
+}
+
+void Adjustment::add_lengths() {
+  std::map<int, const MapEdge*> motion_from;
+  for (const MapEdge& edge : map_.motions) {
+    motion_from[edge.from] = &edge;
+  }
+  const auto add_distance = [&](int from, int to, double log_distance, double sigma) {
+    add<1>(DistanceError{poses_[index(from)], poses_[index(to)], log_distance, sigma}, from, to);
+  };
+  for (const MapLength& length : map_.lengths) {
+    const auto found = motion_from.find(length.keyframe);
+    if (found == motion_from.end()) {
+      continue;
+    }
+    const MapEdge& edge = *found->second;
+    const double distance = edge.from_to.translation.norm();
+    if (distance > 3.0 * edge.sigma_translation) {
+      add_distance(edge.from, edge.to, std::log(distance) + length.log_metres_per_unit,
+                   std::hypot(length.sigma, edge.sigma_translation / distance));
+    }
+  }
+  if (map_.lengths.empty()) {
+    // Any length, so that there is a scale.
+    const auto far =
+        std::ranges::max_element(map_.map_from_keyframe, {}, distance_from_first(map_));
+    if (const double distance = distance_from_first(map_)(*far); distance > 0.0) {
+      add_distance(0, static_cast<int>(far - map_.map_from_keyframe.begin()), std::log(distance),
+                   1e-3);
+    }
+  }
+}
+
+void Adjustment::add_camera() {
+  problem_.AddParameterBlock(camera_.data(), 6);
+  problem_.AddParameterBlock(no_change_.data(), 6);
+  problem_.SetParameterBlockConstant(no_change_.data());
+  if (!options_.camera_sigma) {
+    problem_.SetParameterBlockConstant(camera_.data());
+    return;
+  }
+  Eigen::Matrix<double, 6, 1> information;
+  information << options_.camera_sigma->cwiseInverse(), 1.0;
+  problem_.AddResidualBlock(
+      new ceres::NormalPrior(information.asDiagonal().toDenseMatrix(), Eigen::VectorXd::Zero(6)),
+      nullptr, camera_.data());
+}
+
+void Adjustment::measure_errors() {
+  std::vector<double> errors;
+  errors.reserve(corners_.size());
+  for (const Corner& corner : corners_) {
+    Eigen::Vector2d error;
+    corner.error->Evaluate(corner.at.data(), error.data(), nullptr);
+    errors.push_back(sigma_px_ * error.norm());
+  }
+  median_error_px_ = median(std::move(errors));
+  sigma_px_ = std::max(median_error_px_ / kMedianOfRayleigh, kMinSigma_px);
+  const double loss_px = std::max(kMinLoss_px, kLossShare * median_error_px_);
+  corner_loss_.Reset(new ceres::CauchyLoss(loss_px / sigma_px_), ceres::TAKE_OWNERSHIP);
+}
+
+bool Adjustment::minimize(double tolerance) {
+  measure_errors();
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_SCHUR;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // same bytes with any BLAS
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (AdjustedPoint& point : points_) {
+    options.linear_solver_ordering->AddElementToGroup(point.at.data(), 0);
+  }
+  for (AdjustedPose& pose : poses_) {
+    if (problem_.HasParameterBlock(pose.delta.data())) {
+      options.linear_solver_ordering->AddElementToGroup(pose.delta.data(), 1);
+    }
+  }
+  options.linear_solver_ordering->AddElementToGroup(camera_.data(), 1);
+  options.linear_solver_ordering->AddElementToGroup(no_change_.data(), 1);
+  options.function_tolerance = tolerance;
+  options.max_num_iterations = 100;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem_, &summary);
+  std::ranges::for_each(poses_, &AdjustedPose::take_in);
+  return summary.IsSolutionUsable();
+}
+
+bool Adjustment::solve() {
+  if (points_.empty() || !minimize(1e-3) || !minimize(1e-6)) {
+    return false;
+  }
+  measure_errors();
+  return true;
+}
+
+void Adjustment::read_landmarks(MapAdjustment& result) const {
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    AdjustedLandmark& landmark = result.landmarks.emplace_back();
+    landmark.in_map = points_[i].in_map().hnormalized();
+    landmark.views = tracks_[i];
+    const auto ray_from = [&](const MapView& view) -> Eigen::Vector3d {
+      const Rigid3 map_from_camera = poses_[index(view.keyframe)].camera_from_map().inverse();
+      const Eigen::Vector4d at = points_[i].in_map();
+      return (at.head<3>() - at.w() * map_from_camera.translation).normalized();
+    };
+    const Eigen::Vector3d first = ray_from(tracks_[i].front());
+    for (const MapView& view : tracks_[i]) {
+      const Eigen::Vector3d other = ray_from(view);
+      landmark.max_parallax_rad = std::max(landmark.max_parallax_rad,
+                                           std::atan2(first.cross(other).norm(), first.dot(other)));
+    }
+  }
+}
+
+void Adjustment::read_poses(MapAdjustment& result) const {
+  std::vector<std::vector<double>> growth(poses_.size());  // of lengths, by landmarks' depths
+  for (const AdjustedLandmark& landmark : result.landmarks) {
+    for (const MapView& view : landmark.views) {
+      const KeptCorner& corner = map_.keyframes[index(view.keyframe)].corners[index(view.corner)];
+      const double depth = (poses_[index(view.keyframe)].camera_from_map() * landmark.in_map).z();
+      if (corner.has_landmark() && depth > 0.0 && corner.in_camera.z() > 0.0F) {
+        growth[index(view.keyframe)].push_back(depth / corner.in_camera.z());
+      }
+    }
+  }
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const Rigid3 at = poses_[i].camera_from_map().inverse();
+    const bool is_known = growth[i].size() >= index(kFewLandmarks);
+    result.map_from_keyframe.emplace_back(
+        is_known ? median(std::move(growth[i])) : map_.map_from_keyframe[i].scale, at.rotation,
+        at.translation);
+  }
+}
+
+void Adjustment::read_covariances(MapAdjustment& result) {
+  ceres::Covariance::Options options;
+  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  ceres::Covariance covariance(options);
+  std::vector<std::pair<const double*, const double*>> blocks;
+  const auto ask = [&](const double* block) {
+    if (problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block)) {
+      blocks.emplace_back(block, block);
+    }
+  };
+  ask(camera_.data());
+  for (const int i : options_.covariance_of) {
+    ask(poses_[index(i)].delta.data());
+  }
+  const bool is_known = covariance.Compute(blocks, &problem_);
+  using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  const auto of = [&](double* block) {
+    Matrix6 matrix = Matrix6::Zero();
+    if (is_known &&
+        std::ranges::count(blocks, std::pair<const double*, const double*>(block, block)) > 0) {
+      covariance.GetCovarianceBlock(block, block, matrix.data());
+    }
+    return matrix;
+  };
+  result.camera.sigma = kLikeErrors * of(camera_.data()).diagonal().head<5>().cwiseSqrt();
+  result.camera.sigma[2] *= kFocalSigmaFactor;
+  for (const int i : options_.covariance_of) {
+    AdjustedPose& pose = poses_[index(i)];
+    Matrix6 by_delta = Matrix6::Zero();  // of (position, rotation) by (w, v)
+    by_delta.topLeftCorner<3, 3>() = -skew(pose.translation);
+    by_delta.topRightCorner<3, 3>() = -Eigen::Matrix3d::Identity();
+    by_delta.bottomLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
+    result.covariances.emplace_back(kLikeErrors * kLikeErrors * by_delta * of(pose.delta.data()) *
+                                    by_delta.transpose());
+  }
+}
+
+MapAdjustment Adjustment::result() {
+  MapAdjustment result;
+  result.median_error_px = median_error_px_;
+  result.camera.change = Eigen::Map<const IntrinsicsDelta>(camera_.data());
+  result.camera.num_bundles = 1;
+  read_landmarks(result);
+  read_poses(result);
+  if (options_.camera_sigma || !options_.covariance_of.empty()) {
+    read_covariances(result);
+  }
+  return result;
+}
+
+}  // namespace
+
+std::optional<MapAdjustment> adjust_map(const KeptMap& map, const MapAdjustmentOptions& options) {
+  STEMVO_CHECK(map.map_from_keyframe.size() == map.keyframes.size(), "each keyframe has a node");
+  if (map.keyframes.size() < 2) {
+    return std::nullopt;
+  }
+  Adjustment adjustment(map, options);
+  return adjustment.solve() ? std::optional(adjustment.result()) : std::nullopt;
+}
+
+}  // namespace stemvo
