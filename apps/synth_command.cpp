@@ -25,6 +25,7 @@ Examples:
   stemvo synth drive --frames 200
   stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
   stemvo synth walk --walk --frames 600
+  stemvo synth walk --walk --frames 600 --visit 1 --name again
   stemvo synth drives --name street7 --seed 7   several drives in one folder)";
 
 struct SynthArguments {
@@ -82,6 +83,12 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
                    ? std::string()
                    : "expected a whole number from 0 to 18446744073709551615, found " + text;
       });
+  command
+      .add_option("--visit", options.visit,
+                  "The same place again, on another path and in other light (with the same "
+                  "--trajectory, --frames, --seed); default 0: the first time")
+      ->type_name("N")
+      ->check(in_range(0, 1000000));
   command.add_option("--width", options.width_px, "Pixels; default 1241, with --walk 640")
       ->type_name("W")
       ->check(in_range(16, 8192));

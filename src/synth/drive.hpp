@@ -36,22 +36,33 @@ struct RoadFrame {
   }
 };
 
+/// Knots [begin, end) of a road. Knot i is the same place as knot i - shift; 0: seen first here.
+struct RoadPart {
+  int begin;
+  int end;
+  int shift;
+};
+
 /// A road as frames 1 m apart: the arc length of knot i is i.
 class RoadCurve {
  public:
   /// Points 1 m apart on the road's surface under the camera's path, and an up direction for each;
-  /// at least 3.
-  RoadCurve(const std::vector<Vec3>& points, const std::vector<Vec3>& ups);
+  /// at least 3. `parts` cover all knots in order; none: all of it is new.
+  RoadCurve(const std::vector<Vec3>& points,
+            const std::vector<Vec3>& ups,
+            std::vector<RoadPart> parts = {});
 
   [[nodiscard]] int num_knots() const { return static_cast<int>(knots_.size()); }
   [[nodiscard]] const RoadFrame& knot(int index) const {
     return knots_[static_cast<std::size_t>(index)];
   }
+  [[nodiscard]] const std::vector<RoadPart>& parts() const { return parts_; }
   /// Between the knots: position by cubic Hermite, so that a camera on it moves smoothly.
   [[nodiscard]] RoadFrame at(double arc_m) const;
 
  private:
   std::vector<RoadFrame> knots_;
+  std::vector<RoadPart> parts_;
 };
 
 /// Camera poses and the road under them. The world is any frame in which -y is roughly up.
@@ -69,8 +80,10 @@ inline constexpr double kDriveRate_hz = 10.0;
 [[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed);
 
 /// The road that fits given camera poses: 1.65 m below the smoothed path, with its elevation and
-/// bank. The poses are kept exactly; what the smoothing takes away is how the camera moves against
-/// the road. The car may stand, turn on the spot and reverse.
+/// bank. What the smoothing takes away is how the camera moves against the road. The car may stand,
+/// turn on the spot and reverse. A drive that comes back to a street in the same direction is on
+/// the same street; its poses are lifted there to the street's height, and are kept exactly
+/// elsewhere.
 [[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera);
 
 /// The street near `arc_m`: from 60 m behind to 170 m ahead.
@@ -95,7 +108,8 @@ struct Walk {
 };
 
 /// A walk with a camera in the hand, some 1.5 m above the floor, at 0.5 m/s in the mean: the sway
-/// of steps, slow wander of the view, turns, glances aside and pauses.
-[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz);
+/// of steps, slow wander of the view, turns, glances aside and pauses. Each visit takes another way
+/// through the courtyard of `seed`.
+[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz, int visit = 0);
 
 }  // namespace stemvo::synth

@@ -308,7 +308,7 @@ float gaussian(std::uint64_t bits) {
 
 /// Lens and chip do to light: a point spread of 0.4 px, corners 12 % darker, noise of about 1.8
 /// gray levels per channel, 8 bits. RGB.
-cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
+cv::Mat expose(const cv::Mat& light, float exposure, std::uint64_t seed) {
   cv::Mat blurred;
   const cv::Matx13f spread(0.08F, 0.84F, 0.08F);  // variance 0.16 px^2
   cv::sepFilter2D(light, blurred, CV_32F, spread, spread, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
@@ -322,7 +322,7 @@ cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
     const float dy = static_cast<float>(y) - cy;
     for (int x = 0; x < light.cols; ++x) {
       const float dx = static_cast<float>(x) - cx;
-      const float gain = 255.0F * (1.0F - kCornerLoss * (dx * dx + dy * dy) / corner2);
+      const float gain = exposure * 255.0F * (1.0F - kCornerLoss * (dx * dx + dy * dy) / corner2);
       const std::uint64_t pixel =
           seed ^ (static_cast<std::uint64_t>(y) << 32) ^ (static_cast<std::uint64_t>(x) << 2);
       for (int c = 0; c < 3; ++c) {
@@ -338,14 +338,13 @@ cv::Mat expose(const cv::Mat& light, std::uint64_t seed) {
 
 }  // namespace
 
-Renderer::Renderer(CameraPath path, const Camera& camera, std::uint64_t seed)
-    : path_(std::move(path)), camera_(camera), seed_(seed), textures_(seed) {
-  Draw draw(seed, 'L');
-  const double azimuth = draw.in(0.0, 2.0 * kPi);
-  const double height = draw.in(0.6, 0.8);  // rad
-  to_sun_ = {std::cos(height) * std::sin(azimuth), -std::sin(height),
-             std::cos(height) * std::cos(azimuth)};
-}
+Renderer::Renderer(CameraPath path, const Camera& camera, std::uint64_t seed, int visit)
+    : path_(std::move(path)),
+      camera_(camera),
+      seed_(seed),
+      noise_seed_(visit == 0 ? seed : hash_of(seed, 'N', visit)),
+      textures_(seed),
+      daylight_(daylight(seed, visit)) {}
 
 const Trajectory& Renderer::world_from_camera() const {
   return std::visit([](const auto& path) -> const Trajectory& { return path.world_from_camera; },
@@ -356,7 +355,7 @@ RenderedFrame Renderer::render(std::size_t index) const {
   const Rigid3& pose = world_from_camera()[index];
   const auto* walk = std::get_if<Walk>(&path_);
   const double ambient = walk != nullptr ? 0.7 : 0.36;  // walls light each other
-  Scene scene(pose.translation, to_sun_, ambient);
+  Scene scene(pose.translation, daylight_.to_sun, ambient * daylight_.ambient_factor);
   if (walk != nullptr) {
     add_courtyard(walk->courtyard, scene);
   } else {
@@ -364,7 +363,7 @@ RenderedFrame Renderer::render(std::size_t index) const {
     add_street(drive.road, drive.arcs_m[index], hash_of(seed_, 0), scene);
   }
   RenderedFrame frame = paint_scene(scene, pose, camera_, textures_);
-  frame.rgb = expose(frame.rgb, hash_of(seed_, 'n', index));
+  frame.rgb = expose(frame.rgb, daylight_.gain, hash_of(noise_seed_, 'n', index));
   return frame;
 }
 

@@ -9,6 +9,7 @@
 #include "stemvo/camera.hpp"
 #include "synth/drive.hpp"
 #include "synth/materials.hpp"
+#include "synth/visit.hpp"
 
 namespace stemvo::synth {
 
@@ -23,7 +24,8 @@ struct RenderedFrame {
 /// threads may call render() at once.
 class Renderer {
  public:
-  Renderer(CameraPath path, const Camera& camera, std::uint64_t seed);
+  /// `seed` makes the world; `visit` chooses its light and the noise, 0 is the first one.
+  Renderer(CameraPath path, const Camera& camera, std::uint64_t seed, int visit = 0);
 
   [[nodiscard]] const Trajectory& world_from_camera() const;
   [[nodiscard]] RenderedFrame render(std::size_t index) const;
@@ -32,8 +34,9 @@ class Renderer {
   CameraPath path_;
   Camera camera_;
   std::uint64_t seed_;
+  std::uint64_t noise_seed_;
   Textures textures_;
-  Vec3 to_sun_;
+  Daylight daylight_;
 };
 
 }  // namespace stemvo::synth

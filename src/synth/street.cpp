@@ -4,6 +4,7 @@
 
 #include "synth/drive.hpp"
 #include "synth/materials.hpp"
+#include "synth/vehicles.hpp"
 
 namespace stemvo::synth {
 namespace {
@@ -11,19 +12,36 @@ namespace {
 /// Builders of things along the road need this.
 struct Street {
   const RoadCurve& road;
-  cv::Range window;         ///< knots of the road that are drawn
-  double texture_origin_m;  ///< arc length where u = 0
+  double camera_m;   ///< arc length
+  cv::Range window;  ///< knots of the road that are drawn
   std::uint64_t seed;
   Scene& scene;
 
-  /// Calls build(slot, arc_m) for every slot of `length_m` inside the window; slots are numbered
-  /// along the whole road, so that a thing is the same from wherever it is seen.
+  /// Calls build(slot, arc_m) for every slot of `length_m` inside the window and inside one part of
+  /// the road. Slots are numbered along the whole road, by its first visit to a place, so that a
+  /// thing is the same from wherever and whenever it is seen.
   template <typename Build>
   void for_each_slot(double length_m, const Build& build) const {
-    const int first = static_cast<int>(std::ceil(window.start / length_m));
-    for (int slot = first; slot * length_m + length_m <= window.end - 1; ++slot) {
-      build(slot, slot * length_m);
+    for (const auto& [begin, end, shift] : road.parts()) {
+      const int first = std::max(begin, window.start) - shift;
+      const int last = std::min(end, window.end) - shift - 1;
+      for (int slot = static_cast<int>(std::ceil(first / length_m));
+           slot * length_m + length_m <= last; ++slot) {
+        build(slot, slot * length_m + shift);
+      }
     }
+  }
+  /// The knot of the first visit.
+  [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
+  /// Of the road's texture, near 0 around the camera.
+  [[nodiscard]] double u_m(int knot) const {
+    const auto& [begin, end, shift] = part_of(knot);
+    const double near_m =
+        std::clamp(camera_m, static_cast<double>(begin), static_cast<double>(end)) - shift;
+    return knot - shift - std::floor(near_m / kTexturePeriod_m) * kTexturePeriod_m;
+  }
+  [[nodiscard]] const RoadPart& part_of(int knot) const {
+    return *std::ranges::upper_bound(road.parts(), knot, {}, &RoadPart::end);
   }
   /// The same on the left (-1) and on the right (1): build(draw, side, arc_m).
   template <typename Build>
@@ -81,7 +99,7 @@ void add_segment(const Street& street,
   for (std::size_t k = 0; k < 4; ++k) {
     const auto& [end, lateral_m, height_m] = corners[k];
     points[k] = street.road.knot(knot + end).point(lateral_m, height_m);
-    const double u = knot - street.texture_origin_m;
+    const double u = street.u_m(knot);
     texture[k] = {u + end, is_upright ? height_m : lateral_m};
   }
   street.scene.add_patch(points, texture, style);
@@ -135,7 +153,7 @@ void add_borders(const Street& street) {
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
-      Draw draw(street.seed, 'B', side > 0.0, i / 16);
+      Draw draw(street.seed, 'B', side > 0.0, street.home(i) / 16);
       const std::uint32_t seed = draw.bits();
       const double share = draw.next();
       Style style = share < 0.6 ? kHedge : share < 0.8 ? kWall : kFence;
@@ -317,47 +335,12 @@ void add_poles(const Street& street) {
   });
 }
 
-void add_car(const RoadFrame& place, Draw draw, Scene& scene) {
-  constexpr double kLateral_m = 3.35;
-  const float gray = draw.in_float(0.05, 0.75);
-  const float tint = draw.in_float(-0.12, 0.12);
-  const Rgb paint = {gray + std::max(tint, 0.0F), gray, gray + std::max(-tint, 0.0F)};
-  const std::uint32_t seed = draw.bits();
-  const double width = draw.in(1.65, 1.8);
-  const double length = draw.in(3.9, 4.7);
-  struct Part {
-    Rgb albedo;
-    Vec3 corner;  ///< along, to the right, up from the car's corner; metres
-    Vec3 size;
-  };
-  constexpr Rgb kTyre = {0.03F, 0.03F, 0.03F};
-  constexpr Rgb kLamp = {0.6F, 0.12F, 0.1F};
-  const std::array<Part, 9> parts = {{
-      {paint, {0.0, 0.0, 0.3}, {length, width, 0.52}},
-      {{0.07F, 0.08F, 0.09F}, {0.12 * length, 0.09, 0.82}, {0.55 * length, width - 0.18, 0.5}},
-      {paint, {0.2 * length, 0.12, 1.32}, {0.38 * length, width - 0.24, 0.1}},
-      {kTyre, {0.12 * length, -0.02, 0.0}, {0.6, width + 0.04, 0.58}},
-      {kTyre, {0.72 * length, -0.02, 0.0}, {0.6, width + 0.04, 0.58}},
-      {kLamp, {-0.02, 0.05, 0.62}, {0.02, 0.3, 0.14}},
-      {kLamp, {-0.02, width - 0.35, 0.62}, {0.02, 0.3, 0.14}},
-      {{0.85F, 0.85F, 0.82F}, {-0.02, 0.5 * width - 0.26, 0.5}, {0.02, 0.52, 0.11}},
-      // A thin dark mat below the car: what the sky cannot reach.
-      {{0.07F, 0.07F, 0.075F}, {-0.1, -0.1, 0.0}, {length + 0.2, width + 0.2, 0.015}},
-  }};
-  for (const auto& [albedo, corner, size] : parts) {
-    const Vec3 at = place.point(kLateral_m, 0.0) + corner.x() * place.forward +
-                    (corner.y() - 0.5 * width) * place.right + corner.z() * place.up;
-    scene.add_box(at, {size.x() * place.forward, size.y() * place.right, size.z() * place.up},
-                  {.seed = seed, .albedo = albedo});
-  }
-}
-
 void add_parked_cars(const Street& street) {
   street.for_each_slot(6.5, [&](int slot, double arc_m) {
     Draw draw(street.seed, 'C', slot);
     const auto place = street.roomy(arc_m + draw.in(0.5, 1.4), 1.0, 0.95);
     if (place && draw.chance(0.3)) {
-      add_car(*place, draw, street.scene);
+      add_parked_car(*place, draw, street.scene);
     }
   });
 }
@@ -376,8 +359,7 @@ cv::Range visible_window(const RoadCurve& road, double arc_m) {
 }  // namespace
 
 void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& scene) {
-  const double texture_origin_m = std::floor(arc_m / kTexturePeriod_m) * kTexturePeriod_m;
-  const Street street{road, visible_window(road, arc_m), texture_origin_m, seed, scene};
+  const Street street{road, arc_m, visible_window(road, arc_m), seed, scene};
   add_ground(street);
   add_borders(street);
   street.for_each_lot('H', kLot_m, [&](Draw draw, double side, double begin_m) {

@@ -33,10 +33,7 @@ Camera camera_of(const SyntheticDriveOptions& options) {
   return {f_px, f_px, 607.1928 * scale, 185.2157 * height_px / 376.0, width_px, height_px};
 }
 
-Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
-  if (options.walk) {
-    return synth::make_walk(options.num_frames, options.seed, options.walk_rate_hz);
-  }
+Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
   if (!options.trajectory) {
     return synth::make_own_drive(options.num_frames, options.seed);
   }
@@ -46,6 +43,20 @@ Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   }
   poses->resize(std::min(poses->size(), static_cast<std::size_t>(options.num_frames)));
   return synth::make_drive_along(*poses);
+}
+
+Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
+  if (options.walk) {
+    return synth::make_walk(options.num_frames, options.seed, options.walk_rate_hz, options.visit);
+  }
+  auto drive = plan_drive(options);
+  if (!drive) {
+    return drive.error();
+  }
+  if (options.visit > 0) {
+    synth::drive_again(options.seed, options.visit, *drive);
+  }
+  return *std::move(drive);
 }
 
 struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
@@ -158,7 +169,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
     return lock.error();
   }
   const Camera camera = camera_of(options);
-  const synth::Renderer renderer(std::move(*path), camera, options.seed);
+  const synth::Renderer renderer(std::move(*path), camera, options.seed, options.visit);
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
   const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory

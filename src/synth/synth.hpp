@@ -21,6 +21,9 @@ struct SyntheticDriveOptions {
   int num_frames = 100;  ///< with a trajectory: at most its length
   double walk_rate_hz = 30.0;
   std::uint64_t seed = 1;
+  /// The world of `seed` (and `trajectory`, `num_frames`) at another time: on another path, in
+  /// other light. 0: the first visit.
+  int visit = 0;
   std::optional<int> width_px = std::nullopt;   ///< nullopt: 1241, with a walk 640
   std::optional<int> height_px = std::nullopt;  ///< nullopt: 376, with a walk 480
   std::string name = "00";                      ///< names the sequence's folder and the pose file

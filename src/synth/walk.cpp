@@ -76,8 +76,8 @@ using Crossing = Eigen::Vector2i;
 /// glances and a pause at least.
 class WalkPlan {
  public:
-  WalkPlan(const Courtyard& courtyard, double duration_s, double cruise_m_s)
-      : yard_(courtyard), draw_(courtyard.seed, 'v'), cruise_m_s_(cruise_m_s) {
+  WalkPlan(const Courtyard& courtyard, Draw draw, double duration_s, double cruise_m_s)
+      : yard_(courtyard), draw_(draw), cruise_m_s_(cruise_m_s) {
     // The start lies in the middle of a way from one side to the other.
     const std::array<Crossing, 4> directions = {{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
     direction_ = directions[draw_.bits() % 4];
@@ -206,7 +206,7 @@ class WalkPlan {
 };
 
 /// Turns and pauses included, the camera then moves at 0.5 m/s in the mean.
-double cruising_speed_m_s(const Courtyard& courtyard, double duration_s) {
+double cruising_speed_m_s(const Courtyard& courtyard, Draw draw, double duration_s) {
   constexpr double kMean_m_s = 0.5;
   double low_m_s = 0.2 * kMean_m_s;
   double high_m_s = 2.0 * kMean_m_s;
@@ -214,7 +214,7 @@ double cruising_speed_m_s(const Courtyard& courtyard, double duration_s) {
   for (int i = 0; i < 40; ++i) {
     cruise_m_s = 0.5 * (low_m_s + high_m_s);
     double way_m = 0.0;
-    const WalkPlan plan(courtyard, duration_s, cruise_m_s);
+    const WalkPlan plan(courtyard, draw, duration_s, cruise_m_s);
     for (const Phase& phase : plan.phases) {
       const double turned_m = kArm_m * std::abs(phase.heading_to_rad - phase.heading_from_rad);
       way_m += (phase.is_turn() ? turned_m : (phase.to_m - phase.from_m).norm()) *
@@ -301,12 +301,14 @@ struct Hand {
 
 }  // namespace
 
-Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz) {
+Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz, int visit) {
   Walk walk;
   walk.courtyard = lay_courtyard(seed);
   const double duration_s = num_frames / rate_hz;
-  const WalkPlan plan(walk.courtyard, duration_s, cruising_speed_m_s(walk.courtyard, duration_s));
-  const Hand hand{seed};
+  const Draw draw = visit == 0 ? Draw(seed, 'v') : Draw(seed, 'v', visit);
+  const WalkPlan plan(walk.courtyard, draw, duration_s,
+                      cruising_speed_m_s(walk.courtyard, draw, duration_s));
+  const Hand hand{visit == 0 ? seed : hash_of(seed, 'V', visit)};
   for (int i = 0; i < num_frames; ++i) {
     const double time_s = i / rate_hz;
     walk.world_from_camera.push_back(hand.world_from_camera(stance_at(plan, time_s), time_s));

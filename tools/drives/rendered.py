@@ -12,6 +12,8 @@ import subprocess
 
 RENDERED = "rendered.json"  # written last: a drive without it is not complete
 
+WORLD = 2  # raised when the renderer makes another world of the same poses
+
 
 class DriveError(Exception):
     """One line: what is wrong with which file."""
@@ -43,7 +45,7 @@ class Drive:
     def stamp(self):
         digest = hashlib.sha256(self.poses.read_bytes()).hexdigest()
         return {"poses_sha256": digest, "frames": self.num_frames(), "width": self.width_px,
-                "height": self.height_px, "seed": self.seed}
+                "height": self.height_px, "seed": self.seed, "world": WORLD}
 
 
 def folder_of(cache, drive):

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "support/rendered_frames.hpp"
+#include "synth/drive.hpp"
+#include "synth/renderer.hpp"
+#include "synth/visit.hpp"
+
+namespace stemvo::synth {
+namespace {
+
+/// Round a block of 90 m with corners of 15 m, one and a half times; the second round is 0.8 m
+/// further right and 0.6 m higher.
+Trajectory round_a_block() {
+  constexpr double kStraight_m = 90.0;
+  constexpr double kRadius_m = 15.0;
+  const double side_m = kStraight_m + 0.5 * kPi * kRadius_m;
+  Trajectory poses;
+  Vec3 at = Vec3::Zero();
+  for (double way_m = 0.0; way_m < 6.0 * side_m; way_m += 1.0) {
+    const double in_side_m = std::fmod(way_m, side_m);
+    const double turned = std::max(0.0, in_side_m - kStraight_m) / kRadius_m;
+    const double heading_rad = 0.5 * kPi * std::floor(way_m / side_m) + turned;
+    const Eigen::Matrix3d body = rotation(heading_rad, 0.0, 0.0);
+    const double again = std::clamp(way_m / side_m - 4.0, 0.0, 1.0);
+    poses.push_back(Rigid3::from_matrix(body, at + body * Vec3(0.8 * again, -0.6 * again, 0.0)));
+    at += body.col(2);
+  }
+  return poses;
+}
+
+/// Faces within 30 m of `here` in the scene of one frame.
+std::set<std::array<long, 10>> faces_near(const Drive& drive, std::size_t frame, const Vec3& here) {
+  Scene scene(here, -Vec3::UnitY(), 0.5);
+  add_street(drive.road, drive.arcs_m[frame], 1, scene);
+  std::set<std::array<long, 10>> faces;
+  for (const Face& face : scene.faces()) {
+    std::array<long, 10> key{};
+    bool is_near = true;
+    for (std::size_t i = 0; i < 3; ++i) {
+      is_near = is_near && face.points[i].norm() < 30.0F;
+      for (int k = 0; k < 3; ++k) {
+        key[3 * i + static_cast<std::size_t>(k)] = std::lround(1e3F * face.points[i][k]);
+      }
+    }
+    key[9] = face.style.seed;
+    if (is_near) {
+      faces.insert(key);
+    }
+  }
+  return faces;
+}
+
+TEST(Visit, DriveThatComesBackSeesTheSameStreet) {
+  const Trajectory given = round_a_block();
+  const Drive drive = make_drive_along(given);
+  int compared = 0;
+  for (std::size_t i = 496; i + 50 < given.size(); i += 12) {
+    std::size_t first = 0;
+    for (std::size_t j = 0; j < 350; ++j) {
+      const Vec3 here = drive.world_from_camera[i].translation;
+      const auto distance_m = [&](std::size_t k) {
+        return (drive.world_from_camera[k].translation - here).norm();
+      };
+      first = distance_m(j) < distance_m(first) ? j : first;
+    }
+    const Rigid3 between = drive.world_from_camera[first].inverse() * drive.world_from_camera[i];
+    ASSERT_LT(between.translation.norm(), 2.0) << i;
+    const Vec3 here = drive.world_from_camera[i].translation;
+    const auto before = faces_near(drive, first, here);
+    const auto now = faces_near(drive, i, here);
+    std::vector<std::array<long, 10>> both;
+    std::ranges::set_intersection(before, now, std::back_inserter(both));
+    ASSERT_GT(before.size(), 500U);
+    EXPECT_GT(both.size(), 95 * std::max(before.size(), now.size()) / 100) << "frame " << i;
+    EXPECT_NEAR(-between.translation.y(), 0.0, 0.1) << "at the height of the first visit";
+    ++compared;
+  }
+  EXPECT_GE(compared, 10);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    const Rigid3 moved = given[i].inverse() * drive.world_from_camera[i];
+    EXPECT_LT(std::hypot(moved.translation.x(), moved.translation.z()), 1e-9) << i;
+    EXPECT_LT(std::abs(moved.translation.y()), 0.7) << i;
+  }
+}
+
+TEST(Visit, DriveWithoutComingBackKeepsItsPoses) {
+  Trajectory given = round_a_block();
+  given.resize(350);
+  const Drive drive = make_drive_along(given);
+  ASSERT_EQ(drive.road.parts().size(), 1U);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    ASSERT_EQ(drive.world_from_camera[i].translation, given[i].translation);
+  }
+}
+
+TEST(Visit, SameStreetOnAnotherPath) {
+  for (const int visit : {1, 2, 3}) {
+    const Drive first = make_own_drive(120, 4);
+    Drive again = first;
+    drive_again(4, visit, again);
+    EXPECT_EQ(again.road.knot(100).position, first.road.knot(100).position);
+    for (std::size_t i = 0; i + 10 < again.world_from_camera.size(); ++i) {
+      const Rigid3& pose = again.world_from_camera[i];
+      const RoadFrame road = again.road.at(again.arcs_m[i]);
+      const double height_m = (pose.translation - road.position).dot(road.up);
+      EXPECT_NEAR(height_m, kCameraHeight_m, 0.25) << "visit " << visit << ", frame " << i;
+      double nearest_m = 100.0;
+      for (const Rigid3& other : first.world_from_camera) {
+        nearest_m = std::min(nearest_m, (other.translation - pose.translation).norm());
+      }
+      EXPECT_LT(nearest_m, 1.4) << "visit " << visit << ", frame " << i;
+      EXPECT_GT(nearest_m, 0.02) << "visit " << visit << ", frame " << i;
+    }
+  }
+}
+
+TEST(Visit, SameCourtyardOnAnotherWay) {
+  const Walk first = make_walk(600, 4, 30.0);
+  const Walk again = make_walk(600, 4, 30.0, 1);
+  EXPECT_EQ(first.courtyard.x_m, again.courtyard.x_m);
+  EXPECT_EQ(first.courtyard.wall_m, again.courtyard.wall_m);
+  double most_m = 0.0;
+  for (std::size_t i = 0; i < 600; ++i) {
+    most_m = std::max(
+        most_m,
+        (first.world_from_camera[i].translation - again.world_from_camera[i].translation).norm());
+  }
+  EXPECT_GT(most_m, 1.0);
+}
+
+/// Texture: the image without its shades over 8 px and more.
+cv::Mat texture_of(const RenderedFrame& frame) {
+  cv::Mat gray;
+  cv::Mat shades;
+  testing::gray_of(frame).convertTo(gray, CV_32F);
+  cv::GaussianBlur(gray, shades, {}, 8.0);
+  return gray - shades;
+}
+
+/// Correlation of a frame's texture with that of a frame of another visit, which is warped on to it
+/// by depth and poses.
+double correlation(const Renderer& first, const Renderer& again, std::size_t i, const Camera& at) {
+  const RenderedFrame a = first.render(i);
+  const RenderedFrame b = again.render(i);
+  const Rigid3 b_from_a = again.world_from_camera()[i].inverse() * first.world_from_camera()[i];
+  const cv::Mat map = testing::predict(a, b, b_from_a, at);
+  cv::Mat there;
+  cv::remap(texture_of(b), there, map, {}, cv::INTER_LINEAR);
+  std::vector<cv::Mat> xy;
+  cv::split(map, xy);
+  cv::Mat here = texture_of(a);
+  here.setTo(0.0F, xy[0] < -50.0F);
+  there.setTo(0.0F, xy[0] < -50.0F);
+  return here.dot(there) / std::sqrt(here.dot(here) * there.dot(there));
+}
+
+TEST(Visit, ShowsTheSameThingsInOtherLight) {
+  const Camera camera = testing::kitti_camera(0.5);
+  const Drive first_drive = make_own_drive(40, 3);
+  Drive again_drive = first_drive;
+  drive_again(3, 1, again_drive);
+  const Renderer first(first_drive, camera, 3);
+  const Renderer again(again_drive, camera, 3, 1);
+  const Renderer elsewhere(first_drive, camera, 4);
+  for (const std::size_t i : {5U, 25U}) {
+    EXPECT_GT(correlation(first, again, i, camera), 0.8);
+    EXPECT_LT(correlation(first, elsewhere, i, camera), 0.65) << "kerbs and the horizon remain";
+    const double before = cv::mean(testing::gray_of(first.render(i)))[0];
+    const double now = cv::mean(testing::gray_of(again.render(i)))[0];
+    EXPECT_GT(std::abs(now / before - 1.0), 0.03) << "no other light";
+  }
+}
+
+}  // namespace
+}  // namespace stemvo::synth
