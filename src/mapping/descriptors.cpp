@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/descriptors.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include <opencv2/features2d.hpp>
+
+#include "instruction_set.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A match differs in at most so many of the 256 bits; two that do not belong together in 128, most
+/// of them in more than 80.
+constexpr int kMaxBits = 72;
+/// So much nearer than the next one.
+constexpr double kMaxRatio = 0.85;
+/// Side of the square that the comparisons lie in, pixels of the channel.
+constexpr int kPatch_px = 31;
+
+struct Nearest {
+  int index = -1;
+  int num_bits = std::numeric_limits<int>::max();
+  int next_bits = std::numeric_limits<int>::max();
+
+  void add(int other, int bits) {
+    if (bits < num_bits) {
+      next_bits = num_bits;
+      num_bits = bits;
+      index = other;
+    } else {
+      next_bits = std::min(next_bits, bits);
+    }
+  }
+  [[nodiscard]] bool is_clear() const {
+    return num_bits <= kMaxBits && num_bits < kMaxRatio * next_bits;
+  }
+};
+
+STEMVO_INLINE void find_nearest(std::span<const Descriptor> first,
+                                std::span<const Descriptor> second,
+                                std::span<Nearest> of_first,
+                                std::span<Nearest> of_second) {
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    for (std::size_t j = 0; j < second.size() && first[i] != kNoDescriptor; ++j) {
+      if (second[j] != kNoDescriptor) {
+        int num_bits = 0;
+        for (std::size_t word = 0; word < first[i].size(); ++word) {
+          num_bits += std::popcount(first[i][word] ^ second[j][word]);
+        }
+        of_first[i].add(static_cast<int>(j), num_bits);
+        of_second[j].add(static_cast<int>(i), num_bits);
+      }
+    }
+  }
+}
+#if defined(__x86_64__)
+__attribute__((target("avx2,fma,popcnt"))) void find_nearest_avx2(
+    std::span<const Descriptor> first,
+    std::span<const Descriptor> second,
+    std::span<Nearest> of_first,
+    std::span<Nearest> of_second) {
+  find_nearest(first, second, of_first, of_second);
+}
+#endif
+
+}  // namespace
+
+std::vector<Descriptor> describe(const ChannelImage& channel, std::span<const KeptCorner> corners) {
+  std::vector<cv::KeyPoint> keypoints;
+  for (const KeptCorner& corner : corners) {
+    const Eigen::Vector2f at = channel.map.from_input(corner.uv.cast<double>()).cast<float>();
+    const int index = static_cast<int>(keypoints.size());
+    keypoints.emplace_back(cv::Point2f(at.x(), at.y()), kPatch_px, 0.0F, 0.0F, 0, index);
+  }
+  const cv::Ptr<cv::ORB> orb =
+      cv::ORB::create(std::max(1, static_cast<int>(corners.size())), 2.0F, 1, kPatch_px, 0, 2,
+                      cv::ORB::HARRIS_SCORE, kPatch_px);
+  cv::Mat bits;
+  orb->compute(channel.pixels, keypoints, bits);
+  std::vector<Descriptor> descriptors(corners.size());
+  for (int row = 0; row < bits.rows; ++row) {
+    const int index = keypoints[static_cast<std::size_t>(row)].class_id;
+    std::memcpy(&descriptors[static_cast<std::size_t>(index)], bits.ptr(row), sizeof(Descriptor));
+  }
+  return descriptors;
+}
+
+int count_differences(const Descriptor& a, const Descriptor& b) {
+  int num_bits = 0;
+  for (std::size_t word = 0; word < a.size(); ++word) {
+    num_bits += std::popcount(a[word] ^ b[word]);
+  }
+  return num_bits;
+}
+
+std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,
+                                              std::span<const Descriptor> second) {
+  std::vector<Nearest> of_first(first.size());
+  std::vector<Nearest> of_second(second.size());
+#if defined(__x86_64__)
+  if (uses_avx2()) {
+    find_nearest_avx2(first, second, of_first, of_second);
+  } else {
+    find_nearest(first, second, of_first, of_second);
+  }
+#else
+  find_nearest(first, second, of_first, of_second);
+#endif
+  std::vector<DescriptorPair> pairs;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const Nearest& nearest = of_first[i];
+    if (nearest.index < 0 || !nearest.is_clear()) {
+      continue;
+    }
+    const Nearest& back = of_second[static_cast<std::size_t>(nearest.index)];
+    if (back.index == static_cast<int>(i) && back.is_clear()) {
+      pairs.emplace_back(static_cast<int>(i), nearest.index);
+    }
+  }
+  return pairs;
+}
+
+}  // namespace stemvo

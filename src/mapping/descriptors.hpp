@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mapping/kept_map.hpp"
+#include "stem/channel.hpp"
+
+namespace stemvo {
+
+/// Of a corner too near the border; it matches nothing.
+inline constexpr Descriptor kNoDescriptor{};
+
+/// ORB's 256 comparisons around each corner on the channel, upright: cameras are held upright, and
+/// a turn that is not measured costs no bits. One per corner.
+[[nodiscard]] std::vector<Descriptor> describe(const ChannelImage& channel,
+                                               std::span<const KeptCorner> corners);
+
+/// Bits that differ.
+[[nodiscard]] int count_differences(const Descriptor& a, const Descriptor& b);
+
+/// Index of a descriptor of one frame, of one of another.
+using DescriptorPair = std::pair<int, int>;
+
+/// Pairs that are each other's nearest, within a bound, and clearly nearer than the next one.
+[[nodiscard]] std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,
+                                                            std::span<const Descriptor> second);
+
+}  // namespace stemvo

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "mapping/descriptors.hpp"
+#include "mapping/kept_map.hpp"
+#include "stemvo/camera.hpp"
+#include "stemvo/rigid3.hpp"
+
+namespace stemvo {
+
+/// A frame that may show a kept place: corners, with landmarks or without, and one descriptor each.
+struct PlaceView {
+  Camera camera;
+  std::span<const KeptCorner> corners;
+  std::span<const Descriptor> descriptors;
+};
+
+/// Where the camera of a frame stood in an old keyframe.
+struct PlacePose {
+  Rigid3 old_from_camera;               ///< in the old keyframe's unit
+  std::vector<DescriptorPair> corners;  ///< of the old keyframe, of the frame: inliers
+};
+
+/// Pose of a frame by the landmarks of an old keyframe that its descriptors find: consensus of
+/// samples of three (P3P) from a fixed seed, refined. nullopt: fewer than 30 agree, or they lie in
+/// a small part of the image.
+[[nodiscard]] std::optional<PlacePose> locate_in_place(const PlaceView& old,
+                                                       const PlaceView& frame);
+
+/// The similarity between two keyframes that see the same landmarks, each with its own idea of
+/// where they are: `old` on the new one's, the new one on the old ones, both agreeing, then one
+/// similarity refined on both images. The result's `from` and `to` are not set. nullopt: the two do
+/// not show one place.
+[[nodiscard]] std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent);
+
+}  // namespace stemvo

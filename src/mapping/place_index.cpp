@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include "mapping/place_index.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <random>
+
+#include "mapping/descriptors.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A descriptor votes for places that have one this near: nearer than most that do not belong
+/// together.
+constexpr int kVoteBits = 60;
+
+}  // namespace
+
+PlaceIndex::PlaceIndex() {
+  std::mt19937 random;  // the same on every run
+  for (auto& table : bits_) {
+    for (std::uint8_t& bit : table) {
+      bit = static_cast<std::uint8_t>(random() % 256);
+    }
+  }
+  tables_.fill(std::vector<Cell>(std::size_t{1} << kBits));
+}
+
+std::uint32_t PlaceIndex::cell_of(const Descriptor& descriptor, int table) const {
+  std::uint32_t cell = 0;
+  for (const std::uint8_t bit : bits_[static_cast<std::size_t>(table)]) {
+    cell = 2 * cell + static_cast<std::uint32_t>(descriptor[bit / 64U] >> (bit % 64U) & 1U);
+  }
+  return cell;
+}
+
+void PlaceIndex::add(int keyframe, std::span<const Descriptor> descriptors) {
+  const auto place = static_cast<std::uint32_t>(keyframes_.size());
+  keyframes_.push_back(keyframe);
+  for (const Descriptor& descriptor : descriptors) {
+    if (descriptor == kNoDescriptor) {
+      continue;
+    }
+    const auto entry = static_cast<std::uint32_t>(entries_.size());
+    entries_.push_back({descriptor, place});
+    for (int table = 0; table < kTables; ++table) {
+      tables_[static_cast<std::size_t>(table)][cell_of(descriptor, table)].push_back(entry);
+    }
+  }
+}
+
+std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> descriptors,
+                                                   int before,
+                                                   int max_candidates) const {
+  const auto num_places =
+      static_cast<std::uint32_t>(std::ranges::lower_bound(keyframes_, before) - keyframes_.begin());
+  std::vector<double> votes(num_places);
+  std::vector<int> voted_by(num_places, -1);
+  std::vector<std::uint32_t> places;  // that a descriptor votes for
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    if (descriptors[i] == kNoDescriptor) {
+      continue;
+    }
+    places.clear();
+    for (int table = 0; table < kTables; ++table) {
+      for (const std::uint32_t index :
+           tables_[static_cast<std::size_t>(table)][cell_of(descriptors[i], table)]) {
+        const Entry& entry = entries_[index];
+        if (entry.place >= num_places) {
+          break;  // entries rise
+        }
+        if (voted_by[entry.place] != static_cast<int>(i) &&
+            count_differences(descriptors[i], entry.descriptor) <= kVoteBits) {
+          voted_by[entry.place] = static_cast<int>(i);
+          places.push_back(entry.place);
+        }
+      }
+    }
+    for (const std::uint32_t place : places) {
+      votes[place] += 1.0 / static_cast<double>(places.size());
+    }
+  }
+  std::vector<PlaceCandidate> best;
+  for (std::size_t place = 0; place < votes.size(); ++place) {
+    if (votes[place] > 0.0) {
+      best.push_back({keyframes_[place], votes[place]});
+    }
+  }
+  const auto count = std::min(static_cast<std::ptrdiff_t>(max_candidates), std::ssize(best));
+  std::ranges::partial_sort(best, best.begin() + count, [](const auto& a, const auto& b) {
+    return a.votes != b.votes ? a.votes > b.votes : a.keyframe < b.keyframe;
+  });
+  best.resize(static_cast<std::size_t>(count));
+  return best;
+}
+
+}  // namespace stemvo

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mapping/kept_map.hpp"
+
+namespace stemvo {
+
+/// A place that looks like a frame.
+struct PlaceCandidate {
+  int keyframe = 0;    ///< its number in the map
+  double votes = 0.0;  ///< of the frame's descriptors
+};
+
+/// Finds places by their descriptors: tables of bits, in which two descriptors meet when a table's
+/// bits of theirs are the same (locality-sensitive hashing; Indyk and Motwani 1998).
+class PlaceIndex {
+ public:
+  PlaceIndex();
+
+  /// `keyframe`: its number in the map, higher than those before.
+  void add(int keyframe, std::span<const Descriptor> descriptors);
+  /// The places of numbers below `before` with the most votes, at most so many, best first.
+  [[nodiscard]] std::vector<PlaceCandidate> candidates(std::span<const Descriptor> descriptors,
+                                                       int before,
+                                                       int max_candidates) const;
+
+ private:
+  static constexpr int kTables = 6;
+  static constexpr int kBits = 14;  ///< of a cell's number
+  struct Entry {
+    Descriptor descriptor;
+    std::uint32_t place;  ///< index into keyframes_
+  };
+  using Cell = std::vector<std::uint32_t>;  ///< indices into entries_
+
+  [[nodiscard]] std::uint32_t cell_of(const Descriptor& descriptor, int table) const;
+
+  std::array<std::array<std::uint8_t, kBits>, kTables> bits_;  ///< the tables' bits
+  std::array<std::vector<Cell>, kTables> tables_;
+  std::vector<Entry> entries_;
+  std::vector<int> keyframes_;
+};
+
+}  // namespace stemvo
