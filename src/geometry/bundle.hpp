@@ -28,6 +28,7 @@ struct Bundle : BundleState {
     Eigen::Vector2d uv;
   };
   std::vector<Observation> observations;  ///< ordered by point, then by pose: one of each
+  int num_fixed_points = 0;               ///< the first ones, which stay where they are
 };
 
 /// Changes of cx, cy (px), of the focal lengths (share), k1, k2.

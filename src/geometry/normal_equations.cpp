@@ -183,7 +183,11 @@ STEMVO_INLINE void eliminate(const Bundle& bundle,
                              double damping,
                              NormalEquations::Point& point,
                              NormalEquations& equations) {
-  invert(damping, point.inverse);
+  if (bundle.observations.data()[begin].point < bundle.num_fixed_points) {
+    std::fill_n(point.inverse, 3, Lanes4{});  // nothing to eliminate: it does not move
+  } else {
+    invert(damping, point.inverse);
+  }
   const Lanes4& gradient = point.gradient;
   Block<3> scaled;
   if (equations.has_camera) {

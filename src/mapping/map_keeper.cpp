@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
+#include <utility>
 #include <vector>
 
 #include "geometry/median.hpp"
@@ -14,7 +14,7 @@ namespace stemvo {
 namespace {
 
 /// Errors of a track's points are alike: so many times the sigmas of independent ones.
-constexpr double kSigmaFactor = 3.0;
+constexpr double kAlikeFactor = 3.0;
 /// Least standard deviations of a motion, of rotation and, in shares of the depth, of translation.
 constexpr double kMinSigma_rad = 1e-4;
 constexpr double kMinSigma = 1e-4;
@@ -78,13 +78,26 @@ MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyfr
   const Matrix6d pose =
       pose_influences(camera_from_world, seen.points, seen.uv, view.camera, noise_px).squared_sum();
   edge.sigma_rad =
-      kMinSigma_rad + kSigmaFactor * std::sqrt(pose.bottomRightCorner<3, 3>().trace() / 3.0);
+      kMinSigma_rad + kAlikeFactor * std::sqrt(pose.bottomRightCorner<3, 3>().trace() / 3.0);
   edge.sigma_translation =
       units_of_from *
-      (kMinSigma * depth + kSigmaFactor * std::sqrt(pose.topLeftCorner<3, 3>().trace() / 3.0));
+      (kMinSigma * depth + kAlikeFactor * std::sqrt(pose.topLeftCorner<3, 3>().trace() / 3.0));
   edge.sigma_log_scale =
-      kSigmaFactor * noise_px * log_scale_sigma(view.window, from, to, view.camera.mean_focal_px());
+      kAlikeFactor * noise_px * log_scale_sigma(view.window, from, to, view.camera.mean_focal_px());
   return edge;
+}
+
+/// Both in the order of their tracks.
+void take_landmarks(const std::vector<KeptCorner>& from, std::vector<KeptCorner>& to) {
+  auto other = from.begin();
+  for (KeptCorner& corner : to) {
+    while (other != from.end() && other->track_id < corner.track_id) {
+      ++other;
+    }
+    if (other != from.end() && other->track_id == corner.track_id) {
+      corner.in_camera = other->in_camera;
+    }
+  }
 }
 
 /// What connects the first keyframe of a new map with the last one of the map before.
@@ -100,9 +113,39 @@ MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to) {
 
 }  // namespace
 
+std::vector<KeptCorner> corners_of(const WindowView& view, const Keyframe& keyframe) {
+  const double units = view.history.units(keyframe.frame);
+  const Rigid3 camera_from_world = keyframe.world_from_camera.inverse();
+  std::vector<KeptCorner> corners;
+  for (const Observation& point : keyframe.points) {
+    KeptCorner& corner = corners.emplace_back();
+    corner.track_id = point.track_id;
+    corner.uv = point.uv.cast<float>();
+    const auto landmark = view.window.landmarks.find(point.track_id);
+    if (landmark != view.window.landmarks.end()) {
+      corner.in_camera = (units * (camera_from_world * landmark->second)).cast<float>();
+    }
+  }
+  return corners;
+}
+
+void MapKeeper::load(KeptMap map) {
+  map_ = std::move(map);
+  components_.assign(map_.keyframes.size(), 0);
+}
+
 int MapKeeper::node_of(int frame) const {
   const auto node = nodes_.find(frame);
   return node == nodes_.end() ? -1 : node->second;
+}
+
+bool MapKeeper::has_own(int component) const {
+  for (std::size_t i = 0; i < components_.size(); ++i) {
+    if (components_[i] == component && map_.keyframes[i].frame >= 0) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void MapKeeper::add_nodes(const WindowView& view) {
@@ -121,15 +164,99 @@ void MapKeeper::add_node(const WindowView& view, const Keyframe& keyframe) {
   kept.camera = view.camera;
   kept.world_from_camera = view.trajectory[frame];
   const int node = static_cast<int>(map_.keyframes.size());
-  if (nodes_.empty() && node > 0) {
+  if (nodes_.empty()) {
+    connect_first(kept);
+  }
+  if (view.metric_sigma.has_value()) {
+    const double units_of_metre = view.history.units(keyframe.frame);
+    map_.lengths.push_back({node, -std::log(units_of_metre), *view.metric_sigma});
+  }
+  nodes_[keyframe.frame] = node;
+  components_.push_back(component_);
+  map_.map_from_keyframe.push_back(map_from_world_ * Similarity3(kept.world_from_camera));
+  map_.keyframes.push_back(std::move(kept));
+}
+
+/// The first keyframe of a window.
+void MapKeeper::connect_first(KeptKeyframe& kept) {
+  const int node = static_cast<int>(map_.keyframes.size());
+  if (relocation_.has_value()) {
+    component_ = component_of(relocation_->from);
+    relocation_->to = node;
+    map_.loops.push_back(*relocation_);
+    relocation_.reset();
+    return;
+  }
+  component_ = node;
+  if (node > 0) {
     MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
     edge.from = node - 1;
     edge.to = node;
     map_.motions.push_back(edge);
   }
-  nodes_[keyframe.frame] = node;
-  map_.map_from_keyframe.push_back(map_from_world_ * Similarity3(kept.world_from_camera));
-  map_.keyframes.push_back(std::move(kept));
+}
+
+std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
+  map_.loops.push_back(loop);
+  const int older = std::min(component_of(loop.from), component_of(loop.to));
+  const int younger = std::max(component_of(loop.from), component_of(loop.to));
+  if (older == younger) {
+    return std::nullopt;
+  }
+  Similarity3 moved =
+      map_from_keyframe(loop.from) * loop.from_to * map_from_keyframe(loop.to).inverse();
+  if (component_of(loop.from) == younger) {
+    moved = moved.inverse();
+  }
+  const bool comes_to_world = !has_own(older);
+  for (std::size_t i = 0; i < components_.size(); ++i) {
+    if (components_[i] == younger) {
+      components_[i] = older;
+      map_.map_from_keyframe[i] = moved * map_.map_from_keyframe[i];
+    }
+  }
+  // What was guessed between them counts no more.
+  std::erase_if(map_.motions, [&](const MapEdge& edge) { return edge.to == younger; });
+  if (component_ != younger) {
+    return std::nullopt;
+  }
+  component_ = older;
+  if (comes_to_world) {
+    map_from_world_ = moved * map_from_world_;
+    return std::nullopt;
+  }
+  return map_from_world_.inverse() * moved * map_from_world_;
+}
+
+KeptMap MapKeeper::graph(const WindowView& view) const {
+  KeptMap graph;
+  graph.keyframes.resize(map_.keyframes.size());
+  graph.map_from_keyframe = map_.map_from_keyframe;
+  graph.motions = map_.motions;
+  for (const Loop& loop : map_.loops) {
+    graph.loops.push_back({static_cast<const MapEdge&>(loop), {}});
+  }
+  graph.lengths = map_.lengths;
+  const auto& keyframes = view.window.keyframes;
+  for (std::size_t i = 1; i < keyframes.size(); ++i) {
+    const int node = node_of(keyframes[i].frame);
+    if (node > 0 && node == node_of(keyframes[i - 1].frame) + 1) {
+      MapEdge& edge =
+          graph.motions.emplace_back(motion_between(view, keyframes[i - 1], keyframes[i]));
+      edge.from = node - 1;
+      edge.to = node;
+    }
+  }
+  return graph;
+}
+
+void MapKeeper::apply(std::span<const Similarity3> solved) {
+  const Similarity3 moved = solved.back() * map_.map_from_keyframe[solved.size() - 1].inverse();
+  std::ranges::copy(solved, map_.map_from_keyframe.begin());
+  for (std::size_t i = solved.size(); i < map_.map_from_keyframe.size(); ++i) {
+    map_.map_from_keyframe[i] = moved * map_.map_from_keyframe[i];
+  }
+  map_from_world_ = moved * map_from_world_;
 }
 
 void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
@@ -138,18 +265,13 @@ void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
   if (node < 0) {
     return;
   }
-  KeptKeyframe& kept = map_.keyframes[static_cast<std::size_t>(node)];
-  const double units = view.history.units(keyframe.frame);
-  const Rigid3 camera_from_world = keyframe.world_from_camera.inverse();
-  kept.corners.clear();
-  for (const Observation& point : keyframe.points) {
-    KeptCorner& corner = kept.corners.emplace_back();
-    corner.track_id = point.track_id;
-    corner.uv = point.uv.cast<float>();
-    const auto landmark = view.window.landmarks.find(point.track_id);
-    if (landmark != view.window.landmarks.end()) {
-      corner.in_camera = (units * (camera_from_world * landmark->second)).cast<float>();
-    }
+  // A place stays what it was when it was described; its landmarks are known better now.
+  std::vector<KeptCorner> corners = corners_of(view, keyframe);
+  std::vector<KeptCorner>& kept = this->keyframe(node).corners;
+  if (kept.empty()) {
+    kept = std::move(corners);
+  } else {
+    take_landmarks(corners, kept);
   }
   // The motions to the nodes before and after, where those are in the window still.
   for (const Keyframe& other : view.window.keyframes) {
@@ -157,12 +279,11 @@ void MapKeeper::keep(const WindowView& view, std::size_t leaving) {
     if (neighbour < 0 || std::abs(neighbour - node) != 1) {
       continue;
     }
-    const bool is_before = neighbour < node;
-    MapEdge edge =
-        is_before ? motion_between(view, other, keyframe) : motion_between(view, keyframe, other);
+    MapEdge& edge =
+        map_.motions.emplace_back(neighbour < node ? motion_between(view, other, keyframe)
+                                                   : motion_between(view, keyframe, other));
     edge.from = std::min(node, neighbour);
     edge.to = std::max(node, neighbour);
-    map_.motions.push_back(edge);
   }
 }
 

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "mapping/kept_map.hpp"
 #include "odometry/window.hpp"
@@ -20,36 +22,70 @@ struct WindowView {
   const Camera& camera;
   std::span<const Rigid3> trajectory;  ///< of the frames that have ended
   std::span<const double> times_s;
+  std::optional<double> metric_sigma;  ///< of log(metres per unit); nullopt: units are no metres
 };
+
+/// What a keyframe of the window sees, with the landmarks as they are now.
+[[nodiscard]] std::vector<KeptCorner> corners_of(const WindowView& view, const Keyframe& keyframe);
 
 /// Fills the kept map from the window: a keyframe becomes a node once its pose is in the
 /// trajectory; its landmarks, and the motions to its neighbours, are kept as they are when it
-/// leaves.
+/// leaves. Nodes that nothing measured connects are maps of their own, until a loop joins them: the
+/// younger one is moved to the older.
 class MapKeeper {
  public:
+  /// Begins with what another recording left: frames below 0.
+  void load(KeptMap map);
+
   /// Makes nodes of the window's keyframes that are none yet, but for those whose frame is in work.
   void add_nodes(const WindowView& view);
   /// A keyframe is about to leave the window.
   void leave(const WindowView& view, std::size_t leaving);
   /// The whole window is about to be dropped; the next one is a new map.
   void close(const WindowView& view);
+  /// The next window belongs to the map of this loop's `from`; its first keyframe is the loop's
+  /// `to`.
+  void begin_at(const Loop& relocation) { relocation_ = relocation; }
+
+  /// Returns how the window moves, new world from old, where its map is joined to an older one.
+  [[nodiscard]] std::optional<Similarity3> add_loop(const Loop& loop);
+  /// The graph alone, without corners, but with the motions inside the window.
+  [[nodiscard]] KeptMap graph(const WindowView& view) const;
+  /// What the first nodes' map_from_keyframe became in the graph; the others go with the last.
+  void apply(std::span<const Similarity3> solved);
 
   [[nodiscard]] const KeptMap& map() const { return map_; }
-  [[nodiscard]] KeptMap& map() { return map_; }
+  [[nodiscard]] KeptKeyframe& keyframe(int node) {
+    return map_.keyframes[static_cast<std::size_t>(node)];
+  }
+  [[nodiscard]] const Similarity3& map_from_keyframe(int node) const {
+    return map_.map_from_keyframe[static_cast<std::size_t>(node)];
+  }
   /// Of a keyframe of the window; -1: it is none yet.
   [[nodiscard]] int node_of(int frame) const;
 
   /// The correction so far.
   [[nodiscard]] const Similarity3& map_from_world() const { return map_from_world_; }
+  /// Nothing of this recording is in the map yet: the map comes to the world, and not the world to
+  /// the map.
   void correct(const Similarity3& map_from_world) { map_from_world_ = map_from_world; }
+  /// A map holds keyframes of this recording.
+  [[nodiscard]] bool has_own(int component) const;
+  [[nodiscard]] int component_of(int node) const {
+    return components_[static_cast<std::size_t>(node)];
+  }
 
  private:
   void add_node(const WindowView& view, const Keyframe& keyframe);
+  void connect_first(KeptKeyframe& kept);
   void keep(const WindowView& view, std::size_t leaving);
 
   KeptMap map_;
+  std::vector<int> components_;  ///< of each node its map: that one's first node
   Similarity3 map_from_world_;
   std::map<int, int> nodes_;  ///< of the window's keyframes, by frame
+  int component_ = 0;         ///< the window's
+  std::optional<Loop> relocation_;
 };
 
 }  // namespace stemvo

@@ -1,30 +1,224 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/mapper.hpp"
 
-namespace stemvo {
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
 
-void Mapper::observe(const WindowView& view) {
-  if (is_on_) {
-    keeper_.add_nodes(view);
+#include "mapping/descriptors.hpp"
+#include "mapping/pose_graph.hpp"
+#include "timing/stage_timer.hpp"
+
+namespace stemvo {
+namespace {
+
+/// A graph of so many nodes is solved in the time of one keyframe.
+constexpr int kNodesPerKeyframe = 16;
+/// Standard deviations of where a lost frame was found, one place alone: rotation, share of the
+/// depth, scale.
+constexpr double kSigmaFound_rad = 0.005;
+constexpr double kSigmaFound = 0.01;
+
+std::vector<KeptCorner> corners_of(const Matches& matches) {
+  std::vector<KeptCorner> corners(matches.cur_uv.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    corners[i].track_id = matches.track_ids[i];
+    corners[i].uv = matches.cur_uv[i].cast<float>();
+  }
+  std::ranges::sort(corners, {}, &KeptCorner::track_id);
+  return corners;
+}
+
+}  // namespace
+
+Mapper::Mapper(const Options& options)
+    : is_on_(options.odometry.loops), may_begin_threads_(options.threads != 1) {}
+
+/// Work beside the frames. Where no thread can begin, it is done when its result is asked for.
+template <typename Task>
+auto Mapper::begin(Task task) const {
+  const auto where =
+      may_begin_threads_ ? std::launch::async | std::launch::deferred : std::launch::deferred;
+  return std::async(where, std::move(task)).share();
+}
+
+Recognition Mapper::observe(const WindowView& view, std::shared_ptr<const ImagePyramid> image) {
+  Recognition recognition;
+  if (!is_on_) {
+    return recognition;
+  }
+  finish_lookup();
+  keeper_.add_nodes(view);
+  if (const auto loop = std::exchange(found_, {})) {
+    recognition = take_in(*loop);
+  }
+  begin_lookup(view);
+  newest_ = {view.window.keyframes.back().frame, std::move(image)};
+  solve_graph(view);
+  return recognition;
+}
+
+/// The newest keyframe but one is complete.
+void Mapper::begin_lookup(const WindowView& view) {
+  const Keyframe& complete = *std::prev(view.window.keyframes.end(), 2);
+  if (complete.frame != newest_.frame || newest_.image == nullptr) {
+    return;
+  }
+  LookedUp work{keeper_.node_of(complete.frame), {}, {}};
+  work.keyframe = keeper_.keyframe(work.node);
+  work.keyframe.corners = corners_of(view, complete);
+  if (!recognizer_.asks(work.keyframe)) {
+    return;
+  }
+  looked_up_ = begin([this, work = std::move(work), image = newest_.image]() mutable {
+    const StageTimer timer(Stage::kPlaces);
+    KeptKeyframe& keyframe = work.keyframe;
+    keyframe.descriptors = describe(image->channel, keyframe.corners);
+    work.loop = recognizer_.recognize(keeper_.map(), work.node, keyframe);
+    if (recognizer_.shows_kept_place()) {
+      keyframe.descriptors.clear();
+    } else {
+      recognizer_.add(work.node, keyframe);
+    }
+    return work;
+  });
+}
+
+void Mapper::finish_lookup() {
+  const auto done = std::exchange(looked_up_, {});
+  if (done.valid()) {
+    found_ = keep(done.get(), keeper_);
+  }
+}
+
+std::optional<Loop> Mapper::keep(const LookedUp& found, MapKeeper& keeper) {
+  KeptKeyframe& kept = keeper.keyframe(found.node);
+  kept.corners = found.keyframe.corners;
+  kept.descriptors = found.keyframe.descriptors;
+  return found.loop;
+}
+
+/// Its newer keyframe is in the window still.
+Recognition Mapper::take_in(const Loop& loop) {
+  has_new_loops_ = true;
+  Recognition recognition;
+  recognition.frame = keeper_.keyframe(loop.from).frame;
+  recognition.moved = keeper_.add_loop(loop);
+  if (recognition.moved.has_value()) {
+    solved_ = {};  // of the graph before
+  }
+  const Similarity3 world_from_old =
+      keeper_.map_from_world().inverse() * keeper_.map_from_keyframe(loop.from);
+  for (const auto& [of_old, of_new] : loop.corners) {
+    const KeptCorner& old = keeper_.keyframe(loop.from).corners[static_cast<std::size_t>(of_old)];
+    const KeptCorner& corner = keeper_.keyframe(loop.to).corners[static_cast<std::size_t>(of_new)];
+    if (old.has_landmark()) {
+      recognition.landmarks.emplace(
+          corner.track_id, world_from_old * Eigen::Vector3d(old.in_camera.cast<double>()));
+    }
+  }
+  return recognition;
+}
+
+/// Begins where loops have come, and takes the result in a number of keyframes later that the
+/// graph's size alone decides.
+void Mapper::solve_graph(const WindowView& view) {
+  if (solved_.valid() && --keyframes_until_solved_ <= 0) {
+    const auto solved = std::exchange(solved_, {});
+    if (solved.get().has_value()) {
+      keeper_.apply(*solved.get());
+    }
+  }
+  if (has_new_loops_ && !solved_.valid()) {
+    has_new_loops_ = false;
+    keyframes_until_solved_ =
+        1 + static_cast<int>(keeper_.map().keyframes.size()) / kNodesPerKeyframe;
+    solved_ = begin([graph = keeper_.graph(view)]() mutable {
+      const StageTimer timer(Stage::kPoseGraph);
+      return solve_pose_graph(graph) ? std::optional(graph.map_from_keyframe) : std::nullopt;
+    });
   }
 }
 
 void Mapper::leave(const WindowView& view, std::size_t leaving) {
   if (is_on_) {
+    finish_lookup();
     keeper_.leave(view, leaving);
   }
 }
 
 void Mapper::close(const WindowView& view) {
   if (is_on_) {
+    finish_lookup();
     keeper_.close(view);
+    if (const auto loop = std::exchange(found_, {})) {
+      (void)take_in(*loop);
+    }
+    newest_ = {};
+  }
+}
+
+std::optional<Relocation> Mapper::locate(const Matches& matches,
+                                         const ImagePyramid& image,
+                                         const Camera& camera,
+                                         const Rigid3& predicted) {
+  finish_lookup();
+  if (!is_on_ || keeper_.map().keyframes.empty()) {
+    return std::nullopt;
+  }
+  const StageTimer timer(Stage::kPlaces);
+  const std::vector<KeptCorner> corners = corners_of(matches);
+  const auto found =
+      recognizer_.locate(keeper_.map(), camera, corners, describe(image.channel, corners));
+  if (!found.has_value()) {
+    return std::nullopt;
+  }
+  const Similarity3& map_from_old = keeper_.map_from_keyframe(found->keyframe);
+  if (!keeper_.has_own(keeper_.component_of(found->keyframe))) {
+    const Similarity3 map_from_camera = map_from_old * Similarity3(found->keyframe_from_camera);
+    keeper_.correct(map_from_camera * Similarity3(predicted).inverse());
+  }
+  const Similarity3 world_from_old = keeper_.map_from_world().inverse() * map_from_old;
+  Relocation relocation{
+      keeper_.keyframe(found->keyframe).frame, world_from_old * found->keyframe_from_camera, {}};
+  std::vector<double> depths;
+  for (const auto& [track_id, in_old] : found->landmarks) {
+    relocation.landmarks.emplace(track_id, world_from_old * in_old);
+    depths.push_back(in_old.z());
+  }
+  Loop loop;
+  loop.from = found->keyframe;
+  loop.from_to = Similarity3(found->keyframe_from_camera);
+  loop.from_to.scale = 1.0 / world_from_old.scale;
+  loop.sigma_rad = kSigmaFound_rad;
+  loop.sigma_translation = kSigmaFound * median(std::move(depths));
+  loop.sigma_log_scale = kSigmaFound;
+  located_ = loop;
+  return relocation;
+}
+
+void Mapper::begin_at_relocation() {
+  if (located_.has_value()) {
+    keeper_.begin_at(*std::exchange(located_, {}));
+    has_new_loops_ = true;
   }
 }
 
 KeptMap Mapper::map(const WindowView& view) const {
   MapKeeper keeper = keeper_;
-  if (is_on_) {
-    keeper.close(view);
+  if (!is_on_) {
+    return {};
+  }
+  if (looked_up_.valid()) {
+    if (const auto loop = keep(looked_up_.get(), keeper)) {
+      (void)keeper.add_loop(*loop);
+    }
+  }
+  keeper.close(view);
+  KeptMap graph = keeper.graph(view);
+  if (!graph.loops.empty() && solve_pose_graph(graph)) {
+    keeper.apply(graph.map_from_keyframe);
   }
   return keeper.map();
 }

@@ -2,33 +2,103 @@
 #pragma once
 
 #include <cstddef>
+#include <future>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
 
+#include <Eigen/Core>
+
+#include "features/front_end.hpp"
 #include "mapping/kept_map.hpp"
 #include "mapping/map_keeper.hpp"
+#include "mapping/place_recognizer.hpp"
 #include "stemvo/options.hpp"
 
 namespace stemvo {
 
-/// Remembers what leaves the window (`odometry.loops`; off: nothing).
+/// An old place, and what it says of the window.
+struct Recognition {
+  int frame = -1;  ///< of the old keyframe
+  /// The window belongs to another map, which is moved to that of the place: new world from old.
+  std::optional<Similarity3> moved;
+  /// Where the map has the landmarks of tracks, by id, in the (new) world.
+  std::map<int, Eigen::Vector3d> landmarks;
+};
+
+/// The same for a frame without a pose.
+struct Relocation {
+  int frame = -1;
+  Rigid3 world_from_camera;
+  std::map<int, Eigen::Vector3d> landmarks;
+};
+
+/// The map that remembers (`odometry.loops`; off: it does nothing). Places are looked up, and the
+/// graph is solved, beside the frames where threads may begin; what comes of it is taken in at
+/// fixed keyframes: the same on any number of threads. One call at a time.
 class Mapper {
  public:
-  explicit Mapper(const Options& options) : is_on_(options.odometry.loops) {}
+  explicit Mapper(const Options& options);
 
-  /// The window has a new keyframe; those before it have all their corners now.
-  void observe(const WindowView& view);
+  /// The window has a new keyframe, which came with this image; those before it have all their
+  /// corners now.
+  [[nodiscard]] Recognition observe(const WindowView& view,
+                                    std::shared_ptr<const ImagePyramid> image);
   /// A keyframe is about to leave the window.
   void leave(const WindowView& view, std::size_t leaving);
-  /// The whole window is about to be dropped.
+  /// The whole window is about to be dropped. The next one is a new map, unless it begins at a
+  /// relocation.
   void close(const WindowView& view);
+
+  /// A frame without a pose, or in no map yet; nullopt: it shows no kept place. `predicted`,
+  /// world_from_camera, is what it has where the map is all of another recording: that one comes
+  /// to this world.
+  [[nodiscard]] std::optional<Relocation> locate(const Matches& matches,
+                                                 const ImagePyramid& image,
+                                                 const Camera& camera,
+                                                 const Rigid3& predicted);
+  /// The next window begins with the frame that was located last.
+  void begin_at_relocation();
 
   /// The correction so far.
   [[nodiscard]] const Similarity3& map_from_world() const { return keeper_.map_from_world(); }
-  /// With the keyframes that are still in the window.
+  /// With the keyframes that are still in the window, and all that was begun.
   [[nodiscard]] KeptMap map(const WindowView& view) const;
 
  private:
+  /// A keyframe that was looked up.
+  struct LookedUp {
+    int node = 0;
+    KeptKeyframe keyframe;  ///< corners, and descriptors where it is a place now
+    std::optional<Loop> loop;
+  };
+  /// The last image of a keyframe.
+  struct Seen {
+    int frame = -1;
+    std::shared_ptr<const ImagePyramid> image;
+  };
+
+  template <typename Task>
+  [[nodiscard]] auto begin(Task task) const;
+  void begin_lookup(const WindowView& view);
+  /// Waits for the lookup that was begun.
+  void finish_lookup();
+  [[nodiscard]] static std::optional<Loop> keep(const LookedUp& found, MapKeeper& keeper);
+  [[nodiscard]] Recognition take_in(const Loop& loop);
+  void solve_graph(const WindowView& view);
+
   bool is_on_;
+  bool may_begin_threads_;
   MapKeeper keeper_;
+  PlaceRecognizer recognizer_;  ///< the lookup's while there is one
+  Seen newest_;
+  std::optional<Loop> found_;    ///< by the last lookup
+  std::optional<Loop> located_;  ///< to the last frame that was, which is no node yet
+  bool has_new_loops_ = false;
+  int keyframes_until_solved_ = 0;
+  std::shared_future<std::optional<std::vector<Similarity3>>> solved_;
+  std::shared_future<LookedUp> looked_up_;  ///< last: it ends before what it works on
 };
 
 }  // namespace stemvo

@@ -28,13 +28,16 @@ struct WindowBundle {
   std::vector<int> track_ids;  ///< of its points
 };
 
-WindowBundle read_window(const Window& window, const Camera& camera, int num_fixed_poses) {
-  WindowBundle read;
+/// Adds the landmarks that are fixed, or the others. One that is fixed holds a pose by a single
+/// observation.
+void add_landmarks(const Window& window, int num_fixed_poses, bool are_fixed, WindowBundle& read) {
   Bundle& bundle = read.bundle;
-  bundle.camera = camera;
-  bundle.camera_from_world = poses_of(window);
+  const std::size_t min_observations = are_fixed ? 1 : kMinObservations;
   ObservationWalk walk(window);
   for (const auto& [track_id, point] : window.landmarks) {
+    if (window.fixed.contains(track_id) != are_fixed) {
+      continue;
+    }
     const std::span<const KeyframeObservation> observations = walk.seek(track_id);
     const bool is_in_front =
         std::all_of(observations.begin(), observations.end(),
@@ -43,7 +46,7 @@ WindowBundle read_window(const Window& window, const Camera& camera, int num_fix
                     });
     const bool moves_a_pose =
         !observations.empty() && static_cast<int>(observations.back().keyframe) >= num_fixed_poses;
-    if (observations.size() < kMinObservations || !is_in_front || !moves_a_pose) {
+    if (observations.size() < min_observations || !is_in_front || !moves_a_pose) {
       continue;
     }
     for (const KeyframeObservation& observation : observations) {
@@ -53,6 +56,17 @@ WindowBundle read_window(const Window& window, const Camera& camera, int num_fix
     bundle.points.push_back(point);
     read.track_ids.push_back(track_id);
   }
+}
+
+WindowBundle read_window(const Window& window, const Camera& camera, int num_fixed_poses) {
+  WindowBundle read;
+  read.bundle.camera = camera;
+  read.bundle.camera_from_world = poses_of(window);
+  if (!window.fixed.empty()) {
+    add_landmarks(window, num_fixed_poses, true, read);
+    read.bundle.num_fixed_points = static_cast<int>(read.bundle.points.size());
+  }
+  add_landmarks(window, num_fixed_poses, false, read);
   return read;
 }
 
@@ -100,7 +114,8 @@ bool refine_window(Window& window, const Camera& camera, const BundleOptions& op
   const double length = length_of(window);
   write_back(read, window, options.num_fixed_poses);
   const double refined_length = length_of(window);
-  if (options.num_fixed_poses < 2 && length > 0.0 && refined_length > 0.0) {
+  const bool is_scale_free = options.num_fixed_poses < 2 && read.bundle.num_fixed_points == 0;
+  if (is_scale_free && length > 0.0 && refined_length > 0.0) {
     rescale(window, length / refined_length,
             window.keyframes.front().world_from_camera.translation);
   }

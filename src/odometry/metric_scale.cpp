@@ -26,12 +26,14 @@ MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigm
   road_.emplace(options);
 }
 
-void MetricScale::restart(const RoadImage* road, double time_s) {
+void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) {
   ways_.restart(time_s);
   if (!is_enabled() || (road_.has_value() && road == nullptr)) {
     return;
   }
-  filter_.restart();
+  if (!has_scale) {
+    filter_.restart();
+  }
   is_road_believed_ = false;
   is_way_measured_ = false;
   state_ = ScaleState::kNone;

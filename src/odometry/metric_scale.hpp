@@ -27,8 +27,9 @@ class MetricScale {
   [[nodiscard]] bool is_enabled() const { return road_.has_value() || has_ways_; }
   [[nodiscard]] bool asks_road() const { return road_.has_value(); }
 
-  /// The first image, or one that nothing connects with the ones before.
-  void restart(const RoadImage* road, double time_s);
+  /// The first image, or one that nothing connects with the ones before; `has_scale`: but for the
+  /// scale.
+  void restart(const RoadImage* road, double time_s, bool has_scale = false);
   /// Ways that came before this frame did.
   void add(const std::vector<Way>& ways);
   /// A frame whose image comes `cur_from_prev` (units) after the last one given here. Returns the

@@ -126,6 +126,7 @@ void add_keyframe(Window& window, Keyframe keyframe, const WindowOptions& option
     const std::size_t leaving = leaving_keyframe(window, keyframe);
     for (const int track_id : lost_tracks(window, leaving, keyframe)) {
       window.landmarks.erase(track_id);
+      window.fixed.erase(track_id);
     }
     window.keyframes.erase(window.keyframes.begin() + static_cast<std::ptrdiff_t>(leaving));
   }
@@ -157,6 +158,32 @@ void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& o
     return !is_seen_well(point_in_world, walk.seek(track_id), poses, camera,
                          options.max_reprojection_error_px);
   });
+  std::erase_if(window.fixed, [&](int track_id) { return !window.landmarks.contains(track_id); });
+}
+
+void fix_landmarks(Window& window,
+                   const Camera& camera,
+                   const std::map<int, Eigen::Vector3d>& known,
+                   const WindowOptions& options) {
+  const std::vector<Rigid3> poses = poses_of(window);
+  ObservationWalk walk(window);
+  for (const auto& [track_id, point_in_world] : known) {
+    const std::span<const KeyframeObservation> observations = walk.seek(track_id);
+    if (!observations.empty() && is_seen_well(point_in_world, observations, poses, camera,
+                                              options.max_reprojection_error_px)) {
+      window.landmarks[track_id] = point_in_world;
+      window.fixed.insert(track_id);
+    }
+  }
+}
+
+void move(Window& window, const Similarity3& moved) {
+  for (Keyframe& keyframe : window.keyframes) {
+    keyframe.world_from_camera = moved * keyframe.world_from_camera;
+  }
+  for (auto& [track_id, point] : window.landmarks) {
+    point = moved * point;
+  }
 }
 
 void rescale(Window& window, double factor, const Eigen::Vector3d& center) {

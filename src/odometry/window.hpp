@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <map>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct Keyframe {
 struct Window {
   std::deque<Keyframe> keyframes;            ///< oldest first
   std::map<int, Eigen::Vector3d> landmarks;  ///< track id -> point in the world
+  std::set<int> fixed;  ///< track ids of landmarks that were known before: no adjustment moves them
 };
 
 struct WindowOptions {
@@ -92,6 +94,16 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
 
 /// Drops landmarks that a keyframe sees from behind or too far from their observation.
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
+
+/// Puts landmarks, by track id, where they are known to be in the world, and fixes them there.
+/// Left out are those that no keyframe sees, or one sees elsewhere.
+void fix_landmarks(Window& window,
+                   const Camera& camera,
+                   const std::map<int, Eigen::Vector3d>& known,
+                   const WindowOptions& options);
+
+/// Moves everything, lengths too; `moved`: new world from old.
+void move(Window& window, const Similarity3& moved);
 
 /// Multiplies every length; `center` (in the world) stays where it is.
 void rescale(Window& window, double factor, const Eigen::Vector3d& center);

@@ -49,6 +49,8 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
 
 LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   advance_to(frame.time_s);
+  recognized_frame_ = -1;
+  moved_.reset();
   LocalizedFrame localized;
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
@@ -97,8 +99,12 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
           ? nearer_pose(predict(), predict(frame.hints.prev_from_cur), seen, camera())
           : predict();
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
-  return found.has_value() ? accept_localization(frame, *found, localized)
-                           : measure_since_reference(frame, now, localized);
+  if (found.has_value()) {
+    return accept_localization(frame, *found, localized);
+  }
+  return relocate(frame, now, start)
+             ? accept_localization(frame, {world_from_camera_, 0}, localized)
+             : measure_since_reference(frame, now, localized);
 }
 
 FrameState WindowEstimator::accept_localization(const Frame& frame,
@@ -258,17 +264,20 @@ void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   result.camera_sigma = calibration_.camera_sigma();
   result.world_from_camera = world_from_camera_;
   result.map_from_world = mapper_.map_from_world();
+  result.recognized_frame = recognized_frame_;
+  metric_sigma_ = metric_sigma(result);
   measure_covariance(frame, localized);
   remember(frame, result.state);
 }
 
 void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
+  const Rigid3 last = trajectory_.empty() ? world_from_camera_ : trajectory_.back();
+  const Rigid3 world_from_prev = moved_.has_value() ? *moved_ * last : last;
   const MotionCovariance::Motion motion{
       .state = result.state,
       .is_localized = frame.has_image() && !is_initializing_,
-      .prev_from_cur =
-          trajectory_.empty() ? Rigid3() : trajectory_.back().inverse() * world_from_camera_,
+      .prev_from_cur = world_from_prev.inverse() * world_from_camera_,
       .dt_s = interval_s_,
       .usual_step = speed_ * interval_s_,
       .hidden_px = (result.state == FrameState::kStationary ? 1.0 : kTurnFlow) * min_flow_px(),
@@ -277,10 +286,20 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
       .camera_sigma = result.camera_sigma,
       .scale_sigma = metric_sigma(result)};
   result.motion_covariance = uncertainty_.finish(motion);
+  if (moved_.has_value()) {  // the returned motion has the move in it
+    const Rigid3 move = last.inverse() * world_from_prev;
+    result.motion_covariance.topLeftCorner<3, 3>().diagonal().array() +=
+        move.translation.squaredNorm();
+    result.motion_covariance.bottomRightCorner<3, 3>().diagonal().array() +=
+        move.angle_rad() * move.angle_rad();
+  }
 }
 
 bool WindowEstimator::is_keyframe(const View& view) const {
   const Keyframe& newest = window_.keyframes.back();
+  if (newest.frame == view.frame) {
+    return false;
+  }
   const PointPairs pairs = common_points(newest.points, view.points);
   if (static_cast<double>(pairs.size()) < kMinOverlap * static_cast<double>(newest.points.size())) {
     return true;
@@ -317,8 +336,8 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
                         camera(), localization_.loss_px);
   // The newest keyframe but one: it has its new corners.
   calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
-  mapper_.observe(window_view());
   history_.observe(window_, frame.image);
+  take_in(mapper_.observe(window_view(), frame.pyramid));
 }
 
 double WindowEstimator::pixel_units() const {

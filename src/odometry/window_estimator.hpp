@@ -51,6 +51,8 @@ class WindowEstimator final : public Estimator {
   FrameState accept_localization(const Frame& frame,
                                  const Localization& found,
                                  LocalizedFrame& localized);
+  /// Goes on in the map where the frame shows a kept place; false: it shows none.
+  [[nodiscard]] bool relocate(const Frame& frame, const Observations& now, const Rigid3& predicted);
   FrameState measure_since_reference(const Frame& frame,
                                      const Observations& now,
                                      LocalizedFrame& localized);
@@ -68,7 +70,7 @@ class WindowEstimator final : public Estimator {
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
-    return {window_, history_, camera(), trajectory_, times_s_};
+    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_};
   }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
@@ -80,6 +82,9 @@ class WindowEstimator final : public Estimator {
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
   void add_keyframe(const Frame& frame);
+  /// An old place was recognized: the window keeps to it.
+  void take_in(const Recognition& recognition);
+  void move_world(const Similarity3& moved);
   /// Units of motion that move the median landmark in view by a pixel.
   [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);
@@ -105,14 +110,17 @@ class WindowEstimator final : public Estimator {
   Velocity velocity_;         ///< of the last motion between localized frames
   double assumed_step_;       ///< in the first interval, where nothing measures a length
   HintTrust trust_;
-  double speed_ = 0.0;              ///< of the last step measured or assumed, units per second
-  double interval_s_ = 0.0;         ///< between the frame in work and the one before
-  View last_;                       ///< the last frame with an image, without its points
-  View last_moving_;                ///< the last frame that was not stationary
-  Rigid3 road_pose_;                ///< of the last frame whose road was measured
-  bool is_last_localized_ = false;  ///< last_ has a pose that was measured
-  bool was_static_ = false;         ///< the last image did not show new motion
-  double still_s_ = 0.0;            ///< since the initializer's reference: stationary, rotating
+  double speed_ = 0.0;                  ///< of the last step measured or assumed, units per second
+  double interval_s_ = 0.0;             ///< between the frame in work and the one before
+  View last_;                           ///< the last frame with an image, without its points
+  View last_moving_;                    ///< the last frame that was not stationary
+  Rigid3 road_pose_;                    ///< of the last frame whose road was measured
+  bool is_last_localized_ = false;      ///< last_ has a pose that was measured
+  bool was_static_ = false;             ///< the last image did not show new motion
+  std::optional<double> metric_sigma_;  ///< of the last frame's scale, where that is in metres
+  std::optional<Similarity3> moved_;    ///< the world, on the frame in work: new from old
+  int recognized_frame_ = -1;           ///< by the frame in work
+  double still_s_ = 0.0;                ///< since the initializer's reference: stationary, rotating
   int keyframes_since_refinement_ = 0;
   std::vector<Rigid3> trajectory_;
   std::vector<double> times_s_;  ///< of the frames so far, the one in work among them

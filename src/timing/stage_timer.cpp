@@ -15,11 +15,25 @@
 namespace stemvo {
 namespace {
 
-constexpr std::array<std::string_view, kNumStages> kNames = {
-    "read and decode",     "stem",         "contrast",          "pyramid",    "description",
-    "road image",          "detection",    "tracking",          "homography", "epipolar geometry",
-    "two-view refinement", "localization", "window refinement", "camera",     "road scale",
-    "frame files",         "result files"};
+constexpr std::array<std::string_view, kNumStages> kNames = {"read and decode",
+                                                             "stem",
+                                                             "contrast",
+                                                             "pyramid",
+                                                             "description",
+                                                             "road image",
+                                                             "detection",
+                                                             "tracking",
+                                                             "homography",
+                                                             "epipolar geometry",
+                                                             "two-view refinement",
+                                                             "localization",
+                                                             "window refinement",
+                                                             "camera",
+                                                             "road scale",
+                                                             "places",
+                                                             "pose graph",
+                                                             "frame files",
+                                                             "result files"};
 
 double read_ms(clockid_t clock) {
   timespec time{};

@@ -29,6 +29,8 @@ enum class Stage {
   kWindowRefinement,  ///< triangulation and bundle adjustment
   kCamera,            ///< what a run of keyframes tells of it, beside the frames
   kRoadScale,
+  kPlaces,       ///< described and looked up, beside the frames
+  kPoseGraph,    ///< of the map that remembers, beside the frames
   kFrameFiles,   ///< frames.csv, images of frames
   kResultFiles,  ///< everything that is written at the end
 };

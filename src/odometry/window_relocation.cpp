@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+#include <utility>
+#include <vector>
+
+#include "odometry/tracks.hpp"
+#include "odometry/window_estimator.hpp"
+
+namespace stemvo {
+
+// What the map that remembers does to the window.
+
+bool WindowEstimator::relocate(const Frame& frame,
+                               const Observations& now,
+                               const Rigid3& predicted) {
+  if (frame.pyramid == nullptr) {
+    return false;
+  }
+  const std::optional<Relocation> found =
+      mapper_.locate(frame.matches, *frame.pyramid, camera(), predicted);
+  if (!found.has_value()) {
+    return false;
+  }
+  recognized_frame_ = found->frame;
+  mapper_.close(window_view());
+  mapper_.begin_at_relocation();
+  history_.close(window_);
+  window_ = {};
+  window_.keyframes.push_back({frame.number, found->world_from_camera, now});
+  fix_landmarks(window_, camera(), found->landmarks, window_options_);
+  scale_.restart(frame.road.get(), frame.time_s, true);
+  calibration_.restart();
+  world_from_camera_ = found->world_from_camera;
+  road_pose_ = world_from_camera_;
+  velocity_ = {};
+  is_last_localized_ = false;
+  return true;
+}
+
+void WindowEstimator::take_in(const Recognition& recognition) {
+  if (recognition.frame < 0) {
+    return;
+  }
+  recognized_frame_ = recognition.frame;
+  if (recognition.moved.has_value()) {
+    move_world(*recognition.moved);
+  }
+  fix_landmarks(window_, camera(), recognition.landmarks, window_options_);
+}
+
+void WindowEstimator::move_world(const Similarity3& moved) {
+  move(window_, moved);
+  history_.rescale(moved.scale);
+  calibration_.restart();
+  for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera,
+                       &last_.world_from_camera, &road_pose_}) {
+    *pose = moved * *pose;
+  }
+  speed_ *= moved.scale;
+  moved_ = moved;
+}
+
+}  // namespace stemvo
