@@ -26,6 +26,8 @@ Examples:
   stemvo synth drive --trajectory kitti/poses/03.txt --frames 400 --seed 7
   stemvo synth walk --walk --frames 600
   stemvo synth walk --walk --frames 600 --visit 1 --name again
+  stemvo synth hand --walk --blank-walls --turn-rate 200 --exposure 10 --readout 20 --auto-exposure
+  stemvo synth street --traffic --frames 300
   stemvo synth drives --name street7 --seed 7   several drives in one folder)";
 
 struct SynthArguments {
@@ -89,6 +91,35 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
                   "--trajectory, --frames, --seed); default 0: the first time")
       ->type_name("N")
       ->check(in_range(0, 1000000));
+  CLI::Option* walk = command.get_option("--walk");
+  command
+      .add_flag("--traffic", options.traffic,
+                "Cars, lorries and people that move; an own drive stands at crossings; also "
+                "moving/NNNNNN.png: 255 where something moves")
+      ->excludes(walk);
+  command.add_flag("--blank-walls", options.blank_walls, "A walk between walls of one colour")
+      ->needs(walk);
+  command
+      .add_option("--turn-rate", options.turn_rate_deg_s,
+                  "A walk's turns on the spot, at their fastest; default 67 to 86")
+      ->type_name("DEG_S")
+      ->check(in_range(10.0, 400.0))
+      ->needs(walk);
+  command
+      .add_option_function<double>(
+          "--exposure", [&options](double ms) { options.exposure_s = 1e-3 * ms; },
+          "Motion blur; the pose is that of the exposure's middle; default none")
+      ->type_name("MS")
+      ->check(in_range(0.0, 100.0));
+  command
+      .add_option_function<double>(
+          "--readout", [&options](double ms) { options.readout_s = 1e-3 * ms; },
+          "Rolling shutter, from the first row to the last; the pose is the middle row's; "
+          "default none")
+      ->type_name("MS")
+      ->check(in_range(0.0, 100.0));
+  command.add_flag("--auto-exposure", options.follows_light,
+                   "Exposure that follows the light within half a second");
   command.add_option("--width", options.width_px, "Pixels; default 1241, with --walk 640")
       ->type_name("W")
       ->check(in_range(16, 8192));

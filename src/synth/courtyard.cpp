@@ -277,6 +277,14 @@ void add_wall(const Stand& stand, double length_m, Draw draw) {
   }
 }
 
+/// A wall of one colour.
+void add_blank_wall(const Stand& stand, double length_m, Draw draw) {
+  const float light = draw.in_float(0.45, 0.62);
+  stand.moved(0.0, -kWallDepth_m, 0.0)
+      .add_block({length_m, kWallDepth_m + 0.5 * kMaxRelief_m}, draw.in(2.6, 3.4),
+                 {.albedo = {light, 0.97F * light, 0.9F * light}});
+}
+
 /// Things that stand before the wall, with gaps.
 void add_things_at_wall(const Stand& stand, double length_m, Draw draw) {
   constexpr double kMaxDepth_m = 0.45;
@@ -366,7 +374,14 @@ void add_courtyard(const Courtyard& courtyard, Scene& scene) {
                                        {scene, {left, 0.0, near}, z, x}}};
   for (std::size_t i = 0; i < sides.size(); ++i) {
     const double length_m = i % 2 == 0 ? right - left : far - near;
-    add_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
+    if (courtyard.has_blank_walls) {
+      add_blank_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
+    } else {
+      add_wall(sides[i], length_m, Draw(courtyard.seed, 'W', i));
+    }
+    if (courtyard.has_blank_walls && i % 2 == 0) {
+      continue;
+    }
     add_things_at_wall(sides[i], length_m, Draw(courtyard.seed, 'X', i));
     add_trees_behind(sides[i], length_m, Draw(courtyard.seed, 'Z', i));
   }

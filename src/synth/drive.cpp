@@ -122,6 +122,57 @@ std::vector<double> plan_speed(const std::vector<double>& curvature) {
   return smooth(speed, 10);
 }
 
+/// Stops, stands and goes on.
+class Driver {
+ public:
+  Driver(const std::vector<double>& curvature, std::uint64_t seed)
+      : curvature_(curvature), draw_(seed, 's') {
+    plan_stop(kRoadBehind_m + 45.0);
+  }
+
+  /// For the next interval, no faster than `limit_m_s`.
+  double speed_m_s(double arc_m, double limit_m_s, double interval_s) {
+    constexpr double kGentle_m_s2 = 2.0;
+    const double left_m = std::max(0.0, stop_m_ - arc_m);
+    const double brake_m_s = std::sqrt(2.0 * kGentle_m_s2 * left_m);
+    speed_m_s_ = std::min({limit_m_s, brake_m_s, speed_m_s_ + kGentle_m_s2 * interval_s});
+    if (speed_m_s_ < 0.2) {
+      speed_m_s_ = 0.0;
+      stand_s_ -= interval_s;
+      if (stand_s_ <= 0.0) {
+        plan_stop(arc_m + 60.0);
+      }
+    }
+    return speed_m_s_;
+  }
+
+ private:
+  /// At the straightest place of the 90 m from `begin_m` on.
+  void plan_stop(double begin_m) {
+    constexpr int kAhead = 23;  // knots: a crossing begins there
+    stand_s_ = draw_.in(4.0, 7.0);
+    double least = 1e9;
+    for (int offset = 0; offset < 90; ++offset) {
+      const int stop = static_cast<int>(begin_m) + offset;
+      double most = 0.0;
+      for (int k = stop; k <= stop + kAhead; ++k) {
+        const auto knot = std::min(static_cast<std::size_t>(k), curvature_.size() - 1);
+        most = std::max(most, std::abs(curvature_[knot]));
+      }
+      if (most < least) {
+        least = most;
+        stop_m_ = stop;
+      }
+    }
+  }
+
+  const std::vector<double>& curvature_;
+  Draw draw_;
+  double speed_m_s_ = 8.0;
+  double stop_m_ = 0.0;
+  double stand_s_ = 0.0;
+};
+
 /// How the camera moves against the road.
 struct CarBody {
   std::uint64_t seed;
@@ -190,7 +241,17 @@ RoadFrame RoadCurve::at(double arc_m) const {
   return frame;
 }
 
-Drive make_own_drive(int num_frames, std::uint64_t seed) {
+Rigid3 pose_at(const Trajectory& poses, double frame) {
+  const auto last = static_cast<double>(poses.size() - 1);
+  const double at = std::clamp(frame, 0.0, last);
+  const auto i = static_cast<std::size_t>(at);
+  const Rigid3& from = poses[i];
+  const Rigid3& to = poses[std::min(i + 1, poses.size() - 1)];
+  const double t = at - std::floor(at);
+  return {from.rotation.slerp(t, to.rotation), (1.0 - t) * from.translation + t * to.translation};
+}
+
+Drive make_own_drive(int num_frames, std::uint64_t seed, bool stops) {
   constexpr double kInterval_s = 1.0 / kDriveRate_hz;
   const double longest_m = kMaxSpeed_m_s * kInterval_s * num_frames;
   const auto num_knots = static_cast<std::size_t>(kRoadBehind_m + longest_m + kRoadAhead_m);
@@ -199,10 +260,18 @@ Drive make_own_drive(int num_frames, std::uint64_t seed) {
   Drive drive{lay_road(curvature, seed), {}, {}};
   const CarBody body{seed};
   double arc_m = kRoadBehind_m;
+  Driver driver(curvature, seed);
+  double sway_s = 0.0;  // the car sways while it moves
   for (int i = 0; i < num_frames; ++i) {
-    drive.world_from_camera.push_back(body.world_from_camera(drive.road, arc_m, kInterval_s * i));
+    const double time_s = stops ? sway_s : kInterval_s * i;
+    drive.world_from_camera.push_back(body.world_from_camera(drive.road, arc_m, time_s));
     drive.arcs_m.push_back(arc_m);
-    arc_m += kInterval_s * speed[static_cast<std::size_t>(arc_m)];
+    double now_m_s = speed[static_cast<std::size_t>(arc_m)];
+    if (stops) {
+      now_m_s = driver.speed_m_s(arc_m, now_m_s, kInterval_s);
+      sway_s += kInterval_s * std::min(1.0, now_m_s / 3.0);
+    }
+    arc_m += kInterval_s * now_m_s;
   }
   return drive;
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "evaluation/trajectory.hpp"
@@ -72,12 +73,15 @@ struct Drive {
   std::vector<double> arcs_m;  ///< per pose, along the road
 };
 
+/// Between frames the camera moves and turns evenly; before the first and after the last it stands.
+[[nodiscard]] Rigid3 pose_at(const Trajectory& poses, double frame);
+
 inline constexpr double kDriveRate_hz = 10.0;
 
 /// A street with turns to both sides, gentle hills and banks, driven at 8-12 m/s (slower in turns);
 /// the camera pitches and rolls against the road by about 0.4 deg (standard deviation) and bounces
-/// by 1-2 cm.
-[[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed);
+/// by 1-2 cm. `stops`: it stands for 4 to 7 s every 60 to 150 m, on a straight stretch.
+[[nodiscard]] Drive make_own_drive(int num_frames, std::uint64_t seed, bool stops = false);
 
 /// The road that fits given camera poses: 1.65 m below the smoothed path, with its elevation and
 /// bank. What the smoothing takes away is how the camera moves against the road. The car may stand,
@@ -86,8 +90,13 @@ inline constexpr double kDriveRate_hz = 10.0;
 /// elsewhere.
 [[nodiscard]] Drive make_drive_along(const Trajectory& world_from_camera);
 
-/// The street near `arc_m`: from 60 m behind to 170 m ahead.
-void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& scene);
+/// The street near `arc_m`: from 60 m behind to 170 m ahead. `crossings`: knots, where it was seen
+/// first, in the middle of roads that cross.
+void add_street(const RoadCurve& road,
+                double arc_m,
+                std::uint64_t seed,
+                Scene& scene,
+                const std::vector<int>& crossings = {});
 
 /// A courtyard of some 8 m x 8 m: three walkways each way with a thing between every four of them,
 /// walls all round. x right, z forward, floor at y = 0, -y up; metres.
@@ -96,6 +105,7 @@ struct Courtyard {
   std::array<double, 3> x_m{};     ///< walkways along z
   std::array<double, 3> z_m{};     ///< walkways along x
   std::array<double, 4> wall_m{};  ///< from the outer walkways: left, right, near, far
+  bool has_blank_walls = false;    ///< of one colour each, with nothing before two of them
 };
 
 [[nodiscard]] Courtyard lay_courtyard(std::uint64_t seed);
@@ -107,9 +117,17 @@ struct Walk {
   Courtyard courtyard;
 };
 
+struct WalkOptions {
+  double rate_hz = 30.0;
+  int visit = 0;
+  bool blank_walls = false;
+  std::optional<double> turn_rate_rad_s =
+      std::nullopt;  ///< at a turn's middle; nullopt: 1.2 to 1.5
+};
+
 /// A walk with a camera in the hand, some 1.5 m above the floor, at 0.5 m/s in the mean: the sway
 /// of steps, slow wander of the view, turns, glances aside and pauses. Each visit takes another way
 /// through the courtyard of `seed`.
-[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz, int visit = 0);
+[[nodiscard]] Walk make_walk(int num_frames, std::uint64_t seed, const WalkOptions& options = {});
 
 }  // namespace stemvo::synth

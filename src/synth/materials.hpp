@@ -118,7 +118,10 @@ Rgb fence(const Sample& at);
 Rgb bark(const Sample& at);
 Rgb leaves(const Sample& at);
 Rgb brick(const Sample& at);
-Rgb boards(const Sample& at);  // upright planks
+Rgb boards(const Sample& at);         // upright planks
+Rgb bodywork(const Sample& at);       // a car's sides: panels, dirt
+Rgb printed_sheet(const Sample& at);  // a lorry's sides: fields of colours and writing
+Rgb cloth(const Sample& at);
 
 }  // namespace materials
 }  // namespace stemvo::synth

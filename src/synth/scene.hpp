@@ -21,6 +21,7 @@ struct Style {
   Rgb albedo = {0.5F, 0.5F, 0.5F};
   float light = 1.0F;                        ///< from its normal: 1 is full sun
   std::array<float, 2> size = {0.0F, 0.0F};  ///< of a facade: length and height in metres
+  bool moves = false;                        ///< on its own, at this moment
 };
 
 /// A flat convex polygon. Points in world axes from the camera's centre (metres): differences are
@@ -40,6 +41,8 @@ class Scene {
       : origin_(origin), to_sun_(to_sun), ambient_(ambient) {}
 
   [[nodiscard]] const std::vector<Face>& faces() const { return faces_; }
+  /// The same place and light, empty.
+  [[nodiscard]] Scene without_faces() const { return {origin_, to_sun_, ambient_}; }
 
   /// Three or four corners in order; texture coordinates at the first three. `light` is set from
   /// the normal on the side of the camera; `style.light` multiplies it.

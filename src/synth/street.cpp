@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <optional>
 
+#include "synth/crossing.hpp"
 #include "synth/drive.hpp"
+#include "synth/house.hpp"
 #include "synth/materials.hpp"
 #include "synth/vehicles.hpp"
 
@@ -15,6 +17,7 @@ struct Street {
   double camera_m;   ///< arc length
   cv::Range window;  ///< knots of the road that are drawn
   std::uint64_t seed;
+  const std::vector<int>& crossings;  ///< knots of a first visit, in the middle of crossing roads
   Scene& scene;
 
   /// Calls build(slot, arc_m) for every slot of `length_m` inside the window and inside one part of
@@ -27,10 +30,19 @@ struct Street {
       const int last = std::min(end, window.end) - shift - 1;
       for (int slot = static_cast<int>(std::ceil(first / length_m));
            slot * length_m + length_m <= last; ++slot) {
-        build(slot, slot * length_m + shift);
+        if (!is_crossed(slot * length_m, slot * length_m + length_m)) {
+          build(slot, slot * length_m + shift);
+        }
       }
     }
   }
+  /// Whether a road crosses between these arc lengths of the first visit.
+  [[nodiscard]] bool is_crossed(double begin_m, double end_m) const {
+    return std::ranges::any_of(crossings, [&](int middle) {
+      return begin_m < middle + kCrossingHalf_m && end_m > middle - kCrossingHalf_m;
+    });
+  }
+  [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
   /// The knot of the first visit.
   [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
   /// Of the road's texture, near 0 around the camera.
@@ -105,6 +117,21 @@ void add_segment(const Street& street,
   street.scene.add_patch(points, texture, style);
 }
 
+constexpr Rgb kAsphaltGray = {0.345F, 0.345F, 0.35F};
+constexpr Style kKerbStone{.albedo = {0.46F, 0.445F, 0.42F}};
+
+/// A strip of the road that crosses, at the road's height.
+void add_crossed(const Street& street, int knot, double left_m, double right_m) {
+  const Style style{.material = materials::asphalt,
+                    .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
+                    .albedo = kAsphaltGray};
+  if (right_m > left_m) {
+    add_segment(street, knot,
+                {{{0, left_m, 0.0}, {0, right_m, 0.0}, {1, right_m, 0.0}, {1, left_m, 0.0}}},
+                style);
+  }
+}
+
 /// Strips between lines along the road; lateral distances to the right of the camera's path, which
 /// runs in the right lane.
 void add_ground(const Street& street) {
@@ -118,29 +145,42 @@ void add_ground(const Street& street) {
   constexpr Rgb kPaving = {0.43F, 0.41F, 0.39F};
   constexpr Rgb kGreen = {0.24F, 0.32F, 0.13F};
   constexpr double kKerb_m = 0.12;
-  constexpr std::array<Line, 10> kLines = {
-      {{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
-       {-7.2, kKerb_m, materials::sidewalk, kPaving},
-       {-5.35, kKerb_m, materials::kerb, kStone},
-       {-5.2, kKerb_m, materials::kerb, kStone},
-       {-5.2, 0.0, materials::asphalt, {0.345F, 0.345F, 0.35F}},
-       {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
-       {4.4, 0.0, materials::kerb, kStone},
-       {4.4, kKerb_m, materials::sidewalk, kPaving},
-       {6.6, kKerb_m, materials::grass, kGreen},
-       {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
+  constexpr std::array<Line, 10> kLines = {{{-kStreetHalfWidth_m, 0.25, materials::grass, kGreen},
+                                            {-7.2, kKerb_m, materials::sidewalk, kPaving},
+                                            {-5.35, kKerb_m, materials::kerb, kStone},
+                                            {-5.2, kKerb_m, materials::kerb, kStone},
+                                            {-5.2, 0.0, materials::asphalt, kAsphaltGray},
+                                            {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
+                                            {4.4, 0.0, materials::kerb, kStone},
+                                            {4.4, kKerb_m, materials::sidewalk, kPaving},
+                                            {6.6, kKerb_m, materials::grass, kGreen},
+                                            {kStreetHalfWidth_m, 0.25, nullptr, {}}}};
   for (auto left = kLines.begin(); left + 1 != kLines.end(); ++left) {
     const auto right = left + 1;
     const Style style{.material = left->material,
                       .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
                       .albedo = left->albedo};
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
+      if (street.is_crossed(i)) {
+        add_crossed(street, i, left->lateral_m, right->lateral_m);
+        continue;
+      }
       add_segment(street, i,
                   {{{0, left->lateral_m, left->height_m},
                     {0, right->lateral_m, right->height_m},
                     {1, right->lateral_m, right->height_m},
                     {1, left->lateral_m, left->height_m}}},
                   style);
+      for (const int end : {0, 1}) {  // the strip's end at a crossing road
+        if (left->height_m > 0.0 && street.is_crossed(end == 0 ? i - 1 : i + 1)) {
+          add_segment(street, i,
+                      {{{end, left->lateral_m, 0.0},
+                        {end, right->lateral_m, 0.0},
+                        {end, right->lateral_m, right->height_m},
+                        {end, left->lateral_m, left->height_m}}},
+                      kKerbStone);
+        }
+      }
     }
   }
 }
@@ -153,6 +193,9 @@ void add_borders(const Street& street) {
   for (const double side : {-1.0, 1.0}) {
     const double lateral_m = side * kStreetHalfWidth_m;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
+      if (street.is_crossed(i)) {
+        continue;
+      }
       Draw draw(street.seed, 'B', side > 0.0, street.home(i) / 16);
       const std::uint32_t seed = draw.bits();
       const double share = draw.next();
@@ -170,8 +213,6 @@ void add_borders(const Street& street) {
 }
 
 constexpr double kLot_m = 16.0;
-constexpr double kFoundation_m = 1.2;  // walls go into the ground, which may slope
-
 constexpr std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
                                           {0.72F, 0.64F, 0.48F},
                                           {0.62F, 0.60F, 0.57F},
@@ -180,56 +221,6 @@ constexpr std::array<Rgb, 8> kPlaster = {{{0.78F, 0.76F, 0.70F},
                                           {0.80F, 0.74F, 0.58F},
                                           {0.56F, 0.60F, 0.63F},
                                           {0.44F, 0.42F, 0.40F}}};
-
-struct House {
-  std::array<Vec3, 4> plan;  ///< front left, front right, back right, back left, as seen on foot
-  Vec3 up;
-  Style style;
-  Scene& scene;
-
-  void add_walls(double height_m) {
-    const auto& [fl, fr, br, bl] = plan;
-    const Vec3 down = -kFoundation_m * up;
-    const Vec3 top = height_m * up;
-    for (const auto& [left, right] : {std::pair(fl, fr), std::pair(bl, fl), std::pair(fr, br)}) {
-      const double length_m = (right - left).norm();
-      style.size = {static_cast<float>(length_m), static_cast<float>(height_m)};
-      scene.add_face(
-          {left + down, right + down, right + top, left + top},
-          {Vec2(0.0, -kFoundation_m), Vec2(length_m, -kFoundation_m), Vec2(length_m, height_m)},
-          style);
-    }
-  }
-
-  /// A gable roof with its ridge along the street, over the eaves by 12 cm.
-  void add_roof(double eaves_m, double rise_m, std::uint32_t seed) {
-    const auto& [fl, fr, br, bl] = plan;
-    const Vec3 left_ridge = 0.5 * (fl + bl) + (eaves_m + rise_m) * up;
-    const Vec3 right_ridge = 0.5 * (fr + br) + (eaves_m + rise_m) * up;
-    const Vec3 over_left = 0.12 * (fl - bl).normalized() - 0.1 * up;
-    const Vec3 over_right = 0.12 * (fr - br).normalized() - 0.1 * up;
-    const Vec3 front_left = fl + eaves_m * up + over_left;
-    const Vec3 front_right = fr + eaves_m * up + over_right;
-    const double length_m = (front_right - front_left).norm();
-    const double slope_m = (left_ridge - front_left).norm();
-    scene.add_patch(
-        {front_left, front_right, right_ridge, left_ridge},
-        {Vec2(0, 0), Vec2(length_m, 0), Vec2(length_m, slope_m), Vec2(0, slope_m)},
-        {.material = materials::roof,
-         .seed = seed,
-         .albedo = (seed & 1U) != 0U ? Rgb{0.40F, 0.20F, 0.14F} : Rgb{0.24F, 0.23F, 0.23F}});
-    style.material = materials::plain_wall;
-    for (const auto& [front, back, ridge] :
-         {std::tuple(fl, bl, left_ridge), std::tuple(fr, br, right_ridge)}) {
-      const Vec3 a = front + eaves_m * up;
-      const Vec3 b = back + eaves_m * up;
-      const double width_m = (b - a).norm();
-      scene.add_face(
-          {a, b, ridge, ridge},
-          {Vec2(0, eaves_m), Vec2(width_m, eaves_m), Vec2(0.5 * width_m, eaves_m + rise_m)}, style);
-    }
-  }
-};
 
 void add_building(const Street& street, Draw draw, double side, double arc_m) {
   if (!draw.chance(0.72)) {
@@ -358,8 +349,12 @@ cv::Range visible_window(const RoadCurve& road, double arc_m) {
 
 }  // namespace
 
-void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& scene) {
-  const Street street{road, arc_m, visible_window(road, arc_m), seed, scene};
+void add_street(const RoadCurve& road,
+                double arc_m,
+                std::uint64_t seed,
+                Scene& scene,
+                const std::vector<int>& crossings) {
+  const Street street{road, arc_m, visible_window(road, arc_m), seed, crossings, scene};
   add_ground(street);
   add_borders(street);
   street.for_each_lot('H', kLot_m, [&](Draw draw, double side, double begin_m) {
@@ -368,6 +363,11 @@ void add_street(const RoadCurve& road, double arc_m, std::uint64_t seed, Scene& 
   add_plants(street);
   add_poles(street);
   add_parked_cars(street);
+  for (int i = street.window.start; i < street.window.end; ++i) {
+    if (std::ranges::find(crossings, street.home(i)) != crossings.end()) {
+      add_side_streets(road.knot(i), hash_of(seed, 'Q', street.home(i)), scene);
+    }
+  }
 }
 
 }  // namespace stemvo::synth

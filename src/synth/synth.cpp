@@ -35,7 +35,7 @@ Camera camera_of(const SyntheticDriveOptions& options) {
 
 Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
   if (!options.trajectory) {
-    return synth::make_own_drive(options.num_frames, options.seed);
+    return synth::make_own_drive(options.num_frames, options.seed, options.traffic);
   }
   auto poses = read_kitti_trajectory(*options.trajectory);
   if (!poses) {
@@ -47,7 +47,13 @@ Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
 
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
   if (options.walk) {
-    return synth::make_walk(options.num_frames, options.seed, options.walk_rate_hz, options.visit);
+    std::optional<double> turn_rate_rad_s;
+    if (options.turn_rate_deg_s) {
+      turn_rate_rad_s = synth::radians(*options.turn_rate_deg_s);
+    }
+    return synth::make_walk(
+        options.num_frames, options.seed,
+        {options.walk_rate_hz, options.visit, options.blank_walls, turn_rate_rad_s});
   }
   auto drive = plan_drive(options);
   if (!drive) {
@@ -80,12 +86,15 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
   if (!lock) {
     return lock;
   }
-  for (const char* content : {"image_2", "depth", "times.txt"}) {
+  for (const char* content : {"image_2", "depth", "moving", "times.txt"}) {
     fs::remove_all(drive.sequence / content, code);
   }
   fs::create_directory(drive.sequence / "image_2", code);
   if (options.write_depth) {
     fs::create_directory(drive.sequence / "depth", code);
+  }
+  if (options.traffic) {
+    fs::create_directory(drive.sequence / "moving", code);
   }
   const Status made = pipeline::create_out_folder(drive.poses.parent_path());
   return made ? std::move(lock) : made.error();
@@ -106,7 +115,7 @@ std::string encode_npy(const cv::Mat& values) {
 Status render_frames(const synth::Renderer& renderer,
                      const fs::path& sequence,
                      cv::Range frames,
-                     bool with_depth) {
+                     const SyntheticDriveOptions& options) {
   std::vector<Status> results(static_cast<std::size_t>(frames.size()));
   cv::parallel_for_(frames, [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
@@ -115,7 +124,11 @@ Status render_frames(const synth::Renderer& renderer,
       // Noise does not compress: the fastest level costs a few per cent of size.
       result = write_text_file(sequence / fmt::format("image_2/{:06}.png", i),
                                io::encode_png(frame.rgb, true));
-      if (result && with_depth) {
+      if (result && options.traffic) {
+        result = write_text_file(sequence / fmt::format("moving/{:06}.png", i),
+                                 io::encode_png(frame.moving));
+      }
+      if (result && options.write_depth) {
         result = write_text_file(sequence / fmt::format("depth/{:06}.npy", i),
                                  encode_npy(frame.depth_m));
       }
@@ -169,14 +182,17 @@ Status render_synthetic_drive(const fs::path& out_dir,
     return lock.error();
   }
   const Camera camera = camera_of(options);
-  const synth::Renderer renderer(std::move(*path), camera, options.seed, options.visit);
+  const double rate_hz = options.walk ? options.walk_rate_hz : synth::kDriveRate_hz;
+  const synth::Renderer renderer(std::move(*path), camera, options.seed,
+                                 {options.visit, options.traffic, rate_hz, options.exposure_s,
+                                  options.readout_s, options.follows_light});
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
   const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory
   int done = 0;
   for (bool go_on = true; go_on && done < total;) {
     const cv::Range frames(done, std::min(done + batch, total));
-    const Status status = render_frames(renderer, drive.sequence, frames, options.write_depth);
+    const Status status = render_frames(renderer, drive.sequence, frames, options);
     if (!status) {
       return status;
     }
@@ -184,7 +200,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
     go_on = !progress || progress(static_cast<std::size_t>(done), poses.size());
   }
   return write_texts(drive, camera, std::span(poses).first(static_cast<std::size_t>(done)),
-                     options.walk ? options.walk_rate_hz : synth::kDriveRate_hz);
+                     rate_hz);
 }
 
 }  // namespace stemvo

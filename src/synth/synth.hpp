@@ -24,6 +24,13 @@ struct SyntheticDriveOptions {
   /// The world of `seed` (and `trajectory`, `num_frames`) at another time: on another path, in
   /// other light. 0: the first visit.
   int visit = 0;
+  /// Cars, lorries and people that move. An own drive then stands at crossings.
+  bool traffic = false;
+  bool blank_walls = false;                              ///< of a walk
+  std::optional<double> turn_rate_deg_s = std::nullopt;  ///< of a walk, at a turn's middle
+  double exposure_s = 0.0;     ///< motion blur: a frame's pose is that of its exposure's middle
+  double readout_s = 0.0;      ///< rolling shutter, first to last row: the pose is the middle row's
+  bool follows_light = false;  ///< exposure settles in half a second; else it is constant
   std::optional<int> width_px = std::nullopt;   ///< nullopt: 1241, with a walk 640
   std::optional<int> height_px = std::nullopt;  ///< nullopt: 376, with a walk 480
   std::string name = "00";                      ///< names the sequence's folder and the pose file
@@ -34,9 +41,9 @@ struct SyntheticDriveOptions {
 using RenderProgress = std::function<bool(std::size_t, std::size_t)>;
 
 /// Writes OUT/sequences/NAME/{image_2,calib.txt,times.txt} and OUT/poses/NAME.txt, in place of an
-/// earlier drive. Stopped, the frames that were done are the drive. The same options give the same
-/// bytes, whatever the number of threads. Error: a sequence of that name is there that was not
-/// rendered.
+/// earlier drive; with traffic also moving/%06d.png: 255 where a thing moves, or its shadow.
+/// Stopped, the frames that were done are the drive. The same options give the same bytes, whatever
+/// the number of threads. Error: a sequence of that name is there that was not rendered.
 [[nodiscard]] Status render_synthetic_drive(const std::filesystem::path& out_dir,
                                             const SyntheticDriveOptions& options,
                                             const RenderProgress& progress = {});

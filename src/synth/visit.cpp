@@ -7,16 +7,6 @@
 namespace stemvo::synth {
 namespace {
 
-/// Position and direction between two frames.
-Rigid3 between(const Trajectory& poses, double index) {
-  const auto last = poses.size() - 1;
-  const auto i = std::min(static_cast<std::size_t>(index), last);
-  const Rigid3& from = poses[i];
-  const Rigid3& to = poses[std::min(i + 1, last)];
-  const double t = std::clamp(index - static_cast<double>(i), 0.0, 1.0);
-  return {from.rotation.slerp(t, to.rotation), (1.0 - t) * from.translation + t * to.translation};
-}
-
 /// Where the camera is beside its first path, by the way that is behind it: standing, it stands.
 struct Detour {
   Draw draw;
@@ -54,7 +44,7 @@ void drive_again(std::uint64_t seed, int visit, Drive& drive) {
   double way_m = 0.0;
   Vec3 before = first.front().translation;
   for (std::size_t i = 0; i < first.size(); ++i, at += speed) {
-    const Rigid3 pose = between(first, at);
+    const Rigid3 pose = pose_at(first, at);
     way_m += (pose.translation - before).norm();
     before = pose.translation;
     drive.world_from_camera[i] = detour.moved(pose, way_m);

@@ -76,8 +76,15 @@ using Crossing = Eigen::Vector2i;
 /// glances and a pause at least.
 class WalkPlan {
  public:
-  WalkPlan(const Courtyard& courtyard, Draw draw, double duration_s, double cruise_m_s)
-      : yard_(courtyard), draw_(draw), cruise_m_s_(cruise_m_s) {
+  WalkPlan(const Courtyard& courtyard,
+           const WalkOptions& options,
+           double duration_s,
+           double cruise_m_s)
+      : yard_(courtyard),
+        draw_(options.visit == 0 ? Draw(courtyard.seed, 'v')
+                                 : Draw(courtyard.seed, 'v', options.visit)),
+        turn_rate_rad_s_(options.turn_rate_rad_s),
+        cruise_m_s_(cruise_m_s) {
     // The start lies in the middle of a way from one side to the other.
     const std::array<Crossing, 4> directions = {{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
     direction_ = directions[draw_.bits() % 4];
@@ -188,13 +195,16 @@ class WalkPlan {
     to_ += way;
     Phase phase = stand(0.0);
     phase.heading_to_rad = heading_to(to_);
-    const double rate_rad_s = radians(draw_.in(36.0, 46.0));
+    constexpr double kMeanOfPeak = 8.0 / 15.0;  // as turns are eased
+    double rate_rad_s = radians(draw_.in(36.0, 46.0));
+    rate_rad_s = turn_rate_rad_s_ ? kMeanOfPeak * *turn_rate_rad_s_ : rate_rad_s;
     phase.duration_s = std::abs(phase.heading_to_rad - heading_rad_) / rate_rad_s;
     add(phase);
   }
 
   const Courtyard& yard_;
   Draw draw_;
+  std::optional<double> turn_rate_rad_s_;
   double cruise_m_s_;
   double now_s_ = 0.0;
   double last_pause_s_ = 0.0;
@@ -206,7 +216,9 @@ class WalkPlan {
 };
 
 /// Turns and pauses included, the camera then moves at 0.5 m/s in the mean.
-double cruising_speed_m_s(const Courtyard& courtyard, Draw draw, double duration_s) {
+double cruising_speed_m_s(const Courtyard& courtyard,
+                          const WalkOptions& options,
+                          double duration_s) {
   constexpr double kMean_m_s = 0.5;
   double low_m_s = 0.2 * kMean_m_s;
   double high_m_s = 2.0 * kMean_m_s;
@@ -214,7 +226,7 @@ double cruising_speed_m_s(const Courtyard& courtyard, Draw draw, double duration
   for (int i = 0; i < 40; ++i) {
     cruise_m_s = 0.5 * (low_m_s + high_m_s);
     double way_m = 0.0;
-    const WalkPlan plan(courtyard, draw, duration_s, cruise_m_s);
+    const WalkPlan plan(courtyard, options, duration_s, cruise_m_s);
     for (const Phase& phase : plan.phases) {
       const double turned_m = kArm_m * std::abs(phase.heading_to_rad - phase.heading_from_rad);
       way_m += (phase.is_turn() ? turned_m : (phase.to_m - phase.from_m).norm()) *
@@ -301,16 +313,16 @@ struct Hand {
 
 }  // namespace
 
-Walk make_walk(int num_frames, std::uint64_t seed, double rate_hz, int visit) {
+Walk make_walk(int num_frames, std::uint64_t seed, const WalkOptions& options) {
   Walk walk;
   walk.courtyard = lay_courtyard(seed);
-  const double duration_s = num_frames / rate_hz;
-  const Draw draw = visit == 0 ? Draw(seed, 'v') : Draw(seed, 'v', visit);
-  const WalkPlan plan(walk.courtyard, draw, duration_s,
-                      cruising_speed_m_s(walk.courtyard, draw, duration_s));
-  const Hand hand{visit == 0 ? seed : hash_of(seed, 'V', visit)};
+  walk.courtyard.has_blank_walls = options.blank_walls;
+  const double duration_s = num_frames / options.rate_hz;
+  const WalkPlan plan(walk.courtyard, options, duration_s,
+                      cruising_speed_m_s(walk.courtyard, options, duration_s));
+  const Hand hand{options.visit == 0 ? seed : hash_of(seed, 'V', options.visit)};
   for (int i = 0; i < num_frames; ++i) {
-    const double time_s = i / rate_hz;
+    const double time_s = i / options.rate_hz;
     walk.world_from_camera.push_back(hand.world_from_camera(stance_at(plan, time_s), time_s));
   }
   return walk;

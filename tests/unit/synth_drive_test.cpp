@@ -92,17 +92,23 @@ TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
 }
 
 TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
-  for (const bool is_walk : {false, true}) {
+  for (const int kind : {0, 1, 2}) {
     SyntheticDriveOptions options = small(3);
-    options.walk = is_walk;
+    options.walk = kind == 1;
+    if (kind == 2) {
+      options.traffic = true;
+      options.exposure_s = 0.004;
+      options.readout_s = 0.01;
+      options.follows_light = true;
+    }
     cv::setNumThreads(1);
     ASSERT_TRUE(render_synthetic_drive(root_ / "one", options));
     cv::setNumThreads(2);
     ASSERT_TRUE(render_synthetic_drive(root_ / "two", options));
-    EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3)) << is_walk;
+    EXPECT_TRUE(all_bytes("one", 3) == all_bytes("two", 3)) << kind;
     options.seed = 2;
     ASSERT_TRUE(render_synthetic_drive(root_ / "other", options));
-    EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3)) << is_walk;
+    EXPECT_FALSE(all_bytes("one", 3) == all_bytes("other", 3)) << kind;
   }
 }
 

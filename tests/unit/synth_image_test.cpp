@@ -78,7 +78,7 @@ TEST(SyntheticImage, DepthAndPosesPredictTheNextFrame) {
 /// Walking, looking aside, turning on the spot: surfaces are 0.6 to 6 m away.
 TEST(SyntheticImage, DepthAndPosesPredictTheNextFrameOfAWalk) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    const Renderer renderer(make_walk(600, seed, 30.0), hand_camera(), seed);
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
     Offsets offsets;
     for (std::size_t i = 10; i < 600; i += 97) {
       offsets.add(renderer, i, hand_camera());
@@ -90,7 +90,7 @@ TEST(SyntheticImage, DepthAndPosesPredictTheNextFrameOfAWalk) {
 
 TEST(SyntheticImage, CourtyardIsNearAndRichInTexture) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    const Renderer renderer(make_walk(600, seed, 30.0), hand_camera(), seed);
+    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
     std::vector<double> counts;
     std::vector<double> depths_m;
     for (std::size_t i = 5; i < 600; i += 45) {

@@ -124,8 +124,8 @@ TEST(Visit, SameStreetOnAnotherPath) {
 }
 
 TEST(Visit, SameCourtyardOnAnotherWay) {
-  const Walk first = make_walk(600, 4, 30.0);
-  const Walk again = make_walk(600, 4, 30.0, 1);
+  const Walk first = make_walk(600, 4, {.rate_hz = 30.0});
+  const Walk again = make_walk(600, 4, {.visit = 1});
   EXPECT_EQ(first.courtyard.x_m, again.courtyard.x_m);
   EXPECT_EQ(first.courtyard.wall_m, again.courtyard.wall_m);
   double most_m = 0.0;
@@ -169,7 +169,7 @@ TEST(Visit, ShowsTheSameThingsInOtherLight) {
   Drive again_drive = first_drive;
   drive_again(3, 1, again_drive);
   const Renderer first(first_drive, camera, 3);
-  const Renderer again(again_drive, camera, 3, 1);
+  const Renderer again(again_drive, camera, 3, {.visit = 1});
   const Renderer elsewhere(first_drive, camera, 4);
   for (const std::size_t i : {5U, 25U}) {
     EXPECT_GT(correlation(first, again, i, camera), 0.8);
