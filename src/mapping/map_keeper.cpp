@@ -15,9 +15,11 @@ namespace {
 
 /// Errors of a track's points are alike: so many times the sigmas of independent ones.
 constexpr double kAlikeFactor = 3.0;
-/// Least standard deviations of a motion, of rotation and, in shares of the depth, of translation.
-constexpr double kMinSigma_rad = 1e-4;
-constexpr double kMinSigma = 1e-4;
+/// Standard deviations of a motion between two keyframes: what a camera bends besides the noise of
+/// tracks. Rotation, share of the depth, scale.
+constexpr double kMotionSigma_rad = 5e-4;
+constexpr double kMotionSigma = 2e-3;
+constexpr double kMotionLogScale = 6e-3;
 /// Standard deviations of what connects two maps: nothing but a guess.
 constexpr double kGuess_rad = 1.0;
 constexpr double kGuessLogScale = 1.0;
@@ -77,13 +79,15 @@ MapEdge motion_between(const WindowView& view, const Keyframe& from, const Keyfr
   const double noise_px = errors.empty() ? 1.0 : median(std::move(errors)) / 1.1774;
   const Matrix6d pose =
       pose_influences(camera_from_world, seen.points, seen.uv, view.camera, noise_px).squared_sum();
-  edge.sigma_rad =
-      kMinSigma_rad + kAlikeFactor * std::sqrt(pose.bottomRightCorner<3, 3>().trace() / 3.0);
+  const auto sigma = [&](const auto& covariance) {
+    return kAlikeFactor * std::sqrt(covariance.trace() / 3.0);
+  };
+  edge.sigma_rad = std::hypot(kMotionSigma_rad, sigma(pose.bottomRightCorner<3, 3>()));
   edge.sigma_translation =
-      units_of_from *
-      (kMinSigma * depth + kAlikeFactor * std::sqrt(pose.topLeftCorner<3, 3>().trace() / 3.0));
-  edge.sigma_log_scale =
-      kAlikeFactor * noise_px * log_scale_sigma(view.window, from, to, view.camera.mean_focal_px());
+      units_of_from * std::hypot(kMotionSigma * depth, sigma(pose.topLeftCorner<3, 3>()));
+  edge.sigma_log_scale = std::hypot(
+      kMotionLogScale, kAlikeFactor * noise_px *
+                           log_scale_sigma(view.window, from, to, view.camera.mean_focal_px()));
   return edge;
 }
 

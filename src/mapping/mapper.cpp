@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "geometry/median.hpp"
 #include "mapping/descriptors.hpp"
 #include "mapping/pose_graph.hpp"
 #include "timing/stage_timer.hpp"
@@ -20,6 +21,12 @@ constexpr int kNodesPerKeyframe = 16;
 constexpr double kSigmaFound_rad = 0.005;
 constexpr double kSigmaFound = 0.01;
 
+/// Of a loop's scale: fewer pairs of landmarks do not tell it, errors of landmarks are alike, and
+/// it is never known better.
+constexpr std::size_t kMinPairs = 10;
+constexpr double kAlikeErrors = 2.0;
+constexpr double kMinLogScale = 0.005;
+
 std::vector<KeptCorner> corners_of(const Matches& matches) {
   std::vector<KeptCorner> corners(matches.cur_uv.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -28,6 +35,37 @@ std::vector<KeptCorner> corners_of(const Matches& matches) {
   }
   std::ranges::sort(corners, {}, &KeptCorner::track_id);
   return corners;
+}
+
+/// The scale by the landmarks that both have: where the two stood at one spot, how the one's look
+/// to the other says nothing of it.
+void measure_scale(const KeptKeyframe& old, const KeptKeyframe& recent, Loop& loop) {
+  const Similarity3 turned(1.0, loop.from_to.rotation, loop.from_to.translation);
+  std::vector<double> logs;
+  for (const auto& [of_old, of_recent] : loop.corners) {
+    const KeptCorner& from = old.corners[static_cast<std::size_t>(of_old)];
+    const KeptCorner& to = recent.corners[static_cast<std::size_t>(of_recent)];
+    if (from.has_landmark() && to.has_landmark()) {
+      const Eigen::Vector3d point =
+          turned.inverse() * Eigen::Vector3d(from.in_camera.cast<double>());
+      logs.push_back(std::log(point.norm() / to.in_camera.cast<double>().norm()));
+    }
+  }
+  if (logs.size() < kMinPairs) {
+    return;
+  }
+  const auto num_pairs = static_cast<double>(logs.size());
+  const double middle = median(logs);
+  for (double& value : logs) {
+    value = std::abs(value - middle);
+  }
+  // 1.4826: of a normal distribution's median deviation.
+  const double sigma = std::hypot(
+      kMinLogScale, kAlikeErrors * 1.4826 * median(std::move(logs)) / std::sqrt(num_pairs));
+  if (sigma < loop.sigma_log_scale) {
+    loop.from_to.scale = std::exp(middle);
+    loop.sigma_log_scale = sigma;
+  }
 }
 
 }  // namespace
@@ -76,6 +114,9 @@ void Mapper::begin_lookup(const WindowView& view) {
     KeptKeyframe& keyframe = work.keyframe;
     keyframe.descriptors = describe(image->channel, keyframe.corners);
     work.loop = recognizer_.recognize(keeper_.map(), work.node, keyframe);
+    if (work.loop.has_value()) {
+      measure_scale(keeper_.keyframe(work.loop->from), keyframe, *work.loop);
+    }
     if (recognizer_.shows_kept_place()) {
       keyframe.descriptors.clear();
     } else {
@@ -114,8 +155,8 @@ Recognition Mapper::take_in(const Loop& loop) {
     const KeptCorner& old = keeper_.keyframe(loop.from).corners[static_cast<std::size_t>(of_old)];
     const KeptCorner& corner = keeper_.keyframe(loop.to).corners[static_cast<std::size_t>(of_new)];
     if (old.has_landmark()) {
-      recognition.landmarks.emplace(
-          corner.track_id, world_from_old * Eigen::Vector3d(old.in_camera.cast<double>()));
+      recognition.landmarks.emplace(corner.track_id,
+                                    world_from_old * Eigen::Vector3d(old.in_camera.cast<double>()));
     }
   }
   return recognition;
