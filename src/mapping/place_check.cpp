@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "geometry/median.hpp"
 #include "geometry/similarity_refinement.hpp"
@@ -17,41 +18,34 @@ constexpr std::size_t kMinInliers = 30;
 constexpr int kMinCells = 12;
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
-/// An inlier's reprojection error at a focal length of 718 px.
+/// So many are enough to look for more where a pose has them.
+constexpr std::size_t kMinSample = 15;
+/// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
 constexpr double kBound_px = 4.0;
+constexpr double kMinBound_px = 3.0;
 constexpr double kFocal_px = 718.0;
-/// So much of what either side agrees with, one similarity must explain.
+/// Cauchy scale: corners that were detected twice are off by about that.
+constexpr double kLoss_px = 1.0;
+/// Bits in which a landmark differs from a corner near its projection.
+constexpr int kGuidedBits = 80;
+/// So much of what either side found alone, one similarity must explain.
 constexpr double kMinAgreement = 0.7;
 constexpr std::uint64_t kSeed = 1;
 /// Errors of landmarks are alike: so many times the standard deviations of independent ones.
 constexpr double kLoopSigmaFactor = 3.0;
 
 double bound_px(const Camera& camera) {
-  return std::max(2.0, kBound_px * camera.mean_focal_px() / kFocal_px);
+  return std::max(kMinBound_px, kBound_px * camera.mean_focal_px() / kFocal_px);
 }
 
-/// Landmarks of one view that the other one's corners show.
-struct Side {
-  std::vector<DescriptorPair> pairs;  ///< corners of the one with landmarks, of the other
-  std::vector<Eigen::Vector3d> points;
-  std::vector<Eigen::Vector2d> uv;
-};
-
-Side landmarks_seen(const PlaceView& of,
-                    const PlaceView& by,
-                    const std::vector<DescriptorPair>& pairs,
-                    bool is_swapped) {
-  Side side;
-  for (const DescriptorPair& pair : pairs) {
-    const auto mine = static_cast<std::size_t>(is_swapped ? pair.second : pair.first);
-    const auto other = static_cast<std::size_t>(is_swapped ? pair.first : pair.second);
-    if (of.corners[mine].has_landmark()) {
-      side.pairs.push_back(pair);
-      side.points.push_back(of.corners[mine].in_camera.cast<double>());
-      side.uv.push_back(by.corners[other].uv.cast<double>());
-    }
-  }
-  return side;
+const KeptCorner& corner_of(const PlaceView& view, int index) {
+  return view.corners[static_cast<std::size_t>(index)];
+}
+Eigen::Vector3d landmark_of(const PlaceView& view, int index) {
+  return corner_of(view, index).in_camera.cast<double>();
+}
+Eigen::Vector2d uv_of(const PlaceView& view, int index) {
+  return corner_of(view, index).uv.cast<double>();
 }
 
 bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
@@ -59,130 +53,235 @@ bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
   for (const Eigen::Vector2d& point : uv) {
     const int column =
         std::clamp(static_cast<int>(kColumns * point.x() / camera.width_px), 0, kColumns - 1);
-    const int row =
-        std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
+    const int row = std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
     cells[static_cast<std::size_t>(row * kColumns + column)] = 1;
   }
   return std::ranges::count(cells, char{1}) >= kMinCells;
 }
 
-/// What agrees with a pose, and the pose refined on it; nullopt: too little.
-struct Consensus {
-  Rigid3 camera_from_points;
-  Side inliers;
-};
-
-bool agrees(const Rigid3& camera_from_points,
-            const Eigen::Vector3d& point,
-            const Eigen::Vector2d& uv,
-            const Camera& camera) {
-  const Eigen::Vector3d x = camera_from_points * point;
-  return x.z() > 0.0 && (camera.project(x) - uv).norm() <= bound_px(camera);
+/// What is seen of one view's landmarks by the other one.
+bool is_seen(const Similarity3& by_from_of,
+             const PlaceView& of,
+             int mine,
+             const PlaceView& by,
+             int other) {
+  const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);
+  return x.z() > 0.0 && (by.camera.project(x) - uv_of(by, other)).norm() <= bound_px(by.camera);
 }
 
-std::optional<Consensus> find_consensus(const Side& side, const Camera& camera) {
-  if (side.uv.size() < kMinInliers) {
+/// Landmarks of `of` where `by` has corners like them near their projections: each other's
+/// nearest.
+std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
+                                       const PlaceView& of,
+                                       const PlaceView& by) {
+  struct Best {
+    int mine = -1;
+    int num_bits = kGuidedBits + 1;
+  };
+  std::vector<Best> best(by.corners.size());
+  const double radius_px = 2.0 * bound_px(by.camera);
+  for (std::size_t i = 0; i < of.corners.size(); ++i) {
+    const int mine = static_cast<int>(i);
+    if (!of.corners[i].has_landmark() || of.descriptors[i] == kNoDescriptor) {
+      continue;
+    }
+    const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);
+    if (x.z() <= 0.0) {
+      continue;
+    }
+    const Eigen::Vector2f uv = by.camera.project(x).cast<float>();
+    int nearest = -1;
+    int least = kGuidedBits + 1;
+    for (std::size_t j = 0; j < by.corners.size(); ++j) {
+      if ((by.corners[j].uv - uv).norm() <= radius_px && by.descriptors[j] != kNoDescriptor) {
+        const int num_bits = count_differences(of.descriptors[i], by.descriptors[j]);
+        if (num_bits < least) {
+          least = num_bits;
+          nearest = static_cast<int>(j);
+        }
+      }
+    }
+    if (nearest >= 0 && least < best[static_cast<std::size_t>(nearest)].num_bits) {
+      best[static_cast<std::size_t>(nearest)] = {mine, least};
+    }
+  }
+  std::vector<DescriptorPair> pairs;
+  for (std::size_t j = 0; j < best.size(); ++j) {
+    if (best[j].mine >= 0) {
+      pairs.emplace_back(best[j].mine, static_cast<int>(j));
+    }
+  }
+  return pairs;
+}
+
+std::vector<DescriptorPair> swapped(std::vector<DescriptorPair> pairs) {
+  for (auto& [first, second] : pairs) {
+    std::swap(first, second);
+  }
+  return pairs;
+}
+
+struct Consensus {
+  Rigid3 by_from_of;
+  std::vector<DescriptorPair> inliers;
+};
+
+/// The pose that most of the pairs with landmarks of `of` agree with; nullopt: too few.
+std::optional<Consensus> find_consensus(const PlaceView& of,
+                                        const PlaceView& by,
+                                        const std::vector<DescriptorPair>& pairs) {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector2d> uv;
+  for (const auto& [mine, other] : pairs) {
+    if (corner_of(of, mine).has_landmark()) {
+      points.push_back(landmark_of(of, mine));
+      uv.push_back(uv_of(by, other));
+    }
+  }
+  if (uv.size() < kMinSample) {
     return std::nullopt;
   }
-  const std::optional<Rigid3> start =
-      estimate_absolute_pose(side.points, side.uv, camera, bound_px(camera), kSeed);
+  const auto start = estimate_absolute_pose(points, uv, by.camera, bound_px(by.camera), kSeed);
   if (!start.has_value()) {
     return std::nullopt;
   }
-  Consensus consensus;
-  consensus.camera_from_points =
-      refine_absolute_pose(*start, side.points, side.uv, camera, {.loss_scale_px = 1.0});
-  for (std::size_t i = 0; i < side.uv.size(); ++i) {
-    if (agrees(consensus.camera_from_points, side.points[i], side.uv[i], camera)) {
-      consensus.inliers.pairs.push_back(side.pairs[i]);
-      consensus.inliers.points.push_back(side.points[i]);
-      consensus.inliers.uv.push_back(side.uv[i]);
+  Consensus consensus{
+      refine_absolute_pose(*start, points, uv, by.camera, {.loss_scale_px = kLoss_px}), {}};
+  const Similarity3 by_from_of(consensus.by_from_of);
+  for (const DescriptorPair& pair : pairs) {
+    if (corner_of(of, pair.first).has_landmark() &&
+        is_seen(by_from_of, of, pair.first, by, pair.second)) {
+      consensus.inliers.push_back(pair);
     }
   }
-  if (consensus.inliers.uv.size() < kMinInliers || !is_spread(consensus.inliers.uv, camera)) {
-    return std::nullopt;
+  return consensus.inliers.size() < kMinSample ? std::nullopt : std::optional(consensus);
+}
+
+/// The median ratio of distances of landmarks that both have; nullopt: too few.
+std::optional<double> scale_between(const PlaceView& old,
+                                    const PlaceView& recent,
+                                    const Consensus& on_old) {
+  std::vector<double> ratios;
+  for (const auto& [mine, other] : on_old.inliers) {
+    if (corner_of(recent, other).has_landmark()) {
+      ratios.push_back((on_old.by_from_of * landmark_of(old, mine)).norm() /
+                       landmark_of(recent, other).norm());
+    }
   }
-  return consensus;
+  return ratios.size() < kMinSample ? std::nullopt : std::optional(median(std::move(ratios)));
+}
+
+/// Refines on what either one sees of the other's landmarks.
+RefinedSimilarity refine(const Similarity3& old_from_recent,
+                         const PlaceView& old,
+                         const PlaceView& recent,
+                         const std::vector<DescriptorPair>& on_old,
+                         const std::vector<DescriptorPair>& on_recent) {
+  CrossObservations seen{old.camera, recent.camera, {}, {}};
+  for (const auto& [mine, other] : on_old) {
+    seen.of_a.push_back({landmark_of(old, mine), uv_of(recent, other)});
+  }
+  for (const auto& [mine, other] : on_recent) {
+    seen.of_b.push_back({landmark_of(recent, mine), uv_of(old, other)});
+  }
+  return refine_similarity(old_from_recent, seen, {.loss_scale_px = kLoss_px});
+}
+
+/// The pairs whose landmarks, one or both, are seen where they are.
+std::vector<DescriptorPair> agreeing(const Similarity3& old_from_recent,
+                                     const PlaceView& old,
+                                     const PlaceView& recent,
+                                     const std::vector<DescriptorPair>& pairs) {
+  const Similarity3 recent_from_old = old_from_recent.inverse();
+  std::vector<DescriptorPair> inliers;
+  for (const DescriptorPair& pair : pairs) {
+    const auto& [mine, other] = pair;
+    if ((!corner_of(old, mine).has_landmark() ||
+         is_seen(recent_from_old, old, mine, recent, other)) &&
+        (!corner_of(recent, other).has_landmark() ||
+         is_seen(old_from_recent, recent, other, old, mine))) {
+      inliers.push_back(pair);
+    }
+  }
+  return inliers;
+}
+
+bool is_enough(const PlaceView& by, const std::vector<DescriptorPair>& inliers) {
+  std::vector<Eigen::Vector2d> uv;
+  for (const auto& [mine, other] : inliers) {
+    uv.push_back(uv_of(by, other));
+  }
+  return uv.size() >= kMinInliers && is_spread(uv, by.camera);
+}
+
+double median_error_px(const Similarity3& recent_from_old,
+                       const PlaceView& old,
+                       const PlaceView& recent,
+                       const std::vector<DescriptorPair>& pairs) {
+  std::vector<double> errors_px;
+  for (const auto& [mine, other] : pairs) {
+    errors_px.push_back((recent.camera.project(recent_from_old * landmark_of(old, mine)) -
+                         uv_of(recent, other))
+                            .norm());
+  }
+  return median(std::move(errors_px));
 }
 
 }  // namespace
 
 std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& frame) {
-  const auto pairs = match_descriptors(old.descriptors, frame.descriptors);
-  auto found = find_consensus(landmarks_seen(old, frame, pairs, false), frame.camera);
+  auto found =
+      find_consensus(old, frame, match_descriptors(old.descriptors, frame.descriptors));
   if (!found.has_value()) {
     return std::nullopt;
   }
-  return PlacePose{found->camera_from_points.inverse(), std::move(found->inliers.pairs)};
+  found = find_consensus(old, frame, match_near(Similarity3(found->by_from_of), old, frame));
+  if (!found.has_value() || !is_enough(frame, found->inliers)) {
+    return std::nullopt;
+  }
+  return PlacePose{found->by_from_of.inverse(), std::move(found->inliers)};
 }
 
 std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent) {
   const auto pairs = match_descriptors(old.descriptors, recent.descriptors);
-  const auto on_old = find_consensus(landmarks_seen(old, recent, pairs, false), recent.camera);
+  const auto on_old = find_consensus(old, recent, pairs);
   if (!on_old.has_value()) {
     return std::nullopt;
   }
-  const auto on_recent = find_consensus(landmarks_seen(recent, old, pairs, true), old.camera);
-  if (!on_recent.has_value()) {
+  const auto on_recent = find_consensus(recent, old, swapped(pairs));
+  const auto scale = scale_between(old, recent, *on_old);
+  if (!on_recent.has_value() || !scale.has_value()) {
     return std::nullopt;
   }
-  // The scale, by landmarks that both have.
-  const Rigid3 old_from_recent = on_old->camera_from_points.inverse();
-  std::vector<double> ratios;
-  for (const auto& [mine, other] : on_old->inliers.pairs) {
-    const KeptCorner& corner = recent.corners[static_cast<std::size_t>(other)];
-    if (corner.has_landmark()) {
-      const Eigen::Vector3d point =
-          old.corners[static_cast<std::size_t>(mine)].in_camera.cast<double>();
-      ratios.push_back((on_old->camera_from_points * point).norm() /
-                       corner.in_camera.cast<double>().norm());
+  const Rigid3 start = on_old->by_from_of.inverse();
+  const Similarity3 first = refine({*scale, start.rotation, start.translation}, old, recent,
+                                   on_old->inliers, on_recent->inliers)
+                                .a_from_b;
+  // More of them, where the first similarity has them.
+  const auto near = agreeing(first, old, recent, match_near(first.inverse(), old, recent));
+  std::vector<DescriptorPair> back;
+  for (const auto& [mine, other] : near) {
+    if (corner_of(recent, other).has_landmark()) {
+      back.emplace_back(other, mine);
     }
   }
-  if (ratios.size() < kMinInliers) {
-    return std::nullopt;
-  }
-  CrossObservations seen{old.camera, recent.camera, {}, {}};
-  for (std::size_t i = 0; i < on_old->inliers.uv.size(); ++i) {
-    seen.of_a.push_back({on_old->inliers.points[i], on_old->inliers.uv[i]});
-  }
-  for (std::size_t i = 0; i < on_recent->inliers.uv.size(); ++i) {
-    seen.of_b.push_back({on_recent->inliers.points[i], on_recent->inliers.uv[i]});
-  }
-  const RefinedSimilarity refined =
-      refine_similarity({median(ratios), old_from_recent.rotation, old_from_recent.translation},
-                        seen, {.loss_scale_px = 1.0});
-  // One similarity for both.
-  const Similarity3& similarity = refined.a_from_b;
-  const Similarity3 back = similarity.inverse();
+  const RefinedSimilarity refined = refine(first, old, recent, near, back);
   Loop loop;
-  loop.from_to = similarity;
-  std::vector<Eigen::Vector2d> uv;
-  std::vector<double> errors_px;
-  for (const auto& [mine, other] : on_old->inliers.pairs) {
-    const KeptCorner& from = old.corners[static_cast<std::size_t>(mine)];
-    const KeptCorner& to = recent.corners[static_cast<std::size_t>(other)];
-    const Eigen::Vector3d in_recent = back * Eigen::Vector3d(from.in_camera.cast<double>());
-    const Eigen::Vector3d in_old = similarity * Eigen::Vector3d(to.in_camera.cast<double>());
-    if (!to.has_landmark() || in_old.z() <= 0.0 || in_recent.z() <= 0.0) {
-      continue;
-    }
-    const double error = (recent.camera.project(in_recent) - to.uv.cast<double>()).norm();
-    const double back_error = (old.camera.project(in_old) - from.uv.cast<double>()).norm();
-    if (error <= bound_px(recent.camera) && back_error <= bound_px(old.camera)) {
-      loop.corners.emplace_back(mine, other);
-      uv.emplace_back(to.uv.cast<double>());
-      errors_px.push_back(error);
-      errors_px.push_back(back_error);
-    }
-  }
-  const std::size_t most = std::max(on_old->inliers.uv.size(), on_recent->inliers.uv.size());
-  if (uv.size() < kMinInliers || !is_spread(uv, recent.camera) ||
-      static_cast<double>(uv.size()) < kMinAgreement * static_cast<double>(most)) {
+  loop.from_to = refined.a_from_b;
+  loop.corners = agreeing(loop.from_to, old, recent, near);
+  const auto explained = [&](const std::vector<DescriptorPair>& found) {
+    return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
+           kMinAgreement * static_cast<double>(found.size());
+  };
+  if (!is_enough(recent, loop.corners) || back.size() < kMinInliers ||
+      !explained(on_old->inliers) || !explained(swapped(on_recent->inliers))) {
     return std::nullopt;
   }
-  const double noise_px = kLoopSigmaFactor * median(std::move(errors_px));
-  const auto sigma = [&](int first, int count) {
-    return noise_px * std::sqrt(refined.covariance.diagonal().segment(first, count).mean());
+  const double noise_px =
+      kLoopSigmaFactor *
+      median_error_px(loop.from_to.inverse(), old, recent, loop.corners);
+  const auto sigma = [&](int first_row, int count) {
+    return noise_px * std::sqrt(refined.covariance.diagonal().segment(first_row, count).mean());
   };
   loop.sigma_rad = sigma(0, 3);
   loop.sigma_translation = sigma(3, 3);

@@ -13,6 +13,10 @@ namespace {
 /// A descriptor votes for places that have one this near: nearer than most that do not belong
 /// together.
 constexpr int kVoteBits = 60;
+/// Candidates have so many votes, and so many times those of the best but so many.
+constexpr double kMinVotes = 2.0;
+constexpr double kAboveChance = 1.3;
+constexpr std::ptrdiff_t kChance = 8;
 
 }  // namespace
 
@@ -86,11 +90,18 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
       best.push_back({keyframes_[place], votes[place]});
     }
   }
-  const auto count = std::min(static_cast<std::ptrdiff_t>(max_candidates), std::ssize(best));
-  std::ranges::partial_sort(best, best.begin() + count, [](const auto& a, const auto& b) {
+  const auto is_better = [](const PlaceCandidate& a, const PlaceCandidate& b) {
     return a.votes != b.votes ? a.votes > b.votes : a.keyframe < b.keyframe;
-  });
+  };
+  const auto count = std::min(std::max<std::ptrdiff_t>(max_candidates, kChance), std::ssize(best));
+  std::ranges::partial_sort(best, best.begin() + count, is_better);
+  // Votes by chance are alike: a place that is shown stands out of them.
+  const double chance = std::ssize(best) < kChance ? 0.0 : best[kChance - 1].votes;
   best.resize(static_cast<std::size_t>(count));
+  std::erase_if(best, [&](const PlaceCandidate& place) {
+    return place.votes < kMinVotes || place.votes < kAboveChance * chance;
+  });
+  best.resize(std::min(best.size(), static_cast<std::size_t>(max_candidates)));
   return best;
 }
 
