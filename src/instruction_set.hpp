@@ -11,6 +11,8 @@
 
 #if defined(__x86_64__)
 #define STEMVO_AVX2 __attribute__((target("avx2,fma")))
+/// A processor that has both counts bits, too.
+#define STEMVO_POPCNT __attribute__((target("avx2,fma,popcnt")))
 #endif
 
 namespace stemvo {

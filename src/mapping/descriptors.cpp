@@ -2,7 +2,6 @@
 #include "mapping/descriptors.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -47,24 +46,21 @@ STEMVO_INLINE void find_nearest(std::span<const Descriptor> first,
                                 std::span<Nearest> of_first,
                                 std::span<Nearest> of_second) {
   for (std::size_t i = 0; i < first.size(); ++i) {
-    for (std::size_t j = 0; j < second.size() && first[i] != kNoDescriptor; ++j) {
-      if (second[j] != kNoDescriptor) {
-        int num_bits = 0;
-        for (std::size_t word = 0; word < first[i].size(); ++word) {
-          num_bits += std::popcount(first[i][word] ^ second[j][word]);
-        }
-        of_first[i].add(static_cast<int>(j), num_bits);
-        of_second[j].add(static_cast<int>(i), num_bits);
-      }
+    if (first[i] == kNoDescriptor) {
+      continue;
+    }
+    for (std::size_t j = 0; j < second.size(); ++j) {
+      const int num_bits = differing_bits(first[i], second[j]);
+      of_first[i].add(static_cast<int>(j), num_bits);
+      of_second[j].add(static_cast<int>(i), num_bits);
     }
   }
 }
 #if defined(__x86_64__)
-__attribute__((target("avx2,fma,popcnt"))) void find_nearest_avx2(
-    std::span<const Descriptor> first,
-    std::span<const Descriptor> second,
-    std::span<Nearest> of_first,
-    std::span<Nearest> of_second) {
+STEMVO_POPCNT void find_nearest_avx2(std::span<const Descriptor> first,
+                                     std::span<const Descriptor> second,
+                                     std::span<Nearest> of_first,
+                                     std::span<Nearest> of_second) {
   find_nearest(first, second, of_first, of_second);
 }
 #endif
@@ -91,14 +87,6 @@ std::vector<Descriptor> describe(const ChannelImage& channel, std::span<const Ke
   return descriptors;
 }
 
-int count_differences(const Descriptor& a, const Descriptor& b) {
-  int num_bits = 0;
-  for (std::size_t word = 0; word < a.size(); ++word) {
-    num_bits += std::popcount(a[word] ^ b[word]);
-  }
-  return num_bits;
-}
-
 std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,
                                               std::span<const Descriptor> second) {
   std::vector<Nearest> of_first(first.size());
@@ -119,7 +107,8 @@ std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,
       continue;
     }
     const Nearest& back = of_second[static_cast<std::size_t>(nearest.index)];
-    if (back.index == static_cast<int>(i) && back.is_clear()) {
+    if (back.index == static_cast<int>(i) && back.is_clear() &&
+        second[static_cast<std::size_t>(nearest.index)] != kNoDescriptor) {
       pairs.emplace_back(static_cast<int>(i), nearest.index);
     }
   }

@@ -18,7 +18,8 @@ constexpr std::size_t kMinInliers = 30;
 constexpr int kMinCells = 12;
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
-/// So many are enough to look for more where a pose has them.
+/// Of so many pairs or more, so many are enough to look for more where a pose has them.
+constexpr std::size_t kMinPairs = 24;
 constexpr std::size_t kMinSample = 15;
 /// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
 constexpr double kBound_px = 4.0;
@@ -53,18 +54,16 @@ bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
   for (const Eigen::Vector2d& point : uv) {
     const int column =
         std::clamp(static_cast<int>(kColumns * point.x() / camera.width_px), 0, kColumns - 1);
-    const int row = std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
+    const int row =
+        std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
     cells[static_cast<std::size_t>(row * kColumns + column)] = 1;
   }
   return std::ranges::count(cells, char{1}) >= kMinCells;
 }
 
 /// What is seen of one view's landmarks by the other one.
-bool is_seen(const Similarity3& by_from_of,
-             const PlaceView& of,
-             int mine,
-             const PlaceView& by,
-             int other) {
+bool is_seen(
+    const Similarity3& by_from_of, const PlaceView& of, int mine, const PlaceView& by, int other) {
   const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);
   return x.z() > 0.0 && (by.camera.project(x) - uv_of(by, other)).norm() <= bound_px(by.camera);
 }
@@ -94,7 +93,7 @@ std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
     int least = kGuidedBits + 1;
     for (std::size_t j = 0; j < by.corners.size(); ++j) {
       if ((by.corners[j].uv - uv).norm() <= radius_px && by.descriptors[j] != kNoDescriptor) {
-        const int num_bits = count_differences(of.descriptors[i], by.descriptors[j]);
+        const int num_bits = differing_bits(of.descriptors[i], by.descriptors[j]);
         if (num_bits < least) {
           least = num_bits;
           nearest = static_cast<int>(j);
@@ -138,7 +137,7 @@ std::optional<Consensus> find_consensus(const PlaceView& of,
       uv.push_back(uv_of(by, other));
     }
   }
-  if (uv.size() < kMinSample) {
+  if (uv.size() < kMinPairs) {
     return std::nullopt;
   }
   const auto start = estimate_absolute_pose(points, uv, by.camera, bound_px(by.camera), kSeed);
@@ -220,9 +219,9 @@ double median_error_px(const Similarity3& recent_from_old,
                        const std::vector<DescriptorPair>& pairs) {
   std::vector<double> errors_px;
   for (const auto& [mine, other] : pairs) {
-    errors_px.push_back((recent.camera.project(recent_from_old * landmark_of(old, mine)) -
-                         uv_of(recent, other))
-                            .norm());
+    errors_px.push_back(
+        (recent.camera.project(recent_from_old * landmark_of(old, mine)) - uv_of(recent, other))
+            .norm());
   }
   return median(std::move(errors_px));
 }
@@ -230,8 +229,7 @@ double median_error_px(const Similarity3& recent_from_old,
 }  // namespace
 
 std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& frame) {
-  auto found =
-      find_consensus(old, frame, match_descriptors(old.descriptors, frame.descriptors));
+  auto found = find_consensus(old, frame, match_descriptors(old.descriptors, frame.descriptors));
   if (!found.has_value()) {
     return std::nullopt;
   }
@@ -278,8 +276,7 @@ std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent) {
     return std::nullopt;
   }
   const double noise_px =
-      kLoopSigmaFactor *
-      median_error_px(loop.from_to.inverse(), old, recent, loop.corners);
+      kLoopSigmaFactor * median_error_px(loop.from_to.inverse(), old, recent, loop.corners);
   const auto sigma = [&](int first_row, int count) {
     return noise_px * std::sqrt(refined.covariance.diagonal().segment(first_row, count).mean());
   };

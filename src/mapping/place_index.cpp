@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <random>
 
+#include "instruction_set.hpp"
 #include "mapping/descriptors.hpp"
 
 namespace stemvo {
@@ -53,13 +54,10 @@ void PlaceIndex::add(int keyframe, std::span<const Descriptor> descriptors) {
   }
 }
 
-std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> descriptors,
-                                                   int before,
-                                                   int max_candidates) const {
-  const auto num_places =
-      static_cast<std::uint32_t>(std::ranges::lower_bound(keyframes_, before) - keyframes_.begin());
-  std::vector<double> votes(num_places);
-  std::vector<int> voted_by(num_places, -1);
+/// Each descriptor has one vote, which the places that have its like share.
+STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
+                                        std::span<double> votes) const {
+  std::vector<int> voted_by(votes.size(), -1);
   std::vector<std::uint32_t> places;  // that a descriptor votes for
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
     if (descriptors[i] == kNoDescriptor) {
@@ -70,11 +68,11 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
       for (const std::uint32_t index :
            tables_[static_cast<std::size_t>(table)][cell_of(descriptors[i], table)]) {
         const Entry& entry = entries_[index];
-        if (entry.place >= num_places) {
+        if (entry.place >= votes.size()) {
           break;  // entries rise
         }
         if (voted_by[entry.place] != static_cast<int>(i) &&
-            count_differences(descriptors[i], entry.descriptor) <= kVoteBits) {
+            differing_bits(descriptors[i], entry.descriptor) <= kVoteBits) {
           voted_by[entry.place] = static_cast<int>(i);
           places.push_back(entry.place);
         }
@@ -84,6 +82,29 @@ std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> d
       votes[place] += 1.0 / static_cast<double>(places.size());
     }
   }
+}
+
+void PlaceIndex::vote(std::span<const Descriptor> descriptors, std::span<double> votes) const {
+  vote_for(descriptors, votes);
+}
+#if defined(__x86_64__)
+STEMVO_POPCNT void PlaceIndex::vote_avx2(std::span<const Descriptor> descriptors,
+                                         std::span<double> votes) const {
+  vote_for(descriptors, votes);
+}
+#endif
+
+std::vector<PlaceCandidate> PlaceIndex::candidates(std::span<const Descriptor> descriptors,
+                                                   int before,
+                                                   int max_candidates) const {
+  const auto num_places =
+      static_cast<std::uint32_t>(std::ranges::lower_bound(keyframes_, before) - keyframes_.begin());
+  std::vector<double> votes(num_places);
+#if defined(__x86_64__)
+  uses_avx2() ? vote_avx2(descriptors, votes) : vote(descriptors, votes);
+#else
+  vote(descriptors, votes);
+#endif
   std::vector<PlaceCandidate> best;
   for (std::size_t place = 0; place < votes.size(); ++place) {
     if (votes[place] > 0.0) {

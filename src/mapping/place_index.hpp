@@ -38,6 +38,9 @@ class PlaceIndex {
   };
   using Cell = std::vector<std::uint32_t>;  ///< indices into entries_
 
+  void vote_for(std::span<const Descriptor> descriptors, std::span<double> votes) const;
+  void vote(std::span<const Descriptor> descriptors, std::span<double> votes) const;
+  void vote_avx2(std::span<const Descriptor> descriptors, std::span<double> votes) const;
   [[nodiscard]] std::uint32_t cell_of(const Descriptor& descriptor, int table) const;
 
   std::array<std::array<std::uint8_t, kBits>, kTables> bits_;  ///< the tables' bits

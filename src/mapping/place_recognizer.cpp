@@ -4,17 +4,25 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "geometry/median.hpp"
 
 namespace stemvo {
 namespace {
 
-/// A keyframe is looked up that shares less than this with the last one.
-constexpr double kMaxShared = 0.4;
-/// A place is looked for among keyframes this far before: nearer ones are remembered by tracks.
-constexpr int kMinApart = 40;
-constexpr int kMaxCandidates = 4;
+/// A keyframe is looked up that shares less than this with the last one, so many frames later.
+constexpr double kMaxShared = 0.6;
+constexpr int kMinFrames = 5;
+/// It becomes a place where it shares less than this with the last place ..
+constexpr double kMaxSharedPlace = 0.4;
+/// .. and shows less than this of a kept place.
+constexpr double kSamePlace = 0.3;
+/// A place is looked for among keyframes this far before that share no tracks: the window
+/// remembers the others.
+constexpr int kMinApart = 20;
+constexpr std::size_t kMaxTracks = 4;
+constexpr int kMaxCandidates = 3;
 /// Checks of the last lookups may confirm each other.
 constexpr int kMaxLookupsApart = 3;
 /// Two checks that say the same differ by less: log scale, rad, share of the depth and of the way
@@ -22,13 +30,29 @@ constexpr int kMaxLookupsApart = 3;
 constexpr double kMaxLogScale = 0.1;
 constexpr double kMaxTurn_rad = 0.05;
 constexpr double kMaxShift = 0.1;
-/// A keyframe that shows so much of a kept place is none of its own.
-constexpr double kSamePlace = 0.3;
+/// Of a frame and one just before, both without a pose: rad, share of the depth.
+constexpr double kMaxMotion_rad = 0.3;
+constexpr double kMaxMotion = 0.5;
 
-double share_of(std::size_t part, std::size_t whole) {
-  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+std::vector<int> tracks_of(const KeptKeyframe& keyframe) {
+  std::vector<int> tracks;
+  for (const KeptCorner& corner : keyframe.corners) {
+    tracks.push_back(corner.track_id);
+  }
+  return tracks;
 }
 
+std::size_t num_shared(const std::vector<int>& a, const std::vector<int>& b) {
+  std::vector<int> shared;
+  std::ranges::set_intersection(a, b, std::back_inserter(shared));
+  return shared.size();
+}
+
+bool is_share_below(double bound, std::size_t part, std::size_t whole) {
+  return static_cast<double>(part) < bound * static_cast<double>(whole);
+}
+
+/// Of the landmarks; 0 where there are none.
 double median_depth(const std::vector<KeptCorner>& corners) {
   std::vector<double> depths;
   for (const KeptCorner& corner : corners) {
@@ -50,104 +74,168 @@ const Similarity3& pose_of(const KeptMap& map, int number) {
   return map.map_from_keyframe[static_cast<std::size_t>(number)];
 }
 
+double turn_of(const Similarity3& motion) {
+  return Eigen::Quaterniond::Identity().angularDistance(motion.rotation);
+}
+
 }  // namespace
 
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
-  std::size_t num_shared = 0;
-  auto last = last_corners_.begin();
-  for (const KeptCorner& corner : keyframe.corners) {
-    last = std::find_if(last, last_corners_.end(),
-                        [&](const KeptCorner& other) { return other.track_id >= corner.track_id; });
-    num_shared += last != last_corners_.end() && last->track_id == corner.track_id ? 1 : 0;
-  }
-  return share_of(num_shared, last_corners_.size()) < kMaxShared;
+  return num_lookups_ == 0 ||
+         (keyframe.frame - last_frame_ >= kMinFrames &&
+          is_share_below(kMaxShared, num_shared(last_tracks_, tracks_of(keyframe)),
+                         last_tracks_.size()));
 }
 
 std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
                                                int number,
                                                const KeptKeyframe& keyframe) {
-  last_corners_ = keyframe.corners;
   ++num_lookups_;
-  shows_kept_place_ = false;
+  last_frame_ = keyframe.frame;
+  last_tracks_ = tracks_of(keyframe);
+  shows_kept_place_ = !place_tracks_.empty() &&
+                      !is_share_below(kMaxSharedPlace, num_shared(place_tracks_, last_tracks_),
+                                      place_tracks_.size());
   std::erase_if(sightings_, [&](const Sighting& sighting) {
     return sighting.lookup + kMaxLookupsApart < num_lookups_;
   });
-  std::optional<Loop> best;
+  const double depth = median_depth(keyframe.corners);
+  std::vector<int> to_check;
   for (const PlaceCandidate& candidate :
        index_.candidates(keyframe.descriptors, number - kMinApart, kMaxCandidates)) {
-    std::optional<Loop> loop =
-        check_place(view_of(keyframe_of(map, candidate.keyframe)), view_of(keyframe));
-    if (!loop.has_value()) {
+    to_check.push_back(candidate.keyframe);
+  }
+  const std::size_t num_candidates = to_check.size();
+  std::vector<int> checked;
+  for (std::size_t i = 0; i < to_check.size(); ++i) {
+    const int place = to_check[i];
+    if (std::ranges::count(checked, place) > 0) {
       continue;
     }
-    loop->from = candidate.keyframe;
-    loop->to = number;
-    Sighting sighting{num_lookups_, *loop};
-    for (Sighting& other : sightings_) {
-      if (other.loop.from != sighting.loop.from && confirms(map, sighting, other)) {
-        sighting.is_confirmed = true;
-        other.is_confirmed = true;
-      }
+    checked.push_back(place);
+    const std::optional<Sighting> sighting = look_at(map, place, number, keyframe);
+    if (!sighting.has_value()) {
+      continue;
     }
-    sightings_.push_back(std::move(sighting));
-  }
-  for (const Sighting& sighting : sightings_) {
-    if (sighting.lookup == num_lookups_ && sighting.is_confirmed &&
-        (!best.has_value() || sighting.loop.corners.size() > best->corners.size())) {
-      best = sighting.loop;
+    if (is_confirmed(map, *sighting, depth)) {
+      sightings_.push_back(*sighting);
+      shows_kept_place_ =
+          shows_kept_place_ ||
+          !is_share_below(kSamePlace, sighting->loop.corners.size(), keyframe.corners.size());
+      return sighting->loop;
+    }
+    sightings_.push_back(*sighting);
+    if (i < num_candidates) {
+      std::ranges::copy(neighbours_of(place), std::back_inserter(to_check));
     }
   }
-  shows_kept_place_ =
-      best.has_value() && share_of(best->corners.size(), keyframe.corners.size()) >= kSamePlace;
-  return best;
+  return std::nullopt;
 }
 
-bool PlaceRecognizer::confirms(const KeptMap& map,
-                               const Sighting& one,
-                               const Sighting& other) const {
-  const Similarity3 map_from_one = pose_of(map, one.loop.from) * one.loop.from_to;
-  const Similarity3 map_from_other = pose_of(map, other.loop.from) * other.loop.from_to;
-  const Similarity3 other_from_one =
-      pose_of(map, other.loop.to).inverse() * pose_of(map, one.loop.to);
-  // The identity, if both are right.
-  const Similarity3 difference = map_from_one.inverse() * map_from_other * other_from_one;
-  const double length = median_depth(last_corners_) + (other_from_one.translation).norm();
-  return std::abs(std::log(difference.scale)) < kMaxLogScale &&
-         Eigen::Quaterniond::Identity().angularDistance(difference.rotation) < kMaxTurn_rad &&
-         difference.translation.norm() < kMaxShift * length;
+std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
+    const KeptMap& map, int place, int number, const KeptKeyframe& keyframe) const {
+  const KeptKeyframe& old = keyframe_of(map, place);
+  if (place >= number - kMinApart || num_shared(tracks_of(old), last_tracks_) > kMaxTracks) {
+    return std::nullopt;
+  }
+  std::optional<Loop> loop = check_place(view_of(old), view_of(keyframe));
+  if (!loop.has_value()) {
+    return std::nullopt;
+  }
+  loop->from = place;
+  loop->to = number;
+  return Sighting{num_lookups_, std::move(*loop)};
+}
+
+/// By another sighting, of another place.
+bool PlaceRecognizer::is_confirmed(const KeptMap& map,
+                                   const Sighting& sighting,
+                                   double depth) const {
+  const Loop& loop = sighting.loop;
+  const Similarity3 map_from_camera = pose_of(map, loop.from) * loop.from_to;
+  return std::ranges::any_of(sightings_, [&](const Sighting& other) {
+    if (other.loop.from == loop.from) {
+      return false;
+    }
+    const Similarity3 other_from_camera =
+        pose_of(map, other.loop.to).inverse() * pose_of(map, loop.to);
+    // The identity, if both are right.
+    const Similarity3 difference = map_from_camera.inverse() * pose_of(map, other.loop.from) *
+                                   other.loop.from_to * other_from_camera;
+    return std::abs(std::log(difference.scale)) < kMaxLogScale &&
+           turn_of(difference) < kMaxTurn_rad &&
+           difference.translation.norm() <
+               kMaxShift * (depth + other_from_camera.translation.norm());
+  });
+}
+
+std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
+  const auto at = std::ranges::lower_bound(places_, place);
+  std::vector<int> neighbours;
+  if (at != places_.begin()) {
+    neighbours.push_back(*std::prev(at));
+  }
+  if (at != places_.end() && std::next(at) != places_.end()) {
+    neighbours.push_back(*std::next(at));
+  }
+  return neighbours;
 }
 
 void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
   index_.add(number, keyframe.descriptors);
+  places_.push_back(number);
+  place_tracks_ = tracks_of(keyframe);
 }
 
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                                                     const Camera& camera,
                                                     const std::vector<KeptCorner>& corners,
                                                     const std::vector<Descriptor>& descriptors) {
-  std::optional<LocatedFrame> best;
-  std::size_t num_agreeing = 0;
-  std::vector<Similarity3> map_from_camera;
+  const std::vector<Similarity3> before = std::exchange(located_, {});
+  std::vector<int> to_check;
   for (const PlaceCandidate& candidate :
        index_.candidates(descriptors, static_cast<int>(map.keyframes.size()), kMaxCandidates)) {
-    const KeptKeyframe& old = keyframe_of(map, candidate.keyframe);
+    to_check.push_back(candidate.keyframe);
+  }
+  const std::size_t num_candidates = to_check.size();
+  for (std::size_t i = 0; i < to_check.size(); ++i) {
+    const int place = to_check[i];
+    const KeptKeyframe& old = keyframe_of(map, place);
     const auto found = locate_in_place(view_of(old), {camera, corners, descriptors});
-    if (!found.has_value()) {
+    if (std::find(to_check.begin(), to_check.begin() + static_cast<std::ptrdiff_t>(i), place) !=
+            to_check.begin() + static_cast<std::ptrdiff_t>(i) ||
+        !found.has_value()) {
       continue;
     }
-    map_from_camera.push_back(pose_of(map, candidate.keyframe) *
-                              Similarity3(found->old_from_camera));
-    if (found->corners.size() > num_agreeing) {
-      num_agreeing = found->corners.size();
-      best = LocatedFrame{candidate.keyframe, found->old_from_camera, {}};
+    const Similarity3 map_from_camera = pose_of(map, place) * Similarity3(found->old_from_camera);
+    const auto agrees = [&](const Similarity3& other, double max_turn_rad, double max_shift) {
+      const Similarity3 difference = map_from_camera.inverse() * other;
+      return turn_of(difference) < max_turn_rad &&
+             difference.translation.norm() < max_shift * median_depth(old.corners);
+    };
+    const auto is_same = [&](const Similarity3& other) {
+      return agrees(other, kMaxTurn_rad, kMaxShift);
+    };
+    const auto is_near = [&](const Similarity3& other) {
+      return agrees(other, kMaxMotion_rad, kMaxMotion);
+    };
+    const bool is_certain =
+        std::ranges::any_of(located_, is_same) || std::ranges::any_of(before, is_near);
+    located_.push_back(map_from_camera);
+    if (is_certain) {
+      LocatedFrame located{place, found->old_from_camera, {}};
       for (const auto& [mine, other] : found->corners) {
-        best->landmarks.emplace_back(
+        located.landmarks.emplace_back(
             corners[static_cast<std::size_t>(other)].track_id,
             old.corners[static_cast<std::size_t>(mine)].in_camera.cast<double>());
       }
+      return located;
+    }
+    if (i < num_candidates) {
+      std::ranges::copy(neighbours_of(place), std::back_inserter(to_check));
     }
   }
-  return best;
+  return std::nullopt;
 }
 
 }  // namespace stemvo

@@ -23,17 +23,19 @@ struct LocatedFrame {
 };
 
 /// Tells which keyframe shows a kept place. A check of one pair may be wrong where things repeat: a
-/// place counts once another pair, of a neighbouring place or keyframe, says the same.
+/// place counts once another pair, of a neighbouring place or of the keyframes before, says the
+/// same.
 ///
 /// For each keyframe that is complete: asks(); if so describe() its corners, recognize(), and
 /// unless it shows a kept place add(). The same answers on every run.
 class PlaceRecognizer {
  public:
-  /// Whether the keyframe is worth a lookup: it shows enough that the last one looked up did not.
+  /// Whether the keyframe is worth a lookup: it shows enough that the last one looked up did not,
+  /// some frames ago.
   [[nodiscard]] bool asks(const KeptKeyframe& keyframe) const;
 
   /// The keyframe, which has landmarks as they are now and a descriptor per corner, is to be the
-  /// map's keyframe `number`. Reads of the map keyframes far before it alone, and where they are.
+  /// map's keyframe `number`. Reads of the map places far before it, and where keyframes are.
   /// The loop's corners are those of both keyframes as they are given here.
   [[nodiscard]] std::optional<Loop> recognize(const KeptMap& map,
                                               int number,
@@ -54,15 +56,25 @@ class PlaceRecognizer {
   struct Sighting {
     int lookup = 0;  ///< its number
     Loop loop;
-    bool is_confirmed = false;
   };
-  [[nodiscard]] bool confirms(const KeptMap& map, const Sighting& one, const Sighting& other) const;
+  [[nodiscard]] std::optional<Sighting> look_at(const KeptMap& map,
+                                                int place,
+                                                int number,
+                                                const KeptKeyframe& keyframe) const;
+  [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, double depth) const;
+  /// Places just before and behind a place.
+  [[nodiscard]] std::vector<int> neighbours_of(int place) const;
 
   PlaceIndex index_;
-  std::vector<KeptCorner> last_corners_;  ///< of the keyframe looked up last
-  std::vector<Sighting> sightings_;       ///< of the last lookups
+  std::vector<int> places_;          ///< numbers of keyframes
+  std::vector<int> last_tracks_;     ///< of the keyframe looked up last
+  std::vector<int> place_tracks_;    ///< of the last one that became a place
+  int last_frame_ = 0;               ///< looked up
+  std::vector<Sighting> sightings_;  ///< of the last lookups
   int num_lookups_ = 0;
   bool shows_kept_place_ = false;
+  /// Where frames were located last, unconfirmed: map_from_camera.
+  std::vector<Similarity3> located_;
 };
 
 }  // namespace stemvo
