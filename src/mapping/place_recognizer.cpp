@@ -34,7 +34,7 @@ constexpr double kMaxShift = 0.1;
 constexpr double kMaxMotion_rad = 0.3;
 constexpr double kMaxMotion = 0.5;
 
-std::vector<int> tracks_of(const KeptKeyframe& keyframe) {
+std::vector<int> track_ids_of(const KeptKeyframe& keyframe) {
   std::vector<int> tracks;
   for (const KeptCorner& corner : keyframe.corners) {
     tracks.push_back(corner.track_id);
@@ -83,7 +83,7 @@ double turn_of(const Similarity3& motion) {
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
   return num_lookups_ == 0 ||
          (keyframe.frame - last_frame_ >= kMinFrames &&
-          is_share_below(kMaxShared, num_shared(last_tracks_, tracks_of(keyframe)),
+          is_share_below(kMaxShared, num_shared(last_tracks_, track_ids_of(keyframe)),
                          last_tracks_.size()));
 }
 
@@ -92,7 +92,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
                                                const KeptKeyframe& keyframe) {
   ++num_lookups_;
   last_frame_ = keyframe.frame;
-  last_tracks_ = tracks_of(keyframe);
+  last_tracks_ = track_ids_of(keyframe);
   shows_kept_place_ = !place_tracks_.empty() &&
                       !is_share_below(kMaxSharedPlace, num_shared(place_tracks_, last_tracks_),
                                       place_tracks_.size());
@@ -135,7 +135,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
 std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
     const KeptMap& map, int place, int number, const KeptKeyframe& keyframe) const {
   const KeptKeyframe& old = keyframe_of(map, place);
-  if (place >= number - kMinApart || num_shared(tracks_of(old), last_tracks_) > kMaxTracks) {
+  if (place >= number - kMinApart || num_shared(track_ids_of(old), last_tracks_) > kMaxTracks) {
     return std::nullopt;
   }
   std::optional<Loop> loop = check_place(view_of(old), view_of(keyframe));
@@ -184,7 +184,7 @@ std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
 void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
   index_.add(number, keyframe.descriptors);
   places_.push_back(number);
-  place_tracks_ = tracks_of(keyframe);
+  place_tracks_ = track_ids_of(keyframe);
 }
 
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
