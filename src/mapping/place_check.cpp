@@ -19,7 +19,7 @@ constexpr int kMinCells = 12;
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// Of so many pairs or more, so many are enough to look for more where a pose has them.
-constexpr std::size_t kMinPairs = 24;
+constexpr std::size_t kMinMatches = 24;
 constexpr std::size_t kMinSample = 15;
 /// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
 constexpr double kBound_px = 4.0;
@@ -137,7 +137,7 @@ std::optional<Consensus> find_consensus(const PlaceView& of,
       uv.push_back(uv_of(by, other));
     }
   }
-  if (uv.size() < kMinPairs) {
+  if (uv.size() < kMinMatches) {
     return std::nullopt;
   }
   const auto start = estimate_absolute_pose(points, uv, by.camera, bound_px(by.camera), kSeed);
