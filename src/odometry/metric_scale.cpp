@@ -2,15 +2,16 @@
 #include "odometry/metric_scale.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
 namespace {
 
-/// Drift of log(metres per unit), per frame: the map stretches by 0.1 % a frame on real clips,
+/// Drift of log(metres per unit) in a second: the map stretches by 1 % a second on real clips,
 /// steadily; a random walk must be loose enough to follow without lagging behind.
-constexpr double kDriftSigma = 0.006;
+constexpr double kDriftSigma = 0.019;
 
 }  // namespace
 
@@ -28,6 +29,7 @@ MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigm
 
 void MetricScale::restart(const RoadImage* road, double time_s, bool has_scale) {
   ways_.restart(time_s);
+  last_time_s_ = time_s;
   if (!is_enabled() || (road_.has_value() && road == nullptr)) {
     return;
   }
@@ -57,8 +59,12 @@ double MetricScale::measure(const RoadImage* road,
                             double pixel_units,
                             const std::vector<RoadLandmark>& landmarks) {
   ways_.move(cur_from_prev, time_s, pixel_units);
+  const double interval_s = time_s - std::exchange(last_time_s_, time_s);
   if (!has_ways_ && (!road_.has_value() || road == nullptr)) {
     return 1.0;
+  }
+  if (!road_.has_value() || cur_from_prev.translation.norm() > 0.0) {
+    filter_.predict(interval_s);
   }
   bool is_measured = false;
   if (road_.has_value() && road != nullptr) {
@@ -69,14 +75,10 @@ double MetricScale::measure(const RoadImage* road,
     // A road that is not proven does not bend what ways have measured.
     if (estimate.is_believed || !is_way_measured_) {
       filter_ = with_road;
-    } else {
-      filter_.predict();
     }
     is_measured = estimate.is_measured;
     is_road_believed_ = estimate.is_believed;
     reason_ = estimate.reason;
-  } else {
-    filter_.predict();
   }
   const bool is_way_measured = ways_.measure(filter_);
   is_way_measured_ = is_way_measured_ || is_way_measured;
@@ -95,9 +97,10 @@ double MetricScale::measure(const RoadImage* road,
   return metres_per_unit;
 }
 
-void MetricScale::keep_last(std::string_view reason) {
+void MetricScale::keep_last(std::string_view reason, double time_s) {
+  const double interval_s = time_s - std::exchange(last_time_s_, time_s);
   if (is_enabled()) {
-    filter_.predict();
+    filter_.predict(interval_s);
     state_ = state_ == ScaleState::kMeasured ? ScaleState::kHeld : state_;
     reason_ = road_.has_value() ? reason : "";
   }

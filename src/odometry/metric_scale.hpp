@@ -20,7 +20,7 @@ namespace stemvo {
 /// result says of it.
 class MetricScale {
  public:
-  /// `drift_sigma`: of log(metres per unit), per frame.
+  /// `drift_sigma`: of log(metres per unit), in a second.
   explicit MetricScale(const Options& config, std::optional<double> drift_sigma = {});
 
   /// Somebody measures.
@@ -43,7 +43,7 @@ class MetricScale {
   /// The next motion will not tell how far the camera went since the last one.
   void cut_path(double time_s) { ways_.restart(time_s); }
   /// A frame on which nothing can be measured: the last scale is kept, its sigma grows.
-  void keep_last(std::string_view reason);
+  void keep_last(std::string_view reason, double time_s);
   /// A frame without a map to scale.
   void set_unknown(std::string_view reason);
 
@@ -54,6 +54,7 @@ class MetricScale {
   ScaleFilter filter_;
   std::optional<RoadScale> road_;
   WayScale ways_;
+  double last_time_s_ = 0.0;  ///< of the frame before
   bool has_ways_ = false;
   bool is_road_believed_ = false;
   bool is_way_measured_ = false;  ///< since the last restart

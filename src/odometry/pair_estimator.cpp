@@ -7,8 +7,9 @@
 namespace stemvo {
 namespace {
 
-/// A unit is the last step: what drifts is the car's speed, log per frame.
+/// A unit is the last step: what drifts is the car's speed, its log between frames ..
 constexpr double kSpeedSigma = 0.02;
+constexpr double kSpeedDrift = 0.063;  ///< .. and in a second
 
 /// Backward travel is believed only with this many times the least parallax and a clear winner of
 /// the hypothesis test; otherwise it is the cheirality test's flip of 180 degrees.
@@ -123,7 +124,7 @@ PairEstimator::PairEstimator(const Options& config, const Camera& camera)
       camera_(camera),
       two_view_(config),
       chain_(config.odometry, config.scale),
-      scale_(config, kSpeedSigma) {}
+      scale_(config, kSpeedDrift) {}
 
 LocalizedFrame PairEstimator::localize(const Frame& frame) {
   LocalizedFrame localized;
@@ -156,7 +157,7 @@ void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   scale_.add(frame.ways);
   if (motion_.state == FrameState::kNoImage) {
     chain_.extrapolate(/*has_image=*/false);
-    scale_.keep_last("no image");
+    scale_.keep_last("no image", frame.time_s);
   } else if (motion_.state == FrameState::kFirst) {
     scale_.restart(frame.road.get(), frame.time_s);
   } else {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 namespace stemvo {
 
@@ -11,26 +10,35 @@ namespace {
 
 constexpr double kHuber = 1.5;
 constexpr double kDoubt = 3.0;  ///< standard deviations
-/// In a row, as many as were believed before, within these: off the road, in a tight turn, dozens
-/// of frames tell the same wrong scale, and the map does not drift as fast.
-constexpr int kMinDoubts = 4;
-constexpr int kMaxDoubts = 32;
+/// In a row, for as long as it was believed before, within these: off the road, in a tight turn,
+/// dozens of frames tell the same wrong scale, and the map does not drift as fast.
+constexpr double kMinDoubt_s = 0.4;
+constexpr double kMaxDoubt_s = 3.2;
+/// One measurement counts for the time since the one before, but for no more.
+constexpr double kMaxShare_s = 0.2;
+/// Roads measured so often have the sigma given; errors last for about four of them.
+constexpr double kRoadInterval_s = 0.1;
+constexpr double kMaxRoads = 4.0;
+constexpr double kRounding_s = 1e-6;  ///< of sums
 /// A first measurement may be the wrong peak of a search over scales: others must confirm it.
 constexpr double kFirstSigma = 0.1;
-constexpr double kTrendKept = 0.99;  ///< of a trend that nothing confirms, per frame
+constexpr double kTrend_s = 10.0;  ///< a trend that nothing confirms is forgotten by 1 / e
 
 }  // namespace
 
-void ScaleFilter::predict() {
-  sigma_ = std::min(std::hypot(sigma_, drift_sigma_), kUnknownSigma);
-  log_scale_ += trend_;
-  trend_ *= kTrendKept;
-  ++frames_since_way_;
+void ScaleFilter::predict(double interval_s) {
+  sigma_ = std::min(std::hypot(sigma_, std::sqrt(interval_s) * drift_sigma_), kUnknownSigma);
+  log_scale_ += interval_s * trend_;
+  trend_ *= std::exp(-interval_s / kTrend_s);
+  for (Record& one : records_) {
+    one.since_s += interval_s;
+  }
 }
 
 bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
   if (!is_initialized_) {
     is_initialized_ = true;
+    record(witness).since_s = 0.0;
     log_scale_ = log_scale;
     sigma_ = std::max(sigma, kFirstSigma);
     return true;
@@ -40,48 +48,49 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
     sigma_ = sigma;
     return true;
   }
+  const bool is_road = witness == ScaleWitness::kRoad;
   const double innovation = log_scale - log_scale_;
   const double distance = judge(innovation, sigma, witness);
   // Huber's weight of a residual d is kHuber / d, so the variance grows by d / kHuber; beyond
   // kDoubt it grows by d / kDoubt once more: an outlier then moves the state less the farther it
   // is.
   const double growth = std::max(1.0, distance / kHuber) * std::max(1.0, distance / kDoubt);
-  const double variance = sigma * sigma * growth;
+  const double num_roads = std::min(record(witness).since_s / kRoadInterval_s, kMaxRoads);
+  const double variance = sigma * sigma * growth / (is_road ? num_roads : 1.0);
   const double gain = sigma_ * sigma_ / (sigma_ * sigma_ + variance);
-  if (witness == ScaleWitness::kRoad) {
-    frames_since_way_ = 0;
+  if (is_road) {
     trend_ = 0.0;
   } else {
     // Critical damping; not from a state that is yet to be found.
-    const bool is_trend = sigma_ < sigma && frames_since_way_ > 0;
-    trend_ += is_trend ? 0.25 * gain * gain * innovation / frames_since_way_ : 0.0;
-    frames_since_way_ = 0;
+    const double since_s = std::min(records_[0].since_s, records_[1].since_s);
+    const bool is_trend = sigma_ < sigma && since_s > 0.0;
+    trend_ += is_trend ? 0.25 * gain * gain * innovation / since_s : 0.0;
   }
+  record(witness).since_s = 0.0;
   log_scale_ += gain * innovation;
   sigma_ *= std::sqrt(1.0 - gain);
   return distance < kDoubt;
 }
 
 double ScaleFilter::judge(double innovation, double sigma, ScaleWitness witness) {
-  auto& [num_doubts, num_believed] = records_[static_cast<std::size_t>(witness)];
+  auto& [since_s, doubted_s, believed_s] = record(witness);
+  const double share_s = std::min(since_s, kMaxShare_s);
   const double distance = std::abs(innovation) / std::hypot(sigma, sigma_);
   if (distance < kDoubt) {
-    num_doubts = 0;
-    num_believed = std::min(num_believed, kMaxDoubts - 1) + 1;
+    doubted_s = 0.0;
+    believed_s = std::min(believed_s + share_s, kMaxDoubt_s);
     if (witness == ScaleWitness::kWay) {
-      records_[static_cast<std::size_t>(ScaleWitness::kRoad)].num_doubts = 0;
+      record(ScaleWitness::kRoad).doubted_s = 0.0;
     }
     return distance;
   }
-  const int side = innovation > 0.0 ? 1 : -1;
-  num_doubts = (num_doubts > 0) == (side > 0)
-                   ? std::clamp(num_doubts, -kMaxDoubts, kMaxDoubts) + side
-                   : side;
-  if (std::abs(num_doubts) < std::max(num_believed, kMinDoubts)) {
+  const double before_s = doubted_s * innovation > 0.0 ? doubted_s : 0.0;
+  doubted_s = before_s + std::copysign(share_s, innovation);
+  if (std::abs(doubted_s) < std::max(believed_s, kMinDoubt_s) - kRounding_s) {
     return distance;
   }
-  num_doubts = 0;
-  num_believed = 0;
+  doubted_s = 0.0;
+  believed_s = 0.0;
   trend_ = 0.0;
   sigma_ = std::min(std::abs(innovation), kUnknownSigma);
   return std::abs(innovation) / std::hypot(sigma, sigma_);

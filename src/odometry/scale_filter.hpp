@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 
 namespace stemvo {
@@ -14,20 +15,22 @@ enum class ScaleWitness {
 
 /// Kalman filter of log(metres per unit), a random walk. A measurement far from the state counts
 /// little (Huber; still less beyond three sigmas), but several in a row of one witness on the same
-/// side, as many as were believed before, say that the state is wrong: it opens up. A way that is
-/// believed silences the road's doubts: it needs no model of what is seen.
+/// side, for as long as it was believed before, say that the state is wrong: it opens up. A way
+/// that is believed silences the road's doubts: it needs no model of what is seen. All counts are
+/// of time: neighbouring frames see the same road, so more of them tell no more.
 class ScaleFilter {
  public:
-  /// `drift_sigma`: of the random walk, per frame. `joins_frames`: false where every measurement is
-  /// believed as it comes.
+  /// `drift_sigma`: of the random walk in a second. `joins_frames`: false where every measurement
+  /// is believed as it comes.
   explicit ScaleFilter(double drift_sigma, bool joins_frames = true)
       : drift_sigma_(drift_sigma), joins_frames_(joins_frames) {}
 
   static constexpr double kUnknownSigma = 1.0;
 
-  /// One frame passes: the map may have drifted.
-  void predict();
-  /// Returns whether the measurement was believed; always where frames are not joined.
+  /// Time passes: the map may have drifted.
+  void predict(double interval_s);
+  /// Returns whether the measurement was believed; always where frames are not joined. `sigma` of a
+  /// road: if it were measured ten times a second.
   bool update(double log_scale, double sigma, ScaleWitness witness);
   /// The measurement's distance from the state, standard deviations; nullopt where there is none.
   [[nodiscard]] std::optional<double> innovation(double log_scale, double sigma) const;
@@ -40,9 +43,13 @@ class ScaleFilter {
 
  private:
   struct Record {
-    int num_doubts = 0;    ///< measurements in a row on one side; the sign is the side
-    int num_believed = 0;  ///< since the state opened up, as far as it counts
+    double since_s = 0.0;     ///< the last measurement
+    double doubted_s = 0.0;   ///< in a row on one side; the sign is the side
+    double believed_s = 0.0;  ///< since the state opened up, as far as it counts
   };
+  [[nodiscard]] Record& record(ScaleWitness witness) {
+    return records_[static_cast<std::size_t>(witness)];
+  }
   /// The distance of the measurement in standard deviations, after the state opened up, if it has
   /// to.
   double judge(double innovation, double sigma, ScaleWitness witness);
@@ -52,10 +59,9 @@ class ScaleFilter {
   bool is_initialized_ = false;
   double log_scale_ = 0.0;
   double sigma_ = kUnknownSigma;
-  /// Of log_scale_, per frame: a map that stretches steadily would stay behind by as much as the
+  /// Of log_scale_, per second: a map that stretches steadily would stay behind by as much as the
   /// filter is slow. By ways alone, where no road says otherwise.
   double trend_ = 0.0;
-  int frames_since_way_ = 0;       ///< since the last way, if no road came after it
   std::array<Record, 2> records_;  ///< by witness
 };
 

@@ -351,9 +351,9 @@ double WindowEstimator::pixel_units() const {
 
 void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
   if (!frame.has_image()) {
-    scale_.keep_last("no image");
+    scale_.keep_last("no image", frame.time_s);
   } else if (state == FrameState::kLost) {
-    scale_.keep_last("lost");
+    scale_.keep_last("lost", frame.time_s);
   } else if (is_initializing_) {
     if (state != FrameState::kFirst) {
       scale_.set_unknown("no map");

@@ -196,7 +196,7 @@ TEST(MetricScale, DisabledItChangesNothing) {
   const auto image = drive.road_image(0, true);
   scale.restart(image.get(), 0.0);
   EXPECT_EQ(scale.measure(image.get(), Rigid3(), 1.0, 0.01), 1.0);
-  scale.keep_last("no image");
+  scale.keep_last("no image", 2.0);
   FrameResult result;
   scale.report(result);
   EXPECT_EQ(result.scale_state, ScaleState::kDisabled);

@@ -10,16 +10,17 @@
 namespace stemvo {
 namespace {
 
-constexpr double kDriftSigma = 0.006;
+constexpr double kInterval_s = 0.1;
+constexpr double kDriftSigma = 0.019;  // in a second
 constexpr double kSigma = 0.03;
 constexpr ScaleWitness kRoad = ScaleWitness::kRoad;
 
 TEST(ScaleFilter, AveragesAndKnowsHowWell) {
-  ScaleFilter filter(0.002);
+  ScaleFilter filter(0.0063);
   std::mt19937_64 engine(3);
   std::normal_distribution<double> noise(0.0, 0.03);
   for (int i = 0; i < 200; ++i) {
-    filter.predict();
+    filter.predict(kInterval_s);
     filter.update(0.7 + noise(engine), kSigma, kRoad);
   }
   EXPECT_NEAR(filter.log_scale(), 0.7, 0.02);
@@ -28,7 +29,7 @@ TEST(ScaleFilter, AveragesAndKnowsHowWell) {
 
 void measure(ScaleFilter& filter, int num, double log_scale, ScaleWitness witness = kRoad) {
   for (int i = 0; i < num; ++i) {
-    filter.predict();
+    filter.predict(kInterval_s);
     filter.update(log_scale, kSigma, witness);
   }
 }
@@ -37,6 +38,7 @@ TEST(ScaleFilter, OneWildMeasurementMovesLittleAsManyAsBeforeWin) {
   for (const int num_before : {2, 8, 50}) {
     ScaleFilter filter(kDriftSigma);
     measure(filter, num_before, 0.0);
+    filter.predict(kInterval_s);
     EXPECT_FALSE(filter.update(1.0, kSigma, kRoad));
     EXPECT_LT(std::abs(filter.log_scale()), num_before < 50 ? 0.1 : 0.02) << num_before;
     measure(filter, std::min(num_before + 10, 40), 1.0);
@@ -56,10 +58,35 @@ TEST(ScaleFilter, WhatManyFramesSaidIsNotOverturnedByATurn) {
   EXPECT_NEAR(filter.log_scale(), -0.8, 0.05);
 }
 
+/// Seconds until a road that differs by `step` is followed half of the way.
+double half_way_s(double step, double interval_s) {
+  ScaleFilter filter(kDriftSigma);
+  for (double time_s = 0.0; time_s < 20.0; time_s += interval_s) {
+    filter.predict(interval_s);
+    filter.update(0.0, kSigma, kRoad);
+  }
+  double time_s = 0.0;
+  while (filter.log_scale() < 0.5 * step && time_s < 20.0) {
+    filter.predict(interval_s);
+    filter.update(step, kSigma, kRoad);
+    time_s += interval_s;
+  }
+  return time_s;
+}
+
+TEST(ScaleFilter, AnyRateOfFramesTellsTheSameInTheSameTime) {
+  for (const double step : {0.05, 1.0}) {  // believed at once; doubted first
+    const double expected_s = half_way_s(step, 0.1);
+    for (const double interval_s : {0.02, 0.05, 0.2}) {
+      EXPECT_NEAR(half_way_s(step, interval_s), expected_s, 0.21) << step << ", " << interval_s;
+    }
+  }
+}
+
 TEST(ScaleFilter, WithoutJoiningEachMeasurementStandsAlone) {
   ScaleFilter filter(kDriftSigma, /*joins_frames=*/false);
   for (const double log_scale : {0.0, 1.0, -0.5}) {
-    filter.predict();
+    filter.predict(kInterval_s);
     EXPECT_TRUE(filter.update(log_scale, kSigma, kRoad));
     EXPECT_EQ(filter.log_scale(), log_scale);
   }
@@ -70,7 +97,7 @@ TEST(ScaleFilter, WithoutMeasurementsTheDoubtGrows) {
   filter.update(0.0, kSigma, kRoad);
   double last = filter.sigma();
   for (int i = 0; i < 20; ++i) {
-    filter.predict();
+    filter.predict(kInterval_s);
     EXPECT_GT(filter.sigma(), last);
     last = filter.sigma();
   }
@@ -95,7 +122,7 @@ TEST(ScaleFilter, AWayThatContradictsTheRoadWinsAndKeepsWinning) {
 TEST(ScaleFilter, BothCountByTheirSigmas) {
   ScaleFilter filter(1e-6);
   for (int i = 0; i < 400; ++i) {
-    filter.predict();
+    filter.predict(kInterval_s);
     filter.update(0.0, 0.03, kRoad);
     filter.update(0.03, 0.015, ScaleWitness::kWay);
   }

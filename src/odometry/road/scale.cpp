@@ -201,7 +201,6 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
   RoadScaleEstimate result;
   const Past* past = pick_past(filter);
   if (past != nullptr) {
-    filter.predict();
     result.reason = measure(*past, image, filter, landmarks);
     result.is_measured = result.reason.empty();
     remember(std::move(image));

@@ -32,7 +32,7 @@ class RoadScale {
 
   /// One call per frame with an image. `cur_from_prev`: the motion since the
   /// last call, in units of the map (ignored at the first call and after restart()). The filter,
-  /// which others measure for too, says what is known before, and takes what is measured. The
+  /// which others measure for too, says what is known now, and takes what is measured. The
   /// landmarks, in the current camera, are witnesses of what is measured.
   RoadScaleEstimate update(RoadImage image,
                            const Rigid3& cur_from_prev,
