@@ -63,6 +63,7 @@ class EstimatorRun {
     frame.hints = std::exchange(hints, {});
     frame.image = image;
     frame.road = road ? road(i) : nullptr;
+    frame.pyramid = pyramid ? pyramid(i) : nullptr;
     frame.matches = std::move(matches);
     frame.matches.prev_frame = last_number_;
     const std::vector<int> points = frame.matches.track_ids;
@@ -103,6 +104,7 @@ class EstimatorRun {
   FrameHints hints;                                           ///< of the next frame alone
   cv::Mat image;                                              ///< of the next frame
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
+  std::function<std::shared_ptr<const ImagePyramid>(int)> pyramid;  ///< likewise
   std::vector<FrameResult> results;
   std::vector<char> inlier_mask;  ///< of the last frame
   std::vector<int> point_ids;     ///< of the same matches

@@ -310,5 +310,26 @@ TEST(Bundle, FindsAPlantedCamera) {
   EXPECT_LE(std::abs(bundle.camera.cy_px - drive.camera.cy_px), 4.0 * found_sigma[1]);
 }
 
+TEST(Bundle, FixedPointsStayAndHoldTheScale) {
+  const DriveTracks drive(6, 0.0, 12);
+  Bundle bundle = bundle_of(drive, 0.0);
+  bundle.num_fixed_points = 100;
+  const std::vector<Eigen::Vector3d> truth = bundle.points;
+  for (std::size_t i = 100; i < bundle.points.size(); ++i) {
+    bundle.points[i] *= 1.02;
+  }
+  for (Rigid3& pose : bundle.camera_from_world) {
+    pose.translation *= 1.02;  // the first one is at the origin
+  }
+  EXPECT_TRUE(solve_bundle_adjustment(
+                  bundle, {.num_fixed_poses = 1, .max_iterations = 30, .min_relative_decrease = 0})
+                  .is_usable);
+  for (std::size_t i = 0; i < 100; ++i) {
+    EXPECT_EQ(bundle.points[i], truth[i]);
+  }
+  const Eigen::Vector3d end = bundle.camera_from_world.back().translation;
+  EXPECT_NEAR(end.norm(), drive.pose(5).translation.norm(), 1e-3);
+}
+
 }  // namespace
 }  // namespace stemvo

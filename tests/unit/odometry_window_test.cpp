@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <map>
 
 #include <gtest/gtest.h>
 
@@ -131,6 +132,29 @@ TEST(BundleAdjustment, TooSmallAWindowIsLeftAlone) {
   EXPECT_FALSE(refine_window(window, drive.camera, {}));
   Window empty;
   EXPECT_FALSE(refine_window(empty, drive.camera, {}));
+}
+
+TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
+  const DriveTracks drive(6, 0.3, 4);
+  Window window = window_of(drive, {});
+  std::map<int, Eigen::Vector3d> known;
+  for (const auto& [id, point] : window.landmarks) {
+    known[id] = drive.points[static_cast<std::size_t>(id)];
+  }
+  const int elsewhere = known.begin()->first;
+  known.begin()->second += Eigen::Vector3d(0.0, 5.0, 0.0);
+  fix_landmarks(window, drive.camera, known, {});
+  EXPECT_FALSE(window.fixed.contains(elsewhere));
+  EXPECT_GT(window.fixed.size(), known.size() / 2);
+  EXPECT_TRUE(refine_window(window, drive.camera, {.num_fixed_poses = 1}));
+  for (const int id : window.fixed) {
+    EXPECT_EQ(window.landmarks.at(id), known.at(id));
+  }
+  move(window, Similarity3(2.0, Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0}));
+  const int id = *window.fixed.begin();
+  EXPECT_LT((window.landmarks.at(id) - 2.0 * known.at(id) - Eigen::Vector3d::UnitX()).norm(), 1e-9);
+  cull_landmarks(window, drive.camera, {.max_reprojection_error_px = 1e-9});
+  EXPECT_TRUE(window.fixed.empty());  // those that are culled
 }
 
 }  // namespace
