@@ -24,6 +24,7 @@ Status add_speeds(const RunRequest& request, BesideFrames& beside) {
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
   beside.note += fmt::format(", {} speeds", rows->size());
+  beside.spans.push_back({"--speed", rows->front().time_s, rows->back().time_s});
   return {};
 }
 
@@ -38,6 +39,7 @@ Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFr
   }
   beside.note += fmt::format(", {} turn rates{}", rows->size(),
                              camera_from_imu ? "" : " (taken for about the camera's own axes)");
+  beside.spans.push_back({"--gyro", rows->front().time_s, rows->back().time_s});
   beside.gyro = *std::move(rows);
   return {};
 }
@@ -50,6 +52,19 @@ FrameHints BesideFrames::hints(double last_s, double time_s) const {
     hints.prev_from_cur = dataset::integrate_gyro(gyro, last_s, time_s);
   }
   return hints;
+}
+
+std::vector<std::string> BesideFrames::warnings(double first_s, double last_s) const {
+  std::vector<std::string> warnings;
+  for (const Span& span : spans) {
+    if (span.last_s < first_s || span.first_s > last_s) {
+      warnings.push_back(fmt::format(
+          "{}: expected times among those of the frames, {} to {} s, found {} to {} s: it says "
+          "nothing of them",
+          span.option, first_s, last_s, span.first_s, span.last_s));
+    }
+  }
+  return warnings;
 }
 
 Expected<BesideFrames> read_beside_frames(const RunRequest& request, const FrameSource& sequence) {

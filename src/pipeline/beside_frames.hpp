@@ -18,9 +18,17 @@ struct BesideFrames {
   std::vector<Way> ways;               ///< by speeds
   std::vector<dataset::GyroRow> gyro;  ///< in the camera's axes
   std::string note;                    ///< what there is, for the line of the input; may be empty
+  struct Span {
+    std::string option;
+    double first_s;
+    double last_s;
+  };
+  std::vector<Span> spans;  ///< of the files read
 
   /// For the frame of this time, behind one of that time.
   [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
+  /// Of files whose times are all before or all behind those of the frames.
+  [[nodiscard]] std::vector<std::string> warnings(double first_s, double last_s) const;
 };
 
 /// Reads the files that were asked for. Errors: theirs; speeds beside a scale.source that leaves no

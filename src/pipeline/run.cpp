@@ -114,6 +114,10 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
   if (std::string warning = warn_of_road(report); !warning.empty()) {
     done.warnings.push_back(std::move(warning));
   }
+  for (std::string& warning :
+       run.beside.warnings(done.frames.front().time_s, done.frames.back().time_s)) {
+    done.warnings.push_back(std::move(warning));
+  }
   return RunSummary{report, request.out_dir, std::move(done.warnings), done.interrupted,
                     std::move(written)};
 }

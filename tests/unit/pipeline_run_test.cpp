@@ -25,8 +25,10 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 std::string read_file(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
@@ -218,6 +220,18 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
     EXPECT_EQ(point.rgb[0], point.rgb[1]) << "a gray camera";
   }
   EXPECT_GE(num_good, num_points * 8 / 10) << num_good << " of " << num_points;
+}
+
+TEST_F(PipelineRun, AFileWhoseTimesMissAllFramesIsAWarning) {
+  const auto warnings_with = [&](const std::string& rows) {
+    request_.gyro = folder_ / "gyro.csv";
+    std::ofstream(*request_.gyro) << rows;
+    return run_sequence(request_).value().warnings;
+  };
+  EXPECT_THAT(warnings_with("100 0 0 0\n101 0 0 0\n"),
+              Contains(HasSubstr("--gyro: expected times among those of the frames, 0 to 0.5 s, "
+                                 "found 100 to 101 s")));
+  EXPECT_THAT(warnings_with("-1 0 0 0\n0.2 0 0 0\n"), Not(Contains(HasSubstr("--gyro"))));
 }
 
 TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
