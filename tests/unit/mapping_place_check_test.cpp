@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "geometry/similarity_refinement.hpp"
+#include "mapping/place_check.hpp"
+#include "support/kept_places.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DescribedPoints;
+
+const Rigid3 kOldPose;
+/// A car that comes back 0.7 m aside, 2 m further, turned by 3 degrees.
+const Rigid3 kNewPose(so3_exp({0.005, 0.05, 0.01}), {0.7, 0.05, 2.0});
+constexpr double kOldUnits = 1.3;
+constexpr double kNewUnits = 0.8;
+
+DescribedPoints street(unsigned seed = 1) {
+  const auto path = testing::DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 1}}, 20);
+  return DescribedPoints(testing::points_along(path, 1200, seed), seed);
+}
+
+PlaceView view_of(const KeptKeyframe& keyframe) {
+  return {keyframe.camera, keyframe.corners, keyframe.descriptors};
+}
+
+/// A point of the new keyframe in the old one's unit.
+Similarity3 true_similarity() {
+  const Rigid3 motion = kOldPose.inverse() * kNewPose;
+  return {kOldUnits / kNewUnits, motion.rotation, kOldUnits * motion.translation};
+}
+
+double turn_rad(const Similarity3& a, const Similarity3& b) {
+  return a.rotation.angularDistance(b.rotation);
+}
+
+TEST(PlaceCheck, FindsTheSimilarityOfTwoViews) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  for (std::size_t i = 0; i < recent.descriptors.size(); i += 3) {
+    recent.descriptors[i] = points.draw();  // a corner that is new
+  }
+  const auto loop = check_place(view_of(old), view_of(recent));
+  ASSERT_TRUE(loop.has_value());
+  const Similarity3 truth = true_similarity();
+  EXPECT_LT(turn_rad(loop->from_to, truth), 4.0 * loop->sigma_rad);
+  EXPECT_LT((loop->from_to.translation - truth.translation).norm(), 6.0 * loop->sigma_translation);
+  EXPECT_LT(std::abs(std::log(loop->from_to.scale / truth.scale)), 4.0 * loop->sigma_log_scale);
+  EXPECT_LT(loop->sigma_rad, 0.005);
+  EXPECT_LT(loop->sigma_translation, 0.2);
+  EXPECT_LT(loop->sigma_log_scale, 0.02);
+  EXPECT_GE(loop->corners.size(), 30U);
+  for (const auto& [mine, other] : loop->corners) {
+    EXPECT_EQ(old.corners[static_cast<std::size_t>(mine)].track_id + 100000,
+              recent.corners[static_cast<std::size_t>(other)].track_id);
+  }
+}
+
+TEST(PlaceCheck, AnotherStreetIsNone) {
+  DescribedPoints one = street(1);
+  DescribedPoints other = street(2);
+  EXPECT_FALSE(
+      check_place(view_of(one.see(kOldPose, 1.0, 0)), view_of(other.see(kNewPose, 1.0, 100000)))
+          .has_value());
+}
+
+TEST(PlaceCheck, BothMustAgree) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  for (KeptCorner& corner : recent.corners) {
+    corner.in_camera *= corner.track_id % 2 == 0 ? 1.0F : 2.0F;  // what it sees is another shape
+  }
+  EXPECT_FALSE(check_place(view_of(old), view_of(recent)).has_value());
+}
+
+TEST(PlaceCheck, APartOfTheImageIsNotEnough) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  for (std::size_t i = 0; i < recent.corners.size(); ++i) {
+    const Eigen::Vector2f uv = recent.corners[i].uv;
+    if (uv.x() > 600.0F || uv.y() < 90.0F) {
+      recent.descriptors[i] = points.draw();
+    }
+  }
+  EXPECT_FALSE(check_place(view_of(old), view_of(recent)).has_value());
+}
+
+TEST(PlaceCheck, LocatesAFrameWithoutLandmarks) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe frame = points.see(kNewPose, 1.0, 100000);
+  for (KeptCorner& corner : frame.corners) {
+    corner.in_camera.setConstant(NAN);
+  }
+  const auto found = locate_in_place(view_of(old), view_of(frame));
+  ASSERT_TRUE(found.has_value());
+  const Similarity3 truth = true_similarity();
+  EXPECT_LT(found->old_from_camera.rotation.angularDistance(truth.rotation), 0.002);
+  EXPECT_LT((found->old_from_camera.translation - truth.translation).norm(), 0.05);
+  DescribedPoints other = street(2);
+  EXPECT_FALSE(locate_in_place(view_of(old), view_of(other.see(kNewPose, 1.0, 0))).has_value());
+}
+
+/// Errors over their own standard deviations: rotation, translation, log scale.
+TEST(SimilarityRefinement, CovarianceIsThatOfTheErrors) {
+  constexpr double kNoise_px = 0.8;
+  constexpr int kRuns = 60;
+  const Similarity3 truth = true_similarity();
+  Eigen::Matrix<double, 7, 1> mean_square = Eigen::Matrix<double, 7, 1>::Zero();
+  for (int run = 0; run < kRuns; ++run) {
+    std::mt19937 random(static_cast<unsigned>(run));
+    std::normal_distribution<double> noise(0.0, kNoise_px);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    CrossObservations seen{testing::kitti_camera(), testing::kitti_camera(), {}, {}};
+    for (int i = 0; i < 80; ++i) {
+      const double depth = 15.0 + 10.0 * uniform(random);
+      const double x = 0.6 * depth * uniform(random);
+      const double y = 0.2 * depth * uniform(random);
+      const Eigen::Vector3d in_b(x, y, depth);
+      const Eigen::Vector3d in_a = truth * in_b;
+      const double u = noise(random);
+      const double v = noise(random);
+      const Eigen::Vector2d off(u, v);
+      if (i % 2 == 0) {
+        seen.of_b.push_back({in_b, seen.a.project(in_a) + off});
+      } else {
+        seen.of_a.push_back({in_a, seen.b.project(in_b) + off});
+      }
+    }
+    Similarity3 start = truth;
+    start.scale *= 1.1;
+    start.rotation = so3_exp({0.02, -0.02, 0.01}) * start.rotation;
+    start.translation += Eigen::Vector3d(0.3, -0.2, 0.5);
+    const auto found = refine_similarity(start, seen, {.loss_scale_px = 100.0});
+    Eigen::Matrix<double, 7, 1> error;
+    error << so3_log(truth.rotation * found.a_from_b.rotation.conjugate()),
+        truth.translation - found.a_from_b.translation,
+        std::log(truth.scale / found.a_from_b.scale);
+    mean_square += error.cwiseAbs2().cwiseQuotient(found.covariance.diagonal()) /
+                   (kRuns * kNoise_px * kNoise_px);
+  }
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_NEAR(mean_square[i], 1.0, 0.6) << i;
+  }
+}
+
+TEST(SimilarityRefinement, TooFewPointsTellNothing) {
+  const CrossObservations none{testing::kitti_camera(), testing::kitti_camera(), {}, {}};
+  const auto found = refine_similarity(true_similarity(), none);
+  EXPECT_EQ(found.a_from_b.scale, true_similarity().scale);
+  EXPECT_TRUE(std::isinf(found.covariance(6, 6)));
+}
+
+}  // namespace
+}  // namespace stemvo

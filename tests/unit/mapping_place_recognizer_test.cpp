@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "mapping/place_recognizer.hpp"
+#include "support/kept_places.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DescribedPoints;
+
+constexpr int kLength = 60;
+/// Of the second round: its units are others.
+constexpr double kUnits = 1.4;
+
+/// A street, driven twice, half a metre aside; between the rounds the camera sees nothing of it.
+/// Every keyframe is looked up; tracks are new every 6 keyframes.
+struct TwoRounds {
+  explicit TwoRounds(unsigned seed)
+      : path(testing::DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 2}}, kLength)),
+        points(testing::points_along(path, 2000, seed), seed),
+        elsewhere(testing::points_along(path, 2000, seed + 100), seed + 100) {}
+
+  std::optional<Loop> add(DescribedPoints& seen, const Rigid3& pose, double units) {
+    const int number = static_cast<int>(map.keyframes.size());
+    KeptKeyframe keyframe = seen.see(pose, units, 10000 * (number / 6));
+    keyframe.frame = 5 * number;
+    map.map_from_keyframe.emplace_back(keyframe.world_from_camera);
+    map.keyframes.push_back(keyframe);
+    if (!recognizer.asks(keyframe)) {
+      return std::nullopt;
+    }
+    ++num_lookups;
+    const auto loop = recognizer.recognize(map, number, keyframe);
+    if (!recognizer.shows_kept_place()) {
+      recognizer.add(number, keyframe);
+      ++num_places;
+    }
+    return loop;
+  }
+  [[nodiscard]] Rigid3 aside(int i) const {
+    return path[static_cast<std::size_t>(i)] * Rigid3(so3_exp({0.0, 0.02, 0.0}), {0.5, 0.0, 0.3});
+  }
+  void first_round() {
+    for (int i = 0; i < kLength; ++i) {
+      EXPECT_FALSE(add(points, path[static_cast<std::size_t>(i)], 1.0).has_value()) << i;
+    }
+    for (int i = 0; i < 30; ++i) {
+      EXPECT_FALSE(add(elsewhere, path[static_cast<std::size_t>(i)], 1.0).has_value()) << i;
+    }
+  }
+
+  std::vector<Rigid3> path;
+  DescribedPoints points;
+  DescribedPoints elsewhere;
+  KeptMap map;
+  PlaceRecognizer recognizer;
+  int num_lookups = 0;
+  int num_places = 0;
+};
+
+TEST(PlaceRecognizer, AStreetThatIsDrivenAgainIsRecognized) {
+  TwoRounds drive(3);
+  drive.first_round();
+  const int num_before = drive.num_lookups;
+  const int places_before = drive.num_places;
+  int num_loops = 0;
+  for (int i = 0; i < kLength; ++i) {
+    const auto loop = drive.add(drive.points, drive.aside(i), kUnits);
+    if (loop.has_value()) {
+      ++num_loops;
+      const Rigid3& old = drive.path[static_cast<std::size_t>(loop->from)];
+      const Rigid3 truth = old.inverse() * drive.aside(i);
+      EXPECT_LT((loop->from_to.translation - truth.translation).norm(), 0.15);
+      EXPECT_LT(loop->from_to.rotation.angularDistance(truth.rotation), 0.005);
+      EXPECT_NEAR(loop->from_to.scale, 1.0 / kUnits, 0.02);
+      EXPECT_EQ(loop->to, kLength + 30 + i);
+    }
+  }
+  EXPECT_GE(num_loops, (drive.num_lookups - num_before) * 8 / 10);
+  EXPECT_GT(num_loops, 8);
+  // What was recognized is kept once.
+  EXPECT_LE(drive.num_places - places_before, 2);
+}
+
+TEST(PlaceRecognizer, OneSightingIsNotBelieved) {
+  TwoRounds drive(4);
+  KeptKeyframe alone = drive.points.see(drive.path[10], 1.0, 0);
+  drive.map.keyframes.push_back(alone);
+  drive.map.map_from_keyframe.emplace_back();
+  drive.recognizer.add(0, alone);
+  for (int i = 0; i < 30; ++i) {
+    (void)drive.add(drive.elsewhere, drive.path[static_cast<std::size_t>(i)], 1.0);
+  }
+  EXPECT_FALSE(drive.add(drive.points, drive.aside(10), 1.0).has_value());
+}
+
+TEST(PlaceRecognizer, ALostFrameIsLocatedInTheOldMap) {
+  TwoRounds drive(5);
+  drive.first_round();
+  int num_located = 0;
+  for (int i = 5; i < 40; i += 5) {
+    KeptKeyframe frame = drive.points.see(drive.aside(i), 1.0, 0);
+    for (KeptCorner& corner : frame.corners) {
+      corner.in_camera.setConstant(NAN);
+    }
+    const auto found =
+        drive.recognizer.locate(drive.map, frame.camera, frame.corners, frame.descriptors);
+    if (found.has_value()) {
+      ++num_located;
+      const Rigid3 pose =
+          drive.path[static_cast<std::size_t>(found->keyframe)] * found->keyframe_from_camera;
+      EXPECT_LT((pose.translation - drive.aside(i).translation).norm(), 0.1);
+      EXPECT_GE(found->landmarks.size(), 30U);
+    }
+  }
+  EXPECT_EQ(num_located, 7);
+  DescribedPoints nowhere(testing::points_along(drive.path, 2000, 77), 77);
+  const KeptKeyframe frame = nowhere.see(drive.path[20], 1.0, 0);
+  EXPECT_FALSE(drive.recognizer.locate(drive.map, frame.camera, frame.corners, frame.descriptors)
+                   .has_value());
+}
+
+}  // namespace
+}  // namespace stemvo
