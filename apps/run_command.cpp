@@ -44,16 +44,18 @@ undistorted, and over 1.5 megapixels made smaller. Without camera_height the pat
 too.
 
 --out (a new results/NAME of INPUT without it) receives trajectory_kitti.txt and
-trajectory_tum.txt (the poses), report.html (all there is to look at, for a browser),
-trajectory.png (the path drawn), metrics.json (the numbers), frames.csv (a row per frame),
-config.yaml (what was run) and, with --map, map.ply.
+trajectory_tum.txt (the poses as they came), trajectory_map_kitti.txt and trajectory_map_tum.txt
+(as the map has them in the end, with its loops), map.ply (landmarks and path), report.html (all
+there is to look at, for a browser), trajectory.png (the path drawn), metrics.json (the numbers),
+frames.csv (a row per frame) and config.yaml (what was run).
 
 Examples:
   stemvo run kitti/sequences/03 --out result
 the paper's protocol:
   stemvo run kitti/sequences/03 --out result --set scale.source=ground_truth
-with a point cloud:
-  stemvo run kitti/sequences/03 --out result --map
+a second visit, localized in the map of the first:
+  stemvo run visit1 --out first --save-map place.map
+  stemvo run visit2 --out second --map place.map
 on gray images, the first hundred:
   stemvo run kitti/sequences/03 --out gray --set stem.model=gray --frames 0:100
 the paper's recipe, drawn:
@@ -81,9 +83,6 @@ void print_summary(const RunArguments& arguments, const RunSummary& summary) {
     print(fmt::format("results: {}\n", summary.out_dir.string()));
   }
   print(fmt::format("report: {}\n", (summary.out_dir / "report.html").string()));
-  if (arguments.request.write_map) {
-    print(fmt::format("map: {}\n", (summary.out_dir / "map.ply").string()));
-  }
 }
 
 Expected<int> run(RunArguments& arguments) {
@@ -163,8 +162,11 @@ void add_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
-  command.add_flag("--map", request.write_map,
-                   "Also map.ply: landmarks and path, for MeshLab and others (odometry.mode map)");
+  add_file_option(
+      command, "--map", request.map,
+      "A map that --save-map wrote: the camera finds itself in it (map_* in frames.csv)");
+  add_file_option(command, "--save-map", request.saved_map,
+                  "Write what was remembered, adjusted, with the places of --map");
   command.add_flag("--timing", request.measure_times,
                    "Also where the time went: a table, and the key timing in metrics.json");
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Odometry: the library's asynchronous one in Python.
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -10,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nanobind/eigen/dense.h>
+#include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -118,6 +120,16 @@ class PythonOdometry {
   }
   void reset() {
     in_turn([&] { return check_idle("reset").and_then([&] { return odometry_.reset(); }); });
+  }
+
+  AdjustedMap adjust_map(const std::vector<int>& covariance_of) const {
+    return value_or_raise(unlocked([&] { return odometry_.adjust_map(covariance_of); }));
+  }
+  void save_map(const std::filesystem::path& file) const {
+    value_or_raise(unlocked([&] { return odometry_.save_map(file); }));
+  }
+  void load_map(const std::filesystem::path& file) {
+    in_turn([&] { return odometry_.load_map(file); });
   }
 
   MapChanges landmarks_since(int version) const {
@@ -231,6 +243,11 @@ void bind_odometry(nb::module_& module) {
            "Of the camera along its path, as wheels or GPS tell it; metres from then on")
       .def("add_distance", &PythonOdometry::add_distance, "begin"_a, "end"_a, "metres"_a, "sigma"_a,
            "The camera's way between two times, likewise")
+      .def("adjust_map", &PythonOdometry::adjust_map, "covariance_of"_a = std::vector<int>(),
+           "All frames so far at once; covariance_of: frames of keyframes")
+      .def("save_map", &PythonOdometry::save_map, "file"_a, "Adjusted, for load_map")
+      .def("load_map", &PythonOdometry::load_map, "file"_a,
+           "Before the first frame: its places are recognized from then on")
       .def("landmarks", &PythonOdometry::landmarks,
            "Nx3 in the world, and Nx3 colours: well seen ones, placed by the trajectory")
       .def("landmarks_since", &PythonOdometry::landmarks_since, "version"_a,

@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: MIT
-// Result, MapChanges, Keyframe: what an odometry gives.
+// Result, MapChanges, Keyframe, AdjustedMap: what an odometry gives.
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
+#include "stemvo/map.hpp"
 
 namespace stemvo::python {
 namespace {
@@ -28,6 +32,23 @@ void bind_result(nb::module_& module) {
       .def_prop_ro(
           "world_from_camera", [](const FrameResult& r) { return array_of(r.world_from_camera); },
           nb::rv_policy::move, "4x4")
+      .def_prop_ro(
+          "map_from_world",
+          [](const FrameResult& r) {
+            Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+            const Similarity3& map_from_world = r.map_from_world;
+            matrix.topLeftCorner<3, 3>() =
+                map_from_world.scale * map_from_world.rotation.toRotationMatrix();
+            matrix.topRightCorner<3, 1>() = map_from_world.translation;
+            return matrix;
+          },
+          "4x4, a similarity: the correction so far, by places that were recognized")
+      .def_prop_ro(
+          "recognized_frame",
+          [](const FrameResult& r) {
+            return r.recognized_frame == -1 ? std::nullopt : std::optional(r.recognized_frame);
+          },
+          "Whose place this one shows; below 0: of a map that was loaded; None: none recognized")
       .def_prop_ro(
           "motion_covariance", [](const FrameResult& r) { return r.motion_covariance; },
           "6x6, of the motion since the last frame: x y z, then rotation, about this frame's axes")
@@ -87,11 +108,47 @@ void bind_map(nb::module_& module) {
           nb::rv_policy::move, "4x4, as it came");
 }
 
+void bind_adjusted_map(nb::module_& module) {
+  nb::class_<AdjustedKeyframe>(module, "AdjustedKeyframe")
+      .def_ro("frame", &AdjustedKeyframe::frame, "Results before its own")
+      .def_ro("timestamp", &AdjustedKeyframe::time_s)
+      .def_prop_ro(
+          "map_from_camera", [](const AdjustedKeyframe& k) { return array_of(k.map_from_camera); },
+          nb::rv_policy::move, "4x4")
+      .def_prop_ro(
+          "covariance", [](const AdjustedKeyframe& k) { return k.covariance; },
+          "6x6, in the camera's axes: x y z, then rotation; None: not asked for");
+  nb::class_<AdjustedMap>(module, "AdjustedMap", "All that was seen, adjusted at once")
+      .def_prop_ro(
+          "map_from_camera", [](const AdjustedMap& m) { return array_of(m.map_from_camera); },
+          nb::rv_policy::move, "Nx4x4, of all frames")
+      .def_prop_ro("keyframes", [](const AdjustedMap& m) { return m.keyframes; })
+      .def_prop_ro(
+          "landmarks", [](const AdjustedMap& m) { return arrays_of(m.landmarks); },
+          "Nx3 in the map, and Nx3 colours")
+      .def_prop_ro(
+          "loops",
+          [](const AdjustedMap& m) {
+            std::vector<std::pair<int, int>> frames;
+            for (const MapLoop& loop : m.loops) {
+              frames.emplace_back(loop.from_frame, loop.to_frame);
+            }
+            return frames;
+          },
+          "Pairs of frames that show one place")
+      .def_prop_ro(
+          "camera", [](const AdjustedMap& m) { return m.camera; }, "As all frames tell it")
+      .def_prop_ro(
+          "camera_sigma", [](const AdjustedMap& m) { return m.camera_sigma; },
+          "None: the camera is not refined");
+}
+
 }  // namespace
 
 void bind_results(nb::module_& module) {
   bind_result(module);
   bind_map(module);
+  bind_adjusted_map(module);
 }
 
 }  // namespace stemvo::python

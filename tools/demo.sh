@@ -13,5 +13,5 @@ if [[ ! -f $DATA/stamp || "$(<"$DATA/stamp")" != "$rendered_by" ]]; then
   echo "$rendered_by" >"$DATA/stamp"
 fi
 echo "==> Running stemvo on it (metres from the road and the camera's height; no ground truth, no alignment)"
-"$PROGRAM" run "$DATA/sequences/00" --out "$OUT" --map
+"$PROGRAM" run "$DATA/sequences/00" --out "$OUT"
 echo "==> To look at, in a browser: $PWD/$OUT/report.html (the map: map.ply beside it)"

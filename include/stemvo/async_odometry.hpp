@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -66,6 +67,11 @@ class AsyncOdometry {
   [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
   [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
   [[nodiscard]] cv::Mat channel_image() const;
+
+  /// As those of Odometry. The first two may be called from any thread, and are of the frames done.
+  [[nodiscard]] Expected<AdjustedMap> adjust_map(const std::vector<int>& covariance_of = {}) const;
+  [[nodiscard]] Status save_map(const std::filesystem::path& file) const;
+  [[nodiscard]] Status load_map(const std::filesystem::path& file);
 
  private:
   struct Impl;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
+#include "stemvo/map.hpp"
 #include "stemvo/options.hpp"
 
 namespace stemvo {
@@ -86,6 +88,18 @@ class Odometry {
   [[nodiscard]] MapChanges landmarks_since(int version) const;
   /// Those from id `first` on: they stay as they are.
   [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
+
+  /// Adjusts all frames so far at once; the odometry goes on as it was. It takes as long as the
+  /// map is large. `covariance_of`: frames of keyframes. Errors: nothing is remembered
+  /// (odometry.mode two_frame, odometry.loops off); a frame that is no keyframe.
+  [[nodiscard]] Expected<AdjustedMap> adjust_map(const std::vector<int>& covariance_of = {}) const;
+  /// Writes the map, adjusted, to a file that load_map() reads. Errors: likewise; it cannot be
+  /// written.
+  [[nodiscard]] Status save_map(const std::filesystem::path& file) const;
+  /// Before the first frame: places of that map are recognized, and FrameResult::map_from_world is
+  /// where the world lies in it from then on. The camera may be another one. Errors: likewise; a
+  /// frame came before; no map, damaged, or one of another channel.
+  [[nodiscard]] Status load_map(const std::filesystem::path& file);
 
   /// The points tracked on the last image.
   [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;

@@ -5,11 +5,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from . import _core
-from ._core import (Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result, __version__, align, evaluate,
-                    read_recording)
+from ._core import (AdjustedKeyframe, AdjustedMap, Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result,
+                    __version__, align, evaluate, read_recording)
 
 __all__ = [
-    "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "evaluate",
+    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "evaluate",
     "read_recording",
 ]
 

@@ -130,7 +130,8 @@ def show_live(rr, recording, options):
 
 
 def show_result(rr, folder, open_recording):
-    poses = read_poses(folder / "trajectory_kitti.txt")
+    in_map = folder / "trajectory_map_kitti.txt"  # map.ply is in it
+    poses = read_poses(in_map if in_map.exists() else folder / "trajectory_kitti.txt")
     with open(folder / "frames.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     if len(rows) != len(poses):

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// report.html of a run: {title, subtitle, unit, frames_csv, estimate, truth, segments, metrics, numbers, stages, images, ..}.
+// report.html of a run: {title, subtitle, unit, frames_csv, estimate, map, truth, segments, metrics, numbers, stages, images, ..}.
 
 function columns_of(csv) {
   const [names, ...rows] = csv.trimEnd().split("\n").map((line) => line.split(","));
@@ -62,11 +62,12 @@ function path_in_space(paths, unit) {
            layout: { large: true, scene }, frame_trace: traces.length - 1 };
 }
 
-function errors_over_distance({ travelled, position, height }, texts) {
+function errors_over_distance({ travelled, position, height }, in_map, texts) {
   const has_gaps = travelled.some(Number.isNaN), mode = has_gaps ? "lines+markers" : "lines";
   const traces = [
     { name: "position", y: position, text: texts, hoverinfo: "text+name" },
     { name: "height, too high is above 0", y: height },
+    ...(in_map ? [{ name: "position in the map", y: in_map.position }] : []),
   ].map((trace) => ({ ...trace, x: travelled, mode, connectgaps: has_gaps }));
   const layout = { xaxis: titled("true path, m", 3), yaxis: titled("error, m", 3) };
   return { heading: "Error over distance", traces, layout, frame_trace: 0 };
@@ -146,22 +147,28 @@ function times(frames) {
            layout: { xaxis: frames_axis(frames), yaxis: titled("ms", 1), hovermode: "x unified" }, frame_trace: 0 };
 }
 
+// Lines between frames that show one place, on the path of the map.
+function loops_of({ x, z, loops }) {
+  const between = (axis) => loops.flatMap(([from, to]) => [axis[from], axis[to], null]);
+  return { name: "loops", x: between(x), z: between(z), dotted: true };
+}
+
 function run_page(run) {
   const frames = columns_of(run.frames_csv), { unit } = run;
   const estimate = { name: "estimate", ...run.estimate }, truth = run.truth && { name: TRUTH, ...run.truth };
-  const errors = truth && errors_of(estimate, truth);
+  const errors = truth && errors_of(estimate, truth), map = run.map && { name: "map", ...run.map };
   const texts = frames.frame.map((frame, k) => {
     const text = `frame ${frame}: ${frames.state[k]}, ${frames.inliers[k]} of ${frames.matches[k]} tracks are inliers`;
     const { position, travelled } = errors ?? { position: [] };
     return position[k] >= 0 ? `${text}, ${length_text(position[k], 2)} m off after ${length_text(travelled[k], 1)} m` : text;
   });
-  const paths = truth ? [truth, estimate] : [estimate];
+  const paths = [truth, map, estimate].filter(Boolean), loops = map && map.loops.length > 0 ? [loops_of(map)] : [];
   const sections = [
     paths_from_above("Path from above", "With a mouse: drag to move, wheel (or + and -) to zoom, double click to see all.",
-                     paths.map((one) => (one === estimate ? { ...one, texts } : one)), unit),
+                     loops.concat(paths).map((one) => (one === estimate ? { ...one, texts } : one)), unit),
     { heading: "Numbers", text: run.numbers },
     path_in_space(paths, unit),
-    errors && errors_over_distance(errors, texts),
+    errors && errors_over_distance(errors, map && errors_of(map, truth), texts),
     run.metrics.segments && errors_by_length(run.segments),
     tracks(frames), scale_and_camera(frames, estimate, unit), times(frames),
     run.stages && { heading: "Stages", text: run.stages },

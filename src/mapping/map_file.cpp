@@ -181,13 +181,20 @@ bool is_similarity(const Similarity3& a) {
 /// Whether the list has an element of this number.
 bool holds(const auto& list, int i) { return i >= 0 && std::cmp_less(i, list.size()); }
 
+bool is_number(std::int64_t frame_or_track) {
+  constexpr std::int64_t kMax = 1'000'000'000;  // they are moved by as many
+  return std::abs(frame_or_track) <= kMax;
+}
+
 bool is_corner(const KeptCorner& corner) {
-  return corner.uv.allFinite() && (!corner.has_landmark() || corner.in_camera.allFinite());
+  return is_number(corner.track_id) && corner.uv.allFinite() &&
+         (!corner.has_landmark() || corner.in_camera.allFinite());
 }
 
 std::string_view flaw_of(const KeptKeyframe& keyframe) {
-  return !std::isfinite(keyframe.time_s)  ? "a finite time"
-         : !check_camera(keyframe.camera) ? "a camera"
+  return !is_number(keyframe.frame)        ? "a frame's number"
+         : !std::isfinite(keyframe.time_s) ? "a finite time"
+         : !check_camera(keyframe.camera)  ? "a camera"
          : !is_motion(keyframe.world_from_camera.rotation, keyframe.world_from_camera.translation)
              ? "a pose"
          : !std::ranges::all_of(keyframe.corners, is_corner) ? "finite corners"

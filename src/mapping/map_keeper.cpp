@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -134,8 +135,27 @@ std::vector<KeptCorner> corners_of(const WindowView& view, const Keyframe& keyfr
 }
 
 void MapKeeper::load(KeptMap map) {
+  constexpr int kNone = -1;  // no frame's number, nor a track's
+  constexpr double kPause_s = 3600.0;
   map_ = std::move(map);
   components_.assign(map_.keyframes.size(), 0);
+  if (map_.keyframes.empty()) {
+    return;
+  }
+  int last_track = std::numeric_limits<int>::min();
+  for (const KeptKeyframe& keyframe : map_.keyframes) {
+    last_track = keyframe.corners.empty() ? last_track
+                                          : std::max(last_track, keyframe.corners.back().track_id);
+  }
+  const int last_frame = map_.keyframes.back().frame;
+  const double last_time_s = map_.keyframes.back().time_s;
+  for (KeptKeyframe& keyframe : map_.keyframes) {
+    keyframe.frame += kNone - 1 - last_frame;
+    keyframe.time_s -= last_time_s + kPause_s;
+    for (KeptCorner& corner : keyframe.corners) {
+      corner.track_id += kNone - 1 - last_track;
+    }
+  }
 }
 
 int MapKeeper::node_of(int frame) const {

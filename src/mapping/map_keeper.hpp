@@ -34,7 +34,8 @@ struct WindowView {
 /// younger one is moved to the older.
 class MapKeeper {
  public:
-  /// Begins with what another recording left: frames below 0.
+  /// Before the first node: what another recording left, whose frames and times come to lie before
+  /// this one's.
   void load(KeptMap map);
 
   /// Makes nodes of the window's keyframes that are none yet, but for those whose frame is in work.

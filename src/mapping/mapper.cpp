@@ -81,6 +81,11 @@ auto Mapper::begin(Task task) const {
   return std::async(where, std::move(task)).share();
 }
 
+void Mapper::load(KeptMap map) {
+  keeper_.load(std::move(map));
+  recognizer_.load(keeper_.map());
+}
+
 Recognition Mapper::observe(const WindowView& view, std::shared_ptr<const ImagePyramid> image) {
   Recognition recognition;
   if (!is_on_) {

@@ -41,6 +41,8 @@ class Mapper {
  public:
   explicit Mapper(const Options& options);
 
+  /// Before the first keyframe: what another recording left.
+  void load(KeptMap map);
   /// The window has a new keyframe, which came with this image; those before it have all their
   /// corners now.
   [[nodiscard]] Recognition observe(const WindowView& view,

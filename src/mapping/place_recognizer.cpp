@@ -80,6 +80,19 @@ double turn_of(const Similarity3& motion) {
 
 }  // namespace
 
+void PlaceRecognizer::load(const KeptMap& map) {
+  num_loaded_ = static_cast<int>(map.keyframes.size());
+  for (int i = 0; i < num_loaded_; ++i) {
+    if (!keyframe_of(map, i).descriptors.empty()) {
+      add(i, keyframe_of(map, i));
+    }
+  }
+}
+
+int PlaceRecognizer::end_of_far(int number) const {
+  return std::max(number - kMinApart, num_loaded_);
+}
+
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
   return num_lookups_ == 0 ||
          (keyframe.frame - last_frame_ >= kMinFrames &&
@@ -102,7 +115,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
   const double depth = median_depth(keyframe.corners);
   std::vector<int> to_check;
   for (const PlaceCandidate& candidate :
-       index_.candidates(keyframe.descriptors, number - kMinApart, kMaxCandidates)) {
+       index_.candidates(keyframe.descriptors, end_of_far(number), kMaxCandidates)) {
     to_check.push_back(candidate.keyframe);
   }
   const std::size_t num_candidates = to_check.size();
@@ -135,7 +148,7 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
 std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
     const KeptMap& map, int place, int number, const KeptKeyframe& keyframe) const {
   const KeptKeyframe& old = keyframe_of(map, place);
-  if (place >= number - kMinApart || num_shared(track_ids_of(old), last_tracks_) > kMaxTracks) {
+  if (place >= end_of_far(number) || num_shared(track_ids_of(old), last_tracks_) > kMaxTracks) {
     return std::nullopt;
   }
   std::optional<Loop> loop = check_place(view_of(old), view_of(keyframe));

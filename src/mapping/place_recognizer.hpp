@@ -30,6 +30,8 @@ struct LocatedFrame {
 /// unless it shows a kept place add(). The same answers on every run.
 class PlaceRecognizer {
  public:
+  /// Before the first keyframe: all places of another recording, none of which is too near.
+  void load(const KeptMap& map);
   /// Whether the keyframe is worth a lookup: it shows enough that the last one looked up did not,
   /// some frames ago.
   [[nodiscard]] bool asks(const KeptKeyframe& keyframe) const;
@@ -62,6 +64,8 @@ class PlaceRecognizer {
                                                 int number,
                                                 const KeptKeyframe& keyframe) const;
   [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, double depth) const;
+  /// Keyframes below this number are far enough before that one.
+  [[nodiscard]] int end_of_far(int number) const;
   /// Places just before and behind a place.
   [[nodiscard]] std::vector<int> neighbours_of(int place) const;
 
@@ -72,6 +76,7 @@ class PlaceRecognizer {
   int last_frame_ = 0;               ///< looked up
   std::vector<Sighting> sightings_;  ///< of the last lookups
   int num_lookups_ = 0;
+  int num_loaded_ = 0;  ///< the first keyframes of the map are another recording's
   bool shows_kept_place_ = false;
   /// Where frames were located last, unconfirmed: map_from_camera.
   std::vector<Similarity3> located_;

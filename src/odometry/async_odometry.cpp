@@ -12,6 +12,7 @@
 #include "odometry/check_frame.hpp"
 #include "odometry/event_log.hpp"
 #include "odometry/odometry_loops.hpp"
+#include "odometry/whole_map.hpp"
 
 namespace stemvo {
 
@@ -54,6 +55,15 @@ struct AsyncOdometry::Impl {
                     ? "the odometry has ended: an earlier frame or its callback failed, and "
                       "finish() throws why"
                     : "expected no frame after finish(), found one");
+  }
+
+  [[nodiscard]] Expected<WholeMap> adjusted_map(const std::string& asked,
+                                                const std::vector<int>& covariance_of) const {
+    return odometry.check_remembers(asked).and_then([&]() -> Expected<WholeMap> {
+      WholeMap map = loops.ask([&](const auto&) { return WholeMap(odometry); });
+      const Status status = map.adjust(covariance_of);
+      return status ? Expected<WholeMap>(std::move(map)) : status.error();
+    });
   }
 
   PhasedOdometry odometry;
@@ -207,6 +217,34 @@ std::vector<TrackedPoint> AsyncOdometry::tracked_points() const {
 cv::Mat AsyncOdometry::channel_image() const {
   return impl_ ? impl_->loops.ask([](const auto& frames) { return frames.image().pixels; })
                : cv::Mat();
+}
+
+Expected<AdjustedMap> AsyncOdometry::adjust_map(const std::vector<int>& covariance_of) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  return impl_->adjusted_map("adjust_map", covariance_of).map([](const WholeMap& map) {
+    return map.answer();
+  });
+}
+
+Status AsyncOdometry::save_map(const std::filesystem::path& file) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  return impl_->adjusted_map(file.string(), {}).and_then([&](const WholeMap& map) {
+    return impl_->odometry.save_map(file, map);
+  });
+}
+
+Status AsyncOdometry::load_map(const std::filesystem::path& file) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->turn);
+  return impl_->check.check_none_admitted(file.string()).and_then([&] {
+    return impl_->odometry.load_map(file);
+  });
 }
 
 }  // namespace stemvo

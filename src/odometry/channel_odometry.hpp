@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -40,6 +41,9 @@ class ChannelOdometry {
   /// The last three for one frame; one without an image stands for a frame that could not be read:
   /// the last motion goes on.
   FrameResult process(Frame frame);
+
+  /// As Estimator's.
+  void load_map(KeptMap map) { estimator_->load_map(std::move(map)); }
 
   [[nodiscard]] const Camera& given_camera() const { return given_camera_; }
   /// One per frame optimized.

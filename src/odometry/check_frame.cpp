@@ -77,4 +77,10 @@ Status FrameCheck::admit(const cv::Mat& image,
   return status;
 }
 
+Status FrameCheck::check_none_admitted(const std::string& asked) const {
+  return last_time_s_ ? Status(fail(asked + ": expected a call before the first frame, found one "
+                                            "behind it"))
+                      : Status();
+}
+
 }  // namespace stemvo

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <opencv2/core.hpp>
 
@@ -31,6 +32,8 @@ class FrameCheck {
                              PixelOrder order,
                              double time_s,
                              const FrameHints& hints);
+  /// Error: a frame was admitted. `asked`: what for is the time before.
+  [[nodiscard]] Status check_none_admitted(const std::string& asked) const;
   /// The next frame may have any time.
   void restart() { last_time_s_.reset(); }
 

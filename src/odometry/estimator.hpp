@@ -114,6 +114,8 @@ class Estimator {
   /// What is remembered, the keyframes of the window among it; nothing where there is no window or
   /// loops are off.
   [[nodiscard]] virtual KeptMap kept_map() const { return {}; }
+  /// Before the first frame: what an earlier recording remembered may be recognized.
+  virtual void load_map(KeptMap /*map*/) {}
   /// Numbers of the frames that are keyframes or were, in order.
   [[nodiscard]] virtual std::span<const int> keyframes() const { return {}; }
 };

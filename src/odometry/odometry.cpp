@@ -7,10 +7,20 @@
 #include "odometry/check_frame.hpp"
 #include "odometry/event_log.hpp"
 #include "odometry/phased_odometry.hpp"
+#include "odometry/whole_map.hpp"
 
 namespace stemvo {
 
 struct Odometry::Impl {
+  [[nodiscard]] Expected<WholeMap> adjusted_map(const std::string& asked,
+                                                const std::vector<int>& covariance_of) const {
+    return odometry.check_remembers(asked).and_then([&]() -> Expected<WholeMap> {
+      WholeMap map = WholeMap(odometry);
+      const Status status = map.adjust(covariance_of);
+      return status ? Expected<WholeMap>(std::move(map)) : status.error();
+    });
+  }
+
   PhasedOdometry odometry;
   FrameCheck check;
   WayInput ways;
@@ -84,6 +94,31 @@ std::vector<TrackedPoint> Odometry::tracked_points() const {
 }
 cv::Mat Odometry::channel_image() const {
   return impl_ ? impl_->odometry.frames().image().pixels : cv::Mat();
+}
+
+Expected<AdjustedMap> Odometry::adjust_map(const std::vector<int>& covariance_of) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  return impl_->adjusted_map("adjust_map", covariance_of).map([](const WholeMap& map) {
+    return map.answer();
+  });
+}
+
+Status Odometry::save_map(const std::filesystem::path& file) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  return impl_->adjusted_map(file.string(), {}).and_then([&](const WholeMap& map) {
+    return impl_->odometry.save_map(file, map);
+  });
+}
+
+Status Odometry::load_map(const std::filesystem::path& file) {
+  return impl_ ? impl_->check.check_none_admitted(file.string()).and_then([&] {
+    return impl_->odometry.load_map(file);
+  })
+               : moved_from();
 }
 
 }  // namespace stemvo

@@ -3,12 +3,16 @@
 
 #include <utility>
 
+#include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
 #include "internal_check.hpp"
+#include "mapping/map_file.hpp"
 #include "odometry/check_camera.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/stopwatch.hpp"
+#include "odometry/whole_map.hpp"
+#include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -68,6 +72,40 @@ Frame PhasedOdometry::prepare(const cv::Mat& given, double time_s, const FrameHi
                                     {view_.apply_to_mask(hints.mask), hints.prev_from_cur});
   frame.times.stem_ms += stem_ms;
   return frame;
+}
+
+Status PhasedOdometry::check_remembers(const std::string& asked) const {
+  const bool is_map = options_.odometry.mode == OdometryMode::kMap;
+  return is_map && options_.odometry.loops
+             ? Status()
+             : fail(fmt::format("{}: expected odometry.mode map with odometry.loops true, found {}",
+                                asked, is_map ? "loops false" : "mode two_frame"));
+}
+
+std::string PhasedOdometry::channel_name() const {
+  const StemInfo& info = stem_.info();
+  return fmt::format("{}, filter {}, sampled every {} px", info.model, info.filter,
+                     info.sampling_px);
+}
+
+Status PhasedOdometry::save_map(const std::filesystem::path& file, const WholeMap& map) const {
+  return write_map_file(file, {channel_name(), map.kept});
+}
+
+Status PhasedOdometry::load_map(const std::filesystem::path& file) {
+  if (Status status = check_remembers(file.string()); !status) {
+    return status;
+  }
+  Expected<MapFile> map = read_map_file(file);
+  if (!map) {
+    return map.error();
+  }
+  if (map->channel != channel_name()) {
+    return fail(fmt::format("{}: expected a map of channel '{}', found one of '{}'", file.string(),
+                            channel_name(), one_line(map->channel)));
+  }
+  channel_odometry_.load_map(std::move(map->map));
+  return {};
 }
 
 }  // namespace stemvo

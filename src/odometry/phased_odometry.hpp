@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
+#include <string>
 #include <utility>
 
 #include <opencv2/core.hpp>
@@ -14,6 +16,8 @@
 #include "stemvo/options.hpp"
 
 namespace stemvo {
+
+struct WholeMap;
 
 /// Odometry::process in four phases that can work on three frames at a time; the results are the
 /// same.
@@ -43,6 +47,14 @@ class PhasedOdometry {
   /// A new world: as create() left it. No frame is between its phases.
   void reset() { channel_odometry_ = ChannelOdometry(options_, view_.camera(), mask_); }
 
+  /// Error: it remembers nothing (odometry.mode two_frame, odometry.loops off). `asked`: for what.
+  [[nodiscard]] Status check_remembers(const std::string& asked) const;
+  [[nodiscard]] Status save_map(const std::filesystem::path& file, const WholeMap& map) const;
+  /// The frames that come may recognize what it shows; none has come yet. Errors: as
+  /// check_remembers; the file cannot be read, or is of another channel.
+  [[nodiscard]] Status load_map(const std::filesystem::path& file);
+
+  [[nodiscard]] const Options& options() const { return options_; }
   /// At least one.
   [[nodiscard]] int num_threads() const { return options_.threads; }
   /// It holds the frames optimized.
@@ -52,6 +64,9 @@ class PhasedOdometry {
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 
  private:
+  /// What descriptors are made on.
+  [[nodiscard]] std::string channel_name() const;
+
   PhasedOdometry(
       const Options& options, const FrameView& view, const cv::Mat& mask, Stem stem, int zoom);
 

@@ -44,6 +44,19 @@ bool is_plausible(const CameraMeasurement& found) {
 
 }  // namespace
 
+std::optional<IntrinsicsDelta> prior_sigma(CameraRefinement refinement) {
+  using Sigma = Eigen::Map<const IntrinsicsDelta>;
+  switch (refinement) {
+    case CameraRefinement::kOff:
+      return std::nullopt;
+    case CameraRefinement::kPrincipalPoint:
+      return Sigma(kPriorSigma);
+    case CameraRefinement::kAll:
+      return Sigma(kWeakPriorSigma);
+  }
+  return std::nullopt;
+}
+
 SelfCalibration::SelfCalibration(const Camera& given,
                                  CameraRefinement refinement,
                                  bool may_begin_threads)
@@ -51,8 +64,7 @@ SelfCalibration::SelfCalibration(const Camera& given,
       camera_(given),
       refinement_(refinement),
       may_begin_threads_(may_begin_threads) {
-  const Eigen::Map<const IntrinsicsDelta> sigma(
-      refinement == CameraRefinement::kAll ? kWeakPriorSigma : kPriorSigma);
+  const IntrinsicsDelta sigma = prior_sigma(refinement).value_or(IntrinsicsDelta::Ones());
   information_ = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 

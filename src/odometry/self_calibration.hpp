@@ -15,6 +15,9 @@
 
 namespace stemvo {
 
+/// Standard deviations of what is known of a given camera beforehand; nullopt: it is right.
+[[nodiscard]] std::optional<IntrinsicsDelta> prior_sigma(CameraRefinement refinement);
+
 /// Learns the camera from runs of keyframes, one after the other: principal point, focal length and
 /// the radial distortion that is left, each with a prior. The given camera is changed only
 /// where the data are significant (> 2 sigma).

@@ -38,6 +38,7 @@ class WindowEstimator final : public Estimator {
   }
   [[nodiscard]] std::span<const int> keyframes() const override { return history_.keyframes(); }
 
+  void load_map(KeptMap map) override { mapper_.load(std::move(map)); }
   [[nodiscard]] KeptMap kept_map() const override { return mapper_.map(window_view()); }
   [[nodiscard]] std::optional<CameraEstimate> camera_estimate() const override {
     return calibration_.estimate();

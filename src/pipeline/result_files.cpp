@@ -9,11 +9,10 @@
 
 #include <fmt/format.h>
 
-#include "geometry/median.hpp"
 #include "options/visit.hpp"
+#include "pipeline/map_result.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
-#include "report/map_ply.hpp"
 #include "report/run_page.hpp"
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
@@ -45,26 +44,6 @@ std::string describe_numbers(const MetricsReport& report) {
   return text;
 }
 
-/// Written units per unit of the estimate around a frame: the median over steps, since one that
-/// ends the wait for a first map spans many frames. Frames stay where no step was measured.
-double stretch_at(std::span<const Rigid3> estimated,
-                  std::span<const Rigid3> written,
-                  std::size_t frame) {
-  constexpr std::size_t kStepsAround = 5;  // to both sides
-  const auto step = [](std::span<const Rigid3> poses, std::size_t i) {
-    return (poses[i].translation - poses[i - 1].translation).norm();
-  };
-  std::vector<double> stretches;
-  const std::size_t begin = frame - std::min(frame, kStepsAround);
-  const std::size_t end = std::min(frame + kStepsAround + 1, estimated.size());
-  for (std::size_t i = begin + 1; i < end; ++i) {
-    if (const double before = step(estimated, i); before > 0.0) {
-      stretches.push_back(step(written, i) / before);
-    }
-  }
-  return stretches.empty() ? 1.0 : median(stretches);
-}
-
 /// "frames 10:20 of 03", in the folder's numbering; "frames 10: of 03" where the end is not known.
 std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
   const std::size_t begin = sequence.range().begin;
@@ -89,6 +68,17 @@ double share_in_place(const std::vector<FrameResult>& frames) {
                            : 0.0;
 }
 
+/// Frames that found the camera again in a place, behind one that had not measured it.
+std::size_t count_relocalizations(const std::vector<FrameResult>& frames) {
+  std::size_t count = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const FrameState before = frames[i - 1].state;
+    const bool was_lost = !is_measured(before) || before == FrameState::kInitializing;
+    count += was_lost && frames[i].recognized_frame != -1 ? 1 : 0;
+  }
+  return count;
+}
+
 class ResultWriter {
  public:
   ResultWriter(const Run& run, const Drive& drive)
@@ -106,14 +96,14 @@ class ResultWriter {
   }
 
   /// All but metrics.json and report.html.
-  [[nodiscard]] Status write(MetricsReport& report) const {
+  [[nodiscard]] Status write(MetricsReport& report) {
     const std::filesystem::path& folder = request_.out_dir;
-    Status written = write_poses();
+    Status written = write_poses("trajectory", trajectory_);
     report = make_report();
     keep_first(written, drive_.written);
     keep_first(written, write_text_file(folder / "config.yaml", config_text_));
-    if (request_.write_map) {
-      keep_first(written, write_map());
+    if (request_.config.odometry.mode == OdometryMode::kMap) {
+      keep_first(written, write_map(report));
     }
     keep_first(written, write_image(folder / "trajectory.png", draw_trajectory(make_plot(report))));
     keep_first(written, matched_);
@@ -126,21 +116,54 @@ class ResultWriter {
 
   [[nodiscard]] Status write_page(const MetricsReport& report) const {
     const TrajectoryPlot plot = make_plot(report);
+    std::optional<MapPage> map;
+    if (map_ && report.map) {
+      map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
+    }
     return write_run_page(request_.out_dir / "report.html",
                           {plot.title, plot.subtitle, plot.unit, report, drive_.csv, plot.estimate,
-                           truth_, drive_.images, config_text_, request_.command});
+                           map, truth_, drive_.images, config_text_, request_.command});
   }
 
  private:
-  [[nodiscard]] Status write_poses() const {
+  [[nodiscard]] Status write_poses(const std::string& name, const Trajectory& poses) const {
     const std::filesystem::path& folder = request_.out_dir;
     std::vector<double> times_s;
-    for (std::size_t i = 0; i < trajectory_.size(); ++i) {
+    for (std::size_t i = 0; i < poses.size(); ++i) {
       times_s.push_back(sequence_.time_s(i));
     }
-    Status written = write_kitti_trajectory(folder / "trajectory_kitti.txt", trajectory_);
-    keep_first(written, write_tum_trajectory(folder / "trajectory_tum.txt", times_s, trajectory_));
+    Status written = write_kitti_trajectory(folder / (name + "_kitti.txt"), poses);
+    keep_first(written, write_tum_trajectory(folder / (name + "_tum.txt"), times_s, poses));
     return written;
+  }
+
+  /// What the map makes of the run: files, and its part of the report.
+  [[nodiscard]] Status write_map(MetricsReport& report) {
+    map_ = finish_map(run_);
+    Status written = write_map_ply(run_, *map_);
+    if (!request_.config.odometry.loops) {
+      return written;
+    }
+    keep_first(written, write_poses("trajectory_map", map_->trajectory));
+    if (request_.saved_map) {
+      keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole));
+    }
+    report.map = {.num_keyframes = map_->whole.kept.keyframes.size(),
+                  .num_loops = map_->whole.kept.loops.size(),
+                  .num_relocalizations = count_relocalizations(drive_.frames),
+                  .adjustment_s = map_->adjustment_s,
+                  .metrics = std::nullopt};
+    if (truth_) {
+      report.map->metrics = metrics_of(map_->trajectory, report);
+    }
+    return written;
+  }
+
+  [[nodiscard]] Metrics metrics_of(const Trajectory& poses, const MetricsReport& report) const {
+    // A trajectory without a scale has no error in metres until one is fitted.
+    const Alignment alignment = report.is_up_to_scale() ? Alignment::kSim3 : Alignment::kNone;
+    return evaluate_aligned(take_poses(poses, truth_->frames), truth_->poses, alignment,
+                            request_.config.evaluation);
   }
 
   [[nodiscard]] MetricsReport make_report() const {
@@ -173,10 +196,7 @@ class ResultWriter {
       });
     }
     if (truth_) {
-      // A trajectory without a scale has no error in metres until one is fitted.
-      const Alignment alignment = report.is_up_to_scale() ? Alignment::kSim3 : Alignment::kNone;
-      report.metrics = evaluate_aligned(take_poses(trajectory_, truth_->frames), truth_->poses,
-                                        alignment, config.evaluation);
+      report.metrics = metrics_of(trajectory_, report);
     }
     return report;
   }
@@ -189,29 +209,14 @@ class ResultWriter {
            });
   }
 
-  /// Landmarks and the camera's path among them. Where steps are rescaled, both are.
-  [[nodiscard]] Status write_map() const {
-    const Estimator& estimator = run_.odometry.frames().estimator();
-    std::vector<ColoredPoint> points;
-    for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
-      const auto frame = static_cast<std::size_t>(landmark.frame);
-      const Eigen::Vector3d in_camera = stretch_at(estimator.trajectory(), trajectory_, frame) *
-                                        landmark.in_camera.cast<double>();
-      points.push_back({(trajectory_[frame] * in_camera).cast<float>(), landmark.rgb});
-    }
-    return write_map_ply(request_.out_dir / "map.ply", points, trajectory_);
-  }
-
   /// All frames, in the world of the ground truth where some have one.
   [[nodiscard]] TrajectoryPlot make_plot(const MetricsReport& report) const {
     TrajectoryPlot plot;
     plot.title = describe_frames(sequence_, trajectory_.size());
     plot.subtitle = describe_numbers(report);
-    plot.estimate = trajectory_;
+    plot.estimate = in_truth(trajectory_, report);
     if (truth_) {
       plot.ground_truth = truth_->poses;
-      plot.estimate =
-          align_trajectory(trajectory_, truth_->frames, truth_->poses, report.metrics->alignment);
       if (truth_->frames.size() < trajectory_.size()) {
         plot.subtitle += fmt::format(", ground truth for {} of {} frames", truth_->frames.size(),
                                      trajectory_.size());
@@ -222,6 +227,13 @@ class ResultWriter {
     return plot;
   }
 
+  /// The poses where the ground truth, if there is one, has them.
+  [[nodiscard]] Trajectory in_truth(const Trajectory& poses, const MetricsReport& report) const {
+    return truth_
+               ? align_trajectory(poses, truth_->frames, truth_->poses, report.metrics->alignment)
+               : poses;
+  }
+
   const RunRequest& request_;
   const FrameSource& sequence_;
   const Run& run_;
@@ -229,7 +241,8 @@ class ResultWriter {
   const Trajectory& trajectory_;
   std::string config_text_;
   std::optional<GroundTruth> truth_;
-  Status matched_;  ///< the ground truth of a stream
+  std::optional<MapResult> map_;  ///< nullopt: mode two_frame
+  Status matched_;                ///< the ground truth of a stream
 };
 
 }  // namespace
@@ -270,7 +283,7 @@ std::string config_text(const Run& run, std::size_t num_frames) {
 }
 
 Status write_results(const Run& run, const Drive& drive, MetricsReport& report) {
-  const ResultWriter writer(run, drive);
+  ResultWriter writer(run, drive);
   Status written = timed(Stage::kResultFiles, [&] { return writer.write(report); });
   if (const StageRecorder* recorder = StageRecorder::active()) {
     report.timing = recorder->report();

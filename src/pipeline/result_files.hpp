@@ -17,9 +17,16 @@
 namespace stemvo::pipeline {
 
 /// Files that a run writes into its folder, beside pictures/.
-inline constexpr std::array kResultNames = {
-    "config.yaml", "frames.csv",         "metrics.json",   "trajectory_kitti.txt",
-    "report.html", "trajectory_tum.txt", "trajectory.png", "map.ply"};
+inline constexpr std::array kResultNames = {"config.yaml",
+                                            "frames.csv",
+                                            "metrics.json",
+                                            "report.html",
+                                            "trajectory_kitti.txt",
+                                            "trajectory_tum.txt",
+                                            "trajectory_map_kitti.txt",
+                                            "trajectory_map_tum.txt",
+                                            "trajectory.png",
+                                            "map.ply"};
 
 /// A run refers to its request, its frames and its odometry.
 struct Run {
@@ -54,7 +61,8 @@ void keep_first(Status& first, Status next);
 
 /// Everything that is written at the end; `report` becomes what metrics.json holds:
 /// trajectory_kitti.txt, trajectory_tum.txt, config.yaml (`stemvo run --config` takes it as it is),
-/// map.ply where it is asked for, trajectory.png, metrics.json, report.html.
+/// trajectory.png, metrics.json, report.html; mode map: map.ply and, with loops,
+/// trajectory_map_kitti.txt, trajectory_map_tum.txt and the map to be saved.
 [[nodiscard]] Status write_results(const Run& run, const Drive& drive, MetricsReport& report);
 
 }  // namespace stemvo::pipeline

@@ -58,6 +58,9 @@ Status prepare_out_folder(const Run& run) {
   if (status && run.request.image_every > 0) {
     status = pipeline::create_out_folder(out / "pictures");
   }
+  if (status && run.request.saved_map) {
+    status = check_can_write(*run.request.saved_map);
+  }
   return status ? write_text_file(out / "config.yaml", pipeline::config_text(run, 0)) : status;
 }
 
@@ -137,6 +140,16 @@ Expected<RunSummary> run_source(RunRequest request,
   if (!odometry) {
     return odometry.error();
   }
+  if (request.saved_map) {
+    if (Status status = odometry->check_remembers("--save-map"); !status) {
+      return status.error();
+    }
+  }
+  if (request.map) {
+    if (Status status = odometry->load_map(*request.map); !status) {
+      return status.error();
+    }
+  }
   if (request.out_dir.empty()) {
     const auto folder = pipeline::create_results_folder(sequence.name());
     if (!folder) {
@@ -147,7 +160,8 @@ Expected<RunSummary> run_source(RunRequest request,
   const Run run{request, sequence, *odometry, *beside};
   const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
   auto inputs = pipeline::input_files(request, sequence, request.config);
-  inputs.insert(inputs.end(), {request.speeds.value_or(""), request.gyro.value_or("")});
+  inputs.insert(inputs.end(),
+                {request.speeds.value_or(""), request.gyro.value_or(""), request.map.value_or("")});
   const auto lock = pipeline::open_out_folder(request.out_dir, "run", inputs);
   const Status prepared = lock ? prepare_out_folder(run) : lock.error();
   if (!prepared) {
@@ -165,9 +179,6 @@ Expected<RunSummary> run_source(RunRequest request,
 Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
   if (const Status status = validate(request.config); !status) {
     return status.error();
-  }
-  if (request.write_map && request.config.odometry.mode != OdometryMode::kMap) {
-    return fail("--map: expected odometry.mode map, which makes one, found two_frame");
   }
   RunRequest resolved = request;
   if (request.num_threads > 0) {

@@ -25,8 +25,10 @@ struct RunRequest : FrameSourceRequest {
   std::optional<std::filesystem::path> gyro;    ///< as dataset::read_gyro
   int num_threads = 0;                          ///< 0: all cores
   int image_every = 0;                          ///< 0: no per-frame images
-  bool write_map = false;                       ///< map.ply; needs odometry.mode map
-  bool measure_times = false;                   ///< RunSummary::report.timing
+  /// Of an earlier run: its places are recognized; needs odometry.mode map with loops.
+  std::optional<std::filesystem::path> map;
+  std::optional<std::filesystem::path> saved_map;  ///< is written in the end; needs the same
+  bool measure_times = false;                      ///< RunSummary::report.timing
   std::string command;  ///< that repeats the run, for report.html; may be empty
   /// Called before work starts, and of a stream's ground truth after it: what the input was taken
   /// for, a line each.

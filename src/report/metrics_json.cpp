@@ -60,6 +60,15 @@ void add_metrics(Json& json, const std::optional<Metrics>& metrics) {
   }
 }
 
+void to_json(Json& json, const MapReport& report) {
+  json = {{"keyframes", report.num_keyframes},
+          {"loops", report.num_loops},
+          {"relocalizations", report.num_relocalizations},
+          {"adjustment_s", report.adjustment_s},
+          {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
+  add_metrics(json, report.metrics);
+}
+
 std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
@@ -80,6 +89,7 @@ Json metrics_document(const MetricsReport& report) {
                {"road_believed_fraction", report.road_believed_fraction},
                {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
   add_metrics(json, report.metrics);
+  json["map"] = report.map;
   if (report.timing) {
     json["timing"] = *report.timing;
   }

@@ -20,6 +20,15 @@ struct CameraReport {
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
 };
 
+/// What the map made of it. The keys of `metrics` are those of MetricsReport's.
+struct MapReport {
+  std::size_t num_keyframes = 0;
+  std::size_t num_loops = 0;            ///< places seen again while the camera was tracked
+  std::size_t num_relocalizations = 0;  ///< frames that found the camera again after a loss
+  double adjustment_s = 0.0;            ///< how long the adjustment of everything took
+  std::optional<Metrics> metrics;       ///< of trajectory_map_kitti.txt
+};
+
 /// The numbers of metrics.json. Everything in `metrics` is null in the file without ground truth.
 struct MetricsReport {
   std::string stemvo_version;
@@ -37,6 +46,7 @@ struct MetricsReport {
   /// Frames whose scale was in metres: `measured` or `held`; nullopt as above.
   std::optional<double> road_believed_fraction;
   std::optional<Metrics> metrics;
+  std::optional<MapReport> map;        ///< nullopt: nothing is remembered
   std::optional<TimingReport> timing;  ///< nullopt: nobody asked, and the key is not in the file
 
   /// Lengths are units: nobody gave metres, or the road that should was never believed.
@@ -57,7 +67,9 @@ inline constexpr double kFewBelieved = 0.5;
 /// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
 /// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
 /// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
-/// and, only where it was asked for, timing{threads fps peak_memory_mib cpu_s other_cpu_s
+/// map{keyframes loops relocalizations adjustment_s, alignment and those behind it} (of
+/// trajectory_map_kitti.txt; null where nothing is remembered) and, only where it was asked for,
+/// timing{threads fps peak_memory_mib cpu_s other_cpu_s
 /// stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers
 /// round-trip; a number that is not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,

@@ -53,6 +53,13 @@ std::string head(const MetricsReport& report) {
                                    100.0 * *report.road_measured_fraction,
                                    100.0 * report.road_believed_fraction.value_or(0.0))});
   }
+  if (report.map) {
+    const MapReport& map = *report.map;
+    table.add(
+        {"map",
+         fmt::format("{} keyframes, {} loops, {} relocalizations, adjusted in {:.1f} s",
+                     map.num_keyframes, map.num_loops, map.num_relocalizations, map.adjustment_s)});
+  }
   if (report.metrics) {
     table.add({"path", format_length(report.metrics->path_length_m, 1) + " m (ground truth)"});
   }
@@ -66,16 +73,32 @@ std::string error_table(const MetricsReport& report) {
                                    : fmt::format("mean over {} segments of {}", m.num_segments,
                                                  length_range(m.segment_lengths_m));
   const std::string fitted(to_string(m.alignment));
-  TextTable table("lrlll");
-  table.add({"error", "value", "unit", "alignment", ""});
+  const std::optional<Metrics> in_map = report.map ? report.map->metrics : std::nullopt;
+  TextTable table(in_map ? "lrrlll" : "lrlll");
+  const auto add = [&](const char* error, const auto& shown, const std::string& unit,
+                       const std::string& alignment, const std::string& note) {
+    std::vector<std::string> row = {error, shown(m)};
+    if (in_map) {
+      row.push_back(shown(*in_map));
+    }
+    row.insert(row.end(), {unit, alignment, note});
+    table.add(row);
+  };
+  table.add(in_map ? std::vector<std::string>{"error", "value", "map", "unit", "alignment", ""}
+                   : std::vector<std::string>{"error", "value", "unit", "alignment", ""});
   table.rule();
-  table.add({"translation t_rel", number_or_dash(m.t_rel_percent, 2), "%", fitted, segments});
-  table.add({"rotation r_rel", number_or_dash(m.r_rel_deg_per_100m, 3), "deg/100 m", fitted,
-             "the same segments"});
-  table.add(
-      {"average offset", format_length(m.average_offset_m, 2), "m", fitted, "mean of |dx| + |dz|"});
-  table.add({"  of zero motion", format_length(m.null_offset_m, 2), "m", "none",
-             "the same for a camera that stays at the start"});
+  add(
+      "translation t_rel", [](const Metrics& of) { return number_or_dash(of.t_rel_percent, 2); },
+      "%", fitted, segments);
+  add(
+      "rotation r_rel", [](const Metrics& of) { return number_or_dash(of.r_rel_deg_per_100m, 3); },
+      "deg/100 m", fitted, "the same segments");
+  add(
+      "average offset", [](const Metrics& of) { return format_length(of.average_offset_m, 2); },
+      "m", fitted, "mean of |dx| + |dz|");
+  add(
+      "  of zero motion", [](const Metrics& of) { return format_length(of.null_offset_m, 2); }, "m",
+      "none", "the same for a camera that stays at the start");
   for (const auto& [alignment, note] :
        {std::pair(Alignment::kNone, "root mean square position error"),
         std::pair(Alignment::kScale, "one scale fitted"),
@@ -85,13 +108,21 @@ std::string error_table(const MetricsReport& report) {
     if (report.is_up_to_scale() && !is_scaled) {
       continue;  // units against metres
     }
-    table.add({"position ATE", format_length(m.ate_rmse.after_m(alignment), 2), "m",
-               std::string(to_string(alignment)), note});
+    add(
+        "position ATE",
+        [after = alignment](const Metrics& of) {
+          return format_length(of.ate_rmse.after_m(after), 2);
+        },
+        "m", std::string(to_string(alignment)), note);
   }
-  table.add({"translation per frame", fmt::format("{:.4f}", m.rpe_translation_m), "m", fitted,
-             "mean over steps of one frame (RPE)"});
-  table.add({"rotation per frame", fmt::format("{:.4f}", m.rpe_rotation_deg), "deg", fitted,
-             "the same steps"});
+  add(
+      "translation per frame",
+      [](const Metrics& of) { return fmt::format("{:.4f}", of.rpe_translation_m); }, "m", fitted,
+      "mean over steps of one frame (RPE)");
+  add(
+      "rotation per frame",
+      [](const Metrics& of) { return fmt::format("{:.4f}", of.rpe_rotation_deg); }, "deg", fitted,
+      "the same steps");
   return table.str();
 }
 

@@ -40,10 +40,15 @@ Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
                   {"numbers", format_metrics_table(run.report)},
                   {"stages", run.report.timing ? format_timing_table(*run.report.timing) : ""},
                   {"estimate", html::path_json(run.estimate)},
+                  {"map", Json()},
                   {"truth", Json()},
                   {"images", html::images_json(run.images)},
                   {"command", run.command},
                   {"configuration", run.config}};
+  if (run.map) {
+    content["map"] = html::path_json(run.map->path);
+    content["map"]["loops"] = run.map->loops;
+  }
   if (run.ground_truth) {
     content["truth"] = html::path_json(run.ground_truth->poses);
     content["truth"]["frames"] = run.ground_truth->frames;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dataset/frame_source.hpp"
@@ -14,6 +16,12 @@
 
 namespace stemvo {
 
+/// What the map made of a run.
+struct MapPage {
+  Trajectory path;  ///< of all frames, aligned as the estimate
+  std::vector<std::pair<std::size_t, std::size_t>> loops;  ///< frames that show one place
+};
+
 /// The content of a run's report.html: a row and a pose per frame, in the world of the ground
 /// truth, which some frames may lack.
 struct RunPage {
@@ -22,7 +30,8 @@ struct RunPage {
   std::string unit = "m";  ///< in which the trajectories are
   const MetricsReport& report;
   const std::string& frames_csv;
-  const Trajectory& estimate;  ///< after the alignment of report.metrics
+  const Trajectory& estimate;         ///< after the alignment of report.metrics
+  const std::optional<MapPage>& map;  ///< nullopt: nothing is remembered
   const std::optional<GroundTruth>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
   std::string config;   ///< YAML

@@ -185,9 +185,11 @@ TEST_F(BadInput, Configuration) {
   expect_error(run({"--set", "scale.source=gps"}), 1,
                {"auto, none, constant_speed, camera_height, ground_truth, found 'gps'"});
   expect_error(run({"--set", "scale.step_m=nan"}), 1, {"scale.step_m", "nan"});
-  expect_error(
-      run({"--map", "--set", "odometry.mode=two_frame", "--set", "scale.source=constant_speed"}), 1,
-      {"--map", "odometry.mode map", "found two_frame"});
+  expect_error(run({"--save-map", folder_ / "place.map", "--set", "odometry.mode=two_frame",
+                    "--set", "scale.source=constant_speed"}),
+               1, {"--save-map", "odometry.mode map", "found mode two_frame"});
+  expect_error(run({"--map", folder_ / "poses/00.txt"}), 1,
+               {"00.txt: expected a map of stemvo, found another kind of file"});
 }
 
 TEST_F(BadInput, Evaluate) {

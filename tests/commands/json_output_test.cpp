@@ -62,7 +62,7 @@ TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
     int exit_code = 0;
   };
   const std::vector<Call> calls = {
-      {"run", {sequence_, "--out", run, "--timing", "--map", "--json"}, "out_dir"},
+      {"run", {sequence_, "--out", run, "--timing", "--json"}, "out_dir"},
       {"evaluate", {"--gt", truth, run + "/trajectory_kitti.txt", "--json"}, "estimates"},
       {"check", {run + "/metrics.json", "--against", bounds, "--json"}, "passed"},
       {"channel", {sequence_, "--out", folder_ / "images", "--json"}, "images"},

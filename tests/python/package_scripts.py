@@ -108,6 +108,19 @@ for keyframe in keyframes:
     assert np.array_equal(plain[keyframe.frame].world_from_camera, keyframe.world_from_camera)
 assert len(metres.keyframes(1)) == len(keyframes) - 1
 assert len(metres.landmarks_since(changes.version).ids) == 0 < len(changes.ids) == len(changes.positions) == len(changes.colors)
+last = keyframes[-1].frame
+whole = metres.adjust_map(covariance_of=[last])
+assert len(whole.map_from_camera) == len(plain) and whole.loops == [] and len(whole.landmarks[0]) == len(metres.landmarks()[0])
+assert whole.keyframes[-1].frame == last and np.all(np.linalg.eigvalsh(whole.keyframes[-1].covariance) > 0.0)
+assert whole.keyframes[0].covariance is None and abs(whole.camera.fx / recording.camera.fx - 1.0) < 0.01
+assert np.array_equal(plain[-1].map_from_world, np.eye(4)) and plain[-1].recognized_frame is None
+raises(lambda: metres.adjust_map([-7]), "covariance_of: expected frames of keyframes, found -7")
+metres.save_map(sys.argv[1] + ".map")
+visit = stemvo.Odometry(recording)
+visit.load_map(sys.argv[1] + ".map")
+visit.process(*frames[0])
+raises(lambda: visit.load_map(sys.argv[1] + ".map"), "expected a call before the first frame")
+raises(lambda: stemvo.Odometry(recording, {"odometry.loops": False}).adjust_map(), "found loops false")
 truth = recording.ground_truth[:, :3, 3]
 steps = np.linalg.norm(np.diff(truth, axis=0), axis=1)
 wheels = stemvo.Odometry(recording.camera)

@@ -110,6 +110,8 @@ TEST_F(MapFiles, ThatContradictThemselvesAreRefused) {
   const std::vector<Case> cases = {
       {"a place for each of 2 keyframes, found 1", [](auto& m) { m.map_from_keyframe.pop_back(); }},
       {"in the order of their frames", [](auto& m) { m.keyframes[1].frame = 0; }},
+      {"keyframe 1: expected a frame's number",
+       [](auto& m) { m.keyframes[1].frame = std::numeric_limits<int>::max(); }},
       {"keyframe 1: expected a finite time", [](auto& m) { m.keyframes[1].time_s = kNaN; }},
       {"keyframe 0: expected a camera", [](auto& m) { m.keyframes[0].camera.fx_px = 0.0; }},
       {"expected a pose", [](auto& m) { m.keyframes[0].world_from_camera.rotation.w() = 1.1; }},

@@ -102,8 +102,9 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   ASSERT_TRUE(poses) << poses.error().message;
   EXPECT_EQ(poses->size(), 6U);
-  for (const char* name : {"trajectory_tum.txt", "frames.csv", "config.yaml", "metrics.json",
-                           "trajectory.png", "pictures/000000.png", "pictures/000004.png"}) {
+  for (const char* name :
+       {"trajectory_tum.txt", "trajectory_map_tum.txt", "map.ply", "frames.csv", "config.yaml",
+        "metrics.json", "trajectory.png", "pictures/000000.png", "pictures/000004.png"}) {
     EXPECT_TRUE(fs::exists(request_.out_dir / name)) << name;
   }
 }
@@ -154,7 +155,9 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
   EXPECT_EQ(measured->report.timing->num_frames, 6U);
   EXPECT_GT(timing["peak_memory_mib"].get<double>(), 1.0);
   json.erase("timing");
-  json["fps"] = keys["fps"] = 0;  // the one value of the others that depends on the clock
+  for (auto* one : {&json, &keys}) {  // those of the others that depend on the clock
+    (*one)["fps"] = (*one)["map"]["adjustment_s"] = 0;
+  }
   EXPECT_EQ(json.dump(), keys.dump());
 }
 
@@ -196,10 +199,9 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
 TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   request_.config.odometry.mode = OdometryMode::kMap;
   request_.config.scale_choice = ScaleChoice::kGroundTruth;
-  request_.write_map = true;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
-  const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
+  const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_map_kitti.txt");
   ASSERT_TRUE(poses) << poses.error().message;
   const testing::PlyFile map = testing::read_ply(request_.out_dir / "map.ply");
   ASSERT_EQ(map.edges.size() + 1, poses->size());
@@ -235,6 +237,7 @@ TEST_F(PipelineRun, AFileWhoseTimesMissAllFramesIsAWarning) {
 }
 
 TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
+  request_.config.odometry.mode = OdometryMode::kTwoFrame;  // no map
   request_.config.scale.source = ScaleSource::kConstantSpeed;
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "map.ply") << "somebody's";
@@ -264,8 +267,44 @@ TEST_F(PipelineRun, AFolderWithAnInputIsRefused) {
 TEST_F(PipelineRun, TwoFramesMakeNoMap) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kConstantSpeed;
-  request_.write_map = true;
-  EXPECT_THAT(error_of(request_), HasSubstr("--map: expected odometry.mode map"));
+  ASSERT_TRUE(run_sequence(request_));
+  for (const char* name : {"map.ply", "trajectory_map_kitti.txt", "trajectory_map_tum.txt"}) {
+    EXPECT_FALSE(fs::exists(request_.out_dir / name)) << name;
+  }
+  EXPECT_TRUE(nlohmann::json::parse(read_file(request_.out_dir / "metrics.json"))["map"].is_null());
+  request_.saved_map = folder_ / "saved.map";
+  EXPECT_THAT(error_of(request_), HasSubstr("--save-map: expected odometry.mode map with"));
+  request_.saved_map.reset();
+  request_.map = folder_ / "saved.map";
+  EXPECT_THAT(error_of(request_), HasSubstr("saved.map: expected odometry.mode map with"));
+}
+
+TEST_F(PipelineRun, WithoutLoopsNothingIsRemembered) {
+  request_.config.odometry.loops = false;
+  ASSERT_TRUE(run_sequence(request_));
+  EXPECT_TRUE(fs::exists(request_.out_dir / "map.ply"));
+  EXPECT_FALSE(fs::exists(request_.out_dir / "trajectory_map_kitti.txt"));
+  request_.saved_map = folder_ / "saved.map";
+  EXPECT_THAT(error_of(request_), HasSubstr("found loops false"));
+}
+
+TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
+  request_.saved_map = folder_ / "saved.map";
+  const auto first = run_sequence(request_);
+  ASSERT_TRUE(first && first->written);
+  EXPECT_GE(first->report.map->num_keyframes, 2U);
+  EXPECT_TRUE(first->report.map->metrics.has_value());
+  EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_map_kitti.txt")->size(),
+            std::size_t{kNumFrames});
+  request_.map = request_.saved_map;
+  const auto second = run_sequence(request_);
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_GT(second->report.map->num_keyframes, first->report.map->num_keyframes);
+  request_.config.stem.model = "log";
+  EXPECT_THAT(error_of(request_), HasSubstr("saved.map: expected a map of channel 'log"));
+  request_.saved_map = folder_ / "nowhere/saved.map";
+  request_.map.reset();
+  EXPECT_THAT(error_of(request_), HasSubstr("nowhere/saved.map: cannot write"));
 }
 
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {

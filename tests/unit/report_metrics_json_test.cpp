@@ -42,6 +42,7 @@ MetricsReport example() {
           .road_measured_fraction = 0.75,
           .road_believed_fraction = 0.875,
           .metrics = metrics,
+          .map = {},
           .timing = {}};
 }
 
@@ -84,7 +85,28 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
   EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
       "cx_px": 600.5, "cy_px": 180.25,
       "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_EQ(json.size(), 24U);
+  EXPECT_TRUE(json["map"].is_null());
+  EXPECT_EQ(json.size(), 25U);
+}
+
+TEST(MetricsJson, HoldsWhatTheMapMadeOfIt) {
+  MetricsReport report = example();
+  report.map = {40, 3, 2, 1.5, report.metrics};
+  report.map->metrics->t_rel_percent = 0.25;
+  const nlohmann::json map = written(report)["map"];
+  EXPECT_EQ(map["keyframes"], 40);
+  EXPECT_EQ(map["loops"], 3);
+  EXPECT_EQ(map["relocalizations"], 2);
+  EXPECT_EQ(map["adjustment_s"], 1.5);
+  EXPECT_EQ(map["alignment"], "none");
+  EXPECT_EQ(map["t_rel_percent"], 0.25);
+  EXPECT_EQ(map["ate_rmse_m"]["sim3"], 1.0);
+  const std::string table = format_metrics_table(report);
+  EXPECT_THAT(table, ContainsRegex("map +40 keyframes, 3 loops, 2 relocalizations, adjusted in 1"));
+  EXPECT_THAT(table, ContainsRegex("error +value +map +unit"));
+  EXPECT_THAT(table, ContainsRegex("t_rel +0\\.97 +0\\.25  % +none"));
+  report.map->metrics.reset();
+  EXPECT_TRUE(written(report)["map"]["t_rel_percent"].is_null());
 }
 
 TEST(MetricsJson, IsNullWhereGroundTruthIsMissing) {

@@ -44,6 +44,7 @@ class RunPageTest : public ::testing::Test {
                                                          report_,
                                                          csv,
                                                          estimate_,
+                                                         map_,
                                                          truth_,
                                                          {},
                                                          "key: value",
@@ -53,6 +54,7 @@ class RunPageTest : public ::testing::Test {
 
   testing::TempFolder folder_;
   Trajectory estimate_;
+  std::optional<MapPage> map_;
   std::optional<GroundTruth> truth_;
   MetricsReport report_;
 };
@@ -72,6 +74,14 @@ TEST_F(RunPageTest, HoldsRowsPathsAndMetrics) {
   EXPECT_EQ(page["segments"]["length_m"][0], 100.0);
   EXPECT_NEAR(page["segments"]["t_percent"][0].get<double>(), 100.0 * std::hypot(0.01, 0.001),
               0.03);
+}
+
+TEST_F(RunPageTest, HoldsTheMapsPathAndItsLoops) {
+  EXPECT_TRUE(content()["map"].is_null());
+  map_ = {truth_->poses, {{3, 180}}};
+  const json page = content();
+  EXPECT_EQ(page["map"]["z"][200], 200.0);
+  EXPECT_EQ(page["map"]["loops"], json({{3, 180}}));
 }
 
 TEST_F(RunPageTest, NamesTheFramesThatHaveATruePose) {

@@ -149,7 +149,7 @@ class Package(unittest.TestCase):
 
     def test_view(self):
         sequence = self.folder / "drive/sequences/00"
-        call(PROGRAM, "run", sequence, "--out", self.folder / "seen", "--map")
+        call(PROGRAM, "run", sequence, "--out", self.folder / "seen")
         for name, arguments in {"live": ["--live", sequence],
                                 "result": [self.folder / "seen", "--recording", sequence]}.items():
             file = self.folder / f"{name}.rrd"

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/whole_map.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <iterator>
+
+#include <fmt/format.h>
+
+#include "mapping/map_trajectory.hpp"
+#include "mapping/pose_graph.hpp"
+#include "odometry/self_calibration.hpp"
+
+namespace stemvo {
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.translation}; }
+
+}  // namespace
+
+WholeMap::WholeMap(const PhasedOdometry& odometry)
+    : kept(odometry.frames().estimator().kept_map()),
+      landmarks(odometry.frames().estimator().landmarks_since(0).landmarks),
+      trajectory(odometry.frames().estimator().trajectory()),
+      times_s(odometry.frames().times_s()),
+      map_from_frame(place_trajectory(trajectory, times_s, kept)),
+      camera(odometry.view().camera()),
+      camera_sigma(prior_sigma(odometry.options().camera.refine)) {}
+
+Status WholeMap::adjust(const std::vector<int>& frames) {
+  for (const int frame : frames) {
+    const auto found = std::ranges::lower_bound(kept.keyframes, frame, {}, &KeptKeyframe::frame);
+    if (found == kept.keyframes.end() || found->frame != frame) {
+      return fail(fmt::format("covariance_of: expected frames of keyframes, found {}", frame));
+    }
+    covariance_of.push_back(static_cast<int>(found - kept.keyframes.begin()));
+  }
+  solve_pose_graph(kept);
+  const auto is_of_other = [](const KeptKeyframe& keyframe) { return keyframe.frame < 0; };
+  const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
+  const auto adjusted =
+      adjust_map(kept, {camera, camera_sigma, static_cast<int>(num_of_other), covariance_of});
+  if (adjusted) {
+    take_in(*adjusted);
+  } else {
+    covariance_of.clear();
+  }
+  map_from_frame = place_trajectory(trajectory, times_s, kept);
+  return {};
+}
+
+void WholeMap::take_in(const MapAdjustment& adjusted) {
+  kept.map_from_keyframe = adjusted.map_from_keyframe;
+  covariances = adjusted.covariances;
+  for (const AdjustedLandmark& landmark : adjusted.landmarks) {
+    for (const MapView& view : landmark.views) {
+      const Eigen::Vector3d in_camera =
+          kept.map_from_keyframe[index(view.keyframe)].inverse() * landmark.in_map;
+      if (in_camera.allFinite() && in_camera.z() > 0.0) {
+        kept.keyframes[index(view.keyframe)].corners[index(view.corner)].in_camera =
+            in_camera.cast<float>();
+      }
+    }
+  }
+  if (!camera_sigma) {
+    return;
+  }
+  const IntrinsicsDelta& change = adjusted.camera.change;
+  camera.cx_px += change[0];
+  camera.cy_px += change[1];
+  camera.fx_px *= 1.0 + change[2];
+  camera.fy_px *= 1.0 + change[2];
+  camera_sigma = adjusted.camera.sigma;
+  for (KeptKeyframe& keyframe : kept.keyframes) {
+    keyframe.camera = keyframe.frame < 0 ? keyframe.camera : camera;
+  }
+}
+
+AdjustedMap WholeMap::answer() const {
+  AdjustedMap map;
+  map.camera = camera;
+  if (camera_sigma) {
+    map.camera_sigma = {(*camera_sigma)[2] * camera.fx_px, (*camera_sigma)[0], (*camera_sigma)[1]};
+  }
+  std::ranges::transform(map_from_frame, std::back_inserter(map.map_from_camera), pose_of);
+  for (std::size_t i = 0; i < kept.keyframes.size(); ++i) {
+    const KeptKeyframe& keyframe = kept.keyframes[i];
+    map.keyframes.push_back({keyframe.frame, keyframe.time_s, pose_of(kept.map_from_keyframe[i])});
+  }
+  for (std::size_t i = 0; i < covariance_of.size(); ++i) {
+    map.keyframes[index(covariance_of[i])].covariance = covariances[i];
+  }
+  for (const KeptLandmark& landmark : landmarks) {
+    map.landmarks.push_back(
+        {landmark.id, map_from_frame[index(landmark.frame)] * landmark.in_camera.cast<double>(),
+         landmark.rgb});
+  }
+  for (const Loop& loop : kept.loops) {
+    map.loops.push_back(
+        {kept.keyframes[index(loop.from)].frame, kept.keyframes[index(loop.to)].frame});
+  }
+  return map;
+}
+
+}  // namespace stemvo
