@@ -15,14 +15,16 @@ namespace stemvo::apps {
 namespace {
 
 constexpr const char* kCalibrateFooter =
-    R"(Runs the odometry (mode map, no scale, camera.refine all) and writes down what
-it has learnt of the camera by the end. Turns tell of it, a straight road does
-not: a number that the drive does not determine stays as given and is marked.
+    R"(Runs the odometry, adjusts all keyframes, landmarks and the camera together and
+writes down what that says of the camera: for KITTI's folders calib.txt, else
+camera.yaml, with the distortion. Turns tell of it, a straight road does not: a
+number that the recording does not determine stays as given and is marked.
 Ground truth is not read. Nothing uses FILE unless it is given to a run.
 
-Examples:
+INPUT is anything that 'stemvo run' takes. Examples:
   stemvo calibrate kitti/sequences/00 --out refined.txt
-  stemvo run kitti/sequences/00 --out result --calib refined.txt)";
+  stemvo run kitti/sequences/00 --out result --calib refined.txt
+  stemvo calibrate walk.mp4 --camera camera.yaml --out refined.yaml)";
 
 struct CalibrateArguments {
   CalibrationRequest request;
@@ -42,7 +44,9 @@ nlohmann::ordered_json document(const CalibrateArguments& arguments,
   }
   return {{"written", report.written},
           {"file", arguments.request.out_file.string()},
-          {"runs", report.num_runs},
+          {"keyframes", report.num_keyframes},
+          {"landmarks", report.num_landmarks},
+          {"median_error_px", report.median_error_px},
           {"parameters", parameters}};
 }
 
@@ -89,12 +93,18 @@ Expected<int> calibrate(CalibrateArguments& arguments) {
 
 void add_options(CLI::App& command, CalibrateArguments& arguments) {
   CalibrationRequest& request = arguments.request;
-  command.add_option("SEQUENCE_DIR", request.sequence_dir, "Sequence in KITTI's layout")
+  command
+      .add_option("INPUT", request.sequence_dir,
+                  "A recording: a folder, a video, a quoted pattern of images")
       ->required()
       ->type_name("");
-  command.add_option("--out", request.out_file, "File for the calibration, as KITTI's calib.txt")
+  command
+      .add_option("--out", request.out_file,
+                  "File for the calibration: calib.txt of KITTI's folders, else camera.yaml")
       ->required()
       ->type_name("FILE");
+  add_file_option(command, "--camera", request.camera_file, "Camera file to start from");
+  add_file_option(command, "--times", request.times, "Of images: a time in seconds per image");
   add_file_option(command, "--calib", request.calibration,
                   "Calibration to start from; default: the folder's calib.txt");
   add_range_option(command, "--frames", request.frames, "Frames A to B-1 only");
@@ -106,8 +116,8 @@ void add_options(CLI::App& command, CalibrateArguments& arguments) {
 
 CLI::App* add_calibrate(CLI::App& app, Action& action) {
   return add_command<CalibrateArguments>(
-      app, action, {"calibrate", "Refine focal length and principal point", kCalibrateFooter},
-      add_options, calibrate);
+      app, action, {"calibrate", "Find the camera by a recording", kCalibrateFooter}, add_options,
+      calibrate);
 }
 
 }  // namespace stemvo::apps

@@ -3,14 +3,18 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "calibration/lens.hpp"
+#include "dataset/camera_file.hpp"
 #include "dataset/kitti_text.hpp"
+#include "mapping/map_adjustment.hpp"
+#include "mapping/pose_graph.hpp"
 #include "odometry/phased_odometry.hpp"
-#include "odometry/self_calibration.hpp"
 #include "pipeline/frame_pipeline.hpp"
 #include "pipeline/out_folder.hpp"
 #include "text/text_file.hpp"
@@ -21,21 +25,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What is known of any camera beforehand: principal point (px), focal length (share), k1, k2.
+const IntrinsicsDelta kPriorSigma = (IntrinsicsDelta() << 30.0, 30.0, 0.2, 0.1, 0.1).finished();
 /// A number less certain than this is not determined: px, and a share of the focal length.
 constexpr double kMaxSigma_px = 2.0;
-constexpr double kMaxSigmaOfFocal = 0.01;
+constexpr double kMaxSigmaOfFocal = 0.02;
+constexpr double kMaxSigmaOfDistortion = 0.05;
 
-fs::path calibration_file(const CalibrationRequest& request) {
-  return request.calibration.value_or(request.sequence_dir / "calib.txt");
+fs::path calibration_file(const CalibrationRequest& request, const FrameSource& sequence) {
+  return sequence.given_calibration().value_or(request.sequence_dir / "calib.txt");
 }
 
 /// Everything that can be wrong with a request before work starts.
 Status check_request(const CalibrationRequest& request, const FrameSource& sequence) {
-  if (const Status status = validate(request.config); !status) {
-    return status;
-  }
-  std::vector<fs::path> inputs = pipeline::input_files(sequence, request.config);
-  inputs.insert(inputs.end(), {calibration_file(request), request.config.file,
+  std::vector<fs::path> inputs = pipeline::input_files(request, sequence, request.config);
+  inputs.insert(inputs.end(), {calibration_file(request, sequence), request.config.file,
                                request.sequence_dir / "times.txt"});
   for (const fs::path& input : inputs) {
     std::error_code code;
@@ -47,19 +51,22 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
   return check_can_write(request.out_file);
 }
 
-Expected<PhasedOdometry> create_odometry(const CalibrationRequest& request, const Camera& camera) {
+/// The map that the odometry leaves of the recording.
+Expected<KeptMap> drive(const CalibrationRequest& request,
+                        const FrameSource& sequence,
+                        const CalibrationProgress& progress,
+                        CalibrationReport& report) {
   Config config = request.config;
   config.odometry.mode = OdometryMode::kMap;
+  config.odometry.loops = true;
   config.scale.source = ScaleSource::kConstantSpeed;
   config.camera.refine = CameraRefinement::kAll;
-  return PhasedOdometry::create(camera, config);
-}
-
-/// Runs the odometry over the sequence.
-void drive(const KittiSequence& sequence,
-           PhasedOdometry& odometry,
-           const CalibrationProgress& progress,
-           CalibrationReport& report) {
+  Expected<PhasedOdometry> odometry =
+      PhasedOdometry::create(sequence.camera(), config, sequence.frames().mask);
+  if (!odometry) {
+    return odometry.error();
+  }
+  const std::size_t num_frames = sequence.stream() ? 0 : sequence.size();
   const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
     if (!frame) {
       report.warnings.push_back(frame.error().message);
@@ -67,10 +74,20 @@ void drive(const KittiSequence& sequence,
       report.warnings.push_back(
           fmt::format("frame {}: {}", sequence.range().begin + i, result.problem));
     }
-    report.interrupted = progress && !progress(i + 1, sequence.size());
+    report.interrupted = progress && !progress(i + 1, num_frames);
     return !report.interrupted;
   };
-  pipeline::run_frames(sequence, odometry, visit);
+  pipeline::run_frames(sequence, *odometry, visit);
+  return odometry->frames().estimator().kept_map();
+}
+
+std::optional<MapAdjustment> adjust(KeptMap map, const Camera& camera) {
+  solve_pose_graph(map);
+  map.lengths.clear();  // speeds that were assumed
+  MapAdjustmentOptions options;
+  options.camera = camera;
+  options.camera_sigma = kPriorSigma;
+  return adjust_map(map, options);
 }
 
 void read_estimate(const Camera& given, const CameraEstimate& estimate, CalibrationReport& report) {
@@ -82,60 +99,86 @@ void read_estimate(const Camera& given, const CameraEstimate& estimate, Calibrat
                                sigma, max_sigma, is_determined};
   };
   const double f = given.fx_px;
-  report.num_runs = estimate.num_bundles;
   report.parameters = {parameter("focal length", f, 2, f, kMaxSigmaOfFocal * f),
                        parameter("principal point x", given.cx_px, 0, 1.0, kMaxSigma_px),
                        parameter("principal point y", given.cy_px, 1, 1.0, kMaxSigma_px),
-                       parameter("k1", 0.0, 3, 1.0, 1.0), parameter("k2", 0.0, 4, 1.0, 1.0)};
-  report.refined = given;
-  report.refined.fx_px = report.parameters[0].refined;
-  report.refined.fy_px *= report.refined.fx_px / f;
-  report.refined.cx_px = report.parameters[1].refined;
-  report.refined.cy_px = report.parameters[2].refined;
+                       parameter("k1", 0.0, 3, 1.0, kMaxSigmaOfDistortion),
+                       parameter("k2", 0.0, 4, 1.0, kMaxSigmaOfDistortion)};
 }
 
-Status write_calibration(const CalibrationRequest& request,
-                         const Camera& given,
-                         const Camera& refined) {
-  const Expected<std::string> text =
-      dataset::replace_kitti_camera(calibration_file(request), given, refined);
-  return text ? write_text_file(request.out_file, *text) : Status(text.error());
+/// The changes that are determined.
+IntrinsicsDelta change_of(const CalibrationReport& report) {
+  const auto change = [&](std::size_t i) {
+    return report.parameters[i].refined - report.parameters[i].given;
+  };
+  IntrinsicsDelta result;
+  result << change(1), change(2), change(0) / report.parameters[0].given, change(3), change(4);
+  return result;
+}
+
+Status write_kitti(const fs::path& from,
+                   const Camera& given,
+                   const fs::path& out_file,
+                   CalibrationReport& report) {
+  const IntrinsicsDelta change = change_of(report);
+  report.refined = given;
+  report.refined.cx_px += change[0];
+  report.refined.cy_px += change[1];
+  report.refined.fx_px *= 1.0 + change[2];
+  report.refined.fy_px *= 1.0 + change[2];
+  const Expected<std::string> text = dataset::replace_kitti_camera(from, given, report.refined);
+  return text ? write_text_file(out_file, *text) : Status(text.error());
+}
+
+Status write_camera(const fs::path& from,
+                    const Camera& view,
+                    const fs::path& out_file,
+                    CalibrationReport& report) {
+  Expected<dataset::CameraFile> file = dataset::read_camera_file(from);
+  if (!file) {
+    return file.error();
+  }
+  file->camera = refined_lens(file->camera, view, change_of(report));
+  report.refined = file->camera;
+  return write_text_file(out_file, dataset::camera_file_text(*file));
 }
 
 }  // namespace
 
 Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
                                                const CalibrationProgress& progress) {
-  const Expected<KittiSequence> sequence =
-      KittiSequence::open(request.sequence_dir, {.camera = request.config.input.camera,
-                                                 .frames = request.frames,
-                                                 .calibration = calibration_file(request)});
+  if (const Status status = validate(request.config); !status) {
+    return status.error();
+  }
+  FrameSourceRequest source = request;
+  source.SequenceOptions::camera = request.config.input.camera;
+  const Expected<FrameSource> sequence = open_source(source);
   if (!sequence) {
     return sequence.error();
   }
   if (const Status status = check_request(request, *sequence); !status) {
     return status.error();
   }
-  Expected<PhasedOdometry> odometry = create_odometry(request, sequence->camera());
-  if (!odometry) {
-    return odometry.error();
-  }
   CalibrationReport report;
-  drive(*sequence, *odometry, progress, report);
-  if (report.interrupted) {
-    return report;
+  report.is_kitti = sequence->is_kitti();
+  Expected<KeptMap> map = drive(request, *sequence, progress, report);
+  if (!map || report.interrupted) {
+    return map ? Expected<CalibrationReport>(report) : map.error();
   }
-  read_estimate(sequence->camera(), odometry->frames().estimator().camera_estimate().value(),
-                report);
-  if (report.num_runs == 0) {
-    return fail(fmt::format(
-        "{}: expected frames that move for at least one run of {} keyframes, found "
-        "none in {} frames",
-        request.sequence_dir.string(), SelfCalibration::kNumKeyframes, sequence->size()));
+  report.num_keyframes = map->keyframes.size();
+  const auto adjusted = adjust(*std::move(map), sequence->camera());
+  if (!adjusted) {
+    return fail(fmt::format("{}: expected frames that move, found {} keyframes in {} frames",
+                            request.sequence_dir.string(), report.num_keyframes, sequence->size()));
   }
+  report.num_landmarks = adjusted->landmarks.size();
+  report.median_error_px = adjusted->median_error_px;
+  read_estimate(sequence->camera(), adjusted->camera, report);
   if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
                   std::mem_fn(&CalibratedParameter::is_determined))) {
-    if (const Status status = write_calibration(request, sequence->camera(), report.refined);
+    const auto write = report.is_kitti ? write_kitti : write_camera;
+    if (const Status status = write(calibration_file(request, *sequence), sequence->camera(),
+                                    request.out_file, report);
         !status) {
       return status.error();
     }
@@ -161,10 +204,11 @@ std::string format_calibration_table(const CalibrationReport& report) {
   const CalibratedParameter& k2 = report.parameters[4];
   return table.str() +
          fmt::format(
-             "from {} runs of {} keyframes\nradial distortion left in the frames, which calib.txt "
-             "cannot hold: k1 {:+.4f} +- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
-             report.num_runs, SelfCalibration::kNumKeyframes, k1.refined, k1.sigma, k2.refined,
-             k2.sigma);
+             "from {} keyframes and {} landmarks, which reproject at {:.2f} px (median)\nradial "
+             "distortion left in the frames{}: k1 {:+.4f} +- {:.4f}, k2 {:+.4f} +- {:.4f}\n",
+             report.num_keyframes, report.num_landmarks, report.median_error_px,
+             report.is_kitti ? ", which calib.txt cannot hold" : "", k1.refined, k1.sigma,
+             k2.refined, k2.sigma);
 }
 
 }  // namespace stemvo

@@ -5,24 +5,20 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "config/config.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo {
 
-/// Everything `stemvo calibrate` was asked for.
-struct CalibrationRequest {
-  std::filesystem::path sequence_dir;
+/// Everything `stemvo calibrate` was asked for. The camera is that of `config`.
+struct CalibrationRequest : FrameSourceRequest {
   std::filesystem::path out_file;
-  Config config;                                     ///< of the odometry that learns the camera
-  std::optional<FrameRangeRequest> frames;           ///< else all
-  std::optional<std::filesystem::path> calibration;  ///< to start from; else the folder's calib.txt
+  Config config;  ///< of the odometry that drives
 };
 
 /// One number of the calibration.
@@ -35,27 +31,31 @@ struct CalibratedParameter {
   bool is_determined = false;
 };
 
-/// Camera parameters that a drive has determined.
+/// Camera parameters that a recording has determined.
 struct CalibrationReport {
-  Camera refined;
-  /// Focal length, principal point x and y (px); k1 and k2, the radial distortion
-  /// 1 + k1 r^2 + k2 r^4 (r on the plane z = 1) that the rectification left. The latter are
-  /// estimated so that they do not end up in the focal length; calib.txt cannot hold them.
+  Camera refined;  ///< of the frames as they come, with its lens
+  /// Focal length, principal point x and y (px) of the frames as they are worked on; k1 and k2, the
+  /// radial distortion 1 + k1 r^2 + k2 r^4 (r on the plane z = 1) that is left in them. calib.txt
+  /// cannot hold the latter.
   std::array<CalibratedParameter, 5> parameters;
-  int num_runs = 0;                   ///< of keyframes
+  std::size_t num_keyframes = 0;
+  std::size_t num_landmarks = 0;
+  double median_error_px = 0.0;       ///< of their reprojections
+  bool is_kitti = false;              ///< the form of the file
   std::vector<std::string> warnings;  ///< unreadable frames and the like, one line each
   bool interrupted = false;           ///< no file is written
   bool written = false;               ///< false also where nothing is determined
 };
 
-/// After each frame: done, in all; false stops.
+/// After each frame: done, in all (0: not known); false stops.
 using CalibrationProgress = std::function<bool(std::size_t, std::size_t)>;
 
-/// Focal length and principal point as the odometry learns them over a sequence
-/// (`camera.refine: all`). Ground truth is never read. Writes out_file in KITTI's calib.txt format:
-/// rows of cameras that share the refined camera's intrinsics get the new ones, their baselines
-/// stay, other lines are kept. Same input, same bytes. Errors: those of the sequence and the model,
-/// out_file that cannot be written or is the calibration itself, too few frames that move.
+/// The camera that one adjustment of a whole recording finds (mapping/map_adjustment.hpp): any
+/// recording that `run` takes. Ground truth is never read. Writes out_file; in KITTI's layout as
+/// calib.txt: rows of cameras that share the refined camera's intrinsics get the new ones, their
+/// baselines stay, other lines are kept; else as camera.yaml. Same input, same bytes. Errors: those
+/// of the recording and the model, out_file that cannot be written or is an input, too few frames
+/// that move.
 [[nodiscard]] Expected<CalibrationReport> calibrate_sequence(
     const CalibrationRequest& request, const CalibrationProgress& progress = {});
 

@@ -325,4 +325,33 @@ Expected<CameraFile> read_camera_file(const std::filesystem::path& file) {
   return Reader(file).read();
 }
 
+std::string camera_file_text(const CameraFile& file) {
+  const Camera& camera = file.camera;
+  constexpr const char* kModels[] = {"none", "radial-tangential", "equidistant"};
+  constexpr std::size_t kNumCoefficients[] = {0, 5, 4};
+  const auto model = static_cast<std::size_t>(camera.distortion);
+  std::string text = fmt::format(
+      "image_width: {}\nimage_height: {}\ncamera_model: pinhole\n"
+      "intrinsics: [{:.4f}, {:.4f}, {:.4f}, {:.4f}]  # fx, fy, cx, cy\n"
+      "distortion_model: {}\ndistortion_coefficients: [{:.6f}]\n",
+      camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
+      kModels[model],
+      fmt::join(camera.distortion_coefficients.begin(),
+                camera.distortion_coefficients.begin() +
+                    static_cast<std::ptrdiff_t>(kNumCoefficients[model]),
+                ", "));
+  if (file.body_from_camera) {
+    const Matrix34d matrix = file.body_from_camera->matrix();
+    const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = matrix;
+    text += fmt::format("T_BS: [{:.9f}]\n", fmt::join(rows.data(), rows.data() + 12, ", "));
+  }
+  if (file.rate_hz) {
+    text += fmt::format("rate_hz: {}\n", *file.rate_hz);
+  }
+  if (file.camera_height_m) {
+    text += fmt::format("camera_height: {}\n", *file.camera_height_m);
+  }
+  return text;
+}
+
 }  // namespace stemvo::dataset

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
@@ -33,5 +34,8 @@ struct CameraFile {
 /// naming file and line: unreadable, not YAML, a key missing, unknown or twice, a value that cannot
 /// be.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
+
+/// Our form of it.
+[[nodiscard]] std::string camera_file_text(const CameraFile& file);
 
 }  // namespace stemvo::dataset

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "mapping/adjustment_errors.hpp"
 
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
 namespace stemvo::internal {
 namespace {
 
@@ -36,6 +40,33 @@ bool behind(double* residuals, double** jacobians) {
 }
 
 }  // namespace
+
+bool triangulate(const std::vector<AdjustedPose>& poses,
+                 const MapTrack& track,
+                 const std::vector<Eigen::Vector2d>& rays,
+                 AdjustedPoint& point) {
+  point.map_from_anchor =
+      poses[static_cast<std::size_t>(track.front().keyframe)].camera_from_map().inverse();
+  point.at = {rays.front().x(), rays.front().y(), 0.0};
+  double a = 0.0;
+  double b = 0.0;
+  std::vector<std::pair<double, double>> depths;
+  for (std::size_t i = 0; i < track.size(); ++i) {
+    const Rigid3 camera_from_anchor =
+        poses[static_cast<std::size_t>(track[i].keyframe)].camera_from_map() *
+        point.map_from_anchor;
+    const Eigen::Vector3d at_infinity = camera_from_anchor.rotation * rays.front().homogeneous();
+    const Eigen::Vector3d& t = camera_from_anchor.translation;
+    const Eigen::Vector2d by_inverse_depth = t.head<2>() - rays[i] * t.z();
+    const Eigen::Vector2d off = at_infinity.head<2>() - rays[i] * at_infinity.z();
+    a += by_inverse_depth.squaredNorm();
+    b -= by_inverse_depth.dot(off);
+    depths.emplace_back(at_infinity.z(), t.z());
+  }
+  point.at[2] = a > 0.0 ? b / a : 0.0;
+  return std::ranges::all_of(
+      depths, [&](const auto& depth) { return depth.first + depth.second * point.at[2] > 0.05; });
+}
 
 bool CornerError::Evaluate(double const* const* parameters,
                            double* residuals,

@@ -3,12 +3,14 @@
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Core>
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
 #include "mapping/kept_map.hpp"
+#include "mapping/map_tracks.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
 
@@ -46,6 +48,13 @@ struct AdjustedPoint {
     return point;
   }
 };
+
+/// The point nearest to what its views show as these rays on the plane z = 1: along the first one,
+/// linear in the inverse depth. `poses`: one per keyframe. False: a view has it behind.
+[[nodiscard]] bool triangulate(const std::vector<AdjustedPose>& poses,
+                               const MapTrack& track,
+                               const std::vector<Eigen::Vector2d>& rays,
+                               AdjustedPoint& point);
 
 /// A corner's reprojection error in its sigmas. Unknowns: the point, the pose, the camera: changes
 /// as IntrinsicsDelta, and a sixth that does nothing (Ceres is three times as fast where poses and

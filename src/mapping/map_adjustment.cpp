@@ -15,6 +15,7 @@
 
 #include "geometry/median.hpp"
 #include "internal_check.hpp"
+#include "mapping/adjustment_covariance.hpp"
 #include "mapping/adjustment_errors.hpp"
 
 namespace stemvo {
@@ -30,8 +31,8 @@ using internal::EdgeError;
 /// fewer corners by theirs.
 constexpr int kFewLandmarks = 15;
 /// Most observations of a map; beyond, the shortest tracks are left out.
-constexpr std::size_t kMaxObservations = 250'000;
-constexpr std::size_t kMinObservationsOfKeyframe = 60;
+constexpr std::size_t kMaxObservations = 40'000;
+constexpr std::size_t kMinOfKeyframe = 60;
 /// Least Cauchy scale, px, and over the median error, as in the window.
 constexpr double kMinLoss_px = 0.2;
 constexpr double kLossShare = 2.0;
@@ -39,10 +40,12 @@ constexpr double kLooseLoop = 3.0;
 /// Lengths of errors with equal sigmas in u and v have Rayleigh's distribution.
 constexpr double kMedianOfRayleigh = 1.1774;
 constexpr double kMinSigma_px = 0.01;
-/// Errors of a track's corners are alike: they tell less than as many independent ones.
+/// Errors of a track's corners are alike, and in forward motion those of all tracks: where the
+/// tracks that begin in so many keyframes are off together, they count as one error.
+constexpr int kKeyframesOfCluster = 8;
+constexpr int kMaxClusters = 40;
+/// Clusters are alike, too, where the motion stays the same.
 constexpr double kLikeErrors = 2.0;
-/// Forward motion biases all tracks alike.
-constexpr double kFocalSigmaFactor = 3.0;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -50,53 +53,6 @@ auto distance_from_first(const KeptMap& map) {
   return [&map](const Similarity3& at) {
     return (at.translation - map.map_from_keyframe.front().translation).norm();
   };
-}
-
-/// The point nearest to what its views show, from their poses: linear in the inverse depth of the
-/// first view's ray. False: a view has it behind.
-bool triangulate(const std::vector<AdjustedPose>& poses,
-                 const MapTrack& track,
-                 const std::vector<Eigen::Vector2d>& rays,
-                 AdjustedPoint& point) {
-  point.map_from_anchor = poses[index(track.front().keyframe)].camera_from_map().inverse();
-  point.at = {rays.front().x(), rays.front().y(), 0.0};
-  double a = 0.0;
-  double b = 0.0;
-  std::vector<std::pair<double, double>> depths;
-  for (std::size_t i = 0; i < track.size(); ++i) {
-    const Rigid3 camera_from_anchor =
-        poses[index(track[i].keyframe)].camera_from_map() * point.map_from_anchor;
-    const Eigen::Vector3d at_infinity = camera_from_anchor.rotation * rays.front().homogeneous();
-    const Eigen::Vector3d& t = camera_from_anchor.translation;
-    const Eigen::Vector2d by_inverse_depth = t.head<2>() - rays[i] * t.z();
-    const Eigen::Vector2d off = at_infinity.head<2>() - rays[i] * at_infinity.z();
-    a += by_inverse_depth.squaredNorm();
-    b -= by_inverse_depth.dot(off);
-    depths.emplace_back(at_infinity.z(), t.z());
-  }
-  point.at[2] = a > 0.0 ? b / a : 0.0;
-  return std::ranges::all_of(
-      depths, [&](const auto& depth) { return depth.first + depth.second * point.at[2] > 0.05; });
-}
-
-/// The longest tracks, so many that each keyframe has its share of all.
-std::vector<MapTrack> chosen_tracks(const KeptMap& map) {
-  std::vector<MapTrack> tracks = tracks_of(map);
-  const std::size_t share =
-      std::max(kMinObservationsOfKeyframe, kMaxObservations / map.keyframes.size());
-  std::ranges::stable_sort(tracks, std::ranges::greater{}, &MapTrack::size);
-  std::vector<std::size_t> num(map.keyframes.size());
-  std::erase_if(tracks, [&](const MapTrack& track) {
-    const auto count = [&](const MapView& view) -> std::size_t& {
-      return num[index(view.keyframe)];
-    };
-    if (std::ranges::all_of(track, [&](const MapView& view) { return count(view) >= share; })) {
-      return true;
-    }
-    std::ranges::for_each(track, [&](const MapView& view) { ++count(view); });
-    return false;
-  });
-  return tracks;
 }
 
 /// The unknowns of a map and Ceres's problem of them. `map` and `options` outlive it.
@@ -135,7 +91,7 @@ class Adjustment {
   [[nodiscard]] int num_common_landmarks(const MapEdge& edge) const;
 
   void measure_errors();
-  bool minimize(double tolerance);
+  bool minimize(double tolerance, int max_iterations);
   void keep_length();
   void read_landmarks(MapAdjustment& result) const;
   void read_poses(MapAdjustment& result) const;
@@ -151,6 +107,7 @@ class Adjustment {
   double median_error_px_ = 0.0;
   double sigma_px_ = 1.0;
   std::vector<Corner> corners_;
+  std::vector<internal::ClusteredResidual> residuals_;
   ceres::LossFunctionWrapper corner_loss_{nullptr, ceres::TAKE_OWNERSHIP};
   ceres::CauchyLoss loop_loss_{kLooseLoop};
   ceres::Problem problem_;
@@ -190,11 +147,12 @@ Eigen::Vector2d Adjustment::ray(const MapView& view) {
 }
 
 void Adjustment::place_points() {
-  for (MapTrack& track : chosen_tracks(map_)) {
+  const std::size_t share = std::max(kMinOfKeyframe, kMaxObservations / map_.keyframes.size());
+  for (MapTrack& track : longest_tracks(tracks_of(map_), map_.keyframes.size(), share)) {
     std::vector<Eigen::Vector2d> rays;
     std::ranges::transform(track, std::back_inserter(rays),
                            [&](const MapView& view) { return ray(view); });
-    if (AdjustedPoint point; triangulate(poses_, track, rays, point)) {
+    if (AdjustedPoint point; internal::triangulate(poses_, track, rays, point)) {
       points_.push_back(point);
       tracks_.push_back(std::move(track));
     }
@@ -202,14 +160,17 @@ void Adjustment::place_points() {
 }
 
 void Adjustment::add_corners() {
+  const auto num_keyframes = static_cast<int>(poses_.size());
+  const int num_clusters = std::clamp(num_keyframes / kKeyframesOfCluster, 2, kMaxClusters);
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     for (const MapView& view : tracks_[i]) {
       AdjustedPose& pose = poses_[index(view.keyframe)];
       auto* error =
           new CornerError(uv(view), base_camera(view.keyframe), points_[i], pose, sigma_px_);
       double* camera = camera_change(view.keyframe);
-      problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(), pose.delta.data(),
-                                camera);
+      residuals_.push_back({problem_.AddResidualBlock(error, &corner_loss_, points_[i].at.data(),
+                                                      pose.delta.data(), camera),
+                            tracks_[i].front().keyframe * num_clusters / num_keyframes});
       corners_.push_back({error, {points_[i].at.data(), pose.delta.data(), camera}});
     }
   }
@@ -295,9 +256,9 @@ void Adjustment::add_camera() {
   }
   Eigen::Matrix<double, 6, 1> information;
   information << options_.camera_sigma->cwiseInverse(), 1.0;
-  problem_.AddResidualBlock(
+  residuals_.push_back({problem_.AddResidualBlock(
       new ceres::NormalPrior(information.asDiagonal().toDenseMatrix(), Eigen::VectorXd::Zero(6)),
-      nullptr, camera_.data());
+      nullptr, camera_.data())});
 }
 
 void Adjustment::measure_errors() {
@@ -314,7 +275,7 @@ void Adjustment::measure_errors() {
   corner_loss_.Reset(new ceres::CauchyLoss(loss_px / sigma_px_), ceres::TAKE_OWNERSHIP);
 }
 
-bool Adjustment::minimize(double tolerance) {
+bool Adjustment::minimize(double tolerance, int max_iterations) {
   measure_errors();
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
@@ -331,7 +292,7 @@ bool Adjustment::minimize(double tolerance) {
   options.linear_solver_ordering->AddElementToGroup(camera_.data(), 1);
   options.linear_solver_ordering->AddElementToGroup(no_change_.data(), 1);
   options.function_tolerance = tolerance;
-  options.max_num_iterations = 100;
+  options.max_num_iterations = max_iterations;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem_, &summary);
@@ -340,7 +301,7 @@ bool Adjustment::minimize(double tolerance) {
 }
 
 bool Adjustment::solve() {
-  if (points_.empty() || !minimize(1e-3) || !minimize(1e-6)) {
+  if (points_.empty() || !minimize(1e-3, 15) || !minimize(1e-6, 50)) {
     return false;
   }
   measure_errors();
@@ -387,39 +348,25 @@ void Adjustment::read_poses(MapAdjustment& result) const {
 }
 
 void Adjustment::read_covariances(MapAdjustment& result) {
-  ceres::Covariance::Options options;
-  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  ceres::Covariance covariance(options);
-  std::vector<std::pair<const double*, const double*>> blocks;
-  const auto ask = [&](const double* block) {
-    if (problem_.HasParameterBlock(block) && !problem_.IsParameterBlockConstant(block)) {
-      blocks.emplace_back(block, block);
-    }
-  };
-  ask(camera_.data());
+  std::vector<double*> free;
+  std::vector<double*> blocks;
+  problem_.GetParameterBlocks(&blocks);
+  std::ranges::copy_if(blocks, std::back_inserter(free), [&](const double* block) {
+    return !problem_.IsParameterBlockConstant(block);
+  });
+  std::vector<double*> asked = {camera_.data()};
   for (const int i : options_.covariance_of) {
-    ask(poses_[index(i)].delta.data());
+    asked.push_back(poses_[index(i)].delta.data());
   }
-  const bool is_known = covariance.Compute(blocks, &problem_);
-  using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  const auto of = [&](double* block) {
-    Matrix6 matrix = Matrix6::Zero();
-    if (is_known &&
-        std::ranges::count(blocks, std::pair<const double*, const double*>(block, block)) > 0) {
-      covariance.GetCovarianceBlock(block, block, matrix.data());
-    }
-    return matrix;
-  };
-  result.camera.sigma = kLikeErrors * of(camera_.data()).diagonal().head<5>().cwiseSqrt();
-  result.camera.sigma[2] *= kFocalSigmaFactor;
-  for (const int i : options_.covariance_of) {
-    AdjustedPose& pose = poses_[index(i)];
-    Matrix6 by_delta = Matrix6::Zero();  // of (position, rotation) by (w, v)
-    by_delta.topLeftCorner<3, 3>() = -skew(pose.translation);
-    by_delta.topRightCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-    by_delta.bottomLeftCorner<3, 3>() = -Eigen::Matrix3d::Identity();
-    result.covariances.emplace_back(kLikeErrors * kLikeErrors * by_delta * of(pose.delta.data()) *
-                                    by_delta.transpose());
+  const auto found =
+      internal::clustered_covariances(problem_, free, residuals_, asked, kLikeErrors);
+  result.camera.sigma = found.front().diagonal().head<5>().cwiseSqrt();
+  for (std::size_t i = 0; i < options_.covariance_of.size(); ++i) {
+    const AdjustedPose& pose = poses_[index(options_.covariance_of[i])];
+    Eigen::Matrix<double, 6, 6> by_delta;  // of (position, rotation) by (w, v)
+    by_delta << -skew(pose.translation), -Eigen::Matrix3d::Identity(), -Eigen::Matrix3d::Identity(),
+        Eigen::Matrix3d::Zero();
+    result.covariances.emplace_back(by_delta * found[i + 1] * by_delta.transpose());
   }
 }
 

@@ -103,4 +103,22 @@ std::vector<MapTrack> tracks_of(const KeptMap& map) {
   return tracks;
 }
 
+std::vector<MapTrack> longest_tracks(std::vector<MapTrack> tracks,
+                                     std::size_t num_keyframes,
+                                     std::size_t share) {
+  std::ranges::stable_sort(tracks, std::ranges::greater{}, &MapTrack::size);
+  std::vector<std::size_t> num(num_keyframes);
+  std::erase_if(tracks, [&](const MapTrack& track) {
+    const auto count = [&](const MapView& view) -> std::size_t& {
+      return num[static_cast<std::size_t>(view.keyframe)];
+    };
+    if (std::ranges::all_of(track, [&](const MapView& view) { return count(view) >= share; })) {
+      return true;
+    }
+    std::ranges::for_each(track, [&](const MapView& view) { ++count(view); });
+    return false;
+  });
+  return tracks;
+}
+
 }  // namespace stemvo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "mapping/kept_map.hpp"
@@ -19,5 +20,10 @@ using MapTrack = std::vector<MapView>;
 /// Corners of one track id in keyframes that follow each other, and those that loops connect. A
 /// loop that the graph contradicts connects nothing.
 [[nodiscard]] std::vector<MapTrack> tracks_of(const KeptMap& map);
+
+/// The longest tracks: none all of whose keyframes have `share` views of longer ones.
+[[nodiscard]] std::vector<MapTrack> longest_tracks(std::vector<MapTrack> tracks,
+                                                   std::size_t num_keyframes,
+                                                   std::size_t share);
 
 }  // namespace stemvo

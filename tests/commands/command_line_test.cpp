@@ -95,7 +95,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"synth", "x", "--name", "../x"}, "--name"},
       {{"synth", "x", "--walk", "--trajectory", "p.txt"}, "--trajectory"},
       {{"calibrate", "x"}, "--out"},
-      {{"calibrate", "--out", "o"}, "SEQUENCE_DIR"},
+      {{"calibrate", "--out", "o"}, "INPUT"},
       {{"check", "metrics.json"}, "--against"},
       {{"runn", "x", "--out", "o"}, "robustness, search, found 'runn'"},
       {{"benchmark", "x"}, "--out"},
