@@ -24,9 +24,9 @@ struct AdjustedKeyframe {
   int frame = 0;  ///< results before this one's
   double time_s = 0.0;
   Rigid3 map_from_camera;
-  /// Where it was asked for: the true map_from_camera is this one * error, which is x y z (the
-  /// path's units, squared), then rotation about x y z (rad^2), in the camera's axes, with the
-  /// first keyframe held.
+  /// Where it was asked for and could be found: the true map_from_camera is this one * error, which
+  /// is x y z (the path's units, squared), then rotation about x y z (rad^2), in the camera's axes,
+  /// with the first keyframe held.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance = std::nullopt;
 };
 

@@ -90,7 +90,9 @@ AdjustedMap WholeMap::answer() const {
     map.keyframes.push_back({keyframe.frame, keyframe.time_s, pose_of(kept.map_from_keyframe[i])});
   }
   for (std::size_t i = 0; i < covariance_of.size(); ++i) {
-    map.keyframes[index(covariance_of[i])].covariance = covariances[i];
+    if (covariances[i].trace() > 0.0) {  // else it could not be found
+      map.keyframes[index(covariance_of[i])].covariance = covariances[i];
+    }
   }
   for (const KeptLandmark& landmark : landmarks) {
     map.landmarks.push_back(
