@@ -164,16 +164,25 @@ void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& o
 void fix_landmarks(Window& window,
                    const Camera& camera,
                    const std::map<int, Eigen::Vector3d>& known,
-                   const WindowOptions& options) {
+                   double bound_px) {
   const std::vector<Rigid3> poses = poses_of(window);
+  std::map<int, Eigen::Vector3d> agreeing;
+  std::size_t num_seen = 0;
   ObservationWalk walk(window);
   for (const auto& [track_id, point_in_world] : known) {
     const std::span<const KeyframeObservation> observations = walk.seek(track_id);
-    if (!observations.empty() && is_seen_well(point_in_world, observations, poses, camera,
-                                              options.max_reprojection_error_px)) {
-      window.landmarks[track_id] = point_in_world;
-      window.fixed.insert(track_id);
+    num_seen += observations.empty() ? 0 : 1;
+    if (!observations.empty() &&
+        is_seen_well(point_in_world, observations, poses, camera, bound_px)) {
+      agreeing.emplace(track_id, point_in_world);
     }
+  }
+  if (2 * agreeing.size() < num_seen) {
+    return;
+  }
+  for (const auto& [track_id, point_in_world] : agreeing) {
+    window.landmarks[track_id] = point_in_world;
+    window.fixed.insert(track_id);
   }
 }
 

@@ -95,12 +95,13 @@ void triangulate_landmarks(Window& window, const Camera& camera, const WindowOpt
 /// Drops landmarks that a keyframe sees from behind or too far from their observation.
 void cull_landmarks(Window& window, const Camera& camera, const WindowOptions& options);
 
-/// Puts landmarks, by track id, where they are known to be in the world, and fixes them there.
-/// Left out are those that no keyframe sees, or one sees elsewhere.
+/// Puts landmarks, by track id, where they are known to be in the world, and fixes them there. Left
+/// out are those that no keyframe sees, or one sees farther off than `bound_px`; and all where
+/// those are the most: window and map disagree.
 void fix_landmarks(Window& window,
                    const Camera& camera,
                    const std::map<int, Eigen::Vector3d>& known,
-                   const WindowOptions& options);
+                   double bound_px);
 
 /// Moves everything, lengths too; `moved`: new world from old.
 void move(Window& window, const Similarity3& moved);

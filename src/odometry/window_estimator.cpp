@@ -286,13 +286,7 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
       .camera_sigma = result.camera_sigma,
       .scale_sigma = metric_sigma(result)};
   result.motion_covariance = uncertainty_.finish(motion);
-  if (moved_.has_value()) {  // the returned motion has the move in it
-    const Rigid3 move = last.inverse() * world_from_prev;
-    result.motion_covariance.topLeftCorner<3, 3>().diagonal().array() +=
-        move.translation.squaredNorm();
-    result.motion_covariance.bottomRightCorner<3, 3>().diagonal().array() +=
-        move.angle_rad() * move.angle_rad();
-  }
+  add_move(last.inverse() * world_from_prev, result.motion_covariance);
 }
 
 bool WindowEstimator::is_keyframe(const View& view) const {

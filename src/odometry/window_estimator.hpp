@@ -86,6 +86,7 @@ class WindowEstimator final : public Estimator {
   /// An old place was recognized: the window keeps to it.
   void take_in(const Recognition& recognition);
   void move_world(const Similarity3& moved);
+  void add_move(const Rigid3& move, Matrix6d& covariance) const;
   /// Units of motion that move the median landmark in view by a pixel.
   [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);

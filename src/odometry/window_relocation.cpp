@@ -9,6 +9,13 @@ namespace stemvo {
 
 // What the map that remembers does to the window.
 
+namespace {
+
+/// A landmark is not put where a keyframe would see it farther off: the path has no jumps.
+constexpr double kMaxPull_px = 2.0;
+
+}  // namespace
+
 bool WindowEstimator::relocate(const Frame& frame,
                                const Observations& now,
                                const Rigid3& predicted) {
@@ -26,7 +33,7 @@ bool WindowEstimator::relocate(const Frame& frame,
   history_.close(window_);
   window_ = {};
   window_.keyframes.push_back({frame.number, found->world_from_camera, now});
-  fix_landmarks(window_, camera(), found->landmarks, window_options_);
+  fix_landmarks(window_, camera(), found->landmarks, window_options_.max_reprojection_error_px);
   scale_.restart(frame.road.get(), frame.time_s, true);
   calibration_.restart();
   world_from_camera_ = found->world_from_camera;
@@ -44,7 +51,7 @@ void WindowEstimator::take_in(const Recognition& recognition) {
   if (recognition.moved.has_value()) {
     move_world(*recognition.moved);
   }
-  fix_landmarks(window_, camera(), recognition.landmarks, window_options_);
+  fix_landmarks(window_, camera(), recognition.landmarks, kMaxPull_px);
 }
 
 void WindowEstimator::move_world(const Similarity3& moved) {
@@ -57,6 +64,16 @@ void WindowEstimator::move_world(const Similarity3& moved) {
   }
   speed_ *= moved.scale;
   moved_ = moved;
+}
+
+/// A motion that is returned with a move of the world in it may be wrong by all of that.
+void WindowEstimator::add_move(const Rigid3& move, Matrix6d& covariance) const {
+  if (!moved_.has_value()) {
+    return;
+  }
+  const double angle = move.angle_rad();
+  covariance.topLeftCorner<3, 3>().diagonal().array() += move.translation.squaredNorm();
+  covariance.bottomRightCorner<3, 3>().diagonal().array() += angle * angle;
 }
 
 }  // namespace stemvo

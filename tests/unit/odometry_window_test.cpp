@@ -143,9 +143,16 @@ TEST(Window, KnownLandmarksAreFixedWhereTheyAreSeenAndNoAdjustmentMovesThem) {
   }
   const int elsewhere = known.begin()->first;
   known.begin()->second += Eigen::Vector3d(0.0, 5.0, 0.0);
-  fix_landmarks(window, drive.camera, known, {});
+  fix_landmarks(window, drive.camera, known, 2.0);
   EXPECT_FALSE(window.fixed.contains(elsewhere));
   EXPECT_GT(window.fixed.size(), known.size() / 2);
+  std::map<int, Eigen::Vector3d> wrong = known;
+  for (auto& [id, point] : wrong) {
+    point += Eigen::Vector3d(0.0, 0.5, 0.0);
+  }
+  Window other = window_of(drive, {});
+  fix_landmarks(other, drive.camera, wrong, 2.0);
+  EXPECT_TRUE(other.fixed.empty());
   EXPECT_TRUE(refine_window(window, drive.camera, {.num_fixed_poses = 1}));
   for (const int id : window.fixed) {
     EXPECT_EQ(window.landmarks.at(id), known.at(id));
