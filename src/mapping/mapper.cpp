@@ -15,7 +15,7 @@ namespace stemvo {
 namespace {
 
 /// A graph of so many nodes is solved in the time of one keyframe.
-constexpr int kNodesPerKeyframe = 16;
+constexpr int kNodesPerKeyframe = 64;
 /// Standard deviations of where a lost frame was found, one place alone: rotation, share of the
 /// depth, scale.
 constexpr double kSigmaFound_rad = 0.005;
