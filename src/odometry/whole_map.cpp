@@ -18,6 +18,18 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.translation}; }
 
+/// No keyframe was turned against what was measured between it and the next one.
+bool agrees_with_motions(const KeptMap& kept, const std::vector<Similarity3>& map_from_keyframe) {
+  constexpr double kMaxTurn_rad = 0.035;
+  constexpr double kMaxSigmas = 10.0;
+  return std::ranges::all_of(kept.motions, [&](const MapEdge& edge) {
+    const Eigen::Quaterniond turn = map_from_keyframe[index(edge.from)].rotation.conjugate() *
+                                    map_from_keyframe[index(edge.to)].rotation;
+    return turn.angularDistance(edge.from_to.rotation) <
+           std::max(kMaxTurn_rad, kMaxSigmas * edge.sigma_rad);
+  });
+}
+
 }  // namespace
 
 WholeMap::WholeMap(const PhasedOdometry& odometry)
@@ -42,7 +54,7 @@ Status WholeMap::adjust(const std::vector<int>& frames) {
   const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
   const auto adjusted =
       adjust_map(kept, {camera, camera_sigma, static_cast<int>(num_of_other), covariance_of});
-  if (adjusted) {
+  if (adjusted && agrees_with_motions(kept, adjusted->map_from_keyframe)) {
     take_in(*adjusted);
   } else {
     covariance_of.clear();
