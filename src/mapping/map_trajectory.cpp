@@ -24,9 +24,15 @@ std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_cam
                                           std::span<const double> times_s,
                                           const KeptMap& map) {
   STEMVO_CHECK(world_from_camera.size() == times_s.size(), "a time per pose");
-  const std::span<const KeptKeyframe> keyframes = map.keyframes;
   const auto frame_of = [](const KeptKeyframe& keyframe) { return keyframe.frame; };
+  const auto num_frames = static_cast<int>(times_s.size());
+  const auto last = std::ranges::lower_bound(map.keyframes, num_frames, {}, frame_of);
+  const std::span<const KeptKeyframe> keyframes(map.keyframes.begin(), last);
   const auto begin = std::ranges::lower_bound(keyframes, 0, {}, frame_of);
+  // A keyframe's own time is of another clock.
+  const auto time_of = [&](const KeptKeyframe& keyframe) {
+    return times_s[static_cast<std::size_t>(keyframe.frame)];
+  };
   std::vector<Similarity3> map_from_camera;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
     const auto by = [&](auto keyframe) {
@@ -42,7 +48,7 @@ std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_cam
       map_from_camera.push_back(by(after == begin ? begin : std::prev(after)));
     } else {
       const auto before = std::prev(after);
-      const double share = (times_s[i] - before->time_s) / (after->time_s - before->time_s);
+      const double share = (times_s[i] - time_of(*before)) / (time_of(*after) - time_of(*before));
       map_from_camera.push_back(between(by(before), by(after), share));
     }
   }
