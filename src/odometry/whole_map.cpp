@@ -99,7 +99,10 @@ AdjustedMap WholeMap::answer() const {
   std::ranges::transform(map_from_frame, std::back_inserter(map.map_from_camera), pose_of);
   for (std::size_t i = 0; i < kept.keyframes.size(); ++i) {
     const KeptKeyframe& keyframe = kept.keyframes[i];
-    map.keyframes.push_back({keyframe.frame, keyframe.time_s, pose_of(kept.map_from_keyframe[i])});
+    const bool is_own = keyframe.frame >= 0;  // another recording's clock is its own
+    map.keyframes.push_back({keyframe.frame,
+                             is_own ? times_s[index(keyframe.frame)] : keyframe.time_s,
+                             pose_of(kept.map_from_keyframe[i])});
   }
   for (std::size_t i = 0; i < covariance_of.size(); ++i) {
     if (covariances[i].trace() > 0.0) {  // else it could not be found
