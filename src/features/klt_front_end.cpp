@@ -56,8 +56,7 @@ std::shared_ptr<const ImagePyramid> KltFrontEnd::prepare(const ChannelImage& cha
   return image;
 }
 
-std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& from,
-                                                                  const View& to) {
+std::vector<std::optional<cv::Point2f>> KltFrontEnd::track_points(const View& from, View& to) {
   const auto& prev = static_cast<const KltPyramid&>(*from.image);
   const auto& cur = static_cast<const KltPyramid&>(*to.image);
   std::vector<std::optional<cv::Point2f>> result(from.points.size());

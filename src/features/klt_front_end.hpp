@@ -23,7 +23,7 @@ class KltFrontEnd final : public PointFrontEnd {
 
   [[nodiscard]] bool begin_track(const ImagePyramid&, const Point&) override { return true; }
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
-                                                                     const View& to) override;
+                                                                     View& to) override;
   void end_other_tracks(const std::vector<Point>&,
                         const std::vector<Point>&,
                         const Observations&) override {}

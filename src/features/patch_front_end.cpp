@@ -33,7 +33,7 @@ constexpr int kPredictedLevel = 1;
 constexpr double kFewFound = 0.3;
 /// So many points say whether a hint of the turn leads to them.
 constexpr std::size_t kNumProbes = 40;
-/// A hint that moves a start by less changes nothing.
+/// A hint that moves a start by less says what is expected anyway.
 constexpr float kSameStart_px = 1.0F;
 
 /// Motions of points between two images.
@@ -197,11 +197,10 @@ bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
       num_without += align(point, without, level).correlation >= kMinCorrelation ? 1 : 0;
     }
   }
-  return num_probes > 0 && num_with >= std::max<double>(num_without, kFewFound * num_probes);
+  return num_with >= std::max<double>(num_without, kFewFound * num_probes);
 }
 
-std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from,
-                                                                    const View& to) {
+std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from, View& to) {
   const auto& image = static_cast<const PatchPyramid&>(*to.image);
   const Pyramid pyramid = image.bordered;
   const int coarsest = static_cast<int>(pyramid.size()) - 1;
@@ -216,6 +215,9 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
   };
   const Outlook outlook(from, to);
   const bool is_turned = outlook.knows_turn() && leads_to_points(outlook, from, align, top);
+  if (is_turned) {
+    to.turn = from.turn_to_newest;
+  }
   const auto near = [&](const cv::Point2f& uv) {
     return motions.empty() && is_turned ? outlook.turned(uv) : motions.near(uv);
   };

@@ -34,7 +34,7 @@ class PatchFrontEnd final : public PointFrontEnd {
 
   [[nodiscard]] bool begin_track(const ImagePyramid& image, const Point& point) override;
   [[nodiscard]] std::vector<std::optional<cv::Point2f>> track_points(const View& from,
-                                                                     const View& to) override;
+                                                                     View& to) override;
   template <typename Align>
   [[nodiscard]] bool leads_to_points(const Outlook& outlook,
                                      const View& from,

@@ -108,7 +108,6 @@ Matches PointFrontEnd::track(const View& from, View& to) {
   const std::vector<std::optional<cv::Point2f>> found =
       timed(Stage::kTracking, [&] { return track_points(from, to); });
   to.interval_s = to.time_s - from.time_s;
-  to.turn = from.turn_to_newest;
   const cv::Mat mask = to.image->mask_of(to.image->channel.map, to.image->channel.pixels.size());
   to.points.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -36,8 +36,8 @@ class PointFrontEnd : public FrontEnd {
     int frame = -1;
     double time_s = 0.0;
     double interval_s = 0.0;  ///< from the image where its points were before
-    std::optional<Eigen::Matrix3d> turn =
-        std::nullopt;  ///< the turn from there, as ImageClue::turn
+    /// The turn from there, as ImageClue::turn, where it led to the points.
+    std::optional<Eigen::Matrix3d> turn = std::nullopt;
     /// The turn from here to the newest image.
     std::optional<Eigen::Matrix3d> turn_to_newest = Eigen::Matrix3d::Identity();
   };
@@ -54,7 +54,7 @@ class PointFrontEnd : public FrontEnd {
   [[nodiscard]] virtual bool begin_track(const ImagePyramid& image, const Point& point) = 0;
   /// Where the points of `from` are in the next view, which has no points yet; nullopt: not found.
   [[nodiscard]] virtual std::vector<std::optional<cv::Point2f>> track_points(const View& from,
-                                                                             const View& to) = 0;
+                                                                             View& to) = 0;
   /// A track that ended, near `point` of the image; nullopt: it is not there.
   [[nodiscard]] virtual std::optional<cv::Point2f> match_projection(const ImagePyramid& /*image*/,
                                                                     const Point& /*point*/) {
