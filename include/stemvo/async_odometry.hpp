@@ -43,8 +43,9 @@ class AsyncOdometry {
   void set_log(Log log);
 
   /// The next frame, as Odometry::process takes it. Its pixels are copied before this returns; it
-  /// waits while six frames are at work. Errors: as process, and nothing changes then; after
-  /// finish(), or after a callback threw; in the callback, which would wait for itself.
+  /// waits while six frames are at work. Errors: as process, or 1,000 results wait for next(), and
+  /// nothing changes then; after finish(), or after a callback threw; in the callback, which would
+  /// wait for itself.
   [[nodiscard]] Status push(const cv::Mat& image,
                             PixelOrder order,
                             double time_s,

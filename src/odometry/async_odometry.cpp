@@ -15,6 +15,12 @@
 #include "odometry/whole_map.hpp"
 
 namespace stemvo {
+namespace {
+
+/// Each holds a pose and a few numbers; a program that never asks for them shall hear of it.
+constexpr std::size_t kMaxWaiting = 1000;
+
+}  // namespace
 
 struct AsyncOdometry::Impl {
   Impl(PhasedOdometry given, const Camera& camera, ScaleSource source, Callback on_result)
@@ -48,6 +54,13 @@ struct AsyncOdometry::Impl {
                ? Status(fail(std::string(name) +
                              ": expected a call outside of the callback, found one in it"))
                : Status();
+  }
+  [[nodiscard]] Status check_few_wait() {
+    const std::lock_guard lock(results_mutex);
+    return results.size() < kMaxWaiting
+               ? Status()
+               : Status(fail("push: expected next() to take the results, found " +
+                             std::to_string(results.size()) + " that wait for it"));
   }
   /// Why the loops take no frame.
   [[nodiscard]] Error ended() const {
@@ -120,7 +133,8 @@ Status AsyncOdometry::push(const cv::Mat& image,
     return status;
   }
   const std::lock_guard lock(impl_->turn);
-  status = impl_->check.admit(image, order, time_s, hints);
+  status = impl_->check_few_wait();
+  status = status ? impl_->check.admit(image, order, time_s, hints) : status;
   if (!status) {
     return status;
   }

@@ -144,6 +144,29 @@ TEST_F(Async, ResultsWaitUntilTheyAreTaken) {
               HasSubstr("after finish()"));
 }
 
+TEST_F(Async, AThousandResultsThatNobodyTakesAreEnough) {
+  AsyncOdometry odometry =
+      AsyncOdometry::create(
+          {.fx_px = 60, .fy_px = 60, .cx_px = 40, .cy_px = 30, .width_px = 80, .height_px = 60},
+          with_threads(1))
+          .value();
+  const cv::Mat dark = cv::Mat::zeros(60, 80, CV_8UC1);
+  double now_s = 0.0;
+  const auto push_next = [&] { return odometry.push(dark, PixelOrder::kGray, now_s += 0.1); };
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_TRUE(push_next()) << i;
+  }
+  EXPECT_THAT(error_of(push_next()), AllOf(HasSubstr("next()"), HasSubstr("1000 that wait")));
+  ASSERT_TRUE(odometry.next());
+  EXPECT_TRUE(push_next());
+  EXPECT_FALSE(push_next());
+  EXPECT_TRUE(odometry.finish());
+  int num_taken = 1;
+  for (; odometry.next()->has_value(); ++num_taken) {
+  }
+  EXPECT_EQ(num_taken, 1001) << "what was refused left nothing";
+}
+
 TEST_F(Async, AWrongFrameIsAnErrorOfPushAndChangesNothing) {
   std::vector<Left> found;
   std::optional<AsyncOdometry> odometry;
