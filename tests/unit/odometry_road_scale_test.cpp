@@ -65,17 +65,25 @@ TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
   EXPECT_NEAR(rescaled.slope_rad, pitch_rad, 1e-3);
 }
 
+/// With what its filter knows then.
+struct Estimate : RoadScaleEstimate {
+  double metres_per_unit = 1.0;
+  double sigma = 0.0;
+  bool is_initialized = false;
+};
+
 /// A road scale with a filter of its own.
 struct Scale {
   explicit Scale(const RoadOptions& options = {}) : road(options) {}
 
-  RoadScaleEstimate update(RoadImage image,
-                           const Rigid3& motion,
-                           const std::vector<RoadLandmark>& landmarks = {}) {
+  Estimate update(RoadImage image,
+                  const Rigid3& motion,
+                  const std::vector<RoadLandmark>& landmarks = {}) {
     if (motion.translation.norm() > 0.0) {
       filter.predict(0.1);
     }
-    return road.update(std::move(image), motion, filter, landmarks);
+    const RoadScaleEstimate estimate = road.update(std::move(image), motion, filter, landmarks);
+    return {estimate, std::exp(filter.log_scale()), road.sigma(filter), filter.is_initialized()};
   }
   RoadScale road;
   ScaleFilter filter{kDriftSigma};
@@ -87,7 +95,7 @@ class Drive {
   static constexpr double kStep_m = 0.7;
   static constexpr double kMetresPerUnit = 3.0;
 
-  RoadScaleEstimate next(Scale& scale, bool has_road = true) {
+  Estimate next(Scale& scale, bool has_road = true) {
     scene_.has_road = has_road;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     const cv::Mat image =
@@ -96,7 +104,7 @@ class Drive {
     return scale.update(make_road_image({image, {}}, scene_.camera), step(), landmarks);
   }
   /// A frame that shows the last place again.
-  RoadScaleEstimate stand(Scale& scale) {
+  Estimate stand(Scale& scale) {
     --frame_;
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame_});
     ++frame_;
@@ -118,14 +126,14 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
   Drive drive;
   Scale scale;
   EXPECT_EQ(drive.next(scale).reason, "first frame");
-  RoadScaleEstimate estimate;
+  Estimate estimate;
   for (int i = 0; i < 12; ++i) {
     estimate = drive.next(scale);
   }
   EXPECT_TRUE(estimate.is_measured) << estimate.reason;
   EXPECT_NEAR(std::log(estimate.metres_per_unit / Drive::kMetresPerUnit), 0.0, 0.008);
 
-  const RoadScaleEstimate standing = drive.stand(scale);
+  const Estimate standing = drive.stand(scale);
   EXPECT_EQ(standing.reason, "standing still");
   EXPECT_EQ(standing.metres_per_unit, estimate.metres_per_unit);
   EXPECT_EQ(standing.sigma, estimate.sigma);
@@ -141,12 +149,12 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
 TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
   Drive drive;
   Scale scale;
-  RoadScaleEstimate seen;
+  Estimate seen;
   for (int i = 0; i < 13; ++i) {
     seen = drive.next(scale);
   }
   EXPECT_TRUE(seen.is_believed);
-  RoadScaleEstimate lost;
+  Estimate lost;
   for (int i = 0; i < 6; ++i) {
     lost = drive.next(scale, false);
     EXPECT_FALSE(lost.is_measured);
@@ -160,10 +168,10 @@ TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
 }
 
 /// Drives over asphalt with landmarks of a plane that is `ratio` times as far below the camera.
-RoadScaleEstimate drive_with_landmarks(double ratio, double noise) {
+Estimate drive_with_landmarks(double ratio, double noise) {
   Drive drive;
   Scale scale;
-  RoadScaleEstimate estimate;
+  Estimate estimate;
   const double height = ratio * RoadOptions().camera_height_m / Drive::kMetresPerUnit;
   for (int i = 0; i < 20; ++i) {
     for (int k = 0; k < 8; ++k) {
@@ -179,7 +187,7 @@ RoadScaleEstimate drive_with_landmarks(double ratio, double noise) {
 TEST(RoadScale, LandmarksBelowOrAboveThePlaneSayThatItIsNoRoad) {
   EXPECT_TRUE(drive_with_landmarks(1.0, 0.02).is_measured);
   for (const double ratio : {1.6, 0.6}) {
-    const RoadScaleEstimate estimate = drive_with_landmarks(ratio, 0.02);
+    const Estimate estimate = drive_with_landmarks(ratio, 0.02);
     EXPECT_FALSE(estimate.is_believed) << ratio;
     EXPECT_FALSE(estimate.is_measured) << ratio;
     EXPECT_EQ(estimate.reason, "landmarks are not on it") << ratio;
@@ -202,7 +210,7 @@ double error_on_a_crest(const RoadOptions& options) {
     return Rigid3(so3_exp({-2.0 * kBend_per_m * z, 0.0, 0.0}), {0.0, kBend_per_m * z * z, z});
   };
   Scale scale(options);
-  RoadScaleEstimate estimate;
+  Estimate estimate;
   for (int frame = 0; frame <= kFrames; ++frame) {
     const Rigid3 camera_from_first = first_from_camera(frame).inverse();
     const cv::Mat image =

@@ -210,10 +210,7 @@ RoadScaleEstimate RoadScale::update(RoadImage image,
   } else {
     result.reason = "standing still";
   }
-  result.is_initialized = filter.is_initialized();
-  result.metres_per_unit = std::exp(filter.log_scale());
   result.is_believed = belief_.is_believed();
-  result.sigma = sigma(filter);
   return result;
 }
 

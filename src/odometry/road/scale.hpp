@@ -15,12 +15,9 @@
 
 namespace stemvo {
 
-/// The scale as it is known after a frame; nothing of it looks ahead.
+/// The road's part in the scale after a frame; nothing of it looks ahead.
 struct RoadScaleEstimate {
-  double metres_per_unit = 1.0;  ///< metres = metres_per_unit * units of the given motions
-  double sigma = 0.0;            ///< of log(metres_per_unit)
-  bool is_believed = false;      ///< it is the road; else metres_per_unit is a guess
-  bool is_initialized = false;   ///< a road was seen since the start (or since restart())
+  bool is_believed = false;      ///< it is the road; else the scale is a guess
   bool is_measured = false;      ///< this frame's road was measured and believed
   std::string_view reason = "";  ///< where is_measured is false
 };
