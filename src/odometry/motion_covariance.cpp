@@ -196,6 +196,26 @@ Matrix6d MotionCovariance::finish(const Motion& motion) {
   return is_first ? Matrix6d::Zero() : covariance;
 }
 
+void MotionCovariance::rescale(double factor) {
+  Vector6d lengths = Vector6d::Ones();
+  lengths.head<3>().setConstant(factor);
+  const Matrix6d by = lengths.asDiagonal();
+  for (Matrix6d* one : {&prev_pose_, &flow_, &mean_step_, &mean_change_}) {
+    *one = transformed(*one, by);
+  }
+  if (track_noise_) {
+    track_noise_ = transformed(*track_noise_, by);
+  }
+  for (std::optional<Vector6d>* one : {&step_, &prev_velocity_}) {
+    if (*one) {
+      **one = by * **one;
+    }
+  }
+  for (Vector6d& influence : influences_.of_point) {
+    influence = by * influence;
+  }
+}
+
 Matrix6d MotionCovariance::changes_of_velocity(const Motion& motion) const {
   if (num_changes_ > 0) {
     return mean_change_;

@@ -63,6 +63,8 @@ class MotionCovariance {
 
   /// Last, for every frame. Finite, symmetric, positive definite; zero for the first frame.
   [[nodiscard]] Matrix6d finish(const Motion& motion);
+  /// The map was multiplied by `factor` (new units = factor * old units).
+  void rescale(double factor);
 
  private:
   [[nodiscard]] Matrix6d changes_of_velocity(const Motion& motion) const;

@@ -365,6 +365,7 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
       rescale(window_, factor, center);
       history_.rescale(factor);
       calibration_.rescale(factor, center);
+      uncertainty_.rescale(factor);
       for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera}) {
         pose->translation = center + factor * (pose->translation - center);
       }

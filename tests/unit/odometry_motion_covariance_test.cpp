@@ -135,6 +135,29 @@ MotionCovariance::Motion known_motion() {
   return motion;
 }
 
+TEST(MotionCovariance, KeepsToTheUnitOfTheMap) {
+  MotionCovariance kept;
+  MotionCovariance rescaled;
+  Vector6d units = Vector6d::Ones();
+  for (int i = 0; i < 20; ++i) {
+    MotionCovariance::Motion motion = known_motion();
+    motion.prev_from_cur.translation.z() += 0.3 * std::sin(i);
+    if (i == 19) {  // by the changes of velocity before
+      motion.state = FrameState::kLost;
+      motion.is_localized = false;
+    }
+    const Matrix6d expected = kept.finish(motion);
+    if (i == 15) {
+      units.head<3>().setConstant(3.0);
+      rescaled.rescale(3.0);
+    }
+    motion.prev_from_cur.translation *= units.x();
+    motion.usual_step *= units.x();
+    const Matrix6d found = rescaled.finish(motion);
+    EXPECT_TRUE(found.isApprox(units.asDiagonal() * expected * units.asDiagonal(), 1e-9)) << i;
+  }
+}
+
 TEST(MotionCovariance, TheScaleStretchesTheStep) {
   MotionCovariance::Motion motion = known_motion();
   motion.scale_sigma = 0.03;
