@@ -41,6 +41,13 @@ WholeMap::WholeMap(const PhasedOdometry& odometry)
       camera(odometry.view().camera()),
       camera_sigma(prior_sigma(odometry.options().camera.refine)) {}
 
+void WholeMap::close_loops() {
+  if (!kept.loops.empty()) {
+    solve_pose_graph(kept);
+    map_from_frame = place_trajectory(trajectory, times_s, kept);
+  }
+}
+
 Status WholeMap::adjust(const std::vector<int>& frames) {
   for (const int frame : frames) {
     const auto found = std::ranges::lower_bound(kept.keyframes, frame, {}, &KeptKeyframe::frame);
@@ -49,7 +56,7 @@ Status WholeMap::adjust(const std::vector<int>& frames) {
     }
     covariance_of.push_back(static_cast<int>(found - kept.keyframes.begin()));
   }
-  solve_pose_graph(kept);
+  close_loops();
   const auto is_of_other = [](const KeptKeyframe& keyframe) { return keyframe.frame < 0; };
   const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
   const auto adjusted =

@@ -21,6 +21,8 @@ namespace stemvo {
 struct WholeMap {
   explicit WholeMap(const PhasedOdometry& odometry);
 
+  /// Places keyframes and all frames where loops bend them.
+  void close_loops();
   /// Places keyframes and their landmarks where everything agrees best, and all frames among them.
   /// `covariance_of`: frames of keyframes. Error: one of them is none.
   [[nodiscard]] Status adjust(const std::vector<int>& covariance_of = {});

@@ -34,9 +34,15 @@ double stretch_at(std::span<const Similarity3> estimated,
 }  // namespace
 
 MapResult finish_map(const Run& run) {
-  const auto start = std::chrono::steady_clock::now();
-  MapResult map{WholeMap(run.odometry), {}, 0.0};
-  (void)map.whole.adjust();  // no covariances: no error
+  MapResult map{WholeMap(run.odometry), {}};
+  if (run.request.adjust_map) {
+    const auto start = std::chrono::steady_clock::now();
+    (void)map.whole.adjust();  // no covariances: no error
+    map.adjustment_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  } else {
+    map.whole.close_loops();
+  }
   for (const Similarity3& placed : map.whole.map_from_frame) {
     map.trajectory.emplace_back(placed.rotation, placed.translation);
   }
@@ -44,8 +50,6 @@ MapResult finish_map(const Run& run) {
     map.trajectory = rescale_steps(
         map.trajectory, std::span(*run.sequence.ground_truth()).first(map.trajectory.size()));
   }
-  map.adjustment_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return map;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -15,11 +16,12 @@ namespace stemvo::pipeline {
 /// What the map makes of a run that is over.
 struct MapResult {
   WholeMap whole;
-  Trajectory trajectory;      ///< of all frames, as result files hold it
-  double adjustment_s = 0.0;  ///< it took
+  Trajectory trajectory;                              ///< of all frames, as result files hold it
+  std::optional<double> adjustment_s = std::nullopt;  ///< it took
 };
 
-/// Adjusts what the run remembers; with scale.source=ground_truth steps get their true length.
+/// Takes in what the run remembers, adjusted where that is asked for; with
+/// scale.source=ground_truth steps get their true length.
 [[nodiscard]] MapResult finish_map(const Run& run);
 
 /// Pairs of frames of this run that show one place.

@@ -28,8 +28,9 @@ struct RunRequest : FrameSourceRequest {
   /// Of an earlier run: its places are recognized; needs odometry.mode map with loops.
   std::optional<std::filesystem::path> map;
   std::optional<std::filesystem::path> saved_map;  ///< is written in the end; needs the same
-  bool measure_times = false;                      ///< RunSummary::report.timing
-  std::string command;  ///< that repeats the run, for report.html; may be empty
+  bool adjust_map = false;     ///< keyframes, landmarks and camera together, in the end
+  bool measure_times = false;  ///< RunSummary::report.timing
+  std::string command;         ///< that repeats the run, for report.html; may be empty
   /// Called before work starts, and of a stream's ground truth after it: what the input was taken
   /// for, a line each.
   std::function<void(const std::string&)> note;

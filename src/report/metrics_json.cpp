@@ -64,7 +64,7 @@ void to_json(Json& json, const MapReport& report) {
   json = {{"keyframes", report.num_keyframes},
           {"loops", report.num_loops},
           {"relocalizations", report.num_relocalizations},
-          {"adjustment_s", report.adjustment_s},
+          {"adjustment_s", report.adjustment_s ? Json(*report.adjustment_s) : Json()},
           {"alignment", report.metrics ? Json(to_string(report.metrics->alignment)) : Json()}};
   add_metrics(json, report.metrics);
 }

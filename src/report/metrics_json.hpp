@@ -25,7 +25,7 @@ struct MapReport {
   std::size_t num_keyframes = 0;
   std::size_t num_loops = 0;            ///< places seen again while the camera was tracked
   std::size_t num_relocalizations = 0;  ///< frames that found the camera again after a loss
-  double adjustment_s = 0.0;            ///< how long the adjustment of everything took
+  std::optional<double> adjustment_s;   ///< how long the adjustment of everything took
   std::optional<Metrics> metrics;       ///< of trajectory_map_kitti.txt
 };
 

@@ -55,10 +55,10 @@ std::string head(const MetricsReport& report) {
   }
   if (report.map) {
     const MapReport& map = *report.map;
-    table.add(
-        {"map",
-         fmt::format("{} keyframes, {} loops, {} relocalizations, adjusted in {:.1f} s",
-                     map.num_keyframes, map.num_loops, map.num_relocalizations, map.adjustment_s)});
+    const std::string adjusted =
+        map.adjustment_s ? fmt::format(", adjusted in {:.1f} s", *map.adjustment_s) : "";
+    table.add({"map", fmt::format("{} keyframes, {} loops, {} relocalizations{}", map.num_keyframes,
+                                  map.num_loops, map.num_relocalizations, adjusted)});
   }
   if (report.metrics) {
     table.add({"path", format_length(report.metrics->path_length_m, 1) + " m (ground truth)"});
