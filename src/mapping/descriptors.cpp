@@ -2,6 +2,7 @@
 #include "mapping/descriptors.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -21,6 +22,8 @@ constexpr int kMaxBits = 72;
 constexpr double kMaxRatio = 0.85;
 /// Side of the square that the comparisons lie in, pixels of the channel.
 constexpr int kPatch_px = 31;
+/// It lies in the image.
+constexpr int kBorder_px = kPatch_px / 2 + 1;
 
 struct Nearest {
   int index = -1;
@@ -67,15 +70,23 @@ STEMVO_POPCNT void find_nearest_avx2(std::span<const Descriptor> first,
 
 }  // namespace
 
-std::vector<Descriptor> describe(const ChannelImage& channel, std::span<const KeptCorner> corners) {
+double image_roll_rad(const Eigen::Quaterniond& map_from_camera) {
+  const Eigen::Vector3d y_axis = map_from_camera.conjugate() * Eigen::Vector3d::UnitY();
+  return std::atan2(-y_axis.x(), y_axis.y());
+}
+
+std::vector<Descriptor> describe(const ChannelImage& channel,
+                                 std::span<const KeptCorner> corners,
+                                 double roll_rad) {
+  const auto roll_deg = static_cast<float>(roll_rad * 180.0 / M_PI);
   std::vector<cv::KeyPoint> keypoints;
   for (const KeptCorner& corner : corners) {
     const Eigen::Vector2f at = channel.map.from_input(corner.uv.cast<double>()).cast<float>();
     const int index = static_cast<int>(keypoints.size());
-    keypoints.emplace_back(cv::Point2f(at.x(), at.y()), kPatch_px, 0.0F, 0.0F, 0, index);
+    keypoints.emplace_back(cv::Point2f(at.x(), at.y()), kPatch_px, roll_deg, 0.0F, 0, index);
   }
   const cv::Ptr<cv::ORB> orb =
-      cv::ORB::create(std::max(1, static_cast<int>(corners.size())), 2.0F, 1, kPatch_px, 0, 2,
+      cv::ORB::create(std::max(1, static_cast<int>(corners.size())), 2.0F, 1, kBorder_px, 0, 2,
                       cv::ORB::HARRIS_SCORE, kPatch_px);
   cv::Mat bits;
   orb->compute(channel.pixels, keypoints, bits);

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "instruction_set.hpp"
 #include "mapping/kept_map.hpp"
 #include "stem/channel.hpp"
@@ -16,10 +18,15 @@ namespace stemvo {
 /// Of a corner too near the border; it matches nothing.
 inline constexpr Descriptor kNoDescriptor{};
 
-/// ORB's 256 comparisons around each corner on the channel, upright: cameras are held upright, and
-/// a turn that is not measured costs no bits. One per corner.
+/// From the image's y axis to where the map's y axis points in it.
+[[nodiscard]] double image_roll_rad(const Eigen::Quaterniond& map_from_camera);
+
+/// ORB's 256 comparisons around each corner on the channel, turned with the image: a hand rolls the
+/// camera by 15 degrees, and a turn that is not measured at each corner costs no bits. One per
+/// corner.
 [[nodiscard]] std::vector<Descriptor> describe(const ChannelImage& channel,
-                                               std::span<const KeptCorner> corners);
+                                               std::span<const KeptCorner> corners,
+                                               double roll_rad);
 
 /// Bits that differ; inside of what is compiled for a processor that counts bits, it does.
 STEMVO_INLINE int differing_bits(const Descriptor& a, const Descriptor& b) {

@@ -8,6 +8,7 @@
 
 #include "geometry/median.hpp"
 #include "mapping/descriptors.hpp"
+#include "mapping/drift_bound.hpp"
 #include "mapping/pose_graph.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -94,11 +95,11 @@ Recognition Mapper::observe(const WindowView& view, std::shared_ptr<const ImageP
   finish_lookup();
   keeper_.add_nodes(view);
   if (const auto loop = std::exchange(found_, {})) {
-    recognition = take_in(*loop);
+    recognition = take_in(view, *loop);
   }
+  solve_graph(view);  // before anybody reads it beside the frames
   begin_lookup(view);
   newest_ = {view.window.keyframes.back().frame, std::move(image)};
-  solve_graph(view);
   return recognition;
 }
 
@@ -114,10 +115,11 @@ void Mapper::begin_lookup(const WindowView& view) {
   if (!recognizer_.asks(work.keyframe)) {
     return;
   }
-  looked_up_ = begin([this, work = std::move(work), image = newest_.image]() mutable {
+  const double roll = image_roll_rad(keeper_.map_from_keyframe(work.node).rotation);
+  looked_up_ = begin([this, roll, work = std::move(work), image = newest_.image]() mutable {
     const StageTimer timer(Stage::kPlaces);
     KeptKeyframe& keyframe = work.keyframe;
-    keyframe.descriptors = describe(image->channel, keyframe.corners);
+    keyframe.descriptors = describe(image->channel, keyframe.corners, roll);
     work.loop = recognizer_.recognize(keeper_.map(), work.node, keyframe);
     if (work.loop.has_value()) {
       measure_scale(keeper_.keyframe(work.loop->from), keyframe, *work.loop);
@@ -146,9 +148,12 @@ std::optional<Loop> Mapper::keep(const LookedUp& found, MapKeeper& keeper) {
 }
 
 /// Its newer keyframe is in the window still.
-Recognition Mapper::take_in(const Loop& loop) {
-  has_new_loops_ = true;
+Recognition Mapper::take_in(const WindowView& view, const Loop& loop) {
   Recognition recognition;
+  if (!is_within_drift(keeper_.graph(view), loop)) {
+    return recognition;
+  }
+  has_new_loops_ = true;
   recognition.frame = keeper_.keyframe(loop.from).frame;
   recognition.moved = keeper_.add_loop(loop);
   if (recognition.moved.has_value()) {
@@ -199,7 +204,7 @@ void Mapper::close(const WindowView& view) {
     finish_lookup();
     keeper_.close(view);
     if (const auto loop = std::exchange(found_, {})) {
-      (void)take_in(*loop);
+      (void)take_in(view, *loop);
     }
     newest_ = {};
   }
@@ -215,8 +220,9 @@ std::optional<Relocation> Mapper::locate(const Matches& matches,
   }
   const StageTimer timer(Stage::kPlaces);
   const std::vector<KeptCorner> corners = corners_of(matches);
+  const double roll = image_roll_rad(keeper_.map_from_world().rotation * predicted.rotation);
   const auto found =
-      recognizer_.locate(keeper_.map(), camera, corners, describe(image.channel, corners));
+      recognizer_.locate(keeper_.map(), camera, corners, describe(image.channel, corners, roll));
   if (!found.has_value()) {
     return std::nullopt;
   }
@@ -257,7 +263,8 @@ KeptMap Mapper::map(const WindowView& view) const {
     return {};
   }
   if (looked_up_.valid()) {
-    if (const auto loop = keep(looked_up_.get(), keeper)) {
+    const auto loop = keep(looked_up_.get(), keeper);
+    if (loop.has_value() && is_within_drift(keeper.graph(view), *loop)) {
       (void)keeper.add_loop(*loop);
     }
   }

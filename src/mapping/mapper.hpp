@@ -87,7 +87,7 @@ class Mapper {
   /// Waits for the lookup that was begun.
   void finish_lookup();
   [[nodiscard]] static std::optional<Loop> keep(const LookedUp& found, MapKeeper& keeper);
-  [[nodiscard]] Recognition take_in(const Loop& loop);
+  [[nodiscard]] Recognition take_in(const WindowView& view, const Loop& loop);
   void solve_graph(const WindowView& view);
 
   bool is_on_;

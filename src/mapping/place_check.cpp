@@ -19,8 +19,8 @@ constexpr int kMinCells = 12;
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// Of so many pairs or more, so many are enough to look for more where a pose has them.
-constexpr std::size_t kMinMatches = 24;
-constexpr std::size_t kMinSample = 15;
+constexpr std::size_t kMinMatches = 16;
+constexpr std::size_t kMinSample = 10;
 /// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
 constexpr double kBound_px = 4.0;
 constexpr double kMinBound_px = 3.0;

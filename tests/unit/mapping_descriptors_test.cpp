@@ -34,8 +34,8 @@ std::vector<KeptCorner> corners_at(const std::vector<Eigen::Vector2f>& uv) {
 TEST(Descriptors, FollowWhatIsShown) {
   const ChannelImage image{texture({0, 0}), {}};
   const ChannelImage moved{texture({7, -3}), {}};
-  const auto one = describe(image, corners_at({{100.0F, 80.0F}, {200.0F, 90.0F}}));
-  const auto other = describe(moved, corners_at({{93.0F, 83.0F}, {193.0F, 93.0F}}));
+  const auto one = describe(image, corners_at({{100.0F, 80.0F}, {200.0F, 90.0F}}), 0.0);
+  const auto other = describe(moved, corners_at({{93.0F, 83.0F}, {193.0F, 93.0F}}), 0.0);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_LE(differing_bits(one[i], other[i]), 4);
     EXPECT_NE(one[i], kNoDescriptor);
@@ -43,23 +43,42 @@ TEST(Descriptors, FollowWhatIsShown) {
   EXPECT_GT(differing_bits(one[0], other[1]), 70);
 }
 
+TEST(Descriptors, TurnWithTheImage) {
+  const cv::Mat upright = texture({0, 0});
+  // The camera is turned clockwise, so what it shows turns the other way.
+  const double turn_rad = 0.3;
+  const Eigen::Vector2f centre(160.0F, 100.0F);
+  const Eigen::Rotation2Df turn(static_cast<float>(-turn_rad));
+  cv::Mat turned;
+  cv::warpAffine(upright, turned, cv::getRotationMatrix2D({160.0F, 100.0F}, 17.1887, 1.0),
+                 upright.size());
+  const Eigen::Vector2f uv(150.0F, 80.0F);
+  const Eigen::Vector2f turned_uv = centre + turn * (uv - centre);
+  const double roll = image_roll_rad(so3_exp({0.0, 0.0, turn_rad}));
+  const auto one = describe({upright, {}}, corners_at({uv}), 0.0);
+  const auto other = describe({turned, {}}, corners_at({turned_uv}), roll);
+  EXPECT_LE(differing_bits(one[0], other[0]), 30);
+  EXPECT_GT(differing_bits(one[0], describe({turned, {}}, corners_at({turned_uv}), 0.0)[0]), 40);
+}
+
 TEST(Descriptors, PixelsAreTheInputs) {
   ChannelImage half{texture({0, 0}), {}};
   half.map.scale = {2.0, 2.0};
   half.map.offset_px = {0.5, 0.5};
   const ChannelImage whole{texture({0, 0}), {}};
-  EXPECT_EQ(describe(half, corners_at({{200.5F, 160.5F}})),
-            describe(whole, corners_at({{100.0F, 80.0F}})));
+  EXPECT_EQ(describe(half, corners_at({{200.5F, 160.5F}}), 0.0),
+            describe(whole, corners_at({{100.0F, 80.0F}}), 0.0));
 }
 
 TEST(Descriptors, NoneAtTheBorder) {
   const ChannelImage image{texture({0, 0}), {}};
-  const auto found = describe(image, corners_at({{3.0F, 80.0F}, {100.0F, 80.0F}, {318.0F, 80.0F}}));
+  const auto found =
+      describe(image, corners_at({{3.0F, 80.0F}, {100.0F, 80.0F}, {318.0F, 80.0F}}), 0.0);
   ASSERT_EQ(found.size(), 3U);
   EXPECT_EQ(found[0], kNoDescriptor);
   EXPECT_NE(found[1], kNoDescriptor);
   EXPECT_EQ(found[2], kNoDescriptor);
-  EXPECT_TRUE(describe(image, {}).empty());
+  EXPECT_TRUE(describe(image, {}, 0.0).empty());
 }
 
 TEST(Descriptors, MatchesAreEachOthersAndClear) {
