@@ -31,6 +31,8 @@ const IntrinsicsDelta kPriorSigma = (IntrinsicsDelta() << 30.0, 30.0, 0.2, 0.1, 
 constexpr double kMaxSigma_px = 2.0;
 constexpr double kMaxSigmaOfFocal = 0.02;
 constexpr double kMaxSigmaOfDistortion = 0.05;
+/// Fewer keyframes do not tell a camera.
+constexpr std::size_t kMinKeyframes = 8;
 
 fs::path calibration_file(const CalibrationRequest& request, const FrameSource& sequence) {
   return sequence.given_calibration().value_or(request.sequence_dir / "calib.txt");
@@ -166,7 +168,9 @@ Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request
     return map ? Expected<CalibrationReport>(report) : map.error();
   }
   report.num_keyframes = map->keyframes.size();
-  const auto adjusted = adjust(*std::move(map), sequence->camera());
+  const auto adjusted = report.num_keyframes < kMinKeyframes
+                            ? std::nullopt
+                            : adjust(*std::move(map), sequence->camera());
   if (!adjusted) {
     return fail(fmt::format("{}: expected frames that move, found {} keyframes in {} frames",
                             request.sequence_dir.string(), report.num_keyframes, sequence->size()));

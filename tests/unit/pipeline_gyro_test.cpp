@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A street whose last frames are dark, and a gyro that is right before them.
-class Gyro : public testing::SmallDrive {
+class GyroRun : public testing::SmallDrive {
  protected:
   static constexpr int kNumSeen = 18;
 
@@ -68,7 +68,7 @@ class Gyro : public testing::SmallDrive {
   std::vector<double> times_s_;
 };
 
-TEST_F(Gyro, TurnsALostCameraIfItWasRightBefore) {
+TEST_F(GyroRun, TurnsALostCameraIfItWasRightBefore) {
   const Eigen::Vector3d in_the_dark(0.0, 0.5, 0.1);
   const double dark_s = times_s_.back() - times_s_[kNumSeen - 1];
   const Eigen::Quaterniond said = so3_exp(dark_s * in_the_dark);
