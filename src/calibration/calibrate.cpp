@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 const IntrinsicsDelta kPriorSigma = (IntrinsicsDelta() << 30.0, 30.0, 0.2, 0.1, 0.1).finished();
 /// A number less certain than this is not determined: px, and a share of the focal length.
 constexpr double kMaxSigma_px = 2.0;
-constexpr double kMaxSigmaOfFocal = 0.02;
+constexpr double kMaxSigmaOfFocal = 0.01;
 constexpr double kMaxSigmaOfDistortion = 0.05;
 /// Fewer keyframes do not tell a camera.
 constexpr std::size_t kMinKeyframes = 8;

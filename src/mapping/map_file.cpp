@@ -54,7 +54,7 @@ class MapReader {
       value = {};
       return;
     }
-    std::memcpy(&value, bytes_.data(), sizeof value);
+    std::memcpy(&value, bytes_.data(), sizeof value);  // NOLINT: no string
     bytes_.remove_prefix(sizeof value);
   }
   template <typename List>

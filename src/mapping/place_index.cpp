@@ -22,7 +22,7 @@ constexpr std::ptrdiff_t kChance = 8;
 }  // namespace
 
 PlaceIndex::PlaceIndex() {
-  std::mt19937 random;  // the same on every run
+  std::mt19937 random;  // NOLINT: the same on every run
   for (auto& table : bits_) {
     for (std::uint8_t& bit : table) {
       bit = static_cast<std::uint8_t>(random() % 256);

@@ -115,7 +115,7 @@ class Estimator {
   /// loops are off.
   [[nodiscard]] virtual KeptMap kept_map() const { return {}; }
   /// Before the first frame: what an earlier recording remembered may be recognized.
-  virtual void load_map(KeptMap /*map*/) {}
+  virtual void load_map(KeptMap /*map*/) {}  // NOLINT: an override keeps it
   /// Numbers of the frames that are keyframes or were, in order.
   [[nodiscard]] virtual std::span<const int> keyframes() const { return {}; }
 };
