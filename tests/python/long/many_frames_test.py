@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """10,000 small frames (links to a few, there and back again): open files and time per frame do not grow, memory by what
-is kept of a frame: pose, row and landmarks."""
+is kept of a frame: pose, row, landmarks, and what the map remembers of a keyframe."""
 
 import os
 import pathlib
@@ -13,7 +13,7 @@ from drives import watched_run
 PROGRAM = os.environ["STEMVO_PROGRAM"]
 RENDERED = 100
 FRAMES = 10000
-MAX_KB_PER_FRAME = 8.0
+MAX_KB_PER_FRAME = 32.0  # keyframes of the map, some 25 kB each
 MAX_FILES_FOR_A_MOMENT = 3
 
 
