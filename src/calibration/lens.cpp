@@ -17,13 +17,19 @@ struct SeenRay {
   Eigen::Vector2d uv;
 };
 
-Camera changed(Camera camera, const IntrinsicsDelta& by) {
+/// IntrinsicsDelta, and the third and fourth coefficient of the lens: a centre that moves under a
+/// strong lens looks like tangential distortion.
+using LensDelta = Eigen::Matrix<double, 7, 1>;
+
+Camera changed(Camera camera, const LensDelta& by) {
   camera.cx_px += by[0];
   camera.cy_px += by[1];
   camera.fx_px *= 1.0 + by[2];
   camera.fy_px *= 1.0 + by[2];
   camera.distortion_coefficients[0] += by[3];
   camera.distortion_coefficients[1] += by[4];
+  camera.distortion_coefficients[2] += by[5];
+  camera.distortion_coefficients[3] += by[6];
   return camera;
 }
 
@@ -31,7 +37,9 @@ Camera changed(Camera camera, const IntrinsicsDelta& by) {
 std::vector<SeenRay> seen_rays(const Camera& lens,
                                const Camera& view,
                                const IntrinsicsDelta& change) {
-  Camera truth = changed(view, change);
+  LensDelta of_view = LensDelta::Zero();
+  of_view.head<5>() = change;
+  Camera truth = changed(view, of_view);
   truth.distortion = Distortion::kRadialTangential;
   truth.distortion_coefficients = {change[3], change[4]};
   std::vector<SeenRay> rays;
@@ -69,10 +77,10 @@ Camera refined_lens(const Camera& lens, const Camera& view, const IntrinsicsDelt
   constexpr int kIterations = 10;  // Gauss-Newton; the fit is all but linear
   for (int i = 0; i < kIterations; ++i) {
     const Eigen::VectorXd errors = errors_of(fitted, rays);
-    Eigen::Matrix<double, Eigen::Dynamic, 5> jacobian(errors.size(), 5);
+    Eigen::Matrix<double, Eigen::Dynamic, 7> jacobian(errors.size(), 7);
     constexpr double kStep = 1e-6;
-    for (int c = 0; c < 5; ++c) {
-      const Camera moved = changed(fitted, kStep * IntrinsicsDelta::Unit(c));
+    for (int c = 0; c < 7; ++c) {
+      const Camera moved = changed(fitted, kStep * LensDelta::Unit(c));
       jacobian.col(c) = (errors_of(moved, rays) - errors) / kStep;
     }
     fitted = changed(fitted, -jacobian.colPivHouseholderQr().solve(errors));
