@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What is known of any camera beforehand: principal point (px), focal length (share), k1, k2.
+/// Sigmas of any camera beforehand: principal point (px), focal length (share), k1, k2.
 const IntrinsicsDelta kPriorSigma = (IntrinsicsDelta() << 30.0, 30.0, 0.2, 0.1, 0.1).finished();
 /// A number less certain than this is not determined: px, and a share of the focal length.
 constexpr double kMaxSigma_px = 2.0;

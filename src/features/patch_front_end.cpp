@@ -105,7 +105,7 @@ class PatchFrontEnd::Outlook {
                    ? static_cast<float>((to.time_s - from.time_s) / from.interval_s)
                    : 1.0F) {}
 
-  /// Of a point that came by `motion`, at the same speed.
+  /// The motion of a point that came by `motion`, at the same speed.
   [[nodiscard]] cv::Point2f on(const cv::Point2f& motion) const { return ratio_ * motion; }
   [[nodiscard]] bool knows_turn() const { return from_.turn_to_newest.has_value(); }
   /// By the turn alone.

@@ -52,7 +52,7 @@ QuadraticModel<7> linearize_similarity(const Similarity3& a_from_b,
     add_observation(turned + a_from_b.translation, by_step, observation.uv, seen.a, loss,
                     equations);
   }
-  // What b sees of a's points does not depend on the scale: lengths are a's here.
+  // The view b has of a's points does not depend on the scale: lengths are a's here.
   for (const CrossObservation& observation : seen.of_a) {
     const Eigen::Vector3d moved = observation.point - a_from_b.translation;
     by_step << rotation.transpose() * skew(moved), -rotation.transpose(), Eigen::Vector3d::Zero();

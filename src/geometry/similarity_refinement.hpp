@@ -27,7 +27,7 @@ struct CrossObservations {
 
 struct RefinedSimilarity {
   Similarity3 a_from_b;
-  /// Of the errors of rotation (rad, axes of a), translation (units of a) and log scale, for
+  /// Errors of rotation (rad, axes of a), translation (units of a) and log scale, for
   /// observations of a noise of 1 px.
   Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
 };

@@ -36,7 +36,7 @@ Linearized linearize(ceres::Problem& problem,
   return at;
 }
 
-/// What each cluster's errors move a block by, squared and summed up.
+/// The moves of a block by each cluster's errors, squared and summed up.
 Matrix6 sandwich(const ceres::Problem& problem,
                  const Linearized& at,
                  const std::vector<ClusteredResidual>& residuals,

@@ -8,7 +8,7 @@
 namespace stemvo::internal {
 namespace {
 
-/// Of a point that is scaled to the length of its ray in the anchor.
+/// Least depth of a point that is scaled to the length of its ray in the anchor.
 constexpr double kNearest = 1e-3;
 constexpr double kBehindSigmas = 100.0;
 

@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// Of a corner too near the border; it matches nothing.
+/// Stands for a corner too near the border; it matches nothing.
 inline constexpr Descriptor kNoDescriptor{};
 
 /// From the image's y axis to where the map's y axis points in it.

@@ -29,7 +29,7 @@ struct KeptCorner {
   [[nodiscard]] bool has_landmark() const { return !std::isnan(in_camera.x()); }
 };
 
-/// What is kept of a keyframe. Its unit of length is that of its pose in the trajectory.
+/// A keyframe as it is kept. Its unit of length is that of its pose in the trajectory.
 struct KeptKeyframe {
   int frame = 0;
   double time_s = 0.0;

@@ -33,11 +33,11 @@ struct AdjustedLandmark {
 struct MapAdjustment {
   std::vector<Similarity3> map_from_keyframe;
   std::vector<AdjustedLandmark> landmarks;
-  /// Of the options' camera: mean and sigma.
+  /// Mean and sigma of the options' camera.
   CameraEstimate camera;
-  /// Of the keyframes asked for: the true map_from_camera is the adjusted one * error. The error
-  /// is x y z (units of the map, squared), then rotation about x y z (rad^2), in the camera's axes,
-  /// with keyframe 0 held.
+  /// Covariances of the keyframes asked for: the true map_from_camera is the adjusted one * error.
+  /// The error is x y z (units of the map, squared), then rotation about x y z (rad^2), in the
+  /// camera's axes, with keyframe 0 held.
   std::vector<Eigen::Matrix<double, 6, 6>> covariances;
   double median_error_px = 0.0;
 };

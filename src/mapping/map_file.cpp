@@ -66,7 +66,7 @@ class MapReader {
   bool is_cut_ = false;
 };
 
-// What is read and written is said once: `Archive` is one of the two above.
+// The fields that are read and written are listed once: `Archive` is one of the two above.
 
 void pass_all(auto& archive, auto&... values) { (archive(values), ...); }
 
@@ -167,7 +167,7 @@ void MapReader::count(List& list) {
   list.resize(is_cut_ ? 0 : size);
 }
 
-// What must hold of a map that is read. Each gives what was expected where it does not, else "".
+// Conditions of a map that is read. Each gives what was expected where it does not, else "".
 
 bool is_motion(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
   constexpr double kRounding = 1e-9;
@@ -271,7 +271,7 @@ Status check_map(const KeptMap& map) {
       .and_then([&] { return check_each("length", map.lengths, in_map); });
 }
 
-/// What a file begins with, behind its magic.
+/// The head of a file, behind its magic.
 struct Header {
   std::uint32_t version = kVersion;
   std::uint64_t num_bytes = 0;  ///< of the contents

@@ -105,7 +105,7 @@ void take_landmarks(const std::vector<KeptCorner>& from, std::vector<KeptCorner>
   }
 }
 
-/// What connects the first keyframe of a new map with the last one of the map before.
+/// The guess that connects the first keyframe of a new map with the last one of the map before.
 MapEdge guessed_motion(const KeptKeyframe& from, const KeptKeyframe& to) {
   const Rigid3 from_to = from.world_from_camera.inverse() * to.world_from_camera;
   MapEdge edge;
@@ -239,7 +239,7 @@ std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
       map_.map_from_keyframe[i] = moved * map_.map_from_keyframe[i];
     }
   }
-  // What was guessed between them counts no more.
+  // The guess between them counts no more.
   std::erase_if(map_.motions, [&](const MapEdge& edge) { return edge.to == younger; });
   if (component_ != younger) {
     return std::nullopt;

@@ -15,7 +15,7 @@
 
 namespace stemvo {
 
-/// What the estimator shows of itself.
+/// The estimator's state as the map sees it.
 struct WindowView {
   const Window& window;
   const WindowHistory& history;  ///< of its units
@@ -25,7 +25,7 @@ struct WindowView {
   std::optional<double> metric_sigma;  ///< of log(metres per unit); nullopt: units are no metres
 };
 
-/// What a keyframe of the window sees, with the landmarks as they are now.
+/// The corners of a keyframe of the window, with the landmarks as they are now.
 [[nodiscard]] std::vector<KeptCorner> corners_of(const WindowView& view, const Keyframe& keyframe);
 
 /// Fills the kept map from the window: a keyframe becomes a node once its pose is in the
@@ -52,7 +52,7 @@ class MapKeeper {
   [[nodiscard]] std::optional<Similarity3> add_loop(const Loop& loop);
   /// The graph alone, without corners, but with the motions inside the window.
   [[nodiscard]] KeptMap graph(const WindowView& view) const;
-  /// What the first nodes' map_from_keyframe became in the graph; the others go with the last.
+  /// The first nodes' map_from_keyframe as it became in the graph; the others go with the last.
   void apply(std::span<const Similarity3> solved);
 
   [[nodiscard]] const KeptMap& map() const { return map_; }
@@ -62,7 +62,7 @@ class MapKeeper {
   [[nodiscard]] const Similarity3& map_from_keyframe(int node) const {
     return map_.map_from_keyframe[static_cast<std::size_t>(node)];
   }
-  /// Of a keyframe of the window; -1: it is none yet.
+  /// The node of a keyframe of the window; -1: it is none yet.
   [[nodiscard]] int node_of(int frame) const;
 
   /// The correction so far.

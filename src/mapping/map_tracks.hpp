@@ -14,7 +14,7 @@ struct MapView {
   int corner = 0;
 };
 
-/// What keyframes see of one landmark: at least two views, ordered by keyframe, one of each.
+/// The views of one landmark: at least two views, ordered by keyframe, one of each.
 using MapTrack = std::vector<MapView>;
 
 /// Corners of one track id in keyframes that follow each other, and those that loops connect. A

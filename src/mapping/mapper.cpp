@@ -22,8 +22,8 @@ constexpr int kNodesPerKeyframe = 64;
 constexpr double kSigmaFound_rad = 0.005;
 constexpr double kSigmaFound = 0.01;
 
-/// Of a loop's scale: fewer pairs of landmarks do not tell it, errors of landmarks are alike, and
-/// it is never known better.
+/// Bounds of a loop's scale: fewer pairs of landmarks do not tell it, errors of landmarks are
+/// alike, and it is never known better.
 constexpr std::size_t kMinPairs = 10;
 constexpr double kAlikeErrors = 2.0;
 constexpr double kMinLogScale = 0.005;

@@ -18,7 +18,7 @@ constexpr std::size_t kMinInliers = 30;
 constexpr int kMinCells = 12;
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
-/// Of so many pairs or more, so many are enough to look for more where a pose has them.
+/// So many of so many pairs or more are enough to look for more where a pose has them.
 constexpr std::size_t kMinMatches = 16;
 constexpr std::size_t kMinSample = 10;
 /// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
@@ -61,7 +61,7 @@ bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
   return std::ranges::count(cells, char{1}) >= kMinCells;
 }
 
-/// What is seen of one view's landmarks by the other one.
+/// Sightings of one view's landmarks by the other one.
 bool is_seen(
     const Similarity3& by_from_of, const PlaceView& of, int mine, const PlaceView& by, int other) {
   const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);

@@ -30,7 +30,8 @@ constexpr int kMaxLookupsApart = 3;
 constexpr double kMaxLogScale = 0.1;
 constexpr double kMaxTurn_rad = 0.05;
 constexpr double kMaxShift = 0.1;
-/// Of a frame and one just before, both without a pose: rad, share of the depth.
+/// Bounds of the motion between a frame and one just before, both without a pose: rad, share of the
+/// depth.
 constexpr double kMaxMotion_rad = 0.3;
 constexpr double kMaxMotion = 0.5;
 
@@ -52,7 +53,7 @@ bool is_share_below(double bound, std::size_t part, std::size_t whole) {
   return static_cast<double>(part) < bound * static_cast<double>(whole);
 }
 
-/// Of the landmarks; 0 where there are none.
+/// Median over the landmarks; 0 where there are none.
 double median_depth(const std::vector<KeptCorner>& corners) {
   std::vector<double> depths;
   for (const KeptCorner& corner : corners) {

@@ -8,7 +8,7 @@ namespace stemvo {
 /// Moves map_from_keyframe to where motions, loops and lengths agree best, from where it is. Node
 /// 0 stays; its scale moves where the map has lengths, which make the map's unit a metre.
 ///
-/// What edges should carry, per axis: motions between keyframes that follow each other 0.05
+/// Sigmas that edges should carry, per axis: motions between keyframes that follow each other 0.05
 /// degrees, 0.3 % of the median depth, 1 % of scale per 8 frames at 30 Hz (variances add up along
 /// the frames); loops 0.3 degrees, 1 % of the median depth, 3 % of scale. All are > 0.
 ///

@@ -111,8 +111,8 @@ class Estimator {
   }
   /// As Odometry::landmarks_since; none where there is no window.
   [[nodiscard]] virtual LandmarkChanges landmarks_since(int /*version*/) const { return {}; }
-  /// What is remembered, the keyframes of the window among it; nothing where there is no window or
-  /// loops are off.
+  /// The map that is remembered, the keyframes of the window among it; nothing where there is no
+  /// window or loops are off.
   [[nodiscard]] virtual KeptMap kept_map() const { return {}; }
   /// Before the first frame: what an earlier recording remembered may be recognized.
   virtual void load_map(KeptMap /*map*/) {}  // NOLINT: an override keeps it

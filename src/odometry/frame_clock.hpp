@@ -26,7 +26,7 @@ class FrameClock {
     const double least_s = std::max(now_s_ + 1e-6, std::nextafter(now_s_, -kNever_s));
     return now_s_ = std::max(since_first(given_s), least_s);
   }
-  /// Of what was measured beside the frames.
+  /// Times of what was measured beside the frames.
   [[nodiscard]] double since_first(double given_s) const {
     return whole_us(given_s - first_given_s_);
   }

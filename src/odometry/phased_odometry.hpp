@@ -64,7 +64,7 @@ class PhasedOdometry {
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 
  private:
-  /// What descriptors are made on.
+  /// The channel that descriptors are made on.
   [[nodiscard]] std::string channel_name() const;
 
   PhasedOdometry(

@@ -59,8 +59,8 @@ class ScaleFilter {
   bool is_initialized_ = false;
   double log_scale_ = 0.0;
   double sigma_ = kUnknownSigma;
-  /// Of log_scale_, per second: a map that stretches steadily would stay behind by as much as the
-  /// filter is slow. By ways alone, where no road says otherwise.
+  /// Trend of log_scale_, per second: a map that stretches steadily would stay behind by as much as
+  /// the filter is slow. By ways alone, where no road says otherwise.
   double trend_ = 0.0;
   std::array<Record, 2> records_;  ///< by witness
 };

@@ -17,7 +17,8 @@
 
 namespace stemvo {
 
-/// What is known of all frames so far, to be adjusted at once beside an odometry that goes on.
+/// Everything that is known of all frames so far, to be adjusted at once beside an odometry that
+/// goes on.
 struct WholeMap {
   explicit WholeMap(const PhasedOdometry& odometry);
 

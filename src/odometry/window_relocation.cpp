@@ -7,7 +7,7 @@
 
 namespace stemvo {
 
-// What the map that remembers does to the window.
+// The map that remembers changes the window here.
 
 namespace {
 

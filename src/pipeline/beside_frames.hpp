@@ -27,7 +27,7 @@ struct BesideFrames {
 
   /// For the frame of this time, behind one of that time.
   [[nodiscard]] FrameHints hints(double last_s, double time_s) const;
-  /// Of files whose times are all before or all behind those of the frames.
+  /// A line for each file whose times are all before or all behind those of the frames.
   [[nodiscard]] std::vector<std::string> warnings(double first_s, double last_s) const;
 };
 

@@ -13,7 +13,7 @@
 
 namespace stemvo::pipeline {
 
-/// What the map makes of a run that is over.
+/// The map of a run that is over.
 struct MapResult {
   WholeMap whole;
   Trajectory trajectory;                              ///< of all frames, as result files hold it

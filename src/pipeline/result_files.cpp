@@ -137,7 +137,7 @@ class ResultWriter {
     return written;
   }
 
-  /// What the map makes of the run: files, and its part of the report.
+  /// The map of the run: files, and its part of the report.
   [[nodiscard]] Status write_map(MetricsReport& report) {
     map_ = finish_map(run_);
     Status written = write_map_ply(run_, *map_);

@@ -25,7 +25,7 @@ struct RunRequest : FrameSourceRequest {
   std::optional<std::filesystem::path> gyro;    ///< as dataset::read_gyro
   int num_threads = 0;                          ///< 0: all cores
   int image_every = 0;                          ///< 0: no per-frame images
-  /// Of an earlier run: its places are recognized; needs odometry.mode map with loops.
+  /// An earlier run's map, whose places are recognized; needs odometry.mode map with loops.
   std::optional<std::filesystem::path> map;
   std::optional<std::filesystem::path> saved_map;  ///< is written in the end; needs the same
   bool adjust_map = false;     ///< keyframes, landmarks and camera together, in the end

@@ -20,7 +20,7 @@ struct CameraReport {
   std::optional<CameraSigma> sigma;  ///< nullopt: it is not refined
 };
 
-/// What the map made of it. The keys of `metrics` are those of MetricsReport's.
+/// The map of a run. The keys of `metrics` are those of MetricsReport's.
 struct MapReport {
   std::size_t num_keyframes = 0;
   std::size_t num_loops = 0;            ///< places seen again while the camera was tracked

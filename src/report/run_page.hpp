@@ -16,7 +16,7 @@
 
 namespace stemvo {
 
-/// What the map made of a run.
+/// The map of a run.
 struct MapPage {
   Trajectory path;  ///< of all frames, aligned as the estimate
   std::vector<std::pair<std::size_t, std::size_t>> loops;  ///< frames that show one place

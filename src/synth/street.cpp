@@ -45,7 +45,7 @@ struct Street {
   [[nodiscard]] bool is_crossed(int knot) const { return is_crossed(home(knot), home(knot) + 1); }
   /// The knot of the first visit.
   [[nodiscard]] int home(int knot) const { return knot - part_of(knot).shift; }
-  /// Of the road's texture, near 0 around the camera.
+  /// Coordinates of the road's texture, near 0 around the camera.
   [[nodiscard]] double u_m(int knot) const {
     const auto& [begin, end, shift] = part_of(knot);
     const double near_m =

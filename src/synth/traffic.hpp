@@ -9,9 +9,10 @@
 
 namespace stemvo::synth {
 
-/// What moves in a street on its own: a car or lorry ahead, close from the first frame on; others
-/// oncoming; people on the sidewalks. Where the camera stands at a crossing, cars cross and people
-/// walk over the road before it. All of it depends on the drive, the seed and the time alone.
+/// Everything that moves in a street on its own: a car or lorry ahead, close from the first frame
+/// on; others oncoming; people on the sidewalks. Where the camera stands at a crossing, cars cross
+/// and people walk over the road before it. All of it depends on the drive, the seed and the time
+/// alone.
 class Traffic {
  public:
   Traffic(const Drive& drive, std::uint64_t seed);
@@ -31,7 +32,7 @@ class Traffic {
     int crossing;         ///< knot; -1: no room for one
     bool is_behind_lead;  ///< stands behind what is ahead; else first at the crossing
   };
-  /// What is ahead of the camera, from one stand at which it leaves to the next.
+  /// The vehicle ahead of the camera, from one stand at which it leaves to the next.
   struct Lead {
     double begin_s;
     double leave_s;  ///< from then on it goes faster than the camera

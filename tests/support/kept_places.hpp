@@ -42,8 +42,8 @@ class DescribedPoints {
     return descriptor;
   }
 
-  /// What a camera sees of the nearer points: each second one, corners off by `noise_px`, lengths
-  /// in a unit of its own, `units` of it a metre; track ids from `first_track` on.
+  /// The view a camera has of the nearer points: each second one, corners off by `noise_px`,
+  /// lengths in a unit of its own, `units` of it a metre; track ids from `first_track` on.
   [[nodiscard]] KeptKeyframe see(const Rigid3& world_from_camera,
                                  double units,
                                  int first_track,

@@ -43,8 +43,8 @@ Eigen::Vector2d bend(const Camera& camera,
   return camera.project((xy * (1.0 + r_sq * (radial[0] + r_sq * radial[1]))).homogeneous());
 }
 
-/// What a drive of these tracks leaves: every frame a keyframe, seen through a lens, poses off by
-/// `push`.
+/// The map that a drive of these tracks leaves: every frame a keyframe, seen through a lens, poses
+/// off by `push`.
 KeptMap map_of(const DriveTracks& drive, const Eigen::Vector2d& radial, double push) {
   KeptMap map;
   testing::SceneRandom random(5);

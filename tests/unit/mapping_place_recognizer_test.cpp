@@ -13,7 +13,7 @@ namespace {
 using testing::DescribedPoints;
 
 constexpr int kLength = 60;
-/// Of the second round: its units are others.
+/// The second round has other units.
 constexpr double kUnits = 1.4;
 
 /// A street, driven twice, half a metre aside; between the rounds the camera sees nothing of it.
@@ -82,7 +82,7 @@ TEST(PlaceRecognizer, AStreetThatIsDrivenAgainIsRecognized) {
   }
   EXPECT_GE(num_loops, (drive.num_lookups - num_before) * 8 / 10);
   EXPECT_GT(num_loops, 8);
-  // What was recognized is kept once.
+  // A recognized place is kept once.
   EXPECT_LE(drive.num_places - places_before, 2);
 }
 

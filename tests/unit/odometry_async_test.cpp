@@ -19,7 +19,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// What a frame left, as far as it can be asked for.
+/// Everything a frame left, as far as it can be asked for.
 struct Left {
   FrameResult result;
   std::vector<TrackedPoint> points;
