@@ -2,11 +2,12 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build demo test test-all test-long bench test-frameworks cluster format check-format lint docs clean
+.PHONY: help setup build lab demo test test-all test-long bench test-frameworks cluster format check-format lint docs clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
+	@echo "make lab           install what is missing, build the studies' program build/lab/bin/stemvo-lab (docs/studies.md)"
 	@echo "make test          install what is missing, build, run the tests"
 	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
@@ -26,10 +27,13 @@ build: setup
 	@cmake --preset release --log-level=WARNING >build/setup/configure.log || { cat build/setup/configure.log; exit 1; }
 	@cmake --build --preset release --parallel $(JOBS) --target stemvo_app
 
+lab: setup
+	@tools/setup.sh lab
+
 demo: build
 	@tools/demo.sh
 
-test: build
+test: build lab
 	@tools/setup.sh tools
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)

@@ -26,6 +26,7 @@ coverage  build/venv-coverage
 docs      build/venv-docs      doxygen
 evo       build/venv-evo
 fuzz      -                    clang-16 libclang-rt-16-dev
+lab       build/lab
 lint      build/venv-lint
 peers     build/venv-peers
 ray       build/venv-ray
@@ -164,6 +165,14 @@ install_plotly() {
   mv "$PLOTLY_DIR/new" "$PLOTLY_DIR/plotly.min.js.gz"
 }
 
+# `stemvo-lab` in build/lab: compiled where the sources changed, its Python read from the checkout.
+install_lab() {
+  local log=$LOGS/lab-package.log
+  say "Building the Python package (log: $log)"
+  build/lab/bin/python -m pip install --disable-pip-version-check --no-input --no-deps --no-build-isolation --editable . </dev/null >"$log" 2>&1 ||
+    die "the Python package did not build (log: $log)"
+}
+
 set_up_group() { # set_up_group GROUP
   local row venv packages
   row=$(awk -v group="$1" '$1 == group' <<<"$TABLE")
@@ -172,6 +181,7 @@ set_up_group() { # set_up_group GROUP
   # shellcheck disable=SC2086
   install_packages $packages
   [[ $venv == - ]] || make_venv "$1" "$venv"
+  [[ $1 != lab ]] || install_lab
 }
 
 set_up_base() {

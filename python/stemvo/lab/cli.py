@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""stemvo-lab: a command NAME is the click command `command` of the module stemvo.lab.NAME, imported when it is called."""
+
+import contextlib
+import importlib
+
+import click
+
+import stemvo
+
+COMMANDS = {
+}
+
+
+class Lazy(click.Group):
+    def list_commands(self, ctx):
+        return list(COMMANDS)
+
+    def get_command(self, ctx, name):
+        return importlib.import_module(f"stemvo.lab.{name}").command if name in COMMANDS else None
+
+    def format_commands(self, ctx, formatter):
+        with formatter.section("Commands") if COMMANDS else contextlib.nullcontext():
+            formatter.write_dl(list(COMMANDS.items()) or [("", "")])
+
+
+@click.command(cls=Lazy, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(stemvo.__version__, message="%(version)s")
+def main():
+    """Studies of monocular visual odometry on learned filter channels."""
