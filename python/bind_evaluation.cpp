@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <numeric>
 #include <optional>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -67,6 +68,9 @@ nb::dict evaluate_poses(const PosesArgument& estimate,
   result["r_rel_deg_per_100m"] = metrics.r_rel_deg_per_100m;
   result["ate_rmse_m"] = metrics.ate_rmse.after_m(alignment);
   result["average_offset_m"] = metrics.average_offset_m;
+  result["null_offset_m"] = metrics.null_offset_m;
+  result["segments"] = metrics.num_segments;
+  result["segment_lengths_m"] = metrics.segment_lengths_m;
   result["path_length_m"] = metrics.path_length_m;
   result["rpe_translation_m"] = metrics.rpe_translation_m;
   result["rpe_rotation_deg"] = metrics.rpe_rotation_deg;
@@ -94,6 +98,104 @@ DoubleArray align_poses(const AnyArray& estimate,
   return array_of(align_trajectory(poses, which, true_poses, alignment));
 }
 
+struct TrajectoryPair {
+  Trajectory estimate;
+  Trajectory truth;
+};
+
+/// As many of the one as of the other.
+TrajectoryPair pair_of(const AnyArray& estimate, const AnyArray& truth) {
+  TrajectoryPair pair{value_or_raise(trajectory_of(estimate, "estimate")),
+                      value_or_raise(trajectory_of(truth, "truth"))};
+  if (pair.estimate.size() != pair.truth.size()) {
+    throw nb::value_error(fmt::format("estimate: expected {} poses as in truth, found {}",
+                                      pair.truth.size(), pair.estimate.size())
+                              .c_str());
+  }
+  return pair;
+}
+
+DoubleArray with_true_steps(const AnyArray& estimate, const AnyArray& truth) {
+  const TrajectoryPair pair = pair_of(estimate, truth);
+  return array_of(rescale_steps(pair.estimate, pair.truth));
+}
+
+nb::dict errors_by_segment(const AnyArray& estimate,
+                           const AnyArray& truth,
+                           const std::optional<std::vector<double>>& lengths_m,
+                           std::size_t every) {
+  const TrajectoryPair pair = pair_of(estimate, truth);
+  if (every == 0) {
+    throw nb::value_error("every: expected at least 1, found 0");
+  }
+  const auto errors = [&] {
+    const nb::gil_scoped_release release;
+    return segment_errors(
+        pair.estimate, pair.truth,
+        lengths_m ? *lengths_m : evaluate(pair.estimate, pair.truth).segment_lengths_m, every);
+  }();
+  const auto column = [&](auto member) {
+    std::vector<std::remove_cvref_t<decltype(errors.front().*member)>> values;
+    for (const SegmentError& error : errors) {
+      values.push_back(error.*member);
+    }
+    return array_of(values);
+  };
+  nb::dict result;
+  result["first"] = column(&SegmentError::first);
+  result["last"] = column(&SegmentError::last);
+  result["length_m"] = column(&SegmentError::length_m);
+  result["t_percent"] = column(&SegmentError::t_percent);
+  result["r_deg_per_100m"] = column(&SegmentError::r_deg_per_100m);
+  return result;
+}
+
+nb::dict dense_errors_of(const AnyArray& estimate,
+                         const AnyArray& truth,
+                         std::size_t max_segments) {
+  const TrajectoryPair pair = pair_of(estimate, truth);
+  const DenseErrors errors = [&] {
+    const nb::gil_scoped_release release;
+    return dense_errors(pair.estimate, pair.truth, max_segments);
+  }();
+  nb::dict result;
+  result["t_percent"] = array_of(errors.t_percent);
+  result["r_deg_per_100m"] = array_of(errors.r_deg_per_100m);
+  result["block"] = errors.block;
+  return result;
+}
+
+nb::tuple read_poses(const Path& file, const std::optional<Path>& camera_file) {
+  const PoseFile read = value_or_raise(dataset::read_truth(file, camera_file));
+  return nb::make_tuple(array_of(read.poses), read.timestamps_s.empty()
+                                                  ? nb::object(nb::none())
+                                                  : nb::cast(array_of(read.timestamps_s)));
+}
+
+nb::tuple pair_times(const std::vector<double>& first,
+                     const std::vector<double>& second,
+                     double tolerance_s) {
+  const TimePairs pairs = pair_by_time(first, second, tolerance_s);
+  return nb::make_tuple(array_of(pairs.first), array_of(pairs.second));
+}
+
+void bind_comparison(nb::module_& module) {
+  module.def("rescale_steps", &with_true_steps, "estimate"_a, "truth"_a,
+             "Each step in its own direction with the true step's length (the paper's protocol)");
+  module.def("segment_errors", &errors_by_segment, "estimate"_a, "truth"_a,
+             "lengths_m"_a = nb::none(), "every"_a = 10,
+             "Columns first, last, length_m, t_percent, r_deg_per_100m: the KITTI devkit's "
+             "segments, from every so many frames on. lengths_m: None: as evaluate takes them");
+  module.def("dense_errors", &dense_errors_of, "estimate"_a, "truth"_a, "max_segments"_a = 400,
+             "t_percent and r_deg_per_100m of segments of an eighth of the path, evenly spaced, "
+             "and how many neighbours overlap: block");
+  module.def("read_trajectory", &read_poses, "file"_a, "camera_file"_a = nb::none(),
+             "KITTI's, TUM's or EuRoC's format: Nx4x4, and N seconds or None. camera_file: with "
+             "EuRoC's, whose T_BS says how the camera sits on the body");
+  module.def("pair_by_time", &pair_times, "first"_a, "second"_a, "tolerance_s"_a = kTimeTolerance_s,
+             "Indices of times that are each the nearest of the other, of rising ones");
+}
+
 }  // namespace
 
 void bind_evaluation(nb::module_& module) {
@@ -103,6 +205,7 @@ void bind_evaluation(nb::module_& module) {
       "align", &align_poses, "estimate"_a, "truth"_a, "frames"_a = nb::none(), "align"_a = "sim3",
       "The estimate as report.html draws it: moved to start at the first true pose, fitted to "
       "the truth. frames: indices of the poses that have a true one; None: all");
+  bind_comparison(module);
 }
 
 }  // namespace stemvo::python

@@ -6,11 +6,11 @@ from typing import Any
 
 from . import _core
 from ._core import (AdjustedKeyframe, AdjustedMap, Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result,
-                    __version__, align, evaluate, read_recording)
+                    __version__, align, dense_errors, evaluate, pair_by_time, read_recording, read_trajectory, rescale_steps, segment_errors)
 
 __all__ = [
-    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "evaluate",
-    "read_recording",
+    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "dense_errors", "evaluate",
+    "pair_by_time", "read_recording", "read_trajectory", "rescale_steps", "segment_errors",
 ]
 
 
