@@ -10,4 +10,5 @@ NB_MODULE(_core, module) {
   stemvo::python::bind_results(module);
   stemvo::python::bind_odometry(module);
   stemvo::python::bind_evaluation(module);
+  stemvo::python::bind_studies(module);
 }

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+// Parts of an odometry, for studies that run many channels over one image.
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "arrays.hpp"
+#include "frames.hpp"
+#include "io/sha256.hpp"
+#include "odometry/channel_odometry.hpp"
+#include "options.hpp"
+#include "stem/hand_made.hpp"
+#include "stem/model.hpp"
+#include "stem/stem.hpp"
+
+namespace stemvo::python {
+namespace {
+
+using namespace nb::literals;
+using FloatArray = nb::ndarray<nb::numpy, float, nb::ndim<2>>;
+using FloatArgument = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+/// One per filter asked for; each shares its memory with the arrays made of it.
+using Channels = std::vector<Channel>;
+
+Channel channel_of(const FloatArgument& values, double scale, double offset) {
+  const cv::Mat view(static_cast<int>(values.shape(0)), static_cast<int>(values.shape(1)), CV_32F,
+                     const_cast<float*>(values.data()));
+  return {view.clone(), {{scale, scale}, {offset, offset}}};
+}
+
+/// `owner`: the Python object that keeps the pixels alive.
+FloatArray values_of(nb::handle owner) {
+  const Channel& channel = nb::cast<const Channel&>(owner);
+  const cv::Mat& mat = channel.values;
+  const auto columns = static_cast<std::int64_t>(mat.step1());
+  return {const_cast<float*>(mat.ptr<float>()),
+          {static_cast<std::size_t>(mat.rows), static_cast<std::size_t>(mat.cols)},
+          owner,
+          {columns, 1}};
+}
+
+/// All filters of a layer.
+class PythonStem {
+ public:
+  explicit PythonStem(const Config& config)
+      : resolution_(config.stem.tracking_resolution),
+        method_(config.features.method),
+        stem_(value_or_raise([&] {
+          const nb::gil_scoped_release release;
+          return Stem::load_all(config.stem);
+        }())) {}
+
+  [[nodiscard]] const StemInfo& info() const { return stem_.info(); }
+
+  /// Filters [first, last) as an odometry of this camera's frames takes them.
+  Channels apply(const AnyArray& image, const Camera& camera, int first, std::optional<int> last) {
+    const ImageView view = value_or_raise(view_of(image, "image"));
+    const int end = last.value_or(info().num_filters);
+    if (first < 0 || first >= end || end > info().num_filters) {
+      throw nb::value_error(fmt::format("first, last: expected filters inside 0:{}, found {}:{}",
+                                        info().num_filters, first, end)
+                                .c_str());
+    }
+    auto channels = [&] {
+      const nb::gil_scoped_release release;
+      const auto resolution = choose_tracking_resolution(resolution_, method_, camera);
+      return stem_.apply_range(view.pixels, first, end, stem_.frame_zoom(resolution));
+    }();
+    return value_or_raise(std::move(channels));
+  }
+
+ private:
+  TrackingResolution resolution_;
+  FeatureMethod method_;
+  Stem stem_;
+};
+
+/// The odometry behind the stem; a study calls it from one thread.
+class PythonChannelOdometry {
+ public:
+  PythonChannelOdometry(const nb::object& camera, const nb::object& options) {
+    Config config = config_of(options);
+    config.threads = 1;
+    const FrameList* frames = frames_of(camera);
+    odometry_.emplace(config, frames != nullptr ? frames->camera : nb::cast<Camera>(camera),
+                      frames != nullptr ? frames->mask : cv::Mat());
+  }
+
+  FrameResult process(const Channel* channel,
+                      const std::optional<AnyArray>& image,
+                      double timestamp) {
+    if (!(timestamp > last_time_s_)) {
+      throw nb::value_error(
+          fmt::format("timestamp: expected more than {}, found {}", last_time_s_, timestamp)
+              .c_str());
+    }
+    const cv::Mat pixels = image ? value_or_raise(view_of(*image, "image")).pixels : cv::Mat();
+    const nb::gil_scoped_release release;
+    last_time_s_ = timestamp;
+    Frame frame;
+    frame.time_s = timestamp;
+    if (channel != nullptr && !pixels.empty()) {
+      frame = odometry_->prepare(*channel, pixels.clone(), timestamp);
+    }
+    return odometry_->process(std::move(frame));
+  }
+  [[nodiscard]] DoubleArray trajectory() const {
+    return array_of(std::span<const Rigid3>(odometry_->estimator().trajectory()));
+  }
+
+ private:
+  std::optional<ChannelOdometry> odometry_;
+  double last_time_s_ = -std::numeric_limits<double>::infinity();
+};
+
+std::string model_hash(const std::string& model) {
+  return internal::sha256_hex(is_hand_made(model) ? model : value_or_raise(read_model(model)));
+}
+
+void bind_channels(nb::module_& module) {
+  nb::class_<Channel>(module, "Channel", "A filter's response to an image")
+      .def(
+          "__init__",
+          [](Channel* self, const FloatArgument& values, double scale, double offset) {
+            new (self) Channel(channel_of(values, scale, offset));
+          },
+          "values"_a, "scale"_a = 1.0, "offset"_a = 0.0,
+          "HxW float32, copied; pixel u of it lies at scale * u + offset in the image")
+      .def_prop_ro("values", &values_of, "HxW float32, the channel's own memory")
+      .def_prop_ro("scale", [](const Channel& c) { return c.map.scale.x(); })
+      .def_prop_ro("offset", [](const Channel& c) { return c.map.offset_px.x(); });
+  nb::class_<PythonStem>(module, "Stem", "All filters of a layer, of `stem.model`")
+      .def(
+          "__init__",
+          [](PythonStem* self, const nb::object& options) {
+            new (self) PythonStem(config_of(options));
+          },
+          "options"_a = nb::none())
+      .def_prop_ro("num_filters", [](const PythonStem& s) { return s.info().num_filters; })
+      .def_prop_ro("layer", [](const PythonStem& s) { return s.info().layer; })
+      .def_prop_ro("sampling_px", [](const PythonStem& s) { return s.info().sampling_px; })
+      .def("apply", &PythonStem::apply, "image"_a.noconvert(), "camera"_a, "first"_a = 0,
+           "last"_a = nb::none(),
+           "Channels of the filters from `first` up to `last`, from one pass over the image");
+  module.def("model_hash", &model_hash, "model"_a, "SHA-256 of a model's file");
+  module.def(
+      "model_stride",
+      [](const std::string& model) {
+        if (is_hand_made(model)) {
+          return std::pair(1, true);
+        }
+        const ModelInfo info = value_or_raise(read_model_info(model));
+        return std::pair(info.stride_px, info.native_sampling_only);
+      },
+      "model"_a, "A layer's stride, and whether it is sampled by that alone");
+}
+
+}  // namespace
+
+void bind_studies(nb::module_& module) {
+  bind_channels(module);
+  nb::class_<PythonChannelOdometry>(module, "ChannelOdometry",
+                                    "An odometry whose channels come from elsewhere: many of them "
+                                    "share one stem. Works in the thread that calls it")
+      .def(nb::init<const nb::object&, const nb::object&>(), "camera"_a, "options"_a = nb::none(),
+           "Camera, Recording or FrameView; stem.model and stem.filter are not used")
+      .def("process", &PythonChannelOdometry::process, "channel"_a.none(),
+           "image"_a.noconvert().none(), "timestamp"_a,
+           "Image as Odometry takes it; None for one that could not be read, or seen")
+      .def_prop_ro("trajectory", &PythonChannelOdometry::trajectory, nb::rv_policy::move,
+                   "Nx4x4, world_from_camera of all frames so far");
+  module.def(
+      "set_num_threads", [](int number) { cv::setNumThreads(number); }, "number"_a,
+      "Of OpenCV, in this process");
+}
+
+}  // namespace stemvo::python
