@@ -125,7 +125,7 @@ void bind_adjusted_map(nb::module_& module) {
       .def_prop_ro("keyframes", [](const AdjustedMap& m) { return m.keyframes; })
       .def_prop_ro(
           "landmarks", [](const AdjustedMap& m) { return arrays_of(m.landmarks); },
-          "Nx3 in the map, and Nx3 colours")
+          nb::rv_policy::move, "Nx3 in the map, and Nx3 colours")
       .def_prop_ro(
           "loops",
           [](const AdjustedMap& m) {
