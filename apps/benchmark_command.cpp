@@ -9,9 +9,9 @@
 #include "benchmark/benchmark.hpp"
 #include "commands.hpp"
 #include "console.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -45,11 +45,8 @@ Expected<int> benchmark(BenchmarkArguments& arguments) {
   BenchmarkRequest& request = arguments.request;
   request.command = command_line();
   request.published = data_folder("config") / "published.json";
-  const Expected<Config> paper = load_config(data_folder("config") / "paper.yaml");
-  if (!paper) {
-    return paper.error();
-  }
-  request.configurations = {{"default", Config{}}, {"paper", *paper}};
+  STEMVO_TRY_GET(const Config paper, load_config(data_folder("config") / "paper.yaml"));
+  request.configurations = {{"default", Config{}}, {"paper", paper}};
   std::optional<Progress> progress;
   request.on_run = [&](const std::string& run) {
     if (!arguments.is_quiet) {
@@ -59,14 +56,11 @@ Expected<int> benchmark(BenchmarkArguments& arguments) {
     return !is_interrupted();
   };
   request.on_frame = [&](std::size_t done, std::size_t total) { return (*progress)(done, total); };
-  const Expected<BenchmarkSummary> summary = run_benchmark(request);
-  if (!summary) {
-    return summary.error();
-  }
-  std::ranges::for_each(summary->failures, print_error);
-  std::ranges::for_each(summary->warnings, print_warning);
-  print_json(nlohmann::ordered_json::parse(summary->json));
-  if (summary->interrupted) {
+  STEMVO_TRY_GET(const BenchmarkSummary summary, run_benchmark(request));
+  std::ranges::for_each(summary.failures, print_error);
+  std::ranges::for_each(summary.warnings, print_warning);
+  print_json(nlohmann::ordered_json::parse(summary.json));
+  if (summary.interrupted) {
     print_warning("interrupted; what is done is kept, the same command goes on from there");
     return kExitInterrupted;
   }
@@ -74,7 +68,7 @@ Expected<int> benchmark(BenchmarkArguments& arguments) {
     print(fmt::format("table: {}\nreport: {}\n", (request.out_dir / "benchmark.md").string(),
                       (request.out_dir / "report.html").string()));
   }
-  return summary->failures.empty() ? kExitDone : kExitFailed;
+  return summary.failures.empty() ? kExitDone : kExitFailed;
 }
 
 void add_options(CLI::App& command, BenchmarkArguments& arguments) {

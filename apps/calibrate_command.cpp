@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
 #include <string>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "progress.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -77,18 +77,11 @@ int report(const CalibrateArguments& arguments, const CalibrationReport& report)
 }
 
 Expected<int> calibrate(CalibrateArguments& arguments) {
-  const Expected<Config> config = read_config(arguments.config);
-  if (!config) {
-    return config.error();
-  }
   CalibrationRequest& request = arguments.request;
-  request.config = *config;
+  STEMVO_TRY_GET(request.config, read_config(arguments.config));
   Progress progress("frames", arguments.is_quiet);
-  const Expected<CalibrationReport> result = calibrate_sequence(request, std::ref(progress));
-  if (!result) {
-    return result.error();
-  }
-  return report(arguments, *result);
+  STEMVO_TRY_GET(const CalibrationReport result, calibrate_sequence(request, std::ref(progress)));
+  return report(arguments, result);
 }
 
 void add_options(CLI::App& command, CalibrateArguments& arguments) {

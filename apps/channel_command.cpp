@@ -5,10 +5,10 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "pipeline/channel_images.hpp"
 #include "progress.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -28,18 +28,12 @@ struct ChannelArguments {
 };
 
 Expected<int> draw(ChannelArguments& arguments) {
-  const Expected<Config> config = read_config(arguments.config);
-  if (!config) {
-    return config.error();
-  }
-  arguments.request.config = *config;
+  STEMVO_TRY_GET(arguments.request.config, read_config(arguments.config));
   Progress progress("frames", /*is_quiet=*/false);
-  const Expected<std::size_t> written = write_channel_images(arguments.request, std::ref(progress));
-  if (!written) {
-    return written.error();
-  }
-  print(fmt::format("{} images in {}\n", *written, arguments.request.out_dir.string()));
-  print_json({{"images", *written},
+  STEMVO_TRY_GET(const std::size_t written,
+                 write_channel_images(arguments.request, std::ref(progress)));
+  print(fmt::format("{} images in {}\n", written, arguments.request.out_dir.string()));
+  print_json({{"images", written},
               {"out_dir", arguments.request.out_dir.string()},
               {"interrupted", is_interrupted()}});
   return is_interrupted() ? kExitInterrupted : kExitDone;

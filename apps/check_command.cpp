@@ -8,6 +8,7 @@
 #include "console.hpp"
 #include "report/check.hpp"
 #include "report/metrics_keys.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -39,14 +40,11 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
 }
 
 Expected<int> check(CheckArguments& arguments) {
-  const Expected<std::vector<ThresholdResult>> results =
-      check_metrics(arguments.metrics, arguments.thresholds);
-  if (!results) {
-    return results.error();
-  }
-  print(format_check_table(*results));
-  print_json(document(*results));
-  return all_passed(*results) ? kExitDone : kExitFailed;
+  STEMVO_TRY_GET(const std::vector<ThresholdResult> results,
+                 check_metrics(arguments.metrics, arguments.thresholds));
+  print(format_check_table(results));
+  print_json(document(results));
+  return all_passed(results) ? kExitDone : kExitFailed;
 }
 
 void add_options(CLI::App& command, CheckArguments& arguments) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
-#include <string>
 
 #include "commands.hpp"
 #include "report/metrics_keys.hpp"

@@ -7,6 +7,7 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "report/evaluate_report.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -32,12 +33,9 @@ struct EvaluateArguments {
 
 Expected<int> evaluate(EvaluateArguments& arguments) {
   arguments.request.alignment = parse_alignment(arguments.alignment).value();
-  const Expected<EvaluationReport> report = evaluate_files(arguments.request);
-  if (!report) {
-    return report.error();
-  }
-  print(format_evaluation_table(*report));
-  print_json(evaluation_document(*report));
+  STEMVO_TRY_GET(const EvaluationReport report, evaluate_files(arguments.request));
+  print(format_evaluation_table(report));
+  print_json(evaluation_document(report));
   return kExitDone;
 }
 

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "console.hpp"
 #include "stem/model.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -57,14 +58,11 @@ Expected<int> list_models(ModelsArguments& arguments) {
   int exit_code = kExitDone;
   auto json = nlohmann::ordered_json::array();
   for (const std::string& model : arguments.models) {
-    const Expected<ModelInfo> info = read_model_info(model);
-    if (!info) {
-      return info.error();
-    }
+    STEMVO_TRY_GET(const ModelInfo info, read_model_info(model));
     const auto opened = internal::open_model(model);
     const Status status = opened ? Status() : opened.error();
-    print(describe(model, *info, status));
-    json.push_back(document(model, *info, status));
+    print(describe(model, info, status));
+    json.push_back(document(model, info, status));
     if (!status) {
       print_error(status.error().message);
       exit_code = kExitFailed;

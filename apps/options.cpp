@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "try.hpp"
+
 namespace stemvo::apps {
 namespace {
 
@@ -95,13 +97,9 @@ Expected<Config> read_config(const ConfigArguments& arguments, const Config& bas
       return fail("--set " + before->first + ": expected once, found '" + before->second +
                   "' and '" + assignment + "'");
     }
-    if (const Status status = apply_override(config, assignment); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(apply_override(config, assignment));
   }
-  if (const Status status = validate(config); !status) {
-    return status.error();
-  }
+  STEMVO_TRY(validate(config));
   return config;
 }
 

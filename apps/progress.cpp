@@ -2,17 +2,25 @@
 #include "progress.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <csignal>
 #include <utility>
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include "console.hpp"
-#include "interrupt.hpp"
 
 namespace stemvo::apps {
 namespace {
+
+// Lock-free, so a signal handler may set it; read by whichever thread shows the progress.
+std::atomic<bool> interrupted = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+void on_signal(int /*number*/) { interrupted = true; }
 
 std::string describe_time(double seconds) {
   const auto whole = std::lround(seconds);
@@ -21,6 +29,18 @@ std::string describe_time(double seconds) {
 }
 
 }  // namespace
+
+void catch_interrupts() {
+  struct sigaction action = {};
+  action.sa_handler = on_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  sigemptyset(&action.sa_mask);
+  for (const int number : {SIGINT, SIGTERM}) {
+    sigaction(number, &action, nullptr);
+  }
+}
+
+bool is_interrupted() { return interrupted; }
 
 Progress::Progress(std::string unit, bool is_quiet)
     : unit_(std::move(unit)),

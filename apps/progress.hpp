@@ -7,6 +7,13 @@
 
 namespace stemvo::apps {
 
+/// From here on the first SIGINT or SIGTERM asks the program to stop and write what it has; the
+/// second ends it at once.
+void catch_interrupts();
+
+/// True once an interrupt came.
+[[nodiscard]] bool is_interrupted();
+
 /// Progress on standard error: one line that changes on a terminal, a plain line every few seconds
 /// otherwise, nothing when quiet.
 class Progress {

@@ -14,6 +14,7 @@
 #include "robustness/contenders.hpp"
 #include "robustness/disturbance.hpp"
 #include "robustness/robustness.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -50,25 +51,18 @@ Expected<int> run(RobustnessArguments& arguments) {
   robustness::RobustnessRequest& request = arguments.request;
   Config base;
   base.scale_choice = ScaleChoice::kGroundTruth;
-  const Expected<Config> config = read_config(arguments.config, base);
-  if (!config) {
-    return config.error();
-  }
-  request.config = *config;
+  STEMVO_TRY_GET(request.config, read_config(arguments.config, base));
   request.command = command_line();
   Progress progress("runs", arguments.is_quiet);
   request.progress = std::ref(progress);
-  const auto report = robustness::run_robustness(request);
-  if (!report) {
-    return report.error();
-  }
-  std::ranges::for_each(report->warnings, print_warning);
+  STEMVO_TRY_GET(const auto report, robustness::run_robustness(request));
+  std::ranges::for_each(report.warnings, print_warning);
   if (!arguments.is_quiet) {
-    print(robustness::format_table(*report));
+    print(robustness::format_table(report));
     print(fmt::format("report: {}\n", (request.out_dir / "report.html").string()));
   }
-  print_json(robustness::document(*report));
-  if (report->interrupted) {
+  print_json(robustness::document(report));
+  if (report.interrupted) {
     print_warning("interrupted; the rows that were finished are written");
     return kExitInterrupted;
   }

@@ -10,6 +10,7 @@
 #include "pipeline/run.hpp"
 #include "progress.hpp"
 #include "report/metrics_keys.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -86,38 +87,31 @@ void print_summary(const RunArguments& arguments, const RunSummary& summary) {
 }
 
 Expected<int> run(RunArguments& arguments) {
-  const Expected<Config> config = read_config(arguments.config);
-  if (!config) {
-    return config.error();
-  }
   RunRequest& request = arguments.request;
-  request.config = *config;
+  STEMVO_TRY_GET(request.config, read_config(arguments.config));
   request.command = command_line();
   request.started = process_start();
   if (!arguments.is_quiet) {
     request.note = print_line;
   }
   Progress progress("frames", arguments.is_quiet);
-  const Expected<RunSummary> summary = run_sequence(request, std::ref(progress));
-  if (!summary) {
-    return summary.error();
-  }
-  for (const std::string& warning : summary->warnings) {
+  STEMVO_TRY_GET(const RunSummary summary, run_sequence(request, std::ref(progress)));
+  for (const std::string& warning : summary.warnings) {
     print_warning(warning);
   }
-  if (summary->interrupted) {
+  if (summary.interrupted) {
     print_warning(fmt::format("interrupted; the results hold the first {} frames",
-                              summary->report.num_frames));
+                              summary.report.num_frames));
   }
-  if (!summary->written) {
-    return summary->written.error();
+  if (!summary.written) {
+    return summary.written.error();
   }
-  print_summary(arguments, *summary);
-  nlohmann::ordered_json json = metrics_document(summary->report);
-  json["out_dir"] = summary->out_dir.string();
-  json["interrupted"] = summary->interrupted;
+  print_summary(arguments, summary);
+  nlohmann::ordered_json json = metrics_document(summary.report);
+  json["out_dir"] = summary.out_dir.string();
+  json["interrupted"] = summary.interrupted;
   print_json(json);
-  return summary->interrupted ? kExitInterrupted : kExitDone;
+  return summary.interrupted ? kExitInterrupted : kExitDone;
 }
 
 void add_options(CLI::App& command, RunArguments& arguments) {

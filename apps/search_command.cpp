@@ -10,10 +10,10 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "search/search.hpp"
+#include "try.hpp"
 
 namespace stemvo::apps {
 namespace {
@@ -55,10 +55,7 @@ Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
     return search::merge_searches(arguments.merge, request.out_dir, command_line(),
                                   request.is_stopped);
   }
-  const Expected<Config> config = read_config(arguments.config, search::search_defaults());
-  if (!config) {
-    return config.error();
-  }
+  STEMVO_TRY_GET(request.config, read_config(arguments.config, search::search_defaults()));
   for (const std::string& assignment : arguments.config.overrides) {
     const std::string key = assignment.substr(0, assignment.find('='));
     if (key == "stem.model" || key == "stem.filter") {
@@ -68,7 +65,6 @@ Expected<search::SearchReport> find_filters(SearchArguments& arguments) {
                       key, assignment));
     }
   }
-  request.config = *config;
   request.command = command_line();
   Progress progress("filter-frames", arguments.is_quiet);
   return search::run_search(request, std::ref(progress));

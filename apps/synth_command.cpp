@@ -8,7 +8,6 @@
 
 #include "commands.hpp"
 #include "console.hpp"
-#include "interrupt.hpp"
 #include "options.hpp"
 #include "progress.hpp"
 #include "synth/synth.hpp"

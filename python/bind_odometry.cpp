@@ -204,7 +204,7 @@ void make_odometry(PythonOdometry* self,
         "scale.source: expected none, constant_speed or camera_height, found ground_truth");
   }
   const cv::Mat given = mask ? value_or_raise(view_of(*mask, "mask")).pixels : cv::Mat();
-  if (const FrameList* frames = frames_of(camera)) {
+  if (const FrameSource* frames = frames_of(camera)) {
     new (self) PythonOdometry(frames->camera, dataset::with_camera_height(config, *frames),
                               mask ? given : frames->mask);
   } else if (nb::isinstance<Camera>(camera)) {

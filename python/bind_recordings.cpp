@@ -25,10 +25,10 @@ Expected<FrameSource> dataset::open_video(const FrameSourceRequest& request) {
 
 namespace python {
 
-const FrameList* frames_of(nb::handle object) {
+const FrameSource* frames_of(nb::handle object) {
   const FrameSource* source = nullptr;
   const CameraView* view = nullptr;
-  return nb::try_cast(object, source) && source != nullptr ? &source->frames()
+  return nb::try_cast(object, source) && source != nullptr ? &*source
          : nb::try_cast(object, view) && view != nullptr   ? &view->frames
                                                            : nullptr;
 }
@@ -85,7 +85,7 @@ nb::tuple frame_of(const FrameSource& source, std::size_t index) {
 }
 
 nb::object truth_of(const FrameSource& source) {
-  const auto& truth = source.ground_truth();
+  const auto& truth = source.ground_truth;
   return truth ? nb::cast(array_of(*truth)) : nb::none();
 }
 
@@ -133,13 +133,13 @@ void bind_recording(nb::module_& module) {
                   "tuple[numpy.typing.NDArray[numpy.uint8] | None, float]]"))
       .def("__repr__",
            [](const FrameSource& s) {
-             return fmt::format("Recording({} frames, {}x{})", s.size(), s.camera().width_px,
-                                s.camera().height_px);
+             return fmt::format("Recording({} frames, {}x{})", s.size(), s.camera.width_px,
+                                s.camera.height_px);
            })
-      .def_prop_ro("camera", [](const FrameSource& s) { return s.camera(); })
-      .def_prop_ro("camera_height_m", [](const FrameSource& s) { return s.camera_height_m(); })
+      .def_prop_ro("camera", [](const FrameSource& s) { return s.camera; })
+      .def_prop_ro("camera_height_m", [](const FrameSource& s) { return s.camera_height_m; })
       .def_prop_ro(
-          "timestamps", [](const FrameSource& s) { return array_of(s.timestamps_s()); },
+          "timestamps", [](const FrameSource& s) { return array_of(s.timestamps_s); },
           nb::rv_policy::move)
       .def_prop_ro("ground_truth", &truth_of,
                    nb::sig("def ground_truth(self) -> numpy.typing.NDArray[numpy.float64] | None"),

@@ -91,7 +91,7 @@ class PythonChannelOdometry {
   PythonChannelOdometry(const nb::object& camera, const nb::object& options) {
     Config config = config_of(options);
     config.threads = 1;
-    const FrameList* frames = frames_of(camera);
+    const FrameSource* frames = frames_of(camera);
     odometry_.emplace(config, frames != nullptr ? frames->camera : nb::cast<Camera>(camera),
                       frames != nullptr ? frames->mask : cv::Mat());
   }

@@ -9,11 +9,11 @@ namespace stemvo::python {
 
 /// View of a camera file for frames that come from elsewhere.
 struct CameraView {
-  FrameList frames;  ///< none of its own
+  FrameSource frames;  ///< none of its own
   FrameView view;
 };
 
 /// Frames of a Recording or a FrameView; nullptr: of neither.
-[[nodiscard]] const FrameList* frames_of(nb::handle object);
+[[nodiscard]] const FrameSource* frames_of(nb::handle object);
 
 }  // namespace stemvo::python

@@ -61,7 +61,7 @@ Frames load_frames() {
   }
   SequenceOptions options;
   options.frames = FrameRangeRequest{0, kNumFrames};
-  Frames frames{folder.path(), value_of(KittiSequence::open(sequence, options)), {}, false};
+  Frames frames{folder.path(), value_of(open_kitti(sequence, options)), {}, false};
   for (std::size_t i = 0; i < frames.sequence.size(); ++i) {
     frames.pixels.push_back(value_of(frames.sequence.read(i)));
   }
@@ -72,8 +72,8 @@ Frames load_frames() {
 /// As ChannelOdometry does it; the last frame is not localized.
 Chain run_chain() {
   Chain result;
-  result.camera = frames().sequence.camera();
-  result.config = dataset::with_camera_height({}, frames().sequence.frames());
+  result.camera = frames().sequence.camera;
+  result.config = dataset::with_camera_height({}, frames().sequence);
   const Config& config = result.config;
   const Stem stem = load_stem(config.stem);
   ContrastNormalization contrast(config.stem);

@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "config/config.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "features/front_end.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/window_estimator.hpp"
@@ -20,7 +20,7 @@ namespace stemvo::bench {
 /// folder, or of a drive rendered for this run, at KITTI's size.
 struct Frames {
   std::filesystem::path folder;  ///< room for files, removed at the end
-  KittiSequence sequence;
+  FrameSource sequence;
   std::vector<cv::Mat> pixels;
   bool is_color = false;
 };

@@ -26,7 +26,7 @@ const cv::Mat& frame_of(const State& state) {
 /// The first frame as a file of the kind asked for: as it is, or turned into the other kind.
 std::filesystem::path file_of_kind(bool as_color) {
   if (as_color == frames().is_color) {
-    return frames().sequence.file(0);
+    return frames().sequence.files[0];
   }
   cv::Mat turned;
   cv::cvtColor(frames().pixels.front(), turned, as_color ? cv::COLOR_GRAY2BGR : cv::COLOR_RGB2GRAY);

@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
     const auto& frames = stemvo::bench::frames();
     benchmark::AddCustomContext("stemvo", std::string(stemvo::version()));
     benchmark::AddCustomContext("frames",
-                                frames.sequence.name() + (frames.is_color ? ", colour" : ", gray"));
+                                frames.sequence.name + (frames.is_color ? ", colour" : ", gray"));
     benchmark::RunSpecifiedBenchmarks();
   } catch (const std::exception& error) {
     std::fprintf(stderr, "error: %s\n", error.what());

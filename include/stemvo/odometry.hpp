@@ -37,50 +37,24 @@ enum class LogLevel { kInfo, kWarning };
 /// One line, with the frame's time.
 using Log = std::function<void(LogLevel level, const std::string& line)>;
 
-/// Monocular visual odometry: images in, poses out, one at a time, no look-ahead. Nothing throws
-/// for what a caller hands in. Of one that was moved from, process() is an Error and the rest is
-/// empty.
-class Odometry {
+/// What Odometry and AsyncOdometry share. Nothing throws for what a caller hands in. Of one that
+/// was moved from, what can fail is an Error and the rest is empty.
+class OdometryHandle {
  public:
-  /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
-  /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where
-  /// no points are wanted on any frame; empty: they are everywhere.
-  [[nodiscard]] static Expected<Odometry> create(const Camera& camera,
-                                                 const Options& options = {},
-                                                 const cv::Mat& mask = {});
-  Odometry(Odometry&&) noexcept;
-  Odometry& operator=(Odometry&&) noexcept;
-  ~Odometry();
-
-  /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size.
-  /// The pixels are read before it returns. An image with distortion, or of over 1.5 megapixels, is
-  /// first made the one that FrameResult::camera takes; pixels in results are of that one.
-  /// `time_s`: when it was taken, seconds of any clock that runs on; frames need not be evenly
-  /// spaced, and one that was dropped is a gap. Errors: another type or size; a time that is not
-  /// after the last one; hints that do not fit. Nothing changes then.
-  [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image,
-                                              PixelOrder order,
-                                              double time_s,
-                                              const FrameHints& hints = {});
-
   /// The camera's speed along its path, from wheels, GPS and the like, 1-sigma of m/s; its sign
   /// does not count. Lengths are metres from then on, with the road or without. Speeds are joined
   /// by straight lines where they are at most 1.5 s apart, and count for frames at their times:
-  /// from those on, up to half a minute late or ahead. Their errors are taken for independent of
-  /// each other. Errors: scale.source constant_speed; numbers that are not finite; a time that is
-  /// not after the last speed's; a sigma that is not above 0.
+  /// from the next frame on, up to half a minute late or ahead. Their errors are taken for
+  /// independent of each other. Errors: scale.source constant_speed; numbers that are not finite; a
+  /// time that is not after the last speed's; a sigma that is not above 0.
   [[nodiscard]] Status add_speed(double time_s, double metres_per_s, double sigma);
   /// The way of the camera between two times, likewise; 1-sigma in metres. Errors: likewise, and a
   /// time that is not after its beginning, or the end of the last; a distance below 0.
   [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);
 
   /// Is told in words when tracking begins, ends and recovers, when the scale is believed and when
-  /// no more, and why a frame could not be seen.
+  /// no more, and why a frame could not be seen. Before the first frame.
   void set_log(Log log);
-
-  /// A new world, as after create(): the same network and the given camera, whatever was learnt of
-  /// it; times may begin anew.
-  void reset();
 
   /// Landmarks that came, moved or went since `version` of the map; 0: all. They are seen from at
   /// least 4 keyframes under at least 1.5 degrees of parallax, and move until they leave the
@@ -88,6 +62,11 @@ class Odometry {
   [[nodiscard]] MapChanges landmarks_since(int version) const;
   /// Those from id `first` on: they stay as they are.
   [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
+
+  /// The points tracked on the last image.
+  [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
+  /// The filter's channel of the last image as points are tracked on it: CV_8UC1, own size.
+  [[nodiscard]] cv::Mat channel_image() const;
 
   /// Adjusts all frames so far at once; the odometry goes on as it was. It takes as long as the
   /// map is large. `covariance_of`: frames of keyframes. Errors: nothing is remembered
@@ -101,15 +80,43 @@ class Odometry {
   /// frame came before; no map, damaged, or one of another channel.
   [[nodiscard]] Status load_map(const std::filesystem::path& file);
 
-  /// The points tracked on the last image.
-  [[nodiscard]] std::vector<TrackedPoint> tracked_points() const;
-  /// The filter's channel of the last image as points are tracked on it: CV_8UC1, own size.
-  [[nodiscard]] cv::Mat channel_image() const;
+ protected:
+  struct Impl;
+  explicit OdometryHandle(std::unique_ptr<Impl> impl);
+  OdometryHandle(OdometryHandle&&) noexcept;
+  OdometryHandle& operator=(OdometryHandle&&) noexcept;
+  ~OdometryHandle();
+
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Monocular visual odometry: images in, poses out, one at a time, no look-ahead.
+class Odometry : public OdometryHandle {
+ public:
+  /// Errors: a camera or an option out of range (named); a network that cannot be loaded or does
+  /// not take images of the camera's size; a mask that is not CV_8UC1 of that size. `mask`: 0 where
+  /// no points are wanted on any frame; empty: they are everywhere.
+  [[nodiscard]] static Expected<Odometry> create(const Camera& camera,
+                                                 const Options& options = {},
+                                                 const cv::Mat& mask = {});
+
+  /// The next image: CV_8UC1 for kGray, else CV_8UC3, of the camera's size.
+  /// The pixels are read before it returns. An image with distortion, or of over 1.5 megapixels, is
+  /// first made the one that FrameResult::camera takes; pixels in results are of that one.
+  /// `time_s`: when it was taken, seconds of any clock that runs on; frames need not be evenly
+  /// spaced, and one that was dropped is a gap. Errors: another type or size; a time that is not
+  /// after the last one; hints that do not fit. Nothing changes then.
+  [[nodiscard]] Expected<FrameResult> process(const cv::Mat& image,
+                                              PixelOrder order,
+                                              double time_s,
+                                              const FrameHints& hints = {});
+
+  /// A new world, as after create(): the same network and the given camera, whatever was learnt of
+  /// it; times may begin anew.
+  void reset();
 
  private:
-  struct Impl;
   explicit Odometry(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace stemvo

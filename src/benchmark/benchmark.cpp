@@ -13,7 +13,6 @@
 #include "benchmark/kept_run.hpp"
 #include "html/page.hpp"
 #include "pipeline/out_folder.hpp"
-#include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "stemvo/version.hpp"
 #include "text/text_file.hpp"
@@ -60,10 +59,10 @@ Expected<std::vector<std::string>> find_sequences(const BenchmarkRequest& reques
 
 /// All official frames, at their size, along the official path: a clip, a drive rendered at another
 /// size, or other frames of the same name are not.
-bool is_official(const Json& official, const KittiSequence& sequence) {
-  const Camera& camera = sequence.camera();
-  const auto& truth = sequence.ground_truth();
-  return sequence.range().begin == 0 && sequence.size() == official.at("frames") &&
+bool is_official(const Json& official, const FrameSource& sequence) {
+  const Camera& camera = sequence.camera;
+  const auto& truth = sequence.ground_truth;
+  return sequence.range.begin == 0 && sequence.size() == official.at("frames") &&
          camera.width_px == official.at("width_px") &&
          camera.height_px == official.at("height_px") && truth &&
          std::abs(evaluate(*truth, *truth).path_length_m - official.at("length_m").get<double>()) <=
@@ -98,10 +97,10 @@ class Benchmark {
   /// A row for the sequence, with all runs to be done. Throws Json::exception where `published` is
   /// not what it should be.
   void plan(const std::string& name, const Json& published) {
-    const auto opened = KittiSequence::open(sequence_dir(name));
+    const auto opened = open_kitti(sequence_dir(name));
     const Json official = published.at("sequences").value(name, Json::object());
     const Json publications = published_rows(published.at("published"), name);
-    truths_[name] = opened ? opened->ground_truth() : std::nullopt;
+    truths_[name] = opened ? opened->ground_truth : std::nullopt;
     if (opened) {
       const auto files = pipeline::input_files(*opened, Config{});
       inputs_.insert(inputs_.end(), files.begin(), files.end());
@@ -114,7 +113,7 @@ class Benchmark {
     num_runs_ += runs.size();
     report_["sequences"].push_back({{"name", name},
                                     {"problem", opened ? Json() : Json(opened.error().message)},
-                                    {"first_frame", opened ? opened->range().begin : 0},
+                                    {"first_frame", opened ? opened->range.begin : 0},
                                     {"frames", opened ? opened->size() : 0},
                                     {"official_frames", official.value("frames", Json())},
                                     {"is_complete", is_complete},
@@ -224,10 +223,10 @@ class Benchmark {
 
   /// The metrics of an earlier call, or of a run now, which may be stopped.
   Expected<Json> result_of(RunRequest& one, const std::string& title) {
-    const Expected<Json> inputs =
-        KittiSequence::open(one.sequence_dir, {.camera = one.config.input.camera})
-            .and_then(
-                [&](const KittiSequence& opened) { return benchmark::hash_inputs(one, opened); });
+    const Expected<Json> inputs = open_kitti(one.sequence_dir, {.camera = one.config.input.camera})
+                                      .and_then([&](const FrameSource& opened) {
+                                        return benchmark::hash_inputs(one, opened);
+                                      });
     if (!inputs) {
       return inputs;
     }

@@ -9,7 +9,6 @@
 
 #include "io/sha256.hpp"
 #include "pipeline/result_files.hpp"
-#include "report/json_file.hpp"
 #include "report/metrics_keys.hpp"
 #include "search/input_hashes.hpp"
 #include "text/text_file.hpp"
@@ -31,7 +30,7 @@ Json with_results(const fs::path& folder, Json hashes) {
 
 }  // namespace
 
-Expected<Json> hash_inputs(const RunRequest& run, const KittiSequence& sequence) {
+Expected<Json> hash_inputs(const RunRequest& run, const FrameSource& sequence) {
   Config config = run.config;
   config.threads = 0;  // no result depends on them
   const auto program = search::hash_program();

@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "pipeline/run.hpp"
 #include "stemvo/error.hpp"
 
@@ -20,7 +20,7 @@ inline constexpr const char* kPosesFile = "trajectory_kitti.txt";
 
 /// Hashes of everything a result depends on.
 [[nodiscard]] Expected<nlohmann::ordered_json> hash_inputs(const RunRequest& run,
-                                                           const KittiSequence& sequence);
+                                                           const FrameSource& sequence);
 /// Why the run of this folder is to be done (again), for its title; nothing where its result
 /// counts.
 [[nodiscard]] std::optional<std::string> reason_to_run(const std::filesystem::path& folder,

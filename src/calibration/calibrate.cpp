@@ -19,6 +19,7 @@
 #include "pipeline/out_folder.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -35,7 +36,7 @@ constexpr double kMaxSigmaOfDistortion = 0.05;
 constexpr std::size_t kMinKeyframes = 8;
 
 fs::path calibration_file(const CalibrationRequest& request, const FrameSource& sequence) {
-  return sequence.given_calibration().value_or(request.sequence_dir / "calib.txt");
+  return sequence.given_calibration.value_or(request.sequence_dir / "calib.txt");
 }
 
 /// Everything that can be wrong with a request before work starts.
@@ -63,24 +64,21 @@ Expected<KeptMap> drive(const CalibrationRequest& request,
   config.odometry.loops = true;
   config.scale.source = ScaleSource::kConstantSpeed;
   config.camera.refine = CameraRefinement::kAll;
-  Expected<PhasedOdometry> odometry =
-      PhasedOdometry::create(sequence.camera(), config, sequence.frames().mask);
-  if (!odometry) {
-    return odometry.error();
-  }
-  const std::size_t num_frames = sequence.stream() ? 0 : sequence.size();
+  STEMVO_TRY_GET(PhasedOdometry odometry,
+                 PhasedOdometry::create(sequence.camera, config, sequence.mask));
+  const std::size_t num_frames = sequence.stream ? 0 : sequence.size();
   const auto visit = [&](std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& result) {
     if (!frame) {
       report.warnings.push_back(frame.error().message);
     } else if (!result.problem.empty()) {
       report.warnings.push_back(
-          fmt::format("frame {}: {}", sequence.range().begin + i, result.problem));
+          fmt::format("frame {}: {}", sequence.range.begin + i, result.problem));
     }
     report.interrupted = progress && !progress(i + 1, num_frames);
     return !report.interrupted;
   };
-  pipeline::run_frames(sequence, *odometry, visit);
-  return odometry->frames().estimator().kept_map();
+  pipeline::run_frames(sequence, odometry, visit);
+  return odometry.frames().estimator().kept_map();
 }
 
 std::optional<MapAdjustment> adjust(KeptMap map, const Camera& camera) {
@@ -136,56 +134,43 @@ Status write_camera(const fs::path& from,
                     const Camera& view,
                     const fs::path& out_file,
                     CalibrationReport& report) {
-  Expected<dataset::CameraFile> file = dataset::read_camera_file(from);
-  if (!file) {
-    return file.error();
-  }
-  file->camera = refined_lens(file->camera, view, change_of(report));
-  report.refined = file->camera;
-  return write_text_file(out_file, dataset::camera_file_text(*file));
+  STEMVO_TRY_GET(dataset::CameraFile file, dataset::read_camera_file(from));
+  file.camera = refined_lens(file.camera, view, change_of(report));
+  report.refined = file.camera;
+  return write_text_file(out_file, dataset::camera_file_text(file));
 }
 
 }  // namespace
 
 Expected<CalibrationReport> calibrate_sequence(const CalibrationRequest& request,
                                                const CalibrationProgress& progress) {
-  if (const Status status = validate(request.config); !status) {
-    return status.error();
-  }
+  STEMVO_TRY(validate(request.config));
   FrameSourceRequest source = request;
   source.SequenceOptions::camera = request.config.input.camera;
-  const Expected<FrameSource> sequence = open_source(source);
-  if (!sequence) {
-    return sequence.error();
-  }
-  if (const Status status = check_request(request, *sequence); !status) {
-    return status.error();
-  }
+  STEMVO_TRY_GET(const FrameSource sequence, open_source(source));
+  STEMVO_TRY(check_request(request, sequence));
   CalibrationReport report;
-  report.is_kitti = sequence->is_kitti();
-  Expected<KeptMap> map = drive(request, *sequence, progress, report);
+  report.is_kitti = sequence.is_kitti;
+  Expected<KeptMap> map = drive(request, sequence, progress, report);
   if (!map || report.interrupted) {
     return map ? Expected<CalibrationReport>(report) : map.error();
   }
   report.num_keyframes = map->keyframes.size();
   const auto adjusted = report.num_keyframes < kMinKeyframes
                             ? std::nullopt
-                            : adjust(*std::move(map), sequence->camera());
+                            : adjust(*std::move(map), sequence.camera);
   if (!adjusted) {
     return fail(fmt::format("{}: expected frames that move, found {} keyframes in {} frames",
-                            request.sequence_dir.string(), report.num_keyframes, sequence->size()));
+                            request.sequence_dir.string(), report.num_keyframes, sequence.size()));
   }
   report.num_landmarks = adjusted->landmarks.size();
   report.median_error_px = adjusted->median_error_px;
-  read_estimate(sequence->camera(), adjusted->camera, report);
+  read_estimate(sequence.camera, adjusted->camera, report);
   if (std::any_of(report.parameters.begin(), report.parameters.begin() + 3,
                   std::mem_fn(&CalibratedParameter::is_determined))) {
     const auto write = report.is_kitti ? write_kitti : write_camera;
-    if (const Status status = write(calibration_file(request, *sequence), sequence->camera(),
-                                    request.out_file, report);
-        !status) {
-      return status.error();
-    }
+    STEMVO_TRY(
+        write(calibration_file(request, sequence), sequence.camera, request.out_file, report));
     report.written = true;
   }
   return report;

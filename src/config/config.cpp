@@ -7,6 +7,7 @@
 
 #include "config/config_yaml.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -62,18 +63,14 @@ std::vector<config::Key> keys_of(Config& config) {
 }  // namespace
 
 Expected<Config> load_config(const std::filesystem::path& file, const Config& base) {
-  const auto root = read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
-    return config::parse_document(text, file.string());
-  });
-  if (!root) {
-    return root.error();
-  }
+  STEMVO_TRY_GET(const auto root,
+                 read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
+                   return config::parse_document(text, file.string());
+                 }));
   Config result = base;
   result.file = file;
   std::vector<config::Key> keys = keys_of(result);
-  if (Status status = config::read_document(*root, file.string(), keys); !status) {
-    return status.error();
-  }
+  STEMVO_TRY(config::read_document(root, file.string(), keys));
   for (const config::Key& key : keys) {
     if (key.is_given) {
       result.keys_in_file.insert(key.name());

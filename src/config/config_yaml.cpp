@@ -12,6 +12,7 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::config {
 namespace {
@@ -154,9 +155,7 @@ class MapReader {
                                            first->second));
       }
       if (section.empty() && is_section(key, keys_)) {
-        if (Status status = read(value, key); !status) {
-          return status;
-        }
+        STEMVO_TRY(read(value, key));
       } else if (const std::string problem = read_key(section, key, value, keys_);
                  !problem.empty()) {
         return error(key_node, fmt::format("{}: {}", name, problem));

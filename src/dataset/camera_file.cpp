@@ -15,6 +15,7 @@
 #include "config/config_yaml.hpp"
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -102,9 +103,7 @@ class Reader {
   explicit Reader(const std::filesystem::path& file) : file_(file) {}
 
   Expected<CameraFile> read() {
-    if (const Status status = collect(); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(collect());
     CameraFile result;
     set_body(result.body_from_camera);
     set_size(result.camera);
@@ -118,27 +117,24 @@ class Reader {
  private:
   /// Parses the file, and finds the values of the keys that are read.
   Status collect() {
-    Expected<std::string> text = read_text_file(file_, kMaxSettings_MB);
-    if (!text) {
-      return text.error();
+    STEMVO_TRY_GET(std::string text, read_text_file(file_, kMaxSettings_MB));
+    if (text.starts_with("%YAML:")) {
+      text.front() = '#';  // OpenCV writes "%YAML:1.0", which is not YAML: read as a comment
     }
-    if (text->starts_with("%YAML:")) {
-      text->front() = '#';  // OpenCV writes "%YAML:1.0", which is not YAML: read as a comment
+    if (text.ends_with("\n---\n")) {  // behind each message that ROS prints
+      text.resize(text.size() - 4);
     }
-    if (text->ends_with("\n---\n")) {  // behind each message that ROS prints
-      text->resize(text->size() - 4);
+    STEMVO_TRY_GET(const YAML::Node root, config::parse_document(text, file_.string()));
+    if (root.IsNull()) {
+      return {};
     }
-    const Expected<YAML::Node> root = config::parse_document(*text, file_.string());
-    if (!root || root->IsNull()) {
-      return root ? Status() : Status(root.error());
-    }
-    if (!root->IsMap()) {
+    if (!root.IsMap()) {
       return fail_at(file_, 0, fail("expected keys with values, found none"));
     }
-    format_ = format_of(*root);
-    const YAML::Node fisheye = (*root)["fisheye_model"];  // OpenCV's, in place of a name
+    format_ = format_of(root);
+    const YAML::Node fisheye = root["fisheye_model"];  // OpenCV's, in place of a name
     is_fisheye_ = fisheye && fisheye.IsScalar() && fisheye.Scalar() != "0";
-    return collect_keys(format_.body == kKalibr.body ? (*root)["cam0"] : *root);
+    return collect_keys(format_.body == kKalibr.body ? root["cam0"] : root);
   }
   Status collect_keys(const YAML::Node& map) {
     const std::vector<std::string> known = format_.keys();

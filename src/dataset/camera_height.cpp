@@ -3,7 +3,7 @@
 
 namespace stemvo::dataset {
 
-Config with_camera_height(Config config, const FrameList& frames) {
+Config with_camera_height(Config config, const FrameSource& frames) {
   constexpr const char* kHeight = "scale.camera_height_m";
   // A file that names both keys is a dump of all, whose height is the default.
   const bool is_given =

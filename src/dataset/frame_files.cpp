@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <span>
-#include <string>
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "dataset/ground_truth.hpp"
 #include "dataset/mask.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 
@@ -66,42 +66,36 @@ Expected<FrameRange> resolve_range(const std::optional<FrameRangeRequest>& reque
   return range;
 }
 
-FrameList list_frames(const FrameRange& range,
-                      const std::vector<fs::path>& files,
-                      const std::vector<double>& times_s) {
+FrameSource list_frames(const FrameRange& range,
+                        const std::vector<fs::path>& files,
+                        const std::vector<double>& times_s) {
   const auto cut = [&](const auto& all) {
     return std::span(all).subspan(range.begin, range.end - range.begin);
   };
-  FrameList frames;
+  FrameSource frames;
   frames.range = range;
   frames.files.assign(cut(files).begin(), cut(files).end());
   frames.timestamps_s.assign(cut(times_s).begin(), cut(times_s).end());
   return frames;
 }
 
-Status add_ground_truth(FrameList& frames,
+Status add_ground_truth(FrameSource& frames,
                         const fs::path& poses,
                         const std::optional<fs::path>& camera_file,
                         double tolerance_s,
                         std::size_t num_files,
                         bool is_exact) {
-  const auto truth = read_truth(poses, camera_file);
-  if (!truth) {
-    return truth.error();
-  }
+  STEMVO_TRY_GET(const auto truth, read_truth(poses, camera_file));
   frames.ground_truth_file = poses;
-  if (is_exact && truth->timestamps_s.empty() && truth->poses.size() != num_files) {
+  if (is_exact && truth.timestamps_s.empty() && truth.poses.size() != num_files) {
     return fail(fmt::format("{}: expected a pose for each of {} images, found {} poses",
-                            poses.string(), num_files, truth->poses.size()));
+                            poses.string(), num_files, truth.poses.size()));
   }
-  const auto matched =
-      match_frames(*truth, poses, frames.range.begin, frames.timestamps_s, tolerance_s);
-  if (!matched) {
-    return matched.error();
-  }
-  frames.ground_truth = matched->poses;
-  if (matched->frames.size() < frames.files.size()) {
-    frames.ground_truth_frames = matched->frames;
+  STEMVO_TRY_GET(const auto matched,
+                 match_frames(truth, poses, frames.range.begin, frames.timestamps_s, tolerance_s));
+  frames.ground_truth = matched.poses;
+  if (matched.frames.size() < frames.files.size()) {
+    frames.ground_truth_frames = matched.frames;
   }
   return {};
 }
@@ -120,15 +114,12 @@ Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
   return view ? view : fail(camera_file.string() + ": " + view.error().message);
 }
 
-Status add_view(FrameList& frames,
+Status add_view(FrameSource& frames,
                 const FrameView& view,
                 const std::vector<std::string>& masks,
                 std::function<Expected<cv::Mat>(std::size_t)> read_whole) {
-  const auto mask = make_mask(masks, view.full_size());
-  if (!mask) {
-    return mask.error();
-  }
-  frames.mask = view.apply_to_mask(*mask);
+  STEMVO_TRY_GET(const auto mask, make_mask(masks, view.full_size()));
+  frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();
   frames.camera = view.camera();
   frames.read = [view, read_whole = std::move(read_whole)](std::size_t index) {

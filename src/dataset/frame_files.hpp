@@ -41,14 +41,14 @@ namespace stemvo::dataset {
                                                  std::string_view things = "frames");
 
 /// Files and times of the range; the rest of the list is left as it is made.
-[[nodiscard]] FrameList list_frames(const FrameRange& range,
-                                    const std::vector<std::filesystem::path>& files,
-                                    const std::vector<double>& times_s);
+[[nodiscard]] FrameSource list_frames(const FrameRange& range,
+                                      const std::vector<std::filesystem::path>& files,
+                                      const std::vector<double>& times_s);
 /// Adds the poses of a file: by time where it has times, else one per frame; then it has at least
 /// the poses up to the range's end, `is_exact`: as many as there are files in all (`num_files`).
 /// `camera_file`: as read_truth says. Errors: those of read_truth; another number of poses; none
 /// of these times.
-[[nodiscard]] Status add_ground_truth(FrameList& frames,
+[[nodiscard]] Status add_ground_truth(FrameSource& frames,
                                       const std::filesystem::path& poses,
                                       const std::optional<std::filesystem::path>& camera_file,
                                       double tolerance_s,
@@ -76,7 +76,7 @@ namespace stemvo::dataset {
 
 /// Camera, size, mask and reader: `read_whole` gives the frames as they come, of the view's full
 /// size. Errors: those of make_mask.
-[[nodiscard]] Status add_view(FrameList& frames,
+[[nodiscard]] Status add_view(FrameSource& frames,
                               const FrameView& view,
                               const std::vector<std::string>& masks,
                               std::function<Expected<cv::Mat>(std::size_t)> read_whole);

@@ -8,9 +8,8 @@
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
-#include "dataset/sequence.hpp"
-#include "internal_check.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -89,11 +88,6 @@ Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_
 
 }  // namespace
 
-Expected<cv::Mat> FrameSource::read(std::size_t index) const {
-  STEMVO_CHECK(index < size(), "frame index inside the range");
-  return frames_.read(index);
-}
-
 Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string first = text.substr(0, colon);
@@ -110,20 +104,19 @@ Expected<FrameRangeRequest> parse_frame_range(const std::string& text) {
 }
 
 Expected<std::optional<GroundTruth>> FrameSource::ground_truth_of(std::size_t num_frames) const {
-  if (frames_.match) {
+  if (match) {
     std::vector<double> times_s;
     for (std::size_t i = 0; i < num_frames; ++i) {
       times_s.push_back(time_s(i));
     }
-    return frames_.match(times_s).map(
-        [](const GroundTruth& truth) { return std::optional(truth); });
+    return match(times_s).map([](const GroundTruth& truth) { return std::optional(truth); });
   }
-  if (!frames_.ground_truth) {
+  if (!ground_truth) {
     return std::optional<GroundTruth>();
   }
-  GroundTruth truth{*frames_.ground_truth, {}};
-  if (frames_.ground_truth_frames) {
-    truth.frames = *frames_.ground_truth_frames;
+  GroundTruth truth{*ground_truth, {}};
+  if (ground_truth_frames) {
+    truth.frames = *ground_truth_frames;
     const auto end = std::lower_bound(truth.frames.begin(), truth.frames.end(), num_frames);
     truth.frames.erase(end, truth.frames.end());
   } else {
@@ -155,9 +148,7 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   if (!is_stream && !listing && !dataset::is_folder(path)) {
     return refuse(path);
   }
-  if (const Status status = check_unused(request, listing.has_value(), is_stream); !status) {
-    return status.error();
-  }
+  STEMVO_TRY(check_unused(request, listing.has_value(), is_stream));
   if (is_stream) {
     return dataset::open_video(request);
   }
@@ -168,7 +159,7 @@ Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   if (!looks_like_kitti(path)) {
     return refuse(path);
   }
-  return KittiSequence::open(path, request).map([](const FrameSource& source) { return source; });
+  return open_kitti(path, request);
 }
 
 }  // namespace stemvo

@@ -6,7 +6,6 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -44,9 +43,9 @@ struct GroundTruth {
   std::vector<std::size_t> frames;  ///< whose they are; increasing
 };
 
-/// All that a source knows of its frames before one is read. Files, times and poses are those of
-/// the range, one per frame; a stream has none of them but a video's file.
-struct FrameList {
+/// Frames of one camera, in order, and all that is known of them before one is read. Files, times
+/// and poses are those of the range, one per frame; a stream has none of them but a video's file.
+struct FrameSource {
   std::string kind;    ///< what it was recognised as, e.g. "KITTI sequence"
   std::string name;    ///< of the folder, e.g. "03"
   FrameRange range;    ///< in the folder's numbering
@@ -64,63 +63,26 @@ struct FrameList {
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
   std::optional<Eigen::Quaterniond> camera_from_imu;  ///< where a camera file says it
   bool is_kitti = false;                              ///< whose camera is 1.65 m above a road
-  /// Index in `files` -> frame; several threads may call it. Of a stream, each frame once, in
-  /// order; an empty image behind the last.
+  /// Frame `index` in [0, size()): CV_8UC1, or CV_8UC3 in RGB order, of the camera's size; all
+  /// frames of a source alike. Several threads may call it. Of a stream, each frame once, in order;
+  /// an empty image behind the last. Error (file named): unreadable or truncated, or of another
+  /// size.
   std::function<Expected<cv::Mat>(std::size_t)> read;
   std::optional<StreamInfo> stream = std::nullopt;
   /// Finds the true poses by the times of frames that were read; only a stream with a pose file
   /// has it.
   std::function<Expected<GroundTruth>(const std::vector<double>& times_s)> match = nullptr;
-};
-
-/// Frames of one camera, in order, with a FrameList.
-class FrameSource {
- public:
-  explicit FrameSource(FrameList frames) : frames_(std::move(frames)) {}
 
   /// The number of frames; of a stream the most there may be.
-  [[nodiscard]] std::size_t size() const {
-    return frames_.stream ? frames_.stream->max_frames : frames_.files.size();
-  }
-  [[nodiscard]] const std::optional<StreamInfo>& stream() const { return frames_.stream; }
-  [[nodiscard]] const std::string& kind() const { return frames_.kind; }
-  [[nodiscard]] bool is_kitti() const { return frames_.is_kitti; }
-  [[nodiscard]] const Camera& camera() const { return frames_.camera; }
-  [[nodiscard]] const std::string& name() const { return frames_.name; }
-  [[nodiscard]] FrameRange range() const { return frames_.range; }
-  [[nodiscard]] const std::vector<double>& timestamps_s() const { return frames_.timestamps_s; }
-  [[nodiscard]] const std::optional<Trajectory>& ground_truth() const {
-    return frames_.ground_truth;
-  }
-  [[nodiscard]] bool has_ground_truth() const { return frames_.ground_truth || frames_.match; }
+  [[nodiscard]] std::size_t size() const { return stream ? stream->max_frames : files.size(); }
+  [[nodiscard]] bool has_ground_truth() const { return ground_truth || match; }
   /// The time of a frame; a stream knows it after the frame was read.
   [[nodiscard]] double time_s(std::size_t index) const {
-    return frames_.stream ? frames_.stream->time_s(index) : frames_.timestamps_s[index];
+    return stream ? stream->time_s(index) : timestamps_s[index];
   }
   /// True poses of the first `num_frames`, where they have one; nullopt: there is no ground truth.
   /// Error, of a stream only: no times match.
   [[nodiscard]] Expected<std::optional<GroundTruth>> ground_truth_of(std::size_t num_frames) const;
-  [[nodiscard]] const std::optional<std::filesystem::path>& ground_truth_file() const {
-    return frames_.ground_truth_file;
-  }
-  [[nodiscard]] const std::optional<std::filesystem::path>& given_calibration() const {
-    return frames_.given_calibration;
-  }
-  [[nodiscard]] const std::optional<double>& camera_height_m() const {
-    return frames_.camera_height_m;
-  }
-  [[nodiscard]] const std::filesystem::path& file(std::size_t index) const {
-    return frames_.files[index];
-  }
-  [[nodiscard]] const FrameList& frames() const { return frames_; }
-
-  /// Frame `index` in [0, size()): CV_8UC1, or CV_8UC3 in RGB order, of the camera's size; all
-  /// frames of a source alike. May be called by several threads at a time. Error (file named):
-  /// unreadable or truncated, or of another size.
-  [[nodiscard]] Expected<cv::Mat> read(std::size_t index) const;
-
- private:
-  FrameList frames_;
 };
 
 /// Keys `input.*` of the configuration, and the program's --frames, --gt and --calib.
@@ -149,8 +111,17 @@ struct FrameSourceRequest : SequenceOptions {
 /// ours (camera.yaml beside the images; listing.hpp); with `camera_file` any folder of PNG and JPEG
 /// images, or a pattern, in the order of their names, numbers by value; else KITTI's layout. All
 /// but KITTI's are undistorted when read, colour if the images are. Errors: those of
-/// KittiSequence::open; none of these; no camera file; a camera file that is wrong; no images;
+/// open_kitti; none of these; no camera file; a camera file that is wrong; no images;
 /// images of another size; times or poses that do not fit; a range outside.
 [[nodiscard]] Expected<FrameSource> open_source(const FrameSourceRequest& request);
+
+/// A folder with some of what only KITTI's layout has: open_kitti says what is missing.
+[[nodiscard]] bool looks_like_kitti(const std::filesystem::path& folder);
+/// A KITTI odometry folder: image_N/%06d.png, calib.txt (row PN), times.txt. Frames are gray of the
+/// gray cameras. Errors: folder, images, calib row, times missing or malformed; gap in the
+/// numbering; range outside; fewer poses or times than frames; a --gt file that cannot be read; a
+/// --calib file whose principal point is outside the image (one of another image size).
+[[nodiscard]] Expected<FrameSource> open_kitti(const std::filesystem::path& directory,
+                                               const SequenceOptions& options = {});
 
 }  // namespace stemvo

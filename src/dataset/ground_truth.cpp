@@ -7,6 +7,7 @@
 
 #include "dataset/camera_file.hpp"
 #include "dataset/frame_files.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 
@@ -57,11 +58,9 @@ Expected<GroundTruth> match_frames(const PoseFile& truth,
                                    double tolerance_s) {
   if (!truth.timestamps_s.empty()) {
     const TimePairs pairs = pair_by_time(times_s, truth.timestamps_s, tolerance_s);
-    const Status status =
-        check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s);
-    return status ? Expected<GroundTruth>(
-                        {relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first})
-                  : status.error();
+    STEMVO_TRY(
+        check_pairs(truth_file, truth.timestamps_s, "the frames", times_s, pairs, tolerance_s));
+    return GroundTruth{relative_to_first(take_poses(truth.poses, pairs.second)), pairs.first};
   }
   if (truth.poses.size() < begin + times_s.size()) {
     return fail(fmt::format("{}: expected a pose for each of {} frames, found {} poses",

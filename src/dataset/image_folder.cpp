@@ -5,6 +5,7 @@
 #include "dataset/frame_files.hpp"
 #include "dataset/kitti_text.hpp"
 #include "io/image_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -46,18 +47,15 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
                             const fs::path& folder,
                             const fs::path& camera_file,
                             const Camera& camera) {
-  const auto kind = vote_on_images(files);
-  if (!kind) {
-    return kind.error();
-  }
-  if (kind->size != cv::Size(camera.width_px, camera.height_px)) {
+  STEMVO_TRY_GET(const auto kind, vote_on_images(files));
+  if (kind.size != cv::Size(camera.width_px, camera.height_px)) {
     return fail(
         fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
                     "give the camera file of that size",
                     folder.string(), camera.width_px, camera.height_px, camera_file.string(),
-                    kind->size.width, kind->size.height));
+                    kind.size.width, kind.size.height));
   }
-  return kind->is_color;
+  return kind.is_color;
 }
 
 }  // namespace
@@ -70,47 +68,29 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
                     "'stemvo run --help' shows what it holds",
                     request.sequence_dir.string(), listing.kind));
   }
-  const auto camera_file = read_camera_file(*camera_path);
-  if (!camera_file) {
-    return camera_file.error();
-  }
-  const auto range =
-      resolve_range(request.frames, listing.files.size(), request.sequence_dir.string());
-  if (!range) {
-    return range.error();
-  }
-  const auto times_s = find_times(listing, request, *camera_path, camera_file->rate_hz);
-  if (!times_s) {
-    return times_s.error();
-  }
-  FrameList frames = list_frames(*range, listing.files, *times_s);
+  STEMVO_TRY_GET(const auto camera_file, read_camera_file(*camera_path));
+  STEMVO_TRY_GET(const auto range, resolve_range(request.frames, listing.files.size(),
+                                                 request.sequence_dir.string()));
+  STEMVO_TRY_GET(const auto times_s,
+                 find_times(listing, request, *camera_path, camera_file.rate_hz));
+  FrameSource frames = list_frames(range, listing.files, times_s);
   if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
-    if (const Status status =
-            add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
-                             listing.files.size(), true);
-        !status) {
-      return status.error();
-    }
+    STEMVO_TRY(add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
+                                listing.files.size(), true));
   }
-  const auto is_color =
-      check_images(frames.files, listing.folder, *camera_path, camera_file->camera);
-  if (!is_color) {
-    return is_color.error();
-  }
-  const auto view = view_of(camera_file->camera, *camera_path);
-  if (!view) {
-    return view.error();
-  }
+  STEMVO_TRY_GET(const auto is_color,
+                 check_images(frames.files, listing.folder, *camera_path, camera_file.camera));
+  STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
   frames.kind = listing.kind;
   frames.name = listing.name;
   frames.given_calibration = camera_path;
-  frames.camera_height_m = camera_file->camera_height_m;
-  frames.camera_from_imu = camera_file->camera_from_imu();
-  const Status status =
-      add_view(frames, *view, request.masks,
-               [files = frames.files, is_color = *is_color, size = view->full_size()](
-                   std::size_t i) { return io::read_image(files[i], is_color, size); });
-  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
+  frames.camera_height_m = camera_file.camera_height_m;
+  frames.camera_from_imu = camera_file.camera_from_imu();
+  STEMVO_TRY(add_view(frames, view, request.masks,
+                      [files = frames.files, is_color, size = view.full_size()](std::size_t i) {
+                        return io::read_image(files[i], is_color, size);
+                      }));
+  return frames;
 }
 
 }  // namespace stemvo::dataset

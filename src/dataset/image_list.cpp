@@ -10,6 +10,7 @@
 
 #include "dataset/frame_files.hpp"
 #include "dataset/listing.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -90,11 +91,8 @@ Expected<Listing> list_images(const fs::path& given) {
         fmt::format("{}: expected a folder of images or a pattern with *, ? or [..], found none",
                     result.folder.string()));
   }
-  const auto found = list_folder(result.folder);
-  if (!found) {
-    return found.error();
-  }
-  for (const fs::path& file : *found) {
+  STEMVO_TRY_GET(const auto found, list_folder(result.folder));
+  for (const fs::path& file : found) {
     if (has_image_name(file) && matches_pattern(file.filename().string(), pattern) &&
         !is_folder(file)) {
       result.files.push_back(file);

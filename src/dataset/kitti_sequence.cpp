@@ -6,11 +6,12 @@
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
+#include "dataset/frame_source.hpp"
 #include "dataset/kitti_text.hpp"
 #include "dataset/mask.hpp"
-#include "dataset/sequence.hpp"
 #include "io/image_file.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -47,12 +48,9 @@ Expected<int> choose_camera(const fs::path& directory, const std::string& option
 
 /// Frames 000000.png, 000001.png, ... without a gap. Thumbnails and notes may lie beside them.
 Expected<std::vector<fs::path>> list_images(const fs::path& folder) {
-  const auto found = dataset::list_folder(folder);
-  if (!found) {
-    return found.error();
-  }
+  STEMVO_TRY_GET(const auto found, dataset::list_folder(folder));
   std::vector<std::pair<std::size_t, fs::path>> numbered;
-  for (const fs::path& file : *found) {
+  for (const fs::path& file : found) {
     const std::string stem = file.stem().string();
     const auto number = parse_index(stem);
     if (number && stem.size() >= kDigits && file.extension() == ".png") {
@@ -92,7 +90,7 @@ std::optional<fs::path> find_ground_truth(const fs::path& absolute, const std::s
 Status add_truth(const fs::path& absolute,
                  const SequenceOptions& options,
                  std::size_t num_images,
-                 FrameList& frames) {
+                 FrameSource& frames) {
   const auto file =
       options.ground_truth ? options.ground_truth : find_ground_truth(absolute, frames.name);
   return file ? dataset::add_ground_truth(frames, *file, std::nullopt,
@@ -101,14 +99,11 @@ Status add_truth(const fs::path& absolute,
 }
 
 /// Sets the size that most images have.
-Status set_size(const fs::path& calibration, FrameList& frames) {
-  const auto kind = dataset::vote_on_images(frames.files);
-  if (!kind) {
-    return kind.error();
-  }
-  frames.full_size = kind->size;
-  frames.camera.width_px = kind->size.width;
-  frames.camera.height_px = kind->size.height;
+Status set_size(const fs::path& calibration, FrameSource& frames) {
+  STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames.files));
+  frames.full_size = kind.size;
+  frames.camera.width_px = kind.size.width;
+  frames.camera.height_px = kind.size.height;
   const Status status = dataset::check_center(frames.camera);
   return status ? status
                 : Status(fail(fmt::format("{}: {}: a calibration of another image size",
@@ -127,54 +122,34 @@ bool looks_like_kitti(const fs::path& folder) {
   return false;
 }
 
-Expected<KittiSequence> KittiSequence::open(const fs::path& directory,
-                                            const SequenceOptions& options) {
+Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOptions& options) {
   if (!dataset::is_folder(directory)) {
     return fail(fmt::format("{}: expected a sequence folder, found none; check the path",
                             directory.string()));
   }
-  const auto camera_index = choose_camera(directory, options.camera);
-  if (!camera_index) {
-    return camera_index.error();
-  }
-  const fs::path image_folder = directory / fmt::format("image_{}", *camera_index);
-  const auto images = list_images(image_folder);
-  if (!images) {
-    return images.error();
-  }
-  const auto range = dataset::resolve_range(options.frames, images->size(), image_folder.string());
-  if (!range) {
-    return range.error();
-  }
+  STEMVO_TRY_GET(const auto camera_index, choose_camera(directory, options.camera));
+  const fs::path image_folder = directory / fmt::format("image_{}", camera_index);
+  STEMVO_TRY_GET(const auto images, list_images(image_folder));
+  STEMVO_TRY_GET(const auto range,
+                 dataset::resolve_range(options.frames, images.size(), image_folder.string()));
   const fs::path calibration = options.calibration.value_or(directory / "calib.txt");
-  const auto camera = dataset::read_kitti_camera(calibration, *camera_index);
-  if (!camera) {
-    return camera.error();
-  }
-  const auto times_s = dataset::read_kitti_times(directory / "times.txt", range->end);
-  if (!times_s) {
-    return times_s.error();
-  }
+  STEMVO_TRY_GET(const auto camera, dataset::read_kitti_camera(calibration, camera_index));
+  STEMVO_TRY_GET(const auto times_s, dataset::read_kitti_times(directory / "times.txt", range.end));
   const fs::path absolute = dataset::absolute_folder(directory);
-  FrameList frames = dataset::list_frames(*range, *images, *times_s);
+  FrameSource frames = dataset::list_frames(range, images, times_s);
   frames.kind = "KITTI sequence";
   frames.is_kitti = true;
   frames.name = absolute.filename().string();
-  frames.camera = *camera;
+  frames.camera = camera;
   frames.given_calibration = options.calibration;
-  const bool is_color = *camera_index >= 2;
-  const Status status = add_truth(absolute, options, images->size(), frames).and_then([&] {
-    return set_size(calibration, frames);
-  });
-  const auto mask = dataset::make_mask(options.masks, frames.full_size);
-  if (!status || !mask) {
-    return status ? mask.error() : status.error();
-  }
-  frames.mask = *mask;
+  const bool is_color = camera_index >= 2;
+  STEMVO_TRY(add_truth(absolute, options, images.size(), frames));
+  STEMVO_TRY(set_size(calibration, frames));
+  STEMVO_TRY_GET(frames.mask, dataset::make_mask(options.masks, frames.full_size));
   frames.read = [files = frames.files, is_color, size = frames.full_size](std::size_t index) {
     return io::read_image(files[index], is_color, size);
   };
-  return KittiSequence(std::move(frames));
+  return frames;
 }
 
 }  // namespace stemvo

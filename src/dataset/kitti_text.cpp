@@ -10,6 +10,7 @@
 
 #include "stemvo/rigid3.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -54,29 +55,23 @@ Expected<Camera> to_camera(const Matrix34d& p) {
 }  // namespace
 
 Expected<Camera> read_kitti_camera(const std::filesystem::path& file, int index) {
-  const auto lines = read_lines(file, kMaxSettings_MB);
-  if (!lines) {
-    return lines.error();
-  }
-  for (std::size_t i = 0; i < lines->size(); ++i) {
-    if (camera_of((*lines)[i]) == index) {
-      const Expected<Camera> camera = parse_projection((*lines)[i]).and_then(to_camera);
+  STEMVO_TRY_GET(const auto lines, read_lines(file, kMaxSettings_MB));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (camera_of(lines[i]) == index) {
+      const Expected<Camera> camera = parse_projection(lines[i]).and_then(to_camera);
       return camera ? camera : fail_at(file, i, camera.error());
     }
   }
   return fail(fmt::format("{}: expected a row 'P{}:' for image_{}, found none in {} lines",
-                          file.string(), index, index, lines->size()));
+                          file.string(), index, index, lines.size()));
 }
 
 Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
                                            const Camera& given,
                                            const Camera& refined) {
-  const auto lines = read_lines(file, kMaxSettings_MB);
-  if (!lines) {
-    return lines.error();
-  }
+  STEMVO_TRY_GET(const auto lines, read_lines(file, kMaxSettings_MB));
   std::string text;
-  for (const std::string& line : *lines) {
+  for (const std::string& line : lines) {
     Expected<Matrix34d> row = parse_projection(line);
     const bool is_given =
         camera_of(line) && row &&
@@ -99,25 +94,10 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
 
 Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file,
                                                std::size_t num_expected) {
-  const auto lines = read_lines(file);
-  if (!lines) {
-    return lines.error();
-  }
+  STEMVO_TRY_GET(const auto rows, read_timed_rows(file, {1}, "a time"));
   std::vector<double> times_s;
-  for (std::size_t i = 0; i < lines->size(); ++i) {
-    if (split_words((*lines)[i]).empty()) {
-      continue;
-    }
-    const auto time_s = parse_numbers((*lines)[i], 1);
-    if (!time_s) {
-      return fail_at(file, i, time_s.error());
-    }
-    if (!times_s.empty() && !(time_s->front() > times_s.back())) {
-      return fail_at(file, i,
-                     fail(fmt::format("expected a time after {} s, found {} s", times_s.back(),
-                                      time_s->front())));
-    }
-    times_s.push_back(time_s->front());
+  for (const TimedRow& row : rows) {
+    times_s.push_back(row.time_s);
   }
   if (times_s.size() < num_expected) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/listing.hpp"
 
-#include <algorithm>
-#include <string_view>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -24,40 +21,12 @@ std::optional<fs::path> if_exists(const fs::path& file) {
   return is_there(file) ? std::optional(file) : std::nullopt;
 }
 
-/// The listing with the rows `time name` of a list, `#` before comments; times increase. `unit_s`:
-/// of the times.
+/// The listing with the images that a list names, and their times.
 Expected<Listing> read_list(const fs::path& list, double unit_s, Listing listing) {
-  const auto lines = read_lines(list);
-  if (!lines) {
-    return lines.error();
-  }
-  for (std::size_t i = 0; i < lines->size(); ++i) {
-    std::string line = (*lines)[i];
-    std::replace(line.begin(), line.end(), ',', ' ');
-    const std::vector<std::string_view> words = split_words(line);
-    if (words.empty() || words.front().starts_with('#')) {
-      continue;
-    }
-    if (words.size() != 2) {
-      return fail_at(
-          list, i,
-          fail(fmt::format("expected a time and an image's name, found {} words", words.size())));
-    }
-    const auto time = parse_numbers(words[0], 1);
-    if (!time) {
-      return fail_at(list, i, time.error());
-    }
-    const double time_s = unit_s * time->front();
-    if (!listing.times_s.empty() && !(time_s > listing.times_s.back())) {
-      return fail_at(
-          list, i,
-          fail(fmt::format("expected a time after that of the image before, found {}", words[0])));
-    }
-    listing.times_s.push_back(time_s);
-    listing.files.push_back(listing.folder / words[1]);
-  }
-  if (listing.files.empty()) {
-    return fail(fmt::format("{}: expected at least one image, found none", list.string()));
+  STEMVO_TRY_GET(const auto rows, read_timed_rows(list, {2}, "a time and an image's name", unit_s));
+  for (const TimedRow& row : rows) {
+    listing.times_s.push_back(row.time_s);
+    listing.files.push_back(listing.folder / split_words(row.rest).front());
   }
   return listing;
 }
@@ -78,7 +47,6 @@ std::optional<fs::path> find_euroc_camera(const fs::path& folder) {
 }
 
 Expected<Listing> list_euroc(const fs::path& camera) {
-  constexpr double kNanosecond_s = 1e-9;
   const fs::path mav = camera.parent_path();
   Listing listing;
   listing.kind = "EuRoC recording";

@@ -8,6 +8,7 @@
 
 #include "io/image_file.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -56,9 +57,7 @@ Expected<cv::Mat> make_mask(const std::vector<std::string>& parts, cv::Size size
   }
   cv::Mat mask(size, CV_8UC1, cv::Scalar(255));
   for (const std::string& part : parts) {
-    if (const Status status = add_part(part, mask); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(add_part(part, mask));
   }
   if (cv::countNonZero(mask) == 0) {
     return fail("--mask: expected a part of the frames that is left, found none");

@@ -3,60 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <string>
 
 #include <fmt/format.h>
 
 #include "odometry/frame_clock.hpp"
 #include "stemvo/rigid3.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
 
 constexpr double kMaxGap_s = 0.1;  ///< between rates that a rotation is integrated from
 
-/// Rows of one of these numbers of numbers, the first of which is a time and rises.
-Expected<std::vector<std::vector<double>>> read_rows(const std::filesystem::path& file,
-                                                     std::initializer_list<std::size_t> counts,
-                                                     std::string_view form) {
-  const auto lines = read_lines(file);
-  if (!lines) {
-    return lines.error();
-  }
-  std::vector<std::vector<double>> rows;
-  double unit_s = 1.0;
-  for (std::size_t i = 0; i < lines->size(); ++i) {
-    const std::size_t comment = std::min((*lines)[i].find('#'), (*lines)[i].size());
-    if ((*lines)[i].find("[ns]", comment) != std::string::npos) {
-      unit_s = 1e-9;  // EuRoC's
-    }
-    std::string line = (*lines)[i].substr(0, comment);
-    std::ranges::replace(line, ',', ' ');
-    const std::size_t count = split_words(line).size();
-    if (count == 0) {
-      continue;
-    }
-    if (std::ranges::find(counts, count) == counts.end()) {
-      return fail_at(file, i, fail(fmt::format("expected {}, found {} words", form, count)));
-    }
-    auto row = parse_numbers(line, count);
-    if (!row) {
-      return fail_at(file, i, row.error());
-    }
-    row->front() *= unit_s;
-    if (!rows.empty() && !(row->front() > rows.back().front())) {
-      return fail_at(file, i,
-                     fail(fmt::format("expected a time after {} s, found {} s", rows.back().front(),
-                                      row->front())));
-    }
-    rows.push_back(*std::move(row));
-  }
-  if (rows.empty()) {
-    return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
-  }
-  return rows;
+/// The numbers behind the time.
+Expected<std::vector<double>> numbers_of(const TimedRow& row, const std::filesystem::path& file) {
+  auto numbers = parse_numbers(row.rest, split_words(row.rest).size());
+  return numbers ? numbers : fail_at(file, row.line, numbers.error());
 }
 
 /// The rate at a time, between the rows around it; the first or the last one outside.
@@ -75,31 +38,30 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
 Expected<std::vector<SpeedRow>> read_speeds(const std::filesystem::path& file) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  const auto rows = read_rows(file, {2, 3}, "a time, m/s and maybe a sigma");
-  if (!rows) {
-    return rows.error();
-  }
+  STEMVO_TRY_GET(const auto rows, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma"));
   std::vector<SpeedRow> speeds;
-  for (const std::vector<double>& row : *rows) {
+  for (const TimedRow& row : rows) {
+    STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
     const double sigma =
-        row.size() > 2 ? row[2] : std::max(kMinSigma, kSigmaShare * std::abs(row[1]));
+        numbers.size() > 1 ? numbers[1] : std::max(kMinSigma, kSigmaShare * std::abs(numbers[0]));
     if (!(sigma > 0.0)) {
       return fail(fmt::format("{}: expected a sigma above 0 at {} s, found {}", file.string(),
-                              row[0], sigma));
+                              row.time_s, sigma));
     }
-    speeds.push_back({row[0], row[1], sigma});
+    speeds.push_back({row.time_s, numbers[0], sigma});
   }
   return speeds;
 }
 
 Expected<std::vector<GyroRow>> read_gyro(const std::filesystem::path& file) {
-  return read_rows(file, {4, 7}, "a time and rad/s about x, y and z").map([](const auto& rows) {
-    std::vector<GyroRow> rates;
-    for (const std::vector<double>& row : rows) {
-      rates.push_back({row[0], Eigen::Vector3d(row[1], row[2], row[3])});
-    }
-    return rates;
-  });
+  STEMVO_TRY_GET(const auto rows,
+                 read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z"));
+  std::vector<GyroRow> rates;
+  for (const TimedRow& row : rows) {
+    STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
+    rates.push_back({row.time_s, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])});
+  }
+  return rates;
 }
 
 std::optional<Eigen::Quaterniond> integrate_gyro(const std::vector<GyroRow>& rows,

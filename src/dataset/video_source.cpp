@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <limits>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "dataset/frame_files.hpp"
 #include "dataset/ground_truth.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
@@ -24,7 +24,7 @@ Status check_stream_size(const cv::Size& size, const Camera& camera, const std::
 /// Error: poses without times are fewer than the frames. The container's count may be wrong, so
 /// that --frames overrides it.
 Status check_length(const PoseFile& truth,
-                    const FrameList& frames,
+                    const FrameSource& frames,
                     const FrameSourceRequest& request) {
   const std::size_t num_expected = frames.range.begin + frames.stream->expected_frames;
   if (!truth.timestamps_s.empty() || frames.stream->expected_frames == 0 ||
@@ -44,17 +44,11 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const FrameSourceRequest& request) {
   const std::string owner = request.sequence_dir.string();
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
-  Status status = check_stream_size(stream->size(), camera.camera, owner);
-  const auto view = view_of(camera.camera, *request.camera_file);
-  if (status && !view) {
-    status = view.error();
-  }
-  status = status ? stream->skip(range.begin) : status;
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(check_stream_size(stream->size(), camera.camera, owner));
+  STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
+  STEMVO_TRY(stream->skip(range.begin));
   stream->set_default_rate(camera.rate_hz.value_or(30.0));
-  FrameList frames;
+  FrameSource frames;
   frames.kind = stream->is_live() ? "live camera" : "video";
   frames.name = stream->is_live() ? fmt::format("camera{}", camera_number(owner).value_or(0))
                                   : request.sequence_dir.stem().string();
@@ -71,28 +65,24 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   frames.camera_height_m = camera.camera_height_m;
   frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
-    const auto truth = read_truth(*request.ground_truth, request.camera_file);
-    if (!truth) {
-      return truth.error();
-    }
-    if (const Status fits = check_length(*truth, frames, request); !fits) {
-      return fits.error();
-    }
+    STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
+    STEMVO_TRY(check_length(truth, frames, request));
     frames.ground_truth_file = request.ground_truth;
-    frames.match = [truth = *truth, request](const std::vector<double>& times_s) {
+    frames.match = [truth, request](const std::vector<double>& times_s) {
       return match_frames(truth, *request.ground_truth,
                           request.frames.value_or(FrameRangeRequest{}).begin, times_s,
                           request.ground_truth_tolerance_s);
     };
   }
-  status = add_view(
-      frames, *view, request.masks, [stream, owner, raw = camera.camera](std::size_t index) {
-        auto image = stream->read(index);
-        const Status fits =
-            image && !image->empty() ? check_stream_size(image->size(), raw, owner) : Status();
-        return fits ? image : fits.error();
-      });
-  return status ? Expected<FrameSource>(FrameSource(std::move(frames))) : status.error();
+  const auto read = [stream, owner, raw = camera.camera](std::size_t index) -> Expected<cv::Mat> {
+    STEMVO_TRY_GET(const cv::Mat image, stream->read(index));
+    if (!image.empty()) {
+      STEMVO_TRY(check_stream_size(image.size(), raw, owner));
+    }
+    return image;
+  };
+  STEMVO_TRY(add_view(frames, view, request.masks, read));
+  return frames;
 }
 
 Expected<FrameSource> open_video(const FrameSourceRequest& request) {
@@ -103,16 +93,13 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
                     request.sequence_dir.string(),
                     camera_number(request.sequence_dir) ? "a live camera" : "taken for a video"));
   }
-  const auto camera = read_camera_file(*request.camera_file);
-  if (!camera) {
-    return camera.error();
-  }
+  STEMVO_TRY_GET(const auto camera, read_camera_file(*request.camera_file));
   const auto number = camera_number(request.sequence_dir);
-  const cv::Size size(camera->camera.width_px, camera->camera.height_px);
+  const cv::Size size(camera.camera.width_px, camera.camera.height_px);
   const auto stream = number ? VideoStream::open_camera(*number, size)
                              : VideoStream::open_file(request.sequence_dir);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
-    return open_stream(opened, *camera, request);
+    return open_stream(opened, camera, request);
   });
 }
 

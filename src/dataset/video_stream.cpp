@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "try.hpp"
+
 namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
@@ -15,31 +17,25 @@ namespace fs = std::filesystem;
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file) {
   std::error_code code;
   // A relative path with a colon would be taken for an address.
-  auto decoder = decode_file(fs::absolute(file, code));
-  if (!decoder) {
-    return decoder.error();
-  }
-  if (*decoder == nullptr) {
+  STEMVO_TRY_GET(auto decoder, decode_file(fs::absolute(file, code)));
+  if (decoder == nullptr) {
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
         "no video)",
         file.string()));
   }
-  return std::make_shared<VideoStream>(*std::move(decoder), file.string(), false);
+  return std::make_shared<VideoStream>(std::move(decoder), file.string(), false);
 }
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
-  auto decoder = decode_camera(number, size);
-  if (!decoder) {
-    return decoder.error();
-  }
-  if (*decoder == nullptr) {
+  STEMVO_TRY_GET(auto decoder, decode_camera(number, size));
+  if (decoder == nullptr) {
     return fail(fmt::format(
         "camera:{0}: expected a camera at /dev/video{0} that this user may read, found none; "
         "'ls -l /dev/video*' lists those there are",
         number));
   }
-  return std::make_shared<VideoStream>(*std::move(decoder), fmt::format("camera:{}", number), true);
+  return std::make_shared<VideoStream>(std::move(decoder), fmt::format("camera:{}", number), true);
 }
 
 VideoStream::VideoStream(std::unique_ptr<VideoDecoder> decoder, std::string name, bool is_live)

@@ -2,7 +2,6 @@
 #include "geometry/decomposition.hpp"
 
 #include <cmath>
-#include <cstddef>
 
 #include <Eigen/LU>
 #include <Eigen/SVD>

@@ -2,12 +2,9 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-
-#include "stemvo/rigid3.hpp"
 
 namespace stemvo::internal {
 

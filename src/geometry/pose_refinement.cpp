@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "geometry/pose_refinement.hpp"
 
-#include <cmath>
 #include <cstddef>
 #include <vector>
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "degrees.hpp"
 #include "geometry/decomposition.hpp"

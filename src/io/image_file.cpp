@@ -10,6 +10,7 @@
 
 #include "internal_check.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::io {
 namespace {
@@ -40,9 +41,7 @@ class JpegDecoder {
     if (!is_known_) {
       return damaged(name);
     }
-    if (const Status status = check_size(name, {width_, height_}, wanted); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(check_size(name, {width_, height_}, wanted));
     if (colors_ == TJCS_CMYK || colors_ == TJCS_YCCK) {  // a printer's
       return fail(fmt::format("{}: expected a JPEG image in gray or RGB, found CMYK", name));
     }

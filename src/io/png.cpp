@@ -11,6 +11,8 @@
 #include <fmt/format.h>
 #include <libdeflate.h>
 
+#include "try.hpp"
+
 namespace stemvo::io {
 namespace {
 
@@ -233,9 +235,7 @@ Expected<cv::Mat> decode_png(Bytes bytes,
   const Chunk header = next_chunk(rest);
   if (header.type == "IHDR" && header.data.size() >= 8) {
     const DeclaredSize size{big_endian_32(header.data), big_endian_32(header.data.subspan(4))};
-    if (const Status status = check_size(name, size, wanted); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(check_size(name, size, wanted));
   }
   cv::Mat image = decode_plain_png(bytes, as_color);
   if (image.empty()) {

@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "odometry/check_camera.hpp"
+#include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {

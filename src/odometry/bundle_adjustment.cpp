@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "geometry/bundle.hpp"
 #include "geometry/median.hpp"
 
 namespace stemvo {

@@ -3,8 +3,6 @@
 
 #include <optional>
 
-#include <Eigen/Core>
-
 #include "geometry/bundle.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"

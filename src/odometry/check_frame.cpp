@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "odometry/check_frame.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <opencv2/imgproc.hpp>
+
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -43,6 +47,30 @@ Status check_rotation(const std::optional<Eigen::Quaterniond>& rotation) {
 
 }  // namespace
 
+// Written so that NaN fails.
+Status check_camera(const Camera& camera) {
+  const auto is_side = [](int pixels) { return pixels > 0 && pixels <= kMaxImageSide_px; };
+  if (!is_side(camera.width_px) || !is_side(camera.height_px)) {
+    return fail(fmt::format("camera: expected a size of 1 to {} pixels a side, found {}x{}",
+                            kMaxImageSide_px, camera.width_px, camera.height_px));
+  }
+  if (!(camera.fx_px > 0.0 && camera.fy_px > 0.0 && std::isfinite(camera.fx_px) &&
+        std::isfinite(camera.fy_px))) {
+    return fail(fmt::format("camera: expected focal lengths above 0 px, found {} and {}",
+                            camera.fx_px, camera.fy_px));
+  }
+  if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px)) {
+    return fail(fmt::format("camera: expected a finite principal point, found {}, {}", camera.cx_px,
+                            camera.cy_px));
+  }
+  if (!std::ranges::all_of(camera.distortion_coefficients,
+                           [](double value) { return std::isfinite(value); })) {
+    return fail(fmt::format("camera: expected finite distortion coefficients, found [{}]",
+                            fmt::join(camera.distortion_coefficients, ", ")));
+  }
+  return {};
+}
+
 Status check_mask(const cv::Mat& mask, const Camera& camera) {
   const cv::Size size(camera.width_px, camera.height_px);
   if (!mask.empty() && (mask.size() != size || mask.type() != CV_8UC1)) {
@@ -61,20 +89,16 @@ cv::Mat rgb_of(const cv::Mat& image, PixelOrder order) {
   return rgb;
 }
 
-Error moved_from() { return fail("odometry: expected an object in use, found one moved from"); }
-
 Status FrameCheck::admit(const cv::Mat& image,
                          PixelOrder order,
                          double time_s,
                          const FrameHints& hints) {
-  Status status = check_image(image, order, camera_);
-  status = status ? check_time(time_s, last_time_s_) : status;
-  status = status ? check_mask(hints.mask, camera_) : status;
-  status = status ? check_rotation(hints.prev_from_cur) : status;
-  if (status) {
-    last_time_s_ = time_s;
-  }
-  return status;
+  STEMVO_TRY(check_image(image, order, camera_));
+  STEMVO_TRY(check_time(time_s, last_time_s_));
+  STEMVO_TRY(check_mask(hints.mask, camera_));
+  STEMVO_TRY(check_rotation(hints.prev_from_cur));
+  last_time_s_ = time_s;
+  return {};
 }
 
 Status FrameCheck::check_none_admitted(const std::string& asked) const {

@@ -12,14 +12,14 @@
 
 namespace stemvo {
 
+/// Error: a size of no pixels or too many, a focal length not above 0, a number that is not finite.
+[[nodiscard]] Status check_camera(const Camera& camera);
+
 /// Error: a mask that is neither empty nor CV_8UC1 of the camera's size.
 [[nodiscard]] Status check_mask(const cv::Mat& mask, const Camera& camera);
 
 /// The pixels as the odometry takes them; the same ones where they are already.
 [[nodiscard]] cv::Mat rgb_of(const cv::Mat& image, PixelOrder order);
-
-/// That of a call to an object that was moved from.
-[[nodiscard]] Error moved_from();
 
 /// What a caller may hand in as the next frame.
 class FrameCheck {

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include <Eigen/LU>
 

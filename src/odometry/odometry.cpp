@@ -1,47 +1,260 @@
 // SPDX-License-Identifier: MIT
 #include "stemvo/odometry.hpp"
 
-#include <utility>
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <mutex>
+#include <span>
+#include <system_error>
+#include <thread>
 
-#include "odometry/answers.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/event_log.hpp"
-#include "odometry/phased_odometry.hpp"
+#include "odometry/odometry_loops.hpp"
 #include "odometry/whole_map.hpp"
+#include "stemvo/async_odometry.hpp"
+#include "try.hpp"
 
 namespace stemvo {
+namespace {
 
-struct Odometry::Impl {
+/// Each holds a pose and a few numbers; a program that never asks for them shall hear of it.
+constexpr std::size_t kMaxWaiting = 1000;
+
+Error moved_from() { return fail("odometry: expected an object in use, found one moved from"); }
+
+MapChanges landmarks_of(const ChannelOdometry& frames, int version) {
+  const Estimator& estimator = frames.estimator();
+  LandmarkChanges changes = estimator.landmarks_since(version);
+  MapChanges placed{changes.version, {}, std::move(changes.removed)};
+  for (const KeptLandmark& kept : changes.landmarks) {
+    const Rigid3& world_from_camera = estimator.trajectory()[static_cast<std::size_t>(kept.frame)];
+    placed.landmarks.push_back(
+        {kept.id, world_from_camera * kept.in_camera.cast<double>(), kept.rgb});
+  }
+  return placed;
+}
+
+std::vector<MapKeyframe> keyframes_of(const ChannelOdometry& frames, int first) {
+  const std::span<const int> all = frames.estimator().keyframes();
+  std::vector<MapKeyframe> keyframes;
+  for (auto id = static_cast<std::size_t>(std::max(first, 0)); id < all.size(); ++id) {
+    const auto frame = static_cast<std::size_t>(all[id]);
+    keyframes.push_back({static_cast<int>(id), all[id], frames.times_s()[frame],
+                         frames.estimator().trajectory()[frame]});
+  }
+  return keyframes;
+}
+
+std::vector<TrackedPoint> tracked_points_of(const ChannelOdometry& frames) {
+  const Matches& matches = frames.matches();
+  const std::vector<char>& is_inlier = frames.inlier_mask();
+  std::vector<TrackedPoint> points;
+  for (std::size_t i = 0; i < matches.track_ids.size(); ++i) {
+    points.push_back({matches.track_ids[i], matches.prev_uv[i], matches.cur_uv[i],
+                      i < is_inlier.size() && is_inlier[i] != 0});
+  }
+  return points;
+}
+
+}  // namespace
+
+struct OdometryHandle::Impl {
+  Impl(PhasedOdometry given,
+       const Camera& camera,
+       const Options& options,
+       int num_threads,
+       AsyncOdometry::Callback on_result)
+      : odometry(std::move(given)),
+        check(camera),
+        ways(options.scale.source),
+        callback(std::move(on_result)),
+        loops(
+            odometry,
+            [this](const GivenFrame&, const FrameResult& result) {
+              deliver(result);
+              return true;
+            },
+            num_threads) {}
+
+  void deliver(const FrameResult& result) {
+    struct Delivering {
+      std::atomic<std::thread::id>& thread;
+      ~Delivering() { thread = std::thread::id(); }
+    };
+    const Delivering scope{delivering};
+    delivering = std::this_thread::get_id();
+    log.observe(result);
+    if (callback) {
+      callback(result);
+    } else {
+      const std::lock_guard lock(results_mutex);
+      results.push_back(result);
+    }
+  }
+
+  [[nodiscard]] Status check_not_in_callback(const char* name) const {
+    return delivering == std::this_thread::get_id()
+               ? Status(fail(std::string(name) +
+                             ": expected a call outside of the callback, found one in it"))
+               : Status();
+  }
+  [[nodiscard]] Status check_few_wait() {
+    const std::lock_guard lock(results_mutex);
+    return results.size() < kMaxWaiting
+               ? Status()
+               : Status(fail("push: expected next() to take the results, found " +
+                             std::to_string(results.size()) + " that wait for it"));
+  }
+  /// Why the loops take no frame.
+  [[nodiscard]] Error ended() const {
+    return fail(loops.has_thrown()
+                    ? "the odometry has ended: an earlier frame or its callback failed, and "
+                      "finish() throws why"
+                    : "expected no frame after finish(), found one");
+  }
+
+  /// `is_kept`: the pixels stay as they are until the frame is done; else they are copied.
+  [[nodiscard]] Status push(const cv::Mat& image,
+                            PixelOrder order,
+                            double time_s,
+                            const FrameHints& hints,
+                            bool is_kept) {
+    const std::lock_guard lock(turn);
+    STEMVO_TRY(check_few_wait());
+    STEMVO_TRY(check.admit(image, order, time_s, hints));
+    GivenFrame given{rgb_of(image, order), time_s, hints, {}};
+    if (!is_kept) {
+      given.image = given.image->data == image.data ? image.clone() : *given.image;
+      given.hints.mask = hints.mask.clone();
+    }
+    {
+      const std::lock_guard ways_lock(ways_mutex);
+      given.ways = ways.take(time_s);
+    }
+    return loops.push(std::move(given)) ? Status() : ended();
+  }
+  /// The first result that waits.
+  [[nodiscard]] std::optional<FrameResult> take() {
+    const std::lock_guard lock(results_mutex);
+    if (results.empty()) {
+      return std::nullopt;
+    }
+    std::optional<FrameResult> result = std::move(results.front());
+    results.pop_front();
+    ++num_taken;
+    return result;
+  }
+  [[nodiscard]] Status reset() {
+    const std::lock_guard lock(turn);
+    const bool is_reset = loops.reset();
+    check.restart();
+    log.restart();
+    const std::lock_guard ways_lock(ways_mutex);
+    ways.restart();
+    return is_reset ? Status() : ended();
+  }
+
   [[nodiscard]] Expected<WholeMap> adjusted_map(const std::string& asked,
                                                 const std::vector<int>& covariance_of) const {
-    return odometry.check_remembers(asked).and_then([&]() -> Expected<WholeMap> {
-      WholeMap map = WholeMap(odometry);
-      const Status status = map.adjust(covariance_of);
-      return status ? Expected<WholeMap>(std::move(map)) : status.error();
-    });
+    STEMVO_TRY(odometry.check_remembers(asked));
+    WholeMap map = loops.ask([&](const auto&) { return WholeMap(odometry); });
+    STEMVO_TRY(map.adjust(covariance_of));
+    return map;
   }
 
   PhasedOdometry odometry;
+  std::mutex turn;  ///< of push, finish and reset
   FrameCheck check;
+  std::mutex ways_mutex;
   WayInput ways;
-  EventLog log = {};
+  AsyncOdometry::Callback callback;
+  EventLog log;
+  std::atomic<std::thread::id> delivering;  ///< the thread that is in the callback
+  std::mutex next_turn;
+  std::size_t num_taken = 0;
+  std::mutex results_mutex;
+  std::deque<FrameResult> results;
+  OdometryLoops loops;  ///< last, so that its threads end first
 };
+
+OdometryHandle::OdometryHandle(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Odometry::Odometry(std::unique_ptr<Impl> impl) : OdometryHandle(std::move(impl)) {}
+AsyncOdometry::AsyncOdometry(std::unique_ptr<Impl> impl) : OdometryHandle(std::move(impl)) {}
+OdometryHandle::OdometryHandle(OdometryHandle&&) noexcept = default;
+OdometryHandle& OdometryHandle::operator=(OdometryHandle&&) noexcept = default;
+OdometryHandle::~OdometryHandle() = default;
+
+void OdometryHandle::set_log(Log log) {
+  if (impl_ != nullptr) {
+    impl_->log.set(std::move(log));
+  }
+}
+
+Status OdometryHandle::add_speed(double time_s, double metres_per_s, double sigma) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->ways_mutex);
+  return impl_->ways.add_speed(time_s, metres_per_s, sigma);
+}
+
+Status OdometryHandle::add_distance(double from_s, double to_s, double metres, double sigma) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->ways_mutex);
+  return impl_->ways.add_distance(from_s, to_s, metres, sigma);
+}
+
+MapChanges OdometryHandle::landmarks_since(int version) const {
+  const auto ask = [version](const auto& frames) { return landmarks_of(frames, version); };
+  return impl_ ? impl_->loops.ask(ask) : MapChanges();
+}
+std::vector<MapKeyframe> OdometryHandle::keyframes(int first) const {
+  const auto ask = [first](const auto& frames) { return keyframes_of(frames, first); };
+  return impl_ ? impl_->loops.ask(ask) : std::vector<MapKeyframe>();
+}
+std::vector<TrackedPoint> OdometryHandle::tracked_points() const {
+  return impl_ ? impl_->loops.ask(tracked_points_of) : std::vector<TrackedPoint>();
+}
+cv::Mat OdometryHandle::channel_image() const {
+  return impl_ ? impl_->loops.ask([](const auto& frames) { return frames.image().pixels; })
+               : cv::Mat();
+}
+
+Expected<AdjustedMap> OdometryHandle::adjust_map(const std::vector<int>& covariance_of) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  STEMVO_TRY_GET(const WholeMap map, impl_->adjusted_map("adjust_map", covariance_of));
+  return map.answer();
+}
+
+Status OdometryHandle::save_map(const std::filesystem::path& file) const {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  STEMVO_TRY_GET(const WholeMap map, impl_->adjusted_map(file.string(), {}));
+  return impl_->odometry.save_map(file, map);
+}
+
+Status OdometryHandle::load_map(const std::filesystem::path& file) {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  const std::lock_guard lock(impl_->turn);
+  STEMVO_TRY(impl_->check.check_none_admitted(file.string()));
+  return impl_->odometry.load_map(file);
+}
 
 Expected<Odometry> Odometry::create(const Camera& camera,
                                     const Options& options,
                                     const cv::Mat& mask) {
-  Expected<PhasedOdometry> odometry = PhasedOdometry::create(camera, options, mask);
-  if (!odometry) {
-    return odometry.error();
-  }
-  return Odometry(std::make_unique<Impl>(
-      Impl{*std::move(odometry), FrameCheck(camera), WayInput(options.scale.source)}));
+  STEMVO_TRY_GET(PhasedOdometry odometry, PhasedOdometry::create(camera, options, mask));
+  return Odometry(std::make_unique<Impl>(std::move(odometry), camera, options, 1, nullptr));
 }
-
-Odometry::Odometry(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Odometry::Odometry(Odometry&&) noexcept = default;
-Odometry& Odometry::operator=(Odometry&&) noexcept = default;
-Odometry::~Odometry() = default;
 
 Expected<FrameResult> Odometry::process(const cv::Mat& image,
                                         PixelOrder order,
@@ -50,75 +263,77 @@ Expected<FrameResult> Odometry::process(const cv::Mat& image,
   if (impl_ == nullptr) {
     return moved_from();
   }
-  if (Status status = impl_->check.admit(image, order, time_s, hints); !status) {
-    return status.error();
+  const Status status = impl_->push(image, order, time_s, hints, true);
+  if (impl_->loops.has_thrown()) {
+    impl_->loops.finish();  // throws it
   }
-  Frame frame = impl_->odometry.prepare(rgb_of(image, order), time_s, hints);
-  frame.ways = impl_->ways.take(time_s);
-  FrameResult result = impl_->odometry.process(std::move(frame));
-  impl_->log.observe(result);
-  return result;
-}
-
-Status Odometry::add_speed(double time_s, double metres_per_s, double sigma) {
-  return impl_ ? impl_->ways.add_speed(time_s, metres_per_s, sigma) : moved_from();
-}
-
-Status Odometry::add_distance(double from_s, double to_s, double metres, double sigma) {
-  return impl_ ? impl_->ways.add_distance(from_s, to_s, metres, sigma) : moved_from();
-}
-
-void Odometry::set_log(Log log) {
-  if (impl_ != nullptr) {
-    impl_->log.set(std::move(log));
-  }
+  STEMVO_TRY(status);
+  return *impl_->take();
 }
 
 void Odometry::reset() {
   if (impl_ != nullptr) {
-    impl_->odometry.reset();
-    impl_->check.restart();
-    impl_->log.restart();
-    impl_->ways.restart();
+    (void)impl_->reset();
   }
 }
 
-MapChanges Odometry::landmarks_since(int version) const {
-  return impl_ ? stemvo::landmarks_since(impl_->odometry.frames(), version) : MapChanges();
-}
-std::vector<MapKeyframe> Odometry::keyframes(int first) const {
-  return impl_ ? keyframes_of(impl_->odometry.frames(), first) : std::vector<MapKeyframe>();
-}
-std::vector<TrackedPoint> Odometry::tracked_points() const {
-  return impl_ ? tracked_points_of(impl_->odometry.frames()) : std::vector<TrackedPoint>();
-}
-cv::Mat Odometry::channel_image() const {
-  return impl_ ? impl_->odometry.frames().image().pixels : cv::Mat();
+Expected<AsyncOdometry> AsyncOdometry::create(const Camera& camera,
+                                              const Options& options,
+                                              const cv::Mat& mask,
+                                              Callback callback) {
+  STEMVO_TRY_GET(PhasedOdometry odometry, PhasedOdometry::create(camera, options, mask));
+  const int num_threads = odometry.num_threads();
+  try {
+    return AsyncOdometry(std::make_unique<Impl>(std::move(odometry), camera, options, num_threads,
+                                                std::move(callback)));
+  } catch (const std::system_error& error) {
+    return fail(std::string("threads: expected three more, found ") + error.what());
+  }
 }
 
-Expected<AdjustedMap> Odometry::adjust_map(const std::vector<int>& covariance_of) const {
+Status AsyncOdometry::push(const cv::Mat& image,
+                           PixelOrder order,
+                           double time_s,
+                           const FrameHints& hints) {
   if (impl_ == nullptr) {
     return moved_from();
   }
-  return impl_->adjusted_map("adjust_map", covariance_of).map([](const WholeMap& map) {
-    return map.answer();
-  });
+  STEMVO_TRY(impl_->check_not_in_callback("push"));
+  return impl_->push(image, order, time_s, hints, false);
 }
 
-Status Odometry::save_map(const std::filesystem::path& file) const {
+Expected<std::optional<FrameResult>> AsyncOdometry::next() {
   if (impl_ == nullptr) {
     return moved_from();
   }
-  return impl_->adjusted_map(file.string(), {}).and_then([&](const WholeMap& map) {
-    return impl_->odometry.save_map(file, map);
-  });
+  if (impl_->callback) {
+    return fail("next: expected results that wait, found a callback that took them");
+  }
+  const std::lock_guard lock(impl_->next_turn);
+  impl_->loops.wait_for(impl_->num_taken);
+  std::optional<FrameResult> result = impl_->take();
+  if (!result && impl_->loops.has_thrown()) {
+    return impl_->ended();
+  }
+  return result;
 }
 
-Status Odometry::load_map(const std::filesystem::path& file) {
-  return impl_ ? impl_->check.check_none_admitted(file.string()).and_then([&] {
-    return impl_->odometry.load_map(file);
-  })
-               : moved_from();
+Status AsyncOdometry::finish() {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  STEMVO_TRY(impl_->check_not_in_callback("finish"));
+  const std::lock_guard lock(impl_->turn);
+  impl_->loops.finish();
+  return {};
+}
+
+Status AsyncOdometry::reset() {
+  if (impl_ == nullptr) {
+    return moved_from();
+  }
+  STEMVO_TRY(impl_->check_not_in_callback("reset"));
+  return impl_->reset();
 }
 
 }  // namespace stemvo

@@ -5,8 +5,8 @@
 
 namespace stemvo {
 
-OdometryLoops::OdometryLoops(PhasedOdometry& odometry, Deliver deliver)
-    : odometry_(odometry), deliver_(std::move(deliver)), loops_(stages(), odometry.num_threads()) {}
+OdometryLoops::OdometryLoops(PhasedOdometry& odometry, Deliver deliver, int num_threads)
+    : odometry_(odometry), deliver_(std::move(deliver)), loops_(stages(), num_threads) {}
 
 bool OdometryLoops::push(GivenFrame given) {
   return loops_.push([&](std::size_t k) { slot(k).given = std::move(given); });

@@ -27,8 +27,8 @@ struct GivenFrame {
   std::vector<Way> ways = {};  ///< that came before it did
 };
 
-/// Takes frames through an odometry in FrameLoops, on as many threads as its options say: the
-/// results are those of PhasedOdometry::process.
+/// Takes frames through an odometry in FrameLoops; the results are the same for any number of
+/// threads.
 class OdometryLoops {
  public:
   /// Called for each frame, in order, one call at a time, from another thread where there are
@@ -36,7 +36,7 @@ class OdometryLoops {
   using Deliver = std::function<bool(const GivenFrame&, const FrameResult&)>;
 
   /// The odometry outlives this, and is used by nobody else meanwhile.
-  OdometryLoops(PhasedOdometry& odometry, Deliver deliver);
+  OdometryLoops(PhasedOdometry& odometry, Deliver deliver, int num_threads);
 
   /// The calls of FrameLoops. What `deliver` throws ends the run too.
   [[nodiscard]] bool push(GivenFrame given);

@@ -8,12 +8,12 @@
 
 #include "internal_check.hpp"
 #include "mapping/map_file.hpp"
-#include "odometry/check_camera.hpp"
 #include "odometry/check_frame.hpp"
 #include "odometry/stopwatch.hpp"
 #include "odometry/whole_map.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 
@@ -32,19 +32,16 @@ Expected<PhasedOdometry> PhasedOdometry::create(const Camera& camera,
   if (!view) {
     return fail("camera: " + view.error().message);
   }
-  Expected<Stem> stem = Stem::load(options.stem, options.threads);
-  if (!stem) {
-    return stem.error();
-  }
+  STEMVO_TRY_GET(Stem stem, Stem::load(options.stem, options.threads));
   // A network that cannot take this camera's images is found before work starts.
   const Camera& seen = view->camera();
   const cv::Mat blank(seen.height_px, seen.width_px, CV_8UC1, cv::Scalar(0));
-  const int zoom = stem->frame_zoom(
+  const int zoom = stem.frame_zoom(
       choose_tracking_resolution(options.stem.tracking_resolution, options.features.method, seen));
-  if (const Expected<Channel> channel = stem->apply(blank, zoom); !channel) {
+  if (const Expected<Channel> channel = stem.apply(blank, zoom); !channel) {
     return channel.error();
   }
-  return PhasedOdometry(options, *view, mask, *std::move(stem), zoom);
+  return PhasedOdometry(options, *view, mask, std::move(stem), zoom);
 }
 
 PhasedOdometry::PhasedOdometry(
@@ -93,18 +90,13 @@ Status PhasedOdometry::save_map(const std::filesystem::path& file, const WholeMa
 }
 
 Status PhasedOdometry::load_map(const std::filesystem::path& file) {
-  if (Status status = check_remembers(file.string()); !status) {
-    return status;
-  }
-  Expected<MapFile> map = read_map_file(file);
-  if (!map) {
-    return map.error();
-  }
-  if (map->channel != channel_name()) {
+  STEMVO_TRY(check_remembers(file.string()));
+  STEMVO_TRY_GET(MapFile map, read_map_file(file));
+  if (map.channel != channel_name()) {
     return fail(fmt::format("{}: expected a map of channel '{}', found one of '{}'", file.string(),
-                            channel_name(), one_line(map->channel)));
+                            channel_name(), one_line(map.channel)));
   }
-  channel_odometry_.load_map(std::move(map->map));
+  channel_odometry_.load_map(std::move(map.map));
   return {};
 }
 

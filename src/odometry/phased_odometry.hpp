@@ -39,11 +39,6 @@ class PhasedOdometry {
   /// frame, in another thread.
   [[nodiscard]] FrameResult optimize() { return channel_odometry_.optimize(); }
 
-  /// The last three for one frame, as ChannelOdometry::process.
-  [[nodiscard]] FrameResult process(Frame frame) {
-    return channel_odometry_.process(std::move(frame));
-  }
-
   /// A new world: as create() left it. No frame is between its phases.
   void reset() { channel_odometry_ = ChannelOdometry(options_, view_.camera(), mask_); }
 

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "odometry/check_camera.hpp"
+#include "odometry/check_frame.hpp"
 #include "odometry/two_view_estimator.hpp"
 
 namespace stemvo {

@@ -2,7 +2,6 @@
 #include "odometry/way.hpp"
 
 #include <cmath>
-#include <limits>
 #include <string>
 #include <utility>
 

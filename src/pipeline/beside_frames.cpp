@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "try.hpp"
+
 namespace stemvo::pipeline {
 namespace {
 
@@ -12,35 +14,29 @@ Status add_speeds(const RunRequest& request, BesideFrames& beside) {
   if (request.config.scale_choice == ScaleChoice::kGroundTruth) {
     return fail("--speed: expected scale.source none or camera_height, found ground_truth");
   }
-  const auto rows = dataset::read_speeds(*request.speeds);
-  if (!rows) {
-    return rows.error();
-  }
+  STEMVO_TRY_GET(const auto rows, dataset::read_speeds(*request.speeds));
   WayInput input(request.config.scale.source);
-  for (const dataset::SpeedRow& row : *rows) {
+  for (const dataset::SpeedRow& row : rows) {
     if (Status status = input.add_speed(row.time_s, row.metres_per_s, row.sigma); !status) {
       return fail("--speed: " + status.error().message);
     }
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
-  beside.note += fmt::format(", {} speeds", rows->size());
-  beside.spans.push_back({"--speed", rows->front().time_s, rows->back().time_s});
+  beside.note += fmt::format(", {} speeds", rows.size());
+  beside.spans.push_back({"--speed", rows.front().time_s, rows.back().time_s});
   return {};
 }
 
 Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFrames& beside) {
-  auto rows = dataset::read_gyro(*request.gyro);
-  if (!rows) {
-    return rows.error();
-  }
-  const auto& camera_from_imu = sequence.frames().camera_from_imu;
-  for (dataset::GyroRow& row : *rows) {
+  STEMVO_TRY_GET(auto rows, dataset::read_gyro(*request.gyro));
+  const auto& camera_from_imu = sequence.camera_from_imu;
+  for (dataset::GyroRow& row : rows) {
     row.rad_per_s = camera_from_imu.value_or(Eigen::Quaterniond::Identity()) * row.rad_per_s;
   }
-  beside.note += fmt::format(", {} turn rates{}", rows->size(),
+  beside.note += fmt::format(", {} turn rates{}", rows.size(),
                              camera_from_imu ? "" : " (taken for about the camera's own axes)");
-  beside.spans.push_back({"--gyro", rows->front().time_s, rows->back().time_s});
-  beside.gyro = *std::move(rows);
+  beside.spans.push_back({"--gyro", rows.front().time_s, rows.back().time_s});
+  beside.gyro = std::move(rows);
   return {};
 }
 
@@ -69,9 +65,13 @@ std::vector<std::string> BesideFrames::warnings(double first_s, double last_s) c
 
 Expected<BesideFrames> read_beside_frames(const RunRequest& request, const FrameSource& sequence) {
   BesideFrames beside;
-  Status status = request.speeds ? add_speeds(request, beside) : Status();
-  status = status && request.gyro ? add_gyro(request, sequence, beside) : status;
-  return status ? Expected<BesideFrames>(std::move(beside)) : status.error();
+  if (request.speeds) {
+    STEMVO_TRY(add_speeds(request, beside));
+  }
+  if (request.gyro) {
+    STEMVO_TRY(add_gyro(request, sequence, beside));
+  }
+  return beside;
 }
 
 }  // namespace stemvo::pipeline

@@ -56,10 +56,10 @@ bool is_in_report(std::size_t i, std::size_t n) {
 
 /// Frames in all, of a stream as its container says; 0: not known, or said wrongly.
 std::size_t expected_frames(const FrameSource& sequence, std::size_t num_done) {
-  if (!sequence.stream()) {
+  if (!sequence.stream) {
     return sequence.size();
   }
-  const std::size_t told = sequence.stream()->expected_frames;
+  const std::size_t told = sequence.stream->expected_frames;
   return told > num_done ? told : 0;  // a last frame is known by what comes behind it
 }
 
@@ -78,8 +78,8 @@ class DriveLoop {
           return visit(i, frame, pose);
         },
         run_.beside);
-    if (run_.sequence.stream()) {
-      end_stream(*run_.sequence.stream());
+    if (run_.sequence.stream) {
+      end_stream(*run_.sequence.stream);
     }
     write_rows();
     for (const GrowingFile* file : {&rows_, &kitti_, &tum_}) {
@@ -91,7 +91,7 @@ class DriveLoop {
  private:
   /// False: the run ends behind this frame.
   bool visit(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
-    const std::size_t number = run_.sequence.range().begin + i;
+    const std::size_t number = run_.sequence.range.begin + i;
     if (!frame) {
       drive_.warnings.push_back(frame.error().message);
     }
@@ -122,7 +122,7 @@ class DriveLoop {
     if (i > 0 && run_.request.config.scale_choice == ScaleChoice::kGroundTruth) {
       const Trajectory& estimate = run_.odometry.frames().estimator().trajectory();
       pose.translation = drive_.trajectory.back().translation +
-                         rescaled_step(estimate, *run_.sequence.ground_truth(), i);
+                         rescaled_step(estimate, *run_.sequence.ground_truth, i);
     }
     return pose;
   }
@@ -135,7 +135,7 @@ class DriveLoop {
     if (!is_asked_for && !is_reported) {
       return;
     }
-    const std::size_t number = run_.sequence.range().begin + i;
+    const std::size_t number = run_.sequence.range.begin + i;
     const ChannelOdometry& seen = run_.odometry.frames();
     const cv::Mat image = draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(),
                                            seen.inlier_mask());
@@ -179,7 +179,7 @@ class DriveLoop {
     if (static_cast<double>(num_done) < kMinShare * static_cast<double>(told)) {
       drive_.warnings.push_back(fmt::format(
           "{}: the video ends after {} frames where {} were expected: it may be cut off or damaged",
-          run_.sequence.name(), num_done, told));
+          run_.sequence.name, num_done, told));
     }
   }
 

@@ -13,13 +13,16 @@ void run_frames(const FrameSource& sequence,
                 const FrameVisitor& visit,
                 const BesideFrames& beside) {
   std::size_t num_visited = 0;
-  OdometryLoops loops(odometry, [&](const GivenFrame& given, const FrameResult& result) {
-    return visit(num_visited++, given.image, result);
-  });
+  OdometryLoops loops(
+      odometry,
+      [&](const GivenFrame& given, const FrameResult& result) {
+        return visit(num_visited++, given.image, result);
+      },
+      odometry.num_threads());
   double last_s = 0.0;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
     Expected<cv::Mat> image = timed(Stage::kRead, [&] { return sequence.read(i); });
-    const bool has_ended = sequence.stream() && image && image->empty();
+    const bool has_ended = sequence.stream && image && image->empty();
     if (has_ended) {
       break;
     }

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::pipeline {
 
@@ -92,9 +93,7 @@ bool is_folder_of(const fs::path& folder, const std::string& command) {
 
 Expected<fs::path> create_results_folder(const std::string& name) {
   const fs::path results = "results";
-  if (const Status created = create_out_folder(results); !created) {
-    return created.error();
-  }
+  STEMVO_TRY(create_out_folder(results));
   fs::path folder = results / name;
   std::error_code code;
   for (int i = 2; !fs::create_directory(folder, code) && !code; ++i) {
@@ -106,23 +105,18 @@ Expected<fs::path> create_results_folder(const std::string& name) {
 Expected<FolderLock> open_out_folder(const fs::path& folder,
                                      const std::string& command,
                                      const std::vector<fs::path>& inputs) {
-  const Status status =
-      check_holds_none(folder, inputs).and_then([&] { return create_out_folder(folder); });
-  auto lock = status ? lock_folder(folder) : Expected<FolderLock>(status.error());
-  if (!lock) {
-    return lock;
-  }
-  if (const Status ours = check_may_be_replaced(folder, command); !ours) {
-    return ours.error();
-  }
+  STEMVO_TRY(check_holds_none(folder, inputs));
+  STEMVO_TRY(create_out_folder(folder));
+  STEMVO_TRY_GET(FolderLock lock, lock_folder(folder));
+  STEMVO_TRY(check_may_be_replaced(folder, command));
   const Status marked = write_text_file(folder / kMark, mark_of(command));
-  return marked ? std::move(lock) : refuse(folder, marked.error().message);
+  return marked ? Expected<FolderLock>(lock) : refuse(folder, marked.error().message);
 }
 
 std::vector<fs::path> input_files(const FrameSource& source, const Config& config) {
-  std::vector<fs::path> files = source.frames().files;
+  std::vector<fs::path> files = source.files;
   files.emplace_back(config.stem.model);
-  for (const auto& file : {source.ground_truth_file(), source.given_calibration()}) {
+  for (const auto& file : {source.ground_truth_file, source.given_calibration}) {
     files.push_back(file.value_or(""));
   }
   return files;

@@ -46,9 +46,9 @@ std::string describe_numbers(const MetricsReport& report) {
 
 /// "frames 10:20 of 03", in the folder's numbering; "frames 10: of 03" where the end is not known.
 std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
-  const std::size_t begin = sequence.range().begin;
+  const std::size_t begin = sequence.range.begin;
   const std::string end = num_frames > 0 ? std::to_string(begin + num_frames) : "";
-  return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name()));
+  return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
 }
 
 /// The share of frames for which the predicate holds.
@@ -107,7 +107,7 @@ class ResultWriter {
     }
     keep_first(written, write_image(folder / "trajectory.png", draw_trajectory(make_plot(report))));
     keep_first(written, matched_);
-    if (request_.note && truth_ && sequence_.stream()) {
+    if (request_.note && truth_ && sequence_.stream) {
       request_.note("ground truth" +
                     count_matched(request_, truth_->frames.size(), trajectory_.size()));
     }
@@ -172,8 +172,8 @@ class ResultWriter {
     const Config& config = request_.config;
     MetricsReport report;
     report.stemvo_version = version();
-    report.sequence = sequence_.name();
-    report.first_frame = sequence_.range().begin;
+    report.sequence = sequence_.name;
+    report.first_frame = sequence_.range.begin;
     report.num_frames = trajectory_.size();
     report.model = config.stem.model;
     report.filter = run_.odometry.stem_info().filter;
@@ -267,16 +267,16 @@ std::string config_text(const Run& run, std::size_t num_frames) {
   const StemInfo& stem = run.odometry.stem_info();
   std::string text =
       fmt::format("# stemvo {}\n# {}\n", version(),
-                  describe_frames(sequence, sequence.stream() ? num_frames : sequence.size()));
+                  describe_frames(sequence, sequence.stream ? num_frames : sequence.size()));
   text += fmt::format("# model {}: {} filters, sampled every {} px\n", one_line(stem.model),
                       stem.num_filters, stem.sampling_px);
-  if (const auto& calibration = sequence.given_calibration()) {
+  if (const auto& calibration = sequence.given_calibration) {
     text += fmt::format("# calibration {}\n", one_line(calibration->string()));
   }
   // With what auto, -1 and 0 stand for, which may change with the model.
   Config effective = run.request.config;
   effective.stem.tracking_resolution = choose_tracking_resolution(
-      effective.stem.tracking_resolution, effective.features.method, sequence.camera());
+      effective.stem.tracking_resolution, effective.features.method, sequence.camera);
   effective.stem.filter = stem.filter;
   effective.stem.sampling_px = stem.sampling_px;
   return text + "\n" + dump_config(effective);

@@ -15,6 +15,7 @@
 #include "pipeline/thread_scope.hpp"
 #include "text/text_file.hpp"
 #include "timing/stage_timer.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -29,18 +30,18 @@ Expected<FrameSource> open_sequence(const RunRequest& request) {
     return sequence;
   }
   if (!sequence->has_ground_truth()) {
-    const auto file = sequence->is_kitti()
-                          ? request.sequence_dir / "../../poses" / (sequence->name() + ".txt")
+    const auto file = sequence->is_kitti
+                          ? request.sequence_dir / "../../poses" / (sequence->name + ".txt")
                           : request.sequence_dir;
     return fail(fmt::format(
         "{}: expected a pose file, which scale.source=ground_truth needs, found none (see --gt)",
         file.lexically_normal().string()));
   }
-  if (sequence->stream() || sequence->frames().ground_truth_frames) {
+  if (sequence->stream || sequence->ground_truth_frames) {
     return fail(fmt::format(
         "{}: expected a true pose of every frame, which scale.source=ground_truth needs, found {}",
-        sequence->ground_truth_file()->string(),
-        sequence->stream() ? "a stream, whose times are not known before" : "some only"));
+        sequence->ground_truth_file->string(),
+        sequence->stream ? "a stream, whose times are not known before" : "some only"));
   }
   return sequence;
 }
@@ -68,20 +69,19 @@ std::string describe_truth(const RunRequest& request, const FrameSource& sequenc
   if (!sequence.has_ground_truth()) {
     return "no ground truth";
   }
-  if (sequence.stream()) {
+  if (sequence.stream) {
     return "ground truth to be matched";
   }
-  const auto& frames = sequence.frames().ground_truth_frames;
+  const auto& frames = sequence.ground_truth_frames;
   return "ground truth" + (frames
                                ? pipeline::count_matched(request, frames->size(), sequence.size())
                                : std::string());
 }
 
 std::string describe_size(const FrameSource& sequence) {
-  const Camera& camera = sequence.camera();
-  const std::string count =
-      sequence.stream() ? "frames" : fmt::format("{} frames", sequence.size());
-  const cv::Size full = sequence.frames().full_size;
+  const Camera& camera = sequence.camera;
+  const std::string count = sequence.stream ? "frames" : fmt::format("{} frames", sequence.size());
+  const cv::Size full = sequence.full_size;
   const std::string worked_on =
       full == cv::Size(camera.width_px, camera.height_px)
           ? ""
@@ -95,7 +95,7 @@ void note_start(const Run& run, bool is_replacing) {
   if (!request.note) {
     return;
   }
-  request.note(fmt::format("input: {} {}, {}, {}{}", sequence.kind(), sequence.name(),
+  request.note(fmt::format("input: {} {}, {}, {}{}", sequence.kind, sequence.name,
                            describe_size(sequence), describe_truth(request, sequence),
                            beside.note));
   if (is_replacing) {
@@ -128,36 +128,24 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
 Expected<RunSummary> run_source(RunRequest request,
                                 const FrameSource& sequence,
                                 const RunProgress& progress) {
-  request.config = dataset::with_camera_height(request.config, sequence.frames());
-  const Expected<pipeline::BesideFrames> beside = pipeline::read_beside_frames(request, sequence);
-  if (!beside) {
-    return beside.error();
-  }
+  request.config = dataset::with_camera_height(request.config, sequence);
+  STEMVO_TRY_GET(const pipeline::BesideFrames beside,
+                 pipeline::read_beside_frames(request, sequence));
   // Lives longer than the odometry, whose thread that measures the camera may end last.
   std::optional<StageRecorder> recorder;
-  Expected<PhasedOdometry> odometry =
-      PhasedOdometry::create(sequence.camera(), request.config, sequence.frames().mask);
-  if (!odometry) {
-    return odometry.error();
-  }
+  STEMVO_TRY_GET(PhasedOdometry odometry,
+                 PhasedOdometry::create(sequence.camera, request.config, sequence.mask));
   if (request.saved_map) {
-    if (Status status = odometry->check_remembers("--save-map"); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(odometry.check_remembers("--save-map"));
   }
   if (request.map) {
-    if (Status status = odometry->load_map(*request.map); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(odometry.load_map(*request.map));
   }
   if (request.out_dir.empty()) {
-    const auto folder = pipeline::create_results_folder(sequence.name());
-    if (!folder) {
-      return folder.error();
-    }
-    request.out_dir = *folder;
+    STEMVO_TRY_GET(const auto folder, pipeline::create_results_folder(sequence.name));
+    request.out_dir = folder;
   }
-  const Run run{request, sequence, *odometry, *beside};
+  const Run run{request, sequence, odometry, beside};
   const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
   auto inputs = pipeline::input_files(request, sequence, request.config);
   inputs.insert(inputs.end(),
@@ -177,19 +165,14 @@ Expected<RunSummary> run_source(RunRequest request,
 }  // namespace
 
 Expected<RunSummary> run_sequence(const RunRequest& request, const RunProgress& progress) {
-  if (const Status status = validate(request.config); !status) {
-    return status.error();
-  }
+  STEMVO_TRY(validate(request.config));
   RunRequest resolved = request;
   if (request.num_threads > 0) {
     resolved.config.threads = request.num_threads;
   }
   const pipeline::ThreadScope scope(resolved.config.threads);
-  const auto sequence = open_sequence(resolved);
-  if (!sequence) {
-    return sequence.error();
-  }
-  return run_source(std::move(resolved), *sequence, progress);
+  STEMVO_TRY_GET(const auto sequence, open_sequence(resolved));
+  return run_source(std::move(resolved), sequence, progress);
 }
 
 }  // namespace stemvo

@@ -7,9 +7,10 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
-#include "report/json_file.hpp"
+#include "report/metrics_keys.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 
@@ -94,12 +95,9 @@ Expected<std::vector<ThresholdResult>> check_metrics(const std::filesystem::path
   if (!results) {
     return results;
   }
-  const Expected<Json> metrics = read_json_object(metrics_file);
-  if (!metrics) {
-    return metrics.error();
-  }
+  STEMVO_TRY_GET(const Json metrics, read_json_object(metrics_file));
   for (ThresholdResult& result : *results) {
-    const Json* metric = find_metric(*metrics, result.key);
+    const Json* metric = find_metric(metrics, result.key);
     if (metric == nullptr) {
       return fail(fmt::format("{}:{}: expected a metric of {}, which lists them, found '{}'",
                               thresholds_file.string(), result.line, metrics_file.string(),

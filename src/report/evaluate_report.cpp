@@ -3,14 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "dataset/ground_truth.hpp"
 #include "report/metrics_keys.hpp"
 #include "text/text_table.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 
@@ -40,12 +39,8 @@ Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
   }
   const TimePairs pairs =
       pair_by_time(estimate.timestamps_s, truth.timestamps_s, request.tolerance_s);
-  if (const Status status =
-          dataset::check_pairs(request.ground_truth, truth.timestamps_s, file.string(),
-                               estimate.timestamps_s, pairs, request.tolerance_s);
-      !status) {
-    return status.error();
-  }
+  STEMVO_TRY(dataset::check_pairs(request.ground_truth, truth.timestamps_s, file.string(),
+                                  estimate.timestamps_s, pairs, request.tolerance_s));
   return Pairs{take_poses(estimate.poses, pairs.first), take_poses(truth.poses, pairs.second)};
 }
 
@@ -68,31 +63,22 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 }  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
-  const auto truth = dataset::read_truth(request.ground_truth, request.camera_file);
-  if (!truth) {
-    return truth.error();
-  }
+  STEMVO_TRY_GET(const auto truth, dataset::read_truth(request.ground_truth, request.camera_file));
   EvaluationReport report;
   report.ground_truth = request.ground_truth.string();
-  report.num_poses = truth->poses.size();
+  report.num_poses = truth.poses.size();
   report.alignment = request.alignment;
   for (const std::filesystem::path& file : request.estimates) {
-    const auto estimate = dataset::read_truth(file, request.camera_file);
-    if (!estimate) {
-      return estimate.error();
-    }
-    const auto pairs = pair_poses(*estimate, *truth, file, request);
-    if (!pairs) {
-      return pairs.error();
-    }
-    const Trajectory& compared = *pairs ? (*pairs)->estimate : estimate->poses;
-    const Trajectory& with = *pairs ? (*pairs)->truth : truth->poses;
+    STEMVO_TRY_GET(const auto estimate, dataset::read_truth(file, request.camera_file));
+    STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, file, request));
+    const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
+    const Trajectory& with = pairs ? pairs->truth : truth.poses;
     report.rows.push_back({file.string(), evaluate_aligned(compared, with, request.alignment),
-                           estimate->poses.size(), compared.size()});
+                           estimate.poses.size(), compared.size()});
   }
   // No alignment: a fit would move the whole heap of points into the middle of the drive.
-  report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth->poses.size()), truth->poses),
-                        truth->poses.size(), truth->poses.size()};
+  report.zero_motion = {"(zero motion)", evaluate(Trajectory(truth.poses.size()), truth.poses),
+                        truth.poses.size(), truth.poses.size()};
   return report;
 }
 

@@ -42,6 +42,15 @@ namespace stemvo {
                                          const std::vector<cv::Mat>& channels,
                                          const std::vector<std::string>& captions);
 
+/// One line of text, centred in the height of `box`, `share` of the room left over before it;
+/// shrinks until it fits. OpenCV's fonts know ASCII only: any other byte becomes a '?'. Returns
+/// where the text ends.
+int put_caption(cv::Mat& image,
+                const cv::Rect& box,
+                const std::string& text,
+                const cv::Scalar& color,
+                double share = 0.0);
+
 /// An RGB image as a JPEG for a page: its bytes, made at most `width` pixels wide.
 [[nodiscard]] std::string encode_jpeg(const cv::Mat& image, int width);
 

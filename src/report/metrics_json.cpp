@@ -6,6 +6,7 @@
 #include "report/evaluate_report.hpp"
 #include "report/metrics_keys.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -71,6 +72,22 @@ void to_json(Json& json, const MapReport& report) {
 
 std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+Expected<Json> read_json_object(const std::filesystem::path& file, bool has_comments) {
+  STEMVO_TRY_GET(const std::string text, read_text_file(file, kMaxSettings_MB));
+  try {
+    Json json = Json::parse(text, nullptr, true, has_comments);
+    if (json.is_object()) {
+      return json;
+    }
+    return fail(
+        fmt::format("{}: expected a JSON object, found {}", file.string(), json.type_name()));
+  } catch (const Json::exception& error) {
+    const std::string what = error.what();  // "[json.exception.parse_error.101] parse error at .."
+    return fail(
+        fmt::format("{}: not JSON: {}", file.string(), one_line(what.substr(what.find("] ") + 2))));
+  }
 }
 
 Json metrics_document(const MetricsReport& report) {

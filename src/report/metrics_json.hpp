@@ -10,7 +10,7 @@
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
-#include "timing/timing_report.hpp"
+#include "timing/stage_timer.hpp"
 
 namespace stemvo {
 

@@ -39,4 +39,8 @@ void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& met
 /// UTF-8 the replacement character.
 [[nodiscard]] std::string to_text(const nlohmann::ordered_json& json);
 
+/// Errors: the file cannot be read, is no JSON or holds no object.
+[[nodiscard]] Expected<nlohmann::ordered_json> read_json_object(const std::filesystem::path& file,
+                                                                bool has_comments = false);
+
 }  // namespace stemvo

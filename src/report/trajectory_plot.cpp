@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "internal_check.hpp"
-#include "report/caption.hpp"
+#include "report/frame_image.hpp"
 
 namespace stemvo {
 namespace {

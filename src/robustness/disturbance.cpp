@@ -48,16 +48,16 @@ FrameSource disturb(const FrameSource& source,
   if (disturbance.resample != nullptr) {
     return disturbance.resample(source, strength, seed);
   }
-  FrameList frames = source.frames();
+  FrameSource frames = source;
   frames.read = [read = frames.read, disturbance, strength, seed, size = source.size(),
-                 camera = source.camera()](std::size_t frame) {
+                 camera = source.camera](std::size_t frame) {
     Expected<cv::Mat> image = read(frame);
     if (image && disturbance.disturbs(frame, size, strength)) {
       disturbance.apply(*image, strength, {frame, seed, camera});
     }
     return image;
   };
-  return FrameSource(std::move(frames));
+  return frames;
 }
 
 }  // namespace stemvo::robustness

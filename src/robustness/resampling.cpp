@@ -14,8 +14,8 @@ namespace {
 FrameSource take(const FrameSource& source,
                  const std::vector<std::size_t>& kept,
                  std::vector<std::size_t> shown) {
-  const FrameList& all = source.frames();
-  FrameList frames = all;
+  const FrameSource& all = source;
+  FrameSource frames = all;
   frames.files.clear();
   frames.timestamps_s.clear();
   for (std::size_t i = 0; i < kept.size(); ++i) {
@@ -32,7 +32,7 @@ FrameSource take(const FrameSource& source,
   frames.read = [read = all.read, shown = std::move(shown)](std::size_t index) {
     return read(shown[index]);
   };
-  return FrameSource(std::move(frames));
+  return frames;
 }
 
 bool falls_out(std::size_t frame, double share, std::uint64_t seed) {
@@ -41,12 +41,12 @@ bool falls_out(std::size_t frame, double share, std::uint64_t seed) {
 
 /// Another camera's frames: `part` of the image, resized by `factor`.
 FrameSource with_camera(const FrameSource& source, const cv::Rect& part, double factor) {
-  FrameList frames = source.frames();
+  FrameSource frames = source;
   const cv::Size size(static_cast<int>(std::lround(factor * part.width)),
                       static_cast<int>(std::lround(factor * part.height)));
   const double x = static_cast<double>(size.width) / part.width;
   const double y = static_cast<double>(size.height) / part.height;
-  const Camera& old = source.camera();
+  const Camera& old = source.camera;
   frames.camera = {old.fx_px * x,
                    old.fy_px * y,
                    (old.cx_px - part.x + 0.5) * x - 0.5,
@@ -62,7 +62,7 @@ FrameSource with_camera(const FrameSource& source, const cv::Rect& part, double 
       return result;
     });
   };
-  return FrameSource(std::move(frames));
+  return frames;
 }
 
 FrameSource dropped(const FrameSource& source, double share, std::uint64_t seed) {
@@ -94,7 +94,7 @@ FrameSource every_nth(const FrameSource& source, double step, std::uint64_t /*se
 }
 
 FrameSource cropped(const FrameSource& source, double share, std::uint64_t /*seed*/) {
-  const Camera& camera = source.camera();
+  const Camera& camera = source.camera;
   const int width = static_cast<int>(share * camera.width_px);
   const int height = static_cast<int>(share * camera.height_px);
   return with_camera(
@@ -102,7 +102,7 @@ FrameSource cropped(const FrameSource& source, double share, std::uint64_t /*see
 }
 
 FrameSource scaled(const FrameSource& source, double factor, std::uint64_t /*seed*/) {
-  return with_camera(source, {0, 0, source.camera().width_px, source.camera().height_px}, factor);
+  return with_camera(source, {0, 0, source.camera.width_px, source.camera.height_px}, factor);
 }
 
 }  // namespace

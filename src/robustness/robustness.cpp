@@ -137,12 +137,12 @@ class Robustness {
 
  private:
   Status open(const std::filesystem::path& folder, bool& has_color) {
-    auto source = KittiSequence::open(
-        folder, {.camera = request_.config.input.camera, .frames = request_.frames});
+    auto source =
+        open_kitti(folder, {.camera = request_.config.input.camera, .frames = request_.frames});
     if (!source) {
       return source.error();
     }
-    if (!source->ground_truth()) {
+    if (!source->ground_truth) {
       return fail(fmt::format("{}: expected ground truth (../../poses/NN.txt), found none",
                               folder.string()));
     }
@@ -155,8 +155,8 @@ class Robustness {
     }
     opened_.push_back(folder);
     // Drives of one number in two data sets are told apart by their folders.
-    const bool is_new = !is_among(source->name(), report_.drives);
-    report_.drives.push_back(is_new ? source->name() : folder.string());
+    const bool is_new = !is_among(source->name, report_.drives);
+    report_.drives.push_back(is_new ? source->name : folder.string());
     const auto first = source->read(0);
     has_color = has_color || (first && first->channels() == 3);
     sources_.push_back(*std::move(source));
@@ -166,7 +166,7 @@ class Robustness {
   /// A model or filter that is not there is refused now, not in the middle.
   Status create_each() {
     for (const Contender& one : contenders_) {
-      const auto odometry = PhasedOdometry::create(sources_.front().camera(), one.config);
+      const auto odometry = PhasedOdometry::create(sources_.front().camera, one.config);
       if (!odometry) {
         return odometry.error();
       }
@@ -210,7 +210,7 @@ class Robustness {
                Outcome& outcome) {
     Options options = config;
     options.threads = request_.num_threads > 0 ? request_.num_threads : options.threads;
-    auto odometry = PhasedOdometry::create(source.camera(), options);
+    auto odometry = PhasedOdometry::create(source.camera, options);
     if (!odometry) {
       if (odometry.error().lacks_memory) {
         throw std::bad_alloc();  // of the contender it says nothing
@@ -240,7 +240,7 @@ class Robustness {
     if (is_stopped) {
       return false;
     }
-    const Trajectory& truth = *source.ground_truth();
+    const Trajectory& truth = *source.ground_truth;
     add_states(states, estimate, truth, is_disturbed, outcome);
     const bool has_true_steps = config.scale_choice == ScaleChoice::kGroundTruth;
     add_errors(has_true_steps ? rescale_steps(estimate, truth) : estimate, truth, config.evaluation,

@@ -11,7 +11,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "config/config.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "evaluation/paired_ratio.hpp"
 #include "robustness/outcome.hpp"
 #include "stemvo/error.hpp"

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "report/frame_image.hpp"
 #include "search/records.hpp"
 #include "stem/stem.hpp"
@@ -20,7 +20,7 @@ std::string outcome_of(const FilterRow& row) {
 }
 
 Expected<Pictures> draw_filters(const Results& results,
-                                const KittiSequence& sequence,
+                                const FrameSource& sequence,
                                 const ShownFilters& shown) {
   constexpr int kPageWidth_px = 720;
   const std::size_t middle = sequence.size() / 2;
@@ -30,7 +30,7 @@ Expected<Pictures> draw_filters(const Results& results,
   }
   std::vector<cv::Mat> channels;
   std::vector<std::string> captions = {
-      fmt::format("{}, frame {}", sequence.name(), sequence.range().begin + middle)};
+      fmt::format("{}, frame {}", sequence.name, sequence.range.begin + middle)};
   for (const auto& [rank, row] : shown) {
     const LayerIdentity& layer = results.identity.layer_of(row->key);
     const Config config = config_of(results.config, layer, row->key.filter);
@@ -42,7 +42,7 @@ Expected<Pictures> draw_filters(const Results& results,
     channels.push_back(channel->values);
     captions.push_back(fmt::format("{}: {}, {}", rank, to_string(row->key), outcome_of(*row)));
   }
-  Pictures pictures = {draw_channel_sheet(*frame, channels, captions), {}, sequence.ground_truth()};
+  Pictures pictures = {draw_channel_sheet(*frame, channels, captions), {}, sequence.ground_truth};
   for (const cv::Mat& image : draw_channels(*frame, channels, kPageWidth_px)) {
     pictures.channels.push_back(
         {captions[pictures.channels.size()], encode_jpeg(image, kPageWidth_px)});
@@ -84,7 +84,7 @@ Expected<Pictures> draw_pictures(const Results& results) {
     return Pictures();
   }
   const SequenceIdentity& first = results.identity.sequences.front();
-  const Expected<KittiSequence> sequence = KittiSequence::open(
+  const Expected<FrameSource> sequence = open_kitti(
       first.directory, {.camera = results.config.input.camera,
                         .frames = FrameRangeRequest{first.first_frame, first.end_frame()}});
   if (!sequence) {

@@ -64,7 +64,7 @@ Options on_one_thread(Options options) {
 }  // namespace
 
 FilterDrive::FilterDrive(const Config& config, const FrameSource& sequence)
-    : odometry_(on_one_thread(config), sequence.camera()), config_(&config), sequence_(&sequence) {}
+    : odometry_(on_one_thread(config), sequence.camera), config_(&config), sequence_(&sequence) {}
 
 void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
   Frame now;
@@ -88,7 +88,7 @@ void FilterDrive::process(const Channel* channel, const cv::Mat& frame) {
 DriveScore FilterDrive::score() const {
   const auto num_steps = static_cast<double>(std::max<std::size_t>(num_frames(), 2) - 1);
   DriveScore score;
-  score.sequence = sequence_->name();
+  score.sequence = sequence_->name;
   score.frames = num_frames();
   score.inliers = static_cast<double>(num_inliers_) / num_steps;
   score.tracked = static_cast<double>(outcomes_[kMeasured]) / num_steps;
@@ -101,7 +101,7 @@ DriveScore FilterDrive::score() const {
 }
 
 void FilterDrive::add_errors(DriveScore& score) const {
-  const auto truth = std::span(*sequence_->ground_truth()).first(num_frames());
+  const auto truth = std::span(*sequence_->ground_truth).first(num_frames());
   const Trajectory trajectory = rescale_steps(odometry_.estimator().trajectory(), truth);
   const Metrics metrics = evaluate(trajectory, truth, config_->evaluation);
   score.t_rel_percent = metrics.t_rel_percent;

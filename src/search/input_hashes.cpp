@@ -43,12 +43,12 @@ Expected<std::string> hash_files(const std::vector<fs::path>& files) {
 
 }  // namespace
 
-Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
+Expected<SequenceHashes> hash_sequence(const FrameSource& sequence,
                                        const fs::path& sequence_dir,
                                        FrameIdentity frames) {
   std::vector<fs::path> truth;
-  if (sequence.ground_truth_file()) {
-    truth.push_back(*sequence.ground_truth_file());
+  if (sequence.ground_truth_file) {
+    truth.push_back(*sequence.ground_truth_file);
   }
   const auto calibration = hash_files({sequence_dir / "calib.txt", sequence_dir / "times.txt"});
   const auto ground_truth = hash_files(truth);
@@ -57,7 +57,7 @@ Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
   }
   std::string text;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
-    const fs::path& file = sequence.file(i);
+    const fs::path& file = sequence.files[i];
     text += fmt::format("{} {}\n", (file.parent_path().filename() / file.filename()).string(),
                         identity_of(file, frames));
   }

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "config/config.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 /// Hashes of what a result depends on, so that kept results can be told from outdated ones.
@@ -25,7 +25,7 @@ struct SequenceHashes {
 };
 
 /// Errors: a file that cannot be read. A frame that cannot is none: a run skips it too.
-[[nodiscard]] Expected<SequenceHashes> hash_sequence(const KittiSequence& sequence,
+[[nodiscard]] Expected<SequenceHashes> hash_sequence(const FrameSource& sequence,
                                                      const std::filesystem::path& sequence_dir,
                                                      FrameIdentity frames);
 /// Hashes the model's file. Error: a model that is not there.

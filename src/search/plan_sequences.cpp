@@ -51,7 +51,7 @@ Status check_pair(const SequenceIdentity& before, const SequenceIdentity& added)
 /// A directory, read and hashed once however often it is disturbed.
 struct OpenedSequence {
   fs::path directory;
-  KittiSequence sequence;
+  FrameSource sequence;
   bool is_held_out = false;
   SequenceHashes hashes;
 };
@@ -61,18 +61,18 @@ Expected<OpenedSequence> open_sequence(const SearchRequest& request,
                                        const fs::path& directory,
                                        bool is_held_out,
                                        bool is_run) {
-  Expected<KittiSequence> sequence = KittiSequence::open(
-      directory, {.camera = request.config.input.camera,
-                  .frames = is_held_out ? request.held_out_frames : request.frames});
+  Expected<FrameSource> sequence =
+      open_kitti(directory, {.camera = request.config.input.camera,
+                             .frames = is_held_out ? request.held_out_frames : request.frames});
   if (!sequence) {
     return sequence.error();
   }
-  if (!sequence->ground_truth()) {
-    const fs::path file = directory / "../../poses" / (sequence->name() + ".txt");
+  if (!sequence->ground_truth) {
+    const fs::path file = directory / "../../poses" / (sequence->name + ".txt");
     return fail(file.lexically_normal().string() +
                 ": expected a pose file, by which filters are ranked, found none");
   }
-  const Trajectory& truth = *sequence->ground_truth();
+  const Trajectory& truth = *sequence->ground_truth;
   const Metrics metrics = evaluate(truth, truth, request.config.evaluation);
   if (metrics.num_segments == 0) {
     return fail(fmt::format(
@@ -126,9 +126,9 @@ FrameSource disturbed(const FrameSource& source,
   if (how == nullptr) {
     return source;
   }
-  FrameList frames = robustness::disturb(source, *how, kMiddleStrength, seed).frames();
+  FrameSource frames = robustness::disturb(source, *how, kMiddleStrength, seed);
   frames.name += suffix_of(how);
-  return FrameSource(std::move(frames));
+  return frames;
 }
 
 Status add_sequence(const SearchRequest& request,
@@ -138,10 +138,10 @@ Status add_sequence(const SearchRequest& request,
   std::vector<SequenceIdentity>& known = plan.identity.sequences;
   const bool is_run = request.only_sequence.value_or(known.size()) == known.size();
   const FrameSource source = disturbed(opened.sequence, how, request.config.seed);
-  const SequenceIdentity added = {.name = source.name(),
+  const SequenceIdentity added = {.name = source.name,
                                   .held_out = opened.is_held_out,
                                   .disturbance = suffix_of(how),
-                                  .first_frame = opened.sequence.range().begin,
+                                  .first_frame = opened.sequence.range.begin,
                                   .num_frames = source.size(),
                                   .frames = is_run ? opened.hashes.frames : std::string(),
                                   .calibration = opened.hashes.calibration,
@@ -158,8 +158,7 @@ Status add_sequence(const SearchRequest& request,
   }
   std::vector<std::string> problems;
   for (std::size_t i = 0; i < plan.layers.size(); ++i) {
-    problems.push_back(
-        fit_layer(request, plan.identity.layers[i], source.camera(), plan.layers[i]));
+    problems.push_back(fit_layer(request, plan.identity.layers[i], source.camera, plan.layers[i]));
   }
   plan.sequences.push_back({source, opened.is_held_out, std::move(problems)});
   return {};

@@ -187,7 +187,7 @@ struct Race {
     for (std::size_t i = 0; i < block.size(); ++i) {
       const std::optional<FilterDrive>& drive = drives[block[i]][index];
       DriveScore cannot;
-      cannot.sequence = planned.sequence.name();
+      cannot.sequence = planned.sequence.name;
       cannot.reason = problem(block[i], planned);
       done[i].add(drive ? drive->score() : cannot, planned.is_held_out, drive ? end - begin : 0);
     }
@@ -234,9 +234,9 @@ struct Race {
     const PlanLayer& layer = plan.layers[plan.candidates[running.front()].layer];
     auto channels =
         layer.stem.apply_range(*frame, filter_of(running.front()), filter_of(running.back()) + 1,
-                               frame_zoom(layer, sequence.camera()));
+                               frame_zoom(layer, sequence.camera));
     if (!channels) {
-      warn(fmt::format("frame {}: {}", sequence.range().begin + frame_index,
+      warn(fmt::format("frame {}: {}", sequence.range.begin + frame_index,
                        channels.error().message));
       return {*frame, {}};
     }

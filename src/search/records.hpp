@@ -38,11 +38,11 @@ inline constexpr std::size_t kMaxRecordBytes = 8000000;
 struct FilterKey {
   std::string model;
   std::string layer;     ///< `input` for the input layer and gray
-  std::string features;  ///< `klt`, `orb`, `sift`
+  std::string features;  ///< `patch`, `klt`, `orb`, `sift`
   int filter = 0;
   auto operator<=>(const FilterKey&) const = default;
 };
-/// "efficientnetv2-b0 stem 12", with the features where they are not `klt`.
+/// "efficientnetv2-b0 stem 12", with the features where they are not `patch`.
 [[nodiscard]] std::string to_string(const FilterKey& key);
 
 /// A filter's odometry over one sequence, as far as it ran, with the true length of each step.

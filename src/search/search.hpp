@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::search {

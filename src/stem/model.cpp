@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "built_in_models.hpp"
-#include "stem/model_check.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -125,27 +125,21 @@ Expected<std::string> read_model(const std::string& model) {
 }
 
 Expected<ModelInfo> read_model_info(const std::string& model) {
-  const auto session = open_session(model);
-  return session ? InfoReader(label_of(model), *session).read() : session.error();
+  STEMVO_TRY_GET(const OnnxSession session, open_session(model));
+  return InfoReader(label_of(model), session).read();
 }
 
 Expected<internal::Model> internal::open_model(const std::string& model) {
-  auto session = open_session(model);
-  if (!session) {
-    return session.error();
-  }
+  STEMVO_TRY_GET(auto session, open_session(model));
   const std::string label = label_of(model);
-  const auto info = InfoReader(label, *session).read();
-  if (!info) {
-    return info.error();
-  }
-  const int expected = info->only_filter ? 1 : info->num_filters;
-  if (session->num_filters() != expected) {
+  STEMVO_TRY_GET(const auto info, InfoReader(label, session).read());
+  const int expected = info.only_filter ? 1 : info.num_filters;
+  if (session.num_filters() != expected) {
     return fail(
-        fmt::format("{}: expected {} filters, found {}", label, expected, session->num_filters()));
+        fmt::format("{}: expected {} filters, found {}", label, expected, session.num_filters()));
   }
-  const Status status = check_graph(label, *session, *info);
-  return status ? Expected<Model>(Model{label, *info, *std::move(session)}) : status.error();
+  STEMVO_TRY(check_graph(label, session, info));
+  return Model{label, info, std::move(session)};
 }
 
 }  // namespace stemvo

@@ -4,7 +4,6 @@
 #include <array>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "stem/onnx_session.hpp"
@@ -53,6 +52,12 @@ struct Model {
 /// window of kernel, stride and padding and on no others. So the pixel map is right, and passes
 /// over a shifted frame agree (a graph that normalises over the whole image, say, is refused).
 [[nodiscard]] Expected<Model> open_model(const std::string& model);
+
+/// Runs the graph on small images and holds its outputs against kernel, stride and padding; see
+/// open_model. `label` is what messages call the file.
+[[nodiscard]] Status check_graph(const std::string& label,
+                                 const OnnxSession& session,
+                                 const ModelInfo& info);
 
 }  // namespace internal
 }  // namespace stemvo

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include "stem/model_check.hpp"
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
 
+#include "stem/model.hpp"
 #include "stem/network_layer.hpp"
+#include "try.hpp"
 
 namespace stemvo::internal {
 namespace {
@@ -71,10 +70,7 @@ class GraphCheck {
 
   [[nodiscard]] Status window() {
     const cv::Size fixed = session_.fixed_size();
-    if (Status status = size({probe_size(plan_.x, fixed.width), probe_size(plan_.y, fixed.height)});
-        !status) {
-      return status;
-    }
+    STEMVO_TRY(size({probe_size(plan_.x, fixed.width), probe_size(plan_.y, fixed.height)}));
     output_ = {probe_output(plan_.x), probe_output(plan_.y)};
     window_ = {output_.x * plan_.x.stride - plan_.x.before,
                output_.y * plan_.y.stride - plan_.y.before, plan_.x.kernel, plan_.y.kernel};
@@ -89,8 +85,8 @@ class GraphCheck {
   [[nodiscard]] Status size(cv::Size frame) {
     frame_ = frame;
     channel_ = plan_.channel_size(frame);
-    const auto values = run(noise(frame, 0));
-    return values ? Status() : values.error();
+    STEMVO_TRY(run(noise(frame, 0)));
+    return {};
   }
 
   /// All filters at the one output. Error: not finite somewhere.
@@ -125,14 +121,11 @@ class GraphCheck {
   [[nodiscard]] Status dependence() const {
     const cv::Mat1f base = noise(frame_, 0);
     const cv::Mat1f other = noise(frame_, 1);
-    const auto expected = run(base);
+    STEMVO_TRY_GET(const auto expected, run(base));
     cv::Mat1f outside = other.clone();
     base(window_).copyTo(outside(window_));
-    const auto with_other_outside = run(outside);
-    if (!expected || !with_other_outside) {
-      return (expected ? with_other_outside : expected).error();
-    }
-    if (differ(*expected, *with_other_outside)) {
+    STEMVO_TRY_GET(const auto with_other_outside, run(outside));
+    if (differ(expected, with_other_outside)) {
       return fail(
           fmt::format("{}: expected outputs that depend on the {}x{} window of the model's "
                       "kernel, stride and padding only, found that pixels outside it matter",
@@ -145,11 +138,8 @@ class GraphCheck {
                                  {w.br().x - 1, w.y, 1, w.height}}) {
       cv::Mat1f changed = base.clone();
       other(edge).copyTo(changed(edge));
-      const auto values = run(changed);
-      if (!values) {
-        return values.error();
-      }
-      if (!differ(*expected, *values)) {
+      STEMVO_TRY_GET(const auto values, run(changed));
+      if (!differ(expected, values)) {
         return fail(fmt::format(
             "{}: expected the {}x{} window of the model's kernel, stride and padding, found that "
             "the {}x{} pixels at {}, {} of it do not matter",

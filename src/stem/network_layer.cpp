@@ -11,6 +11,8 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "try.hpp"
+
 namespace stemvo::internal {
 namespace {
 
@@ -27,9 +29,7 @@ class NetworkLayer {
         num_threads_(num_threads) {}
 
   [[nodiscard]] Expected<std::vector<Channel>> apply(const cv::Mat& frame, int first, int last) {
-    if (Status status = check_size(frame.size()); !status) {
-      return status.error();
-    }
+    STEMVO_TRY(check_size(frame.size()));
     const std::lock_guard lock(mutex_);
     fit_buffers(frame.size());
     fill_planes(frame);
@@ -148,9 +148,7 @@ class NetworkLayer {
     if (is_written_in_place()) {
       return run_in_place(image, channels.front().values);
     }
-    if (Status status = session_.run(image, buffer_, output.ptr<float>(), pass_); !status) {
-      return status;
-    }
+    STEMVO_TRY(session_.run(image, buffer_, output.ptr<float>(), pass_));
     for (std::size_t i = 0; i < channels.size(); ++i) {
       const int top = (first + static_cast<int>(i)) * pass_.height;
       interleave(index, output.rowRange(top, top + pass_.height), channels[i].values);
@@ -170,10 +168,7 @@ class NetworkLayer {
       const cv::Size rows_seen(buffer_.width, (num_rows - 1) * axis.stride + axis.kernel);
       const float* const start =
           image + static_cast<std::ptrdiff_t>(top) * axis.stride * buffer_.width;
-      if (Status status = session_.run(start, rows_seen, channel[top], {channel.cols, num_rows});
-          !status) {
-        return status;
-      }
+      STEMVO_TRY(session_.run(start, rows_seen, channel[top], {channel.cols, num_rows}));
     }
     return {};
   }

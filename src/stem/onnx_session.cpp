@@ -13,6 +13,7 @@
 #include <onnxruntime_c_api.h>
 
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::internal {
 
@@ -52,13 +53,7 @@ constexpr const char* kInputName = "image";
 
 }  // namespace
 
-// Returns from the calling member function with the Error, if there is one.
-#define STEMVO_ORT_TRY(call)                          \
-  do {                                                \
-    if (Status status_ = to_status(call); !status_) { \
-      return status_.error();                         \
-    }                                                 \
-  } while (false)
+#define STEMVO_ORT_TRY(call) STEMVO_TRY(to_status(call))
 
 /// The one function in which an OrtStatus becomes an Error (of one line) and is freed.
 Status OnnxSession::to_status(OrtStatus* raw) const {
@@ -76,12 +71,9 @@ Status OnnxSession::to_status(OrtStatus* raw) const {
 
 Expected<OnnxSession> OnnxSession::create(const std::string& label, std::string_view model) {
   OnnxSession session(label);
-  Status status = session.load(model);
-  status = status ? session.check_input() : status;
-  status = status ? session.check_output() : status;
-  if (!status) {
-    return status.error();
-  }
+  STEMVO_TRY(session.load(model));
+  STEMVO_TRY(session.check_input());
+  STEMVO_TRY(session.check_output());
   return session;
 }
 
@@ -154,17 +146,14 @@ Status OnnxSession::check_input() {
   if (inputs != 1) {
     return fail(fmt::format("{}: expected 1 input, found {}", label_, inputs));
   }
-  const auto input = read_tensor_info(true, 0);
-  if (!input) {
-    return input.error();
-  }
-  const bool is_gray = input->is_float({1, 1, -1, -1});
-  if (input->name != kInputName || (!is_gray && !input->is_float({1, 3, -1, -1}))) {
+  STEMVO_TRY_GET(const auto input, read_tensor_info(true, 0));
+  const bool is_gray = input.is_float({1, 1, -1, -1});
+  if (input.name != kInputName || (!is_gray && !input.is_float({1, 3, -1, -1}))) {
     return fail(fmt::format("{}: expected input '{} float 1x3xHxW' or 1x1xHxW, found '{}'", label_,
-                            kInputName, input->describe()));
+                            kInputName, input.describe()));
   }
   const auto side_of = [&](std::size_t axis) {
-    return static_cast<int>(std::clamp<std::int64_t>(input->shape[axis], 0, INT_MAX));
+    return static_cast<int>(std::clamp<std::int64_t>(input.shape[axis], 0, INT_MAX));
   };
   num_planes_ = is_gray ? 1 : 3;
   fixed_size_ = {side_of(3), side_of(2)};
@@ -177,16 +166,13 @@ Status OnnxSession::check_output() {
   if (outputs != 1) {
     return fail(fmt::format("{}: expected 1 output, found {}", label_, outputs));
   }
-  const auto output = read_tensor_info(false, 0);
-  if (!output) {
-    return output.error();
-  }
-  if (!output->is_float({1, -1, -1, -1}) || output->shape[1] < 1) {
+  STEMVO_TRY_GET(const auto output, read_tensor_info(false, 0));
+  if (!output.is_float({1, -1, -1, -1}) || output.shape[1] < 1) {
     return fail(fmt::format("{}: expected output 'float 1xCxhxw' with C known, found '{}'", label_,
-                            output->describe()));
+                            output.describe()));
   }
-  output_ = output->name;
-  num_filters_ = static_cast<int>(output->shape[1]);
+  output_ = output.name;
+  num_filters_ = static_cast<int>(output.shape[1]);
   return {};
 }
 
@@ -224,14 +210,11 @@ Status OnnxSession::run(const float* image,
                         cv::Size image_size,
                         float* channels,
                         cv::Size channel_size) const {
-  const auto input = make_tensor(image, num_planes_, image_size);
-  const auto output = make_tensor(channels, num_filters_, channel_size);
-  if (!input || !output) {
-    return (input ? output : input).error();
-  }
+  STEMVO_TRY_GET(const auto input, make_tensor(image, num_planes_, image_size));
+  STEMVO_TRY_GET(const auto output, make_tensor(channels, num_filters_, channel_size));
   const char* const output_name = output_.c_str();
-  const OrtValue* const raw_input = input->get();
-  OrtValue* raw_output = output->get();
+  const OrtValue* const raw_input = input.get();
+  OrtValue* raw_output = output.get();
   return to_status(
       api_->Run(session_.get(), nullptr, &kInputName, &raw_input, 1, &output_name, 1, &raw_output));
 }

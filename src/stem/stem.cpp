@@ -12,6 +12,7 @@
 #include "stem/hand_made.hpp"
 #include "stem/model.hpp"
 #include "stem/network_layer.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 
@@ -87,49 +88,40 @@ void check_frame(const cv::Mat& frame) {
 
 Expected<Stem> Stem::create(const StemOptions& options, bool all_filters, int num_threads) {
   if (auto hand_made = internal::hand_made_bank(options.model)) {
-    const auto filter = choose_filter(options.filter, options.model, hand_made->num_filters, 0);
-    const auto sampling = choose_sampling(options.sampling_px, 1, /*native_only=*/false);
-    if (!filter || !sampling) {
-      return (filter ? sampling : filter).error();
-    }
-    return Stem({.model = options.model, .filter = *filter, .num_filters = hand_made->num_filters},
+    STEMVO_TRY_GET(const int filter,
+                   choose_filter(options.filter, options.model, hand_made->num_filters, 0));
+    STEMVO_TRY(choose_sampling(options.sampling_px, 1, /*native_only=*/false));
+    return Stem({.model = options.model, .filter = filter, .num_filters = hand_made->num_filters},
                 std::move(hand_made->bank), /*has_all=*/true);
   }
-  auto model = internal::open_model(choose_model(options, all_filters));
-  if (!model) {
-    return model.error();
-  }
-  const ModelInfo& info = model->info;
-  const auto filter =
-      choose_filter(options.filter, options.model, info.num_filters, info.default_filter);
-  const auto sampling =
-      choose_sampling(options.sampling_px, info.stride_px, info.native_sampling_only);
-  if (!filter || !sampling) {
-    return (filter ? sampling : filter).error();
-  }
-  if (info.only_filter && (all_filters || *filter != *info.only_filter)) {
-    return fail(fmt::format("{}: expected a model of {}, found one of filter {} alone",
-                            model->label,
+  STEMVO_TRY_GET(auto model, internal::open_model(choose_model(options, all_filters)));
+  const ModelInfo& info = model.info;
+  STEMVO_TRY_GET(const int filter, choose_filter(options.filter, options.model, info.num_filters,
+                                                 info.default_filter));
+  STEMVO_TRY_GET(const int sampling,
+                 choose_sampling(options.sampling_px, info.stride_px, info.native_sampling_only));
+  if (info.only_filter && (all_filters || filter != *info.only_filter)) {
+    return fail(fmt::format("{}: expected a model of {}, found one of filter {} alone", model.label,
                             all_filters ? fmt::format("all {} filters", info.num_filters)
-                                        : fmt::format("filter {}", *filter),
+                                        : fmt::format("filter {}", filter),
                             *info.only_filter));
   }
-  const internal::SamplingPlan plan(info, *sampling);
-  const bool has_one_size = !model->session.fixed_size().empty();
+  const internal::SamplingPlan plan(info, sampling);
+  const bool has_one_size = !model.session.fixed_size().empty();
   if (plan.needs_margin() && has_one_size) {
     return fail(fmt::format(
         "stem.sampling_px: expected {} for {}, which pads and takes frames of one size only, "
         "found {}",
-        info.stride_px, model->label, *sampling));
+        info.stride_px, model.label, sampling));
   }
   return Stem(
       {.model = options.model,
        .layer = info.layer,
-       .filter = *filter,
+       .filter = filter,
        .num_filters = info.num_filters,
-       .sampling_px = *sampling,
+       .sampling_px = sampling,
        .takes_any_size = !has_one_size && !info.native_sampling_only},
-      internal::make_network_layer(model->label, std::move(model->session), plan, num_threads),
+      internal::make_network_layer(model.label, std::move(model.session), plan, num_threads),
       /*has_all=*/!info.only_filter);
 }
 
@@ -143,11 +135,8 @@ Expected<Stem> Stem::load_all(const StemOptions& options) {
 Expected<Channel> Stem::apply(const cv::Mat& frame, int zoom) const {
   check_frame(frame);
   const int index = has_all_ ? info_.filter : 0;
-  auto channels = apply_enlarged(bank_, frame, index, index + 1, zoom);
-  if (!channels) {
-    return channels.error();
-  }
-  return std::move(channels->front());
+  STEMVO_TRY_GET(auto channels, apply_enlarged(bank_, frame, index, index + 1, zoom));
+  return std::move(channels.front());
 }
 
 Expected<std::vector<Channel>> Stem::apply_range(const cv::Mat& frame,

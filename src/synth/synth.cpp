@@ -14,6 +14,7 @@
 #include "pipeline/out_folder.hpp"
 #include "synth/renderer.hpp"
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -37,12 +38,9 @@ Expected<synth::Drive> plan_drive(const SyntheticDriveOptions& options) {
   if (!options.trajectory) {
     return synth::make_own_drive(options.num_frames, options.seed, options.traffic);
   }
-  auto poses = read_kitti_trajectory(*options.trajectory);
-  if (!poses) {
-    return poses.error();
-  }
-  poses->resize(std::min(poses->size(), static_cast<std::size_t>(options.num_frames)));
-  return synth::make_drive_along(*poses);
+  STEMVO_TRY_GET(auto poses, read_kitti_trajectory(*options.trajectory));
+  poses.resize(std::min(poses.size(), static_cast<std::size_t>(options.num_frames)));
+  return synth::make_drive_along(poses);
 }
 
 Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
@@ -55,14 +53,11 @@ Expected<synth::CameraPath> plan_path(const SyntheticDriveOptions& options) {
         options.num_frames, options.seed,
         {options.walk_rate_hz, options.visit, options.blank_walls, turn_rate_rad_s});
   }
-  auto drive = plan_drive(options);
-  if (!drive) {
-    return drive.error();
-  }
+  STEMVO_TRY_GET(auto drive, plan_drive(options));
   if (options.visit > 0) {
-    synth::drive_again(options.seed, options.visit, *drive);
+    synth::drive_again(options.seed, options.visit, drive);
   }
-  return *std::move(drive);
+  return drive;
 }
 
 struct DriveFolder {  // OUT/sequences/NAME and OUT/poses/NAME.txt
@@ -82,10 +77,7 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
         "{}: expected poses of a rendered drive or none, found {} (--name gives another name)",
         drive.poses.string(), is_input ? "the given trajectory" : "others"));
   }
-  auto lock = pipeline::open_out_folder(drive.sequence, "synth", {});
-  if (!lock) {
-    return lock;
-  }
+  STEMVO_TRY_GET(const auto lock, pipeline::open_out_folder(drive.sequence, "synth", {}));
   for (const char* content : {"image_2", "depth", "moving", "times.txt"}) {
     fs::remove_all(drive.sequence / content, code);
   }
@@ -96,8 +88,8 @@ Expected<pipeline::FolderLock> open_folder(const DriveFolder& drive,
   if (options.traffic) {
     fs::create_directory(drive.sequence / "moving", code);
   }
-  const Status made = pipeline::create_out_folder(drive.poses.parent_path());
-  return made ? std::move(lock) : made.error();
+  STEMVO_TRY(pipeline::create_out_folder(drive.poses.parent_path()));
+  return lock;
 }
 
 /// NumPy format 1.0, little-endian float32, rows first.
@@ -171,19 +163,13 @@ Status write_texts(const DriveFolder& drive,
 Status render_synthetic_drive(const fs::path& out_dir,
                               const SyntheticDriveOptions& options,
                               const RenderProgress& progress) {
-  auto path = plan_path(options);
-  if (!path) {
-    return path.error();
-  }
+  STEMVO_TRY_GET(auto path, plan_path(options));
   const DriveFolder drive{out_dir / "sequences" / options.name,
                           out_dir / "poses" / (options.name + ".txt")};
-  const auto lock = open_folder(drive, options);
-  if (!lock) {
-    return lock.error();
-  }
+  STEMVO_TRY_GET(const auto lock, open_folder(drive, options));
   const Camera camera = camera_of(options);
   const double rate_hz = options.walk ? options.walk_rate_hz : synth::kDriveRate_hz;
-  const synth::Renderer renderer(std::move(*path), camera, options.seed,
+  const synth::Renderer renderer(std::move(path), camera, options.seed,
                                  {options.visit, options.traffic, rate_hz, options.exposure_s,
                                   options.readout_s, options.follows_light});
   const Trajectory& poses = renderer.world_from_camera();

@@ -12,6 +12,8 @@
 
 #include <fmt/core.h>
 
+#include "try.hpp"
+
 namespace stemvo {
 namespace {
 
@@ -42,15 +44,6 @@ Status check_place(const fs::path& file) {
         fmt::format("{}: expected a file to write, found {}", file.string(), kind_of(file)));
   }
   return {};
-}
-
-/// Writes beside the file. Errors name the file.
-Status write_unfinished(const fs::path& file, std::string_view text) {
-  errno = 0;
-  std::ofstream stream(unfinished(file), std::ios::binary);
-  stream << text;
-  stream.close();
-  return stream ? Status() : Status(cannot("write", file, errno));
 }
 
 }  // namespace
@@ -88,25 +81,28 @@ Expected<std::string> read_text_file(const fs::path& file, int max_MB) {
 }
 
 Status write_text_file(const fs::path& file, std::string_view text) {
-  std::error_code code;
-  Status status = check_place(file);
-  status = status ? write_unfinished(file, text) : status;
-  if (status) {
+  STEMVO_TRY(check_place(file));
+  errno = 0;
+  std::ofstream stream(unfinished(file), std::ios::binary);
+  stream << text;
+  stream.close();
+  std::error_code code(stream ? 0 : std::max(errno, 1), std::generic_category());
+  if (!code) {
     fs::rename(unfinished(file), file, code);
-    status = code ? Status(cannot("write", file, code.value())) : status;
   }
-  if (!status) {
-    fs::remove(unfinished(file), code);
-  }
-  return status;
+  std::error_code ignored;
+  fs::remove(unfinished(file), ignored);
+  return code ? Status(cannot("write", file, code.value())) : Status();
 }
 
 Status check_can_write(const fs::path& file) {
-  Status status = check_place(file);
-  status = status ? write_unfinished(file, {}) : status;
+  STEMVO_TRY(check_place(file));
+  errno = 0;
+  const bool is_open = std::ofstream(unfinished(file), std::ios::binary).is_open();
+  const int reason = errno;
   std::error_code ignored;
   fs::remove(unfinished(file), ignored);
-  return status;
+  return is_open ? Status() : Status(cannot("write", file, reason));
 }
 
 Status remove_file(const fs::path& file) {
@@ -168,6 +164,45 @@ std::string at_line(const fs::path& file, std::size_t line) {
 
 Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
   return fail(fmt::format("{}: {}", at_line(file, index + 1), error.message));
+}
+
+Expected<std::vector<TimedRow>> read_timed_rows(const fs::path& file,
+                                                std::initializer_list<std::size_t> counts,
+                                                std::string_view form,
+                                                double unit_s) {
+  STEMVO_TRY_GET(const auto lines, read_lines(file));
+  std::vector<TimedRow> rows;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::size_t comment = std::min(lines[i].find('#'), lines[i].size());
+    if (lines[i].find("[ns]", comment) != std::string::npos) {
+      unit_s = kNanosecond_s;  // EuRoC's
+    }
+    std::string line = lines[i].substr(0, comment);
+    std::ranges::replace(line, ',', ' ');
+    const std::size_t count = split_words(line).size();
+    if (count == 0) {
+      continue;
+    }
+    if (std::ranges::find(counts, count) == counts.end()) {
+      return fail_at(file, i, fail(fmt::format("expected {}, found {} words", form, count)));
+    }
+    std::string_view rest = line;
+    const auto time = parse_numbers(take_word(rest), 1);
+    if (!time) {
+      return fail_at(file, i, time.error());
+    }
+    const double time_s = unit_s * time->front();
+    if (!rows.empty() && !(time_s > rows.back().time_s)) {
+      return fail_at(
+          file, i,
+          fail(fmt::format("expected a time after {} s, found {} s", rows.back().time_s, time_s)));
+    }
+    rows.push_back({time_s, std::string(rest), i});
+  }
+  if (rows.empty()) {
+    return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
+  }
+  return rows;
 }
 
 std::optional<std::size_t> parse_index(std::string_view text) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@ namespace stemvo {
 /// The size limits, MB: of settings, whose YAML and JSON take long to parse, and of other files.
 inline constexpr int kMaxSettings_MB = 1;
 inline constexpr int kMaxFile_MB = 256;
+inline constexpr double kNanosecond_s = 1e-9;
 
 /// Names what lies there, for messages: "a file", "a folder", "nothing of that name", ..
 [[nodiscard]] std::string_view kind_of(const std::filesystem::path& path);
@@ -27,6 +29,7 @@ inline constexpr int kMaxFile_MB = 256;
 /// Replaces the file at once: a reader finds the old or the new one, whole. It is written beside
 /// and renamed. Errors: the place is no regular file's, or the file cannot be written whole.
 [[nodiscard]] Status write_text_file(const std::filesystem::path& file, std::string_view text);
+
 /// Proves that write_text_file can, without touching the file.
 [[nodiscard]] Status check_can_write(const std::filesystem::path& file);
 
@@ -51,6 +54,21 @@ inline constexpr int kMaxFile_MB = 256;
 [[nodiscard]] Error fail_at(const std::filesystem::path& file,
                             std::size_t index,
                             const Error& error);
+
+/// A row of a file that begins with its time.
+struct TimedRow {
+  double time_s = 0.0;
+  std::string rest;      ///< words between blanks
+  std::size_t line = 0;  ///< counted from 0
+};
+/// Rows of one of these numbers of words, between commas or blanks, `#` before comments; the times
+/// rise, in this unit, or in ns where a comment says [ns]. `form` names a row. Errors, with file
+/// and line: unreadable, other rows, no row.
+[[nodiscard]] Expected<std::vector<TimedRow>> read_timed_rows(
+    const std::filesystem::path& file,
+    std::initializer_list<std::size_t> counts,
+    std::string_view form,
+    double unit_s = 1.0);
 
 /// Decimal digits alone; nullopt: another text, or too large.
 [[nodiscard]] std::optional<std::size_t> parse_index(std::string_view text);

@@ -7,7 +7,6 @@
 #include <ctime>
 #include <fstream>
 #include <limits>
-#include <string>
 #include <string_view>
 
 #include "internal_check.hpp"

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/run_program.hpp"
 #include "synth/synth.hpp"
@@ -39,9 +39,9 @@ class Hints : public ::testing::Test {
   [[nodiscard]] Outcome run(bool has_hints,
                             const Eigen::Quaterniond& off = so3_exp({0, 0, 0}),
                             std::size_t every = 1) {
-    const KittiSequence walk = KittiSequence::open(folder_ / "walk/sequences/00", {}).value();
-    const Trajectory& truth = *walk.ground_truth();
-    Odometry odometry = Odometry::create(walk.camera()).value();
+    const FrameSource walk = open_kitti(folder_ / "walk/sequences/00", {}).value();
+    const Trajectory& truth = *walk.ground_truth;
+    Odometry odometry = Odometry::create(walk.camera).value();
     std::mt19937 random(3);
     std::normal_distribution<double> noise_rad(0.0, 0.2 * kDeg);
     Outcome outcome;

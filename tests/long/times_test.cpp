@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "evaluation/metrics.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/odometry.hpp"
@@ -28,7 +28,7 @@ class Times : public test::NeedsClips {
   void SetUp() override {
     test::NeedsClips::SetUp();
     if (!IsSkipped()) {
-      clip_.emplace(KittiSequence::open(*test::shared_data() / "kitti/sequences/03", {}).value());
+      clip_.emplace(open_kitti(*test::shared_data() / "kitti/sequences/03", {}).value());
     }
   }
 
@@ -44,7 +44,7 @@ class Times : public test::NeedsClips {
     return (clip_->time_s(clip_->size() - 1) - clip_->time_s(0)) / last;
   }
   [[nodiscard]] Outcome run(const std::vector<GivenFrame>& frames) const {
-    Odometry odometry = Odometry::create(clip_->camera()).value();
+    Odometry odometry = Odometry::create(clip_->camera).value();
     Trajectory estimate;
     Trajectory truth;
     Outcome outcome;
@@ -53,7 +53,7 @@ class Times : public test::NeedsClips {
       const PixelOrder order = image.channels() == 1 ? PixelOrder::kGray : PixelOrder::kRgb;
       const FrameResult frame = odometry.process(image, order, given.time_s).value();
       estimate.push_back(frame.world_from_camera);
-      truth.push_back((*clip_->ground_truth())[given.index]);
+      truth.push_back((*clip_->ground_truth)[given.index]);
       outcome.inliers += frame.num_inliers / static_cast<double>(frames.size());
     }
     const Metrics metrics = evaluate(rescale_steps(estimate, truth), truth, {});
@@ -62,7 +62,7 @@ class Times : public test::NeedsClips {
     return outcome;
   }
 
-  std::optional<KittiSequence> clip_;
+  std::optional<FrameSource> clip_;
 };
 
 TEST_F(Times, DroppedFramesAndJitterCostLittleAndFramesTakenForEvenlySpacedMore) {

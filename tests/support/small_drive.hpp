@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/temp_folder.hpp"
 #include "synth/synth.hpp"
@@ -41,8 +41,8 @@ inline const SmallFrames& small_frames() {
   struct Drive : SmallDrive {
     void TestBody() override {}
     [[nodiscard]] SmallFrames read() const {
-      const KittiSequence sequence = KittiSequence::open(sequence_, {}).value();
-      SmallFrames frames{sequence.camera(), {}};
+      const FrameSource sequence = open_kitti(sequence_, {}).value();
+      SmallFrames frames{sequence.camera, {}};
       for (std::size_t i = 0; i < sequence.size(); ++i) {
         frames.images.push_back(sequence.read(i).value());
       }

@@ -8,7 +8,7 @@
 #include "calibration/calibrate.hpp"
 #include "calibration/lens.hpp"
 #include "dataset/camera_file.hpp"
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "geometry/distortion.hpp"
 #include "support/temp_folder.hpp"
 #include "synth/synth.hpp"
@@ -44,7 +44,7 @@ class CalibrateSequence : public ::testing::Test {
 };
 
 TEST_F(CalibrateSequence, FindsThePrincipalPointAndKeepsOtherRows) {
-  const Camera truth = KittiSequence::open(request_.sequence_dir, {}).value().camera();
+  const Camera truth = open_kitti(request_.sequence_dir, {}).value().camera;
   request_.calibration =
       folder_.file("wrong.txt", fmt::format("P1: 9 0 8 7 0 9 8 0 0 0 1 0\n"
                                             "P2: {0} 0 {1} 0 0 {0} {2} 0 0 0 1 0\n"
@@ -88,7 +88,7 @@ TEST_F(CalibrateSequence, TooFewFramesAndBrokenOnes) {
 
 // The same images as a folder with a camera file, whose form the result has.
 TEST_F(CalibrateSequence, ARecordingGetsACameraFile) {
-  const Camera truth = KittiSequence::open(request_.sequence_dir, {}).value().camera();
+  const Camera truth = open_kitti(request_.sequence_dir, {}).value().camera;
   request_.sequence_dir = folder_ / "sequences/00/image_2";
   request_.frames = FrameRangeRequest{0, 60};
   request_.camera_file = folder_.file(

@@ -66,16 +66,16 @@ TEST_F(ImageFolderTest, OpensAFolder) {
   ASSERT_TRUE(opened) << opened.error().message;
   const FrameSource& source = *opened;
   EXPECT_EQ(source.size(), 4U);
-  EXPECT_EQ(source.name(), "my drive");
-  EXPECT_EQ(source.camera().fy_px, 31.0);
-  EXPECT_EQ(source.camera().width_px, 32);
-  EXPECT_EQ(source.camera().height_px, 24);
-  EXPECT_THAT(source.timestamps_s(), ElementsAre(0.0, 0.1, 0.2, 3 / 10.0));
-  EXPECT_FALSE(source.ground_truth());
-  EXPECT_FALSE(source.camera_height_m());
-  EXPECT_EQ(source.given_calibration(), request_.camera_file);
+  EXPECT_EQ(source.name, "my drive");
+  EXPECT_EQ(source.camera.fy_px, 31.0);
+  EXPECT_EQ(source.camera.width_px, 32);
+  EXPECT_EQ(source.camera.height_px, 24);
+  EXPECT_THAT(source.timestamps_s, ElementsAre(0.0, 0.1, 0.2, 3 / 10.0));
+  EXPECT_FALSE(source.ground_truth);
+  EXPECT_FALSE(source.camera_height_m);
+  EXPECT_EQ(source.given_calibration, request_.camera_file);
   for (std::size_t i = 0; i < source.size(); ++i) {
-    EXPECT_EQ(source.file(i), image(static_cast<int>(i))) << "frame8, frame9, frame10, frame11";
+    EXPECT_EQ(source.files[i], image(static_cast<int>(i))) << "frame8, frame9, frame10, frame11";
     const auto frame = source.read(i);
     ASSERT_TRUE(frame) << frame.error().message;
     ASSERT_EQ(frame->type(), CV_8UC3);
@@ -90,7 +90,7 @@ TEST_F(ImageFolderTest, OpensAPattern) {
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
   EXPECT_EQ(opened->size(), 2U);
-  EXPECT_EQ(opened->name(), "my drive_frame");
+  EXPECT_EQ(opened->name, "my drive_frame");
 }
 
 TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
@@ -102,16 +102,16 @@ TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
   ASSERT_TRUE(opened) << opened.error().message;
   const FrameSource& source = *opened;
   EXPECT_EQ(source.size(), 2U);
-  EXPECT_EQ(source.range().begin, 1U);
-  EXPECT_EQ(source.range().end, 3U);
-  EXPECT_THAT(source.timestamps_s(), ElementsAre(5.5, 6.25));
-  EXPECT_EQ(source.file(0), image(1));
-  EXPECT_EQ(source.camera_height_m(), 1.25);
-  ASSERT_TRUE(source.ground_truth());
-  ASSERT_EQ(source.ground_truth()->size(), 2U);
-  EXPECT_EQ(source.ground_truth()->front().translation, Eigen::Vector3d::Zero());
-  EXPECT_NEAR(source.ground_truth()->back().translation.z(), 2.0, 1e-12);
-  EXPECT_EQ(source.ground_truth_file(), request_.ground_truth);
+  EXPECT_EQ(source.range.begin, 1U);
+  EXPECT_EQ(source.range.end, 3U);
+  EXPECT_THAT(source.timestamps_s, ElementsAre(5.5, 6.25));
+  EXPECT_EQ(source.files[0], image(1));
+  EXPECT_EQ(source.camera_height_m, 1.25);
+  ASSERT_TRUE(source.ground_truth);
+  ASSERT_EQ(source.ground_truth->size(), 2U);
+  EXPECT_EQ(source.ground_truth->front().translation, Eigen::Vector3d::Zero());
+  EXPECT_NEAR(source.ground_truth->back().translation.z(), 2.0, 1e-12);
+  EXPECT_EQ(source.ground_truth_file, request_.ground_truth);
 }
 
 TEST_F(ImageFolderTest, GrayImagesAreReadAsGray) {
@@ -304,8 +304,8 @@ TEST_F(ImageFolderTest, KittisLayoutNeedsNoCameraFile) {
   std::ofstream(folder / "times.txt") << "0\n";
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ(opened->name(), "07");
-  EXPECT_EQ(opened->camera().fx_px, 90.0);
+  EXPECT_EQ(opened->name, "07");
+  EXPECT_EQ(opened->camera.fx_px, 90.0);
 }
 
 }  // namespace

@@ -117,12 +117,12 @@ TEST_F(Recordings, EurocByItsFolderItsMav0OrOneCamera) {
   for (const fs::path& input : {folder, folder / "mav0", folder / "mav0/cam0", folder / "mav0/"}) {
     const auto source = open_source(request(input));
     ASSERT_TRUE(source) << source.error().message;
-    EXPECT_EQ(source->kind(), "EuRoC recording");
-    EXPECT_EQ(source->name(), "MH_00");
+    EXPECT_EQ(source->kind, "EuRoC recording");
+    EXPECT_EQ(source->name, "MH_00");
     ASSERT_EQ(source->size(), 6U);
     EXPECT_NEAR(source->time_s(5) - source->time_s(0), 0.25, 1e-6);
-    EXPECT_EQ(source->camera().fy_px, 61.0);
-    EXPECT_EQ(source->given_calibration()->filename(), "sensor.yaml");
+    EXPECT_EQ(source->camera.fy_px, 61.0);
+    EXPECT_EQ(source->given_calibration->filename(), "sensor.yaml");
     for (int i = 0; i < kNumFrames; ++i) {
       expect_frame(source->read(static_cast<std::size_t>(i)), i);
     }
@@ -151,8 +151,8 @@ TEST_F(Recordings, TumWithinTheTolerance) {
   tum.camera_file = camera("");
   const auto source = open_source(tum);
   ASSERT_TRUE(source) << source.error().message;
-  EXPECT_EQ(source->kind(), "TUM RGB-D recording");
-  EXPECT_EQ(source->name(), "desk");
+  EXPECT_EQ(source->kind, "TUM RGB-D recording");
+  EXPECT_EQ(source->name, "desk");
   ASSERT_EQ(source->size(), 6U);
   EXPECT_NEAR(source->time_s(0), 1305031452.791720, 1e-6);
   expect_frame(source->read(3), 3);
@@ -172,7 +172,7 @@ TEST_F(Recordings, ListsOfImagesAreChecked) {
     (void)temp_.file("desk/rgb.txt", list);
     return error_of(tum);
   };
-  EXPECT_THAT(error_with("# nothing\n"), HasSubstr("at least one image"));
+  EXPECT_THAT(error_with("# nothing\n"), HasSubstr("expected rows of a time and an image"));
   EXPECT_THAT(error_with("1.0 rgb/a.png\n1.0 rgb/b.png\n"),
               HasSubstr("rgb.txt:2: expected a time"));
   EXPECT_THAT(error_with("1.0 my photo.png\n"), HasSubstr("rgb.txt:1: expected a time and"));
@@ -187,10 +187,10 @@ TEST_F(Recordings, AVideoIsReadFrameByFrame) {
   video.frames = FrameRangeRequest{1, std::nullopt};
   const auto source = open_source(video);
   ASSERT_TRUE(source) << source.error().message;
-  EXPECT_EQ(source->kind(), "video");
-  EXPECT_EQ(source->name(), "drive");
-  ASSERT_TRUE(source->stream());
-  EXPECT_EQ(source->stream()->expected_frames, 5U);
+  EXPECT_EQ(source->kind, "video");
+  EXPECT_EQ(source->name, "drive");
+  ASSERT_TRUE(source->stream);
+  EXPECT_EQ(source->stream->expected_frames, 5U);
   for (std::size_t i = 0; i < 5; ++i) {
     expect_frame(source->read(i), static_cast<int>(i) + 1);
     EXPECT_NEAR(source->time_s(i), 0.04 * static_cast<double>(i + 1), 1e-3);
@@ -275,10 +275,10 @@ TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
   live.camera_file = file;
   const auto source = dataset::open_stream(stream, *dataset::read_camera_file(file), live);
   ASSERT_TRUE(source) << source.error().message;
-  EXPECT_EQ(source->kind(), "live camera");
-  EXPECT_EQ(source->name(), "camera0");
-  EXPECT_TRUE(source->stream()->is_live);
-  EXPECT_EQ(source->stream()->expected_frames, 0U);
+  EXPECT_EQ(source->kind, "live camera");
+  EXPECT_EQ(source->name, "camera0");
+  EXPECT_TRUE(source->stream->is_live);
+  EXPECT_EQ(source->stream->expected_frames, 0U);
   double last_s = -1.0;
   for (std::size_t i = 0; i < kNumFrames; ++i) {
     expect_frame(source->read(i), static_cast<int>(i));
@@ -302,19 +302,19 @@ TEST_F(Recordings, RealOnesAreRecognised) {
   const fs::path base = testing::shared_data();
   const auto euroc = open_source(request(base / "euroc"));
   ASSERT_TRUE(euroc) << euroc.error().message;
-  EXPECT_EQ(euroc->kind(), "EuRoC recording");
+  EXPECT_EQ(euroc->kind, "EuRoC recording");
   EXPECT_GT(euroc->size(), 10U);
   const auto image = euroc->read(0);
   ASSERT_TRUE(image) << image.error().message;
-  EXPECT_EQ(image->cols, euroc->camera().width_px);
-  EXPECT_EQ(image->rows, euroc->camera().height_px);
+  EXPECT_EQ(image->cols, euroc->camera.width_px);
+  EXPECT_EQ(image->rows, euroc->camera.height_px);
   FrameSourceRequest tum = request(base / "tum");
   tum.camera_file = temp_.file("tum.yaml",
                                "resolution: [640, 480]\nintrinsics: [517.3, 516.5, 318.6, 255.3]\n"
                                "distortion_model: none\n");
   const auto desk = open_source(tum);
   ASSERT_TRUE(desk) << desk.error().message;
-  EXPECT_EQ(desk->kind(), "TUM RGB-D recording");
+  EXPECT_EQ(desk->kind, "TUM RGB-D recording");
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {
@@ -47,7 +47,7 @@ class KittiSequenceTest : public ::testing::Test {
   }
   static void write(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
   std::string open_error(const SequenceOptions& options = {}) const {
-    const auto sequence = KittiSequence::open(folder_, options);
+    const auto sequence = open_kitti(folder_, options);
     return sequence ? "(opened)" : sequence.error().message;
   }
   static SequenceOptions frames(const std::string& text) {
@@ -60,16 +60,16 @@ class KittiSequenceTest : public ::testing::Test {
 };
 
 TEST_F(KittiSequenceTest, OpensASoundFolder) {
-  const auto sequence = KittiSequence::open(folder_);
+  const auto sequence = open_kitti(folder_);
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), 4U);
-  EXPECT_EQ(sequence->name(), "07");
-  EXPECT_EQ(sequence->camera().fx_px, 100.0);
-  EXPECT_EQ(sequence->camera().fy_px, 101.0);
-  EXPECT_EQ(sequence->camera().cx_px, 4.0);
-  EXPECT_EQ(sequence->camera().cy_px, 3.0);
-  EXPECT_EQ(sequence->camera().width_px, 8);
-  EXPECT_EQ(sequence->camera().height_px, 6);
+  EXPECT_EQ(sequence->name, "07");
+  EXPECT_EQ(sequence->camera.fx_px, 100.0);
+  EXPECT_EQ(sequence->camera.fy_px, 101.0);
+  EXPECT_EQ(sequence->camera.cx_px, 4.0);
+  EXPECT_EQ(sequence->camera.cy_px, 3.0);
+  EXPECT_EQ(sequence->camera.width_px, 8);
+  EXPECT_EQ(sequence->camera.height_px, 6);
   const auto frame = sequence->read(1);
   ASSERT_TRUE(frame) << frame.error().message;
   ASSERT_EQ(frame->type(), CV_8UC3);
@@ -77,15 +77,15 @@ TEST_F(KittiSequenceTest, OpensASoundFolder) {
 }
 
 TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
-  const auto sequence = KittiSequence::open(folder_ / "", frames("1:3"));
+  const auto sequence = open_kitti(folder_ / "", frames("1:3"));
   ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_EQ(sequence->name(), "07") << "a slash at the end changes nothing";
+  EXPECT_EQ(sequence->name, "07") << "a slash at the end changes nothing";
   ASSERT_EQ(sequence->size(), 2U);
-  EXPECT_EQ(sequence->range().begin, 1U);
-  EXPECT_EQ(sequence->file(0).filename(), "000001.png");
-  EXPECT_EQ(sequence->timestamps_s().front(), 0.1);
-  ASSERT_TRUE(sequence->ground_truth());
-  const Trajectory& truth = *sequence->ground_truth();
+  EXPECT_EQ(sequence->range.begin, 1U);
+  EXPECT_EQ(sequence->files[0].filename(), "000001.png");
+  EXPECT_EQ(sequence->timestamps_s.front(), 0.1);
+  ASSERT_TRUE(sequence->ground_truth);
+  const Trajectory& truth = *sequence->ground_truth;
   ASSERT_EQ(truth.size(), 2U);
   EXPECT_LT(truth[0].translation.norm() + truth[0].angle_rad(), 1e-12);
   EXPECT_LT((truth[1].translation - Eigen::Vector3d(0, 0, 2)).norm(), 1e-12);
@@ -93,18 +93,18 @@ TEST_F(KittiSequenceTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
 
 TEST_F(KittiSequenceTest, NoPoseFileMeansNoTruth) {
   fs::remove(poses());
-  const auto sequence = KittiSequence::open(folder_);
+  const auto sequence = open_kitti(folder_);
   ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_FALSE(sequence->ground_truth());
+  EXPECT_FALSE(sequence->ground_truth);
 }
 
 TEST_F(KittiSequenceTest, GivenPoseFileIsTakenInsteadAndMustExist) {
   write(root_ / "other.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 9\n");
   SequenceOptions options = frames(":2");
   options.ground_truth = root_ / "other.txt";
-  const auto sequence = KittiSequence::open(folder_, options);
+  const auto sequence = open_kitti(folder_, options);
   ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_NEAR(sequence->ground_truth()->back().translation.z(), 9.0, 1e-12);
+  EXPECT_NEAR(sequence->ground_truth->back().translation.z(), 9.0, 1e-12);
   options.ground_truth = root_ / "absent.txt";
   EXPECT_THAT(open_error(options), HasSubstr("absent.txt"));
 }
@@ -112,11 +112,11 @@ TEST_F(KittiSequenceTest, GivenPoseFileIsTakenInsteadAndMustExist) {
 TEST_F(KittiSequenceTest, CameraIsChosenAndNeverReplaced) {
   fs::create_directories(folder_ / "image_0");
   cv::imwrite((folder_ / "image_0" / "000000.png").string(), cv::Mat(5, 7, CV_8UC1, cv::Scalar(9)));
-  const auto gray = KittiSequence::open(folder_, {.camera = "image_0"});
+  const auto gray = open_kitti(folder_, {.camera = "image_0"});
   ASSERT_TRUE(gray) << gray.error().message;
-  EXPECT_EQ(gray->camera().fx_px, 90.0);
+  EXPECT_EQ(gray->camera.fx_px, 90.0);
   EXPECT_EQ(gray->read(0)->type(), CV_8UC1);
-  EXPECT_EQ(KittiSequence::open(folder_)->camera().fx_px, 100.0) << "auto takes image_2";
+  EXPECT_EQ(open_kitti(folder_)->camera.fx_px, 100.0) << "auto takes image_2";
   EXPECT_THAT(open_error({.camera = "image_3"}), HasSubstr("image_3"));
   EXPECT_THAT(open_error({.camera = "left"}), HasSubstr("found 'left'"));
 }
@@ -188,7 +188,7 @@ TEST_F(KittiSequenceTest, TruncatedImageAnywhereIsAnErrorOfThatFrameOnly) {
   const auto bytes = fs::file_size(image(2));
   for (std::uintmax_t keep = 0; keep < bytes; ++keep) {
     fs::resize_file(image(2), keep);
-    const auto sequence = KittiSequence::open(folder_);
+    const auto sequence = open_kitti(folder_);
     ASSERT_TRUE(sequence) << sequence.error().message;
     const auto frame = sequence->read(2);
     ASSERT_FALSE(frame) << keep << " of " << bytes << " bytes";
@@ -203,7 +203,7 @@ TEST_F(KittiSequenceTest, DamagedImageIsAnError) {
   file.seekp(45);  // inside the compressed pixels
   file.put('\x55');
   file.close();
-  const auto sequence = KittiSequence::open(folder_);
+  const auto sequence = open_kitti(folder_);
   ASSERT_TRUE(sequence);
   const auto frame = sequence->read(2);
   ASSERT_FALSE(frame);
@@ -213,9 +213,9 @@ TEST_F(KittiSequenceTest, DamagedImageIsAnError) {
 TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
   write(image(0), "not an image");
   cv::imwrite(image(3).string(), cv::Mat(6, 9, CV_8UC3, cv::Scalar(0, 0, 0)));
-  const auto sequence = KittiSequence::open(folder_);
+  const auto sequence = open_kitti(folder_);
   ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_EQ(sequence->camera().width_px, 8);
+  EXPECT_EQ(sequence->camera.width_px, 8);
   EXPECT_THAT(sequence->read(0).error().message, HasSubstr("another kind of file"));
   EXPECT_THAT(sequence->read(3).error().message, HasSubstr("8x6 pixels, found 9x6"));
   for (int i = 0; i < kNumFrames; ++i) {
@@ -226,9 +226,9 @@ TEST_F(KittiSequenceTest, BrokenFirstImageDoesNotHideTheSize) {
 
 TEST_F(KittiSequenceTest, AnOddFirstImageDoesNotSetTheSize) {
   cv::imwrite(image(0).string(), cv::Mat(6, 9, CV_8UC3, cv::Scalar(0, 0, 0)));
-  const auto sequence = KittiSequence::open(folder_);
+  const auto sequence = open_kitti(folder_);
   ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_EQ(sequence->camera().width_px, 8);
+  EXPECT_EQ(sequence->camera.width_px, 8);
   EXPECT_THAT(sequence->read(0).error().message, HasSubstr("8x6 pixels, found 9x6"));
   EXPECT_TRUE(sequence->read(1));
 }

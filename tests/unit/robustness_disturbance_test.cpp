@@ -21,7 +21,7 @@ constexpr std::size_t kNumFrames = 80;
 
 /// Blurred noise that moves to the left, along a straight path.
 FrameSource make_source(int type = CV_8UC1) {
-  FrameList frames;
+  FrameSource frames;
   frames.name = "wall";
   frames.range = {0, kNumFrames};
   frames.camera = {600.0, 600.0, 319.5, 119.5, 640, 240};
@@ -44,7 +44,7 @@ FrameSource make_source(int type = CV_8UC1) {
     }
     return image;
   };
-  return FrameSource(std::move(frames));
+  return frames;
 }
 
 double distance(const cv::Mat& a, const cv::Mat& b) {
@@ -77,11 +77,11 @@ TEST_P(EachDisturbance, KeepsTypeAndCameraSize) {
   for (const int type : {CV_8UC1, CV_8UC3}) {
     for (std::size_t strength = 0; strength < 3; ++strength) {
       const FrameSource source = disturb(make_source(type), kind(), strength, 1);
-      ASSERT_EQ(source.ground_truth()->size(), source.size());
-      ASSERT_EQ(source.timestamps_s().size(), source.size());
+      ASSERT_EQ(source.ground_truth->size(), source.size());
+      ASSERT_EQ(source.timestamps_s.size(), source.size());
       const cv::Mat image = *source.read(source.size() / 2);
       EXPECT_EQ(image.type(), type);
-      EXPECT_EQ(image.size(), cv::Size(source.camera().width_px, source.camera().height_px));
+      EXPECT_EQ(image.size(), cv::Size(source.camera.width_px, source.camera.height_px));
     }
   }
 }
@@ -177,12 +177,12 @@ TEST(Disturbances, OtherFramesKeepTheirPosesAndTimes) {
   };
   const FrameSource third = disturb(source, kind("every_nth"), 1, 1);
   ASSERT_EQ(third.size(), 27U);
-  EXPECT_EQ((*third.ground_truth())[4].translation.x(), 12.0);
+  EXPECT_EQ((*third.ground_truth)[4].translation.x(), 12.0);
   EXPECT_EQ(distance(*third.read(4), *source.read(12)), 0.0);
   const FrameSource dropped = disturb(source, kind("dropped"), 2, 1);
   EXPECT_LT(dropped.size(), source.size());
   for (std::size_t i = 0; i < dropped.size(); ++i) {
-    const auto frame = static_cast<std::size_t>((*dropped.ground_truth())[i].translation.x());
+    const auto frame = static_cast<std::size_t>((*dropped.ground_truth)[i].translation.x());
     EXPECT_EQ(distance(*dropped.read(i), *source.read(frame)), 0.0) << i;
   }
   const FrameSource repeated = disturb(source, kind("repeated"), 2, 1);
@@ -206,8 +206,8 @@ TEST(Disturbances, OtherCamerasSeeTheSameRays) {
     int count = 0;
     for (int v = 5; v + 5 < image.rows; ++v) {
       for (int u = 5; u + 5 < image.cols; ++u) {
-        const Camera& from = other.camera();
-        const Camera& to = source.camera();
+        const Camera& from = other.camera;
+        const Camera& to = source.camera;
         const cv::Point2f at(
             static_cast<float>((u - from.cx_px) / from.fx_px * to.fx_px + to.cx_px),
             static_cast<float>((v - from.cy_px) / from.fy_px * to.fy_px + to.cy_px));

@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/core/utility.hpp>
 
-#include "dataset/sequence.hpp"
+#include "dataset/frame_source.hpp"
 #include "support/temp_folder.hpp"
 #include "synth/synth.hpp"
 
@@ -57,15 +57,15 @@ class SyntheticDriveTest : public ::testing::Test {
 
 TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   ASSERT_EQ(sequence->size(), 3U);
-  EXPECT_EQ(sequence->camera().width_px, 160);
-  EXPECT_NEAR(sequence->camera().fx_px, 718.856 * 160 / 1241, 1e-9);
-  EXPECT_EQ(sequence->camera().fx_px, sequence->camera().fy_px);
-  EXPECT_DOUBLE_EQ(sequence->timestamps_s()[2], 0.2);
-  ASSERT_TRUE(sequence->ground_truth());
-  const Rigid3 step = sequence->ground_truth()->at(1);
+  EXPECT_EQ(sequence->camera.width_px, 160);
+  EXPECT_NEAR(sequence->camera.fx_px, 718.856 * 160 / 1241, 1e-9);
+  EXPECT_EQ(sequence->camera.fx_px, sequence->camera.fy_px);
+  EXPECT_DOUBLE_EQ(sequence->timestamps_s[2], 0.2);
+  ASSERT_TRUE(sequence->ground_truth);
+  const Rigid3 step = sequence->ground_truth->at(1);
   EXPECT_GT(step.translation.z(), 0.75) << "8 m/s at least, forward";
   EXPECT_LT(step.translation.norm(), 1.25) << "12 m/s at most";
   EXPECT_EQ(sequence->read(2)->type(), CV_8UC3);
@@ -84,10 +84,10 @@ TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
   for (const auto& [name, frames] : {std::pair("00", 3U), std::pair("street", 2U)}) {
-    const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / name);
+    const auto sequence = open_kitti(root_ / "out" / "sequences" / name);
     ASSERT_TRUE(sequence) << sequence.error().message;
     EXPECT_EQ(sequence->size(), frames);
-    EXPECT_TRUE(sequence->ground_truth());
+    EXPECT_TRUE(sequence->ground_truth);
   }
 }
 
@@ -119,16 +119,16 @@ TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
     return done < 2;
   };
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(6), stop_after_two));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), 2U);
-  EXPECT_EQ(sequence->ground_truth()->size(), 2U);
+  EXPECT_EQ(sequence->ground_truth->size(), 2U);
 }
 
 TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), 2U);
 }
@@ -152,11 +152,11 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
   options.write_depth = true;
   options.trajectory = write_poses(poses);
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   ASSERT_EQ(sequence->size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const Rigid3 error = sequence->ground_truth()->at(i).inverse() * poses[i];
+    const Rigid3 error = sequence->ground_truth->at(i).inverse() * poses[i];
     EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
     // The last numbers of the file: the road before the car, which nothing may stand on.
     const std::string depth =
@@ -176,7 +176,7 @@ TEST_F(SyntheticDriveTest, DefaultDriveIsWhatItAlwaysWas) {
   options.width_px = 310;
   options.height_px = 94;
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   const cv::Mat image = *sequence->read(19);
   constexpr std::array<double, 4> kMeans = {124.3807, 128.3152, 97.2685, 90.0490};
@@ -192,12 +192,12 @@ TEST_F(SyntheticDriveTest, WalkIsASequence) {
   options.width_px = 80;
   options.height_px = 60;
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  const auto sequence = KittiSequence::open(root_ / "out" / "sequences" / "00");
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), 3U);
-  EXPECT_DOUBLE_EQ(sequence->camera().fx_px, 585.0 / 8);
-  EXPECT_DOUBLE_EQ(sequence->camera().cx_px, 40.0);
-  EXPECT_NEAR(sequence->timestamps_s()[2], 2.0 / 30.0, 1e-9);
+  EXPECT_DOUBLE_EQ(sequence->camera.fx_px, 585.0 / 8);
+  EXPECT_DOUBLE_EQ(sequence->camera.cx_px, 40.0);
+  EXPECT_NEAR(sequence->timestamps_s[2], 2.0 / 30.0, 1e-9);
 }
 
 TEST_F(SyntheticDriveTest, WhatIsNotRenderedStaysAsItIs) {

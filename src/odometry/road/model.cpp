@@ -2,7 +2,6 @@
 #include "odometry/road/model.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <Eigen/Cholesky>
 

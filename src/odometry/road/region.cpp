@@ -2,7 +2,6 @@
 #include "odometry/road/region.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace stemvo {
 
