@@ -17,6 +17,7 @@
 #include "internal_check.hpp"
 #include "mapping/adjustment_covariance.hpp"
 #include "mapping/adjustment_errors.hpp"
+#include "mapping/pose_graph.hpp"
 
 namespace stemvo {
 namespace {
@@ -223,7 +224,8 @@ void Adjustment::add_lengths() {
   const auto add_distance = [&](int from, int to, double log_distance, double sigma) {
     add<1>(DistanceError{poses_[index(from)], poses_[index(to)], log_distance, sigma}, from, to);
   };
-  for (const MapLength& length : map_.lengths) {
+  for (std::size_t i = 0; i < map_.lengths.size(); ++i) {
+    const MapLength& length = map_.lengths[i];
     const auto found = motion_from.find(length.keyframe);
     if (found == motion_from.end()) {
       continue;
@@ -232,7 +234,7 @@ void Adjustment::add_lengths() {
     const double distance = edge.from_to.translation.norm();
     if (distance > 3.0 * edge.sigma_translation) {
       add_distance(edge.from, edge.to, std::log(distance) + length.log_metres_per_unit,
-                   std::hypot(length.sigma, edge.sigma_translation / distance));
+                   std::hypot(independent_sigma(map_, i), edge.sigma_translation / distance));
     }
   }
   if (map_.lengths.empty()) {

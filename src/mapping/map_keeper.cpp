@@ -188,6 +188,10 @@ void MapKeeper::add_node(const WindowView& view, const Keyframe& keyframe) {
   kept.camera = view.camera;
   kept.world_from_camera = view.trajectory[frame];
   const int node = static_cast<int>(map_.keyframes.size());
+  if (nodes_.empty() && node > 0 && map_.keyframes.back().frame == keyframe.frame) {
+    reopen_last(keyframe);
+    return;
+  }
   if (nodes_.empty()) {
     connect_first(kept);
   }
@@ -211,13 +215,52 @@ void MapKeeper::connect_first(KeptKeyframe& kept) {
     relocation_.reset();
     return;
   }
-  component_ = node;
-  if (node > 0) {
-    MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
-    edge.from = node - 1;
-    edge.to = node;
-    map_.motions.push_back(edge);
+  if (node == 0) {
+    component_ = node;
+    return;
   }
+  MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
+  if (kept.frame <= last_localized_ && !map_.motions.empty()) {
+    // Both frames saw the window before: the motion is as well known as the last one was.
+    edge.sigma_rad = map_.motions.back().sigma_rad;
+    edge.sigma_translation = map_.motions.back().sigma_translation;
+  } else {
+    component_ = node;
+  }
+  edge.from = node - 1;
+  edge.to = node;
+  map_.motions.push_back(edge);
+}
+
+/// The last node has a new unit: landmarks and lengths in its old one count no more.
+void MapKeeper::reopen_last(const Keyframe& keyframe) {
+  const int node = static_cast<int>(map_.keyframes.size()) - 1;
+  nodes_[keyframe.frame] = node;
+  for (MapEdge& motion : map_.motions) {
+    if (motion.to == node) {
+      motion.sigma_log_scale = kGuessLogScale;
+    }
+  }
+  std::erase_if(map_.lengths, [&](const MapLength& length) { return length.keyframe == node; });
+  std::vector<KeptCorner>& corners = map_.keyframes.back().corners;
+  std::map<int, KeptCorner> by_track;
+  for (const Observation& point : keyframe.points) {
+    by_track[point.track_id] = {point.track_id, point.uv.cast<float>()};
+  }
+  for (KeptCorner& corner : corners) {
+    corner.in_camera.setConstant(std::numeric_limits<float>::quiet_NaN());
+    by_track.erase(corner.track_id);
+  }
+  const bool is_place =
+      !map_.keyframes.back().descriptors.empty() ||
+      std::ranges::any_of(map_.loops, [&](const Loop& loop) { return loop.to == node; });
+  if (is_place) {
+    return;  // loops count its corners
+  }
+  for (const auto& [track_id, corner] : by_track) {
+    corners.push_back(corner);
+  }
+  std::ranges::sort(corners, {}, &KeptCorner::track_id);
 }
 
 std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
@@ -254,7 +297,9 @@ std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
 
 KeptMap MapKeeper::graph(const WindowView& view) const {
   KeptMap graph;
-  graph.keyframes.resize(map_.keyframes.size());
+  for (const KeptKeyframe& keyframe : map_.keyframes) {
+    graph.keyframes.emplace_back().time_s = keyframe.time_s;
+  }
   graph.map_from_keyframe = map_.map_from_keyframe;
   graph.motions = map_.motions;
   for (const Loop& loop : map_.loops) {
@@ -317,6 +362,7 @@ void MapKeeper::leave(const WindowView& view, std::size_t leaving) {
 }
 
 void MapKeeper::close(const WindowView& view) {
+  last_localized_ = view.last_localized;
   add_nodes(view);
   for (std::size_t i = 0; i < view.window.keyframes.size(); ++i) {
     leave(view, i);

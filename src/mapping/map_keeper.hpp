@@ -23,6 +23,7 @@ struct WindowView {
   std::span<const Rigid3> trajectory;  ///< of the frames that have ended
   std::span<const double> times_s;
   std::optional<double> metric_sigma;  ///< of log(metres per unit); nullopt: units are no metres
+  int last_localized = -1;             ///< the last frame that landmarks placed
 };
 
 /// The corners of a keyframe of the window, with the landmarks as they are now.
@@ -30,7 +31,8 @@ struct WindowView {
 
 /// Fills the kept map from the window: a keyframe becomes a node once its pose is in the
 /// trajectory; its landmarks, and the motions to its neighbours, are kept as they are when it
-/// leaves. Nodes that nothing measured connects are maps of their own, until a loop joins them: the
+/// leaves. A window that begins where the one before ended goes on in its map, in a unit of its
+/// own. Nodes that nothing measured connects are maps of their own, until a loop joins them: the
 /// younger one is moved to the older.
 class MapKeeper {
  public:
@@ -79,6 +81,7 @@ class MapKeeper {
  private:
   void add_node(const WindowView& view, const Keyframe& keyframe);
   void connect_first(KeptKeyframe& kept);
+  void reopen_last(const Keyframe& keyframe);
   void keep(const WindowView& view, std::size_t leaving);
 
   KeptMap map_;
@@ -86,6 +89,7 @@ class MapKeeper {
   Similarity3 map_from_world_;
   std::map<int, int> nodes_;  ///< of the window's keyframes, by frame
   int component_ = 0;         ///< the window's
+  int last_localized_ = -1;   ///< in the window before
   std::optional<Loop> relocation_;
 };
 

@@ -18,6 +18,25 @@ Similarity3 between(const Similarity3& a, const Similarity3& b, double share) {
                          so3_exp(share * so3_log(a_from_b.rotation)), share * a_from_b.translation);
 }
 
+/// For each keyframe whether the trajectory came to it from the one before as was measured: it did
+/// not where the world was moved, or where a lost camera was found.
+std::vector<char> find_connected(const KeptMap& map) {
+  constexpr double kMaxSigmas = 5.0;
+  std::vector<char> connected(map.keyframes.size());
+  for (const MapEdge& edge : map.motions) {
+    const auto to = static_cast<std::size_t>(edge.to);
+    if (edge.from + 1 == edge.to) {
+      const Rigid3 came =
+          map.keyframes[to - 1].world_from_camera.inverse() * map.keyframes[to].world_from_camera;
+      connected[to] |= static_cast<char>(came.rotation.angularDistance(edge.from_to.rotation) <
+                                             kMaxSigmas * edge.sigma_rad &&
+                                         (came.translation - edge.from_to.translation).norm() <
+                                             kMaxSigmas * edge.sigma_translation);
+    }
+  }
+  return connected;
+}
+
 }  // namespace
 
 std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_camera,
@@ -33,6 +52,7 @@ std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_cam
   const auto time_of = [&](const KeptKeyframe& keyframe) {
     return times_s[static_cast<std::size_t>(keyframe.frame)];
   };
+  const std::vector<char> connected = find_connected(map);
   std::vector<Similarity3> map_from_camera;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
     const auto by = [&](auto keyframe) {
@@ -42,10 +62,14 @@ std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_cam
     };
     const auto after =
         std::ranges::lower_bound(begin, keyframes.end(), static_cast<int>(i), {}, frame_of);
+    const bool is_keyframe = after != keyframes.end() && after->frame == static_cast<int>(i);
     if (begin == keyframes.end()) {
       map_from_camera.emplace_back(world_from_camera[i]);
-    } else if (after == keyframes.end() || after == begin) {
-      map_from_camera.push_back(by(after == begin ? begin : std::prev(after)));
+    } else if (after == begin || is_keyframe) {
+      map_from_camera.push_back(by(after));
+    } else if (after == keyframes.end() ||
+               connected[static_cast<std::size_t>(after - keyframes.begin())] == 0) {
+      map_from_camera.push_back(by(std::prev(after)));
     } else {
       const auto before = std::prev(after);
       const double share = (times_s[i] - time_of(*before)) / (time_of(*after) - time_of(*before));

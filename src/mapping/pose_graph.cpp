@@ -12,6 +12,7 @@
 #include <ceres/rotation.h>
 
 #include "internal_check.hpp"
+#include "odometry/scale_filter.hpp"
 
 namespace stemvo {
 namespace {
@@ -64,7 +65,7 @@ struct MotionError {
 
 /// The unit of a keyframe as it was measured.
 struct LengthError {
-  const MapLength& length;
+  MapLength length;
 
   template <typename T>
   bool operator()(const T* node, T* residual) const {
@@ -114,7 +115,9 @@ Graph::Graph(const KeptMap& map) : problem_(shared_parts()) {
   for (const Loop& loop : map.loops) {
     add(loop, &loop_loss_);
   }
-  for (const MapLength& length : map.lengths) {
+  for (std::size_t i = 0; i < map.lengths.size(); ++i) {
+    MapLength length = map.lengths[i];
+    length.sigma = independent_sigma(map, i);
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<LengthError, 1, 8>(new LengthError{length}), nullptr,
         nodes_.at(static_cast<std::size_t>(length.keyframe)).data());
@@ -151,6 +154,18 @@ std::vector<Similarity3> Graph::similarities() const {
 }
 
 }  // namespace
+
+double independent_sigma(const KeptMap& map, std::size_t length) {
+  const auto time_of = [&](const MapLength& one) {
+    return map.keyframes.at(static_cast<std::size_t>(one.keyframe)).time_s;
+  };
+  const MapLength& at = map.lengths[length];
+  const double interval_s = length > 0 ? time_of(at) - time_of(map.lengths[length - 1]) : 0.0;
+  // A steady filter of a random walk forgets by 1 / e in memory_s.
+  const double memory_s = at.sigma * at.sigma / (kScaleDrift * kScaleDrift);
+  return interval_s > 0.0 ? at.sigma * std::sqrt(std::max(1.0, 2.0 * memory_s / interval_s))
+                          : at.sigma;
+}
 
 double sigmas_off(const KeptMap& map, const MapEdge& edge) {
   const Node from = node_of(map.map_from_keyframe.at(static_cast<std::size_t>(edge.from)));

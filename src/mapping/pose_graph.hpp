@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
+
 #include "mapping/kept_map.hpp"
 
 namespace stemvo {
@@ -16,6 +18,10 @@ namespace stemvo {
 /// by many sigmas it pulls no more. One thread, no clock: the same bytes on every run.
 /// False: nothing to do, or not solved; the map is unchanged.
 bool solve_pose_graph(KeptMap& map);
+
+/// Sigma of a length if its error were like no other one's: a filter remembers, so that lengths
+/// that follow each other err alike.
+[[nodiscard]] double independent_sigma(const KeptMap& map, std::size_t length);
 
 /// How far map_from_keyframe is from what an edge measured: the length of its seven errors in their
 /// sigmas. Of a true one, whose sigmas hold, the square is 7 on average.

@@ -7,16 +7,8 @@
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
-namespace {
-
-/// Drift of log(metres per unit) in a second: the map stretches by 1 % a second on real clips,
-/// steadily; a random walk must be loose enough to follow without lagging behind.
-constexpr double kDriftSigma = 0.019;
-
-}  // namespace
-
 MetricScale::MetricScale(const Options& config, std::optional<double> drift_sigma)
-    : filter_(drift_sigma.value_or(kDriftSigma), config.scale.temporal_filter) {
+    : filter_(drift_sigma.value_or(kScaleDrift), config.scale.temporal_filter) {
   if (config.scale.source != ScaleSource::kCameraHeight) {
     return;
   }

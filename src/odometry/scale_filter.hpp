@@ -13,6 +13,10 @@ enum class ScaleWitness {
   kWay,   ///< a speed or a distance from outside
 };
 
+/// Drift of log(metres per unit) in a second, standard deviation: the map stretches by 1 % a second
+/// on real clips, steadily; a random walk must be loose enough to follow without lagging behind.
+inline constexpr double kScaleDrift = 0.019;
+
 /// Kalman filter of log(metres per unit), a random walk. A measurement far from the state counts
 /// little (Huber; still less beyond three sigmas), but several in a row of one witness on the same
 /// side, for as long as it was believed before, say that the state is wrong: it opens up. A way

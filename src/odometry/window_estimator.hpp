@@ -71,7 +71,7 @@ class WindowEstimator final : public Estimator {
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
-    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_};
+    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_, last_moving_.frame};
   }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }

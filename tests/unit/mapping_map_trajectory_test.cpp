@@ -29,6 +29,11 @@ struct Path {
     keyframe.frame = frame;
     keyframe.time_s = times_s[i];
     keyframe.world_from_camera = poses[i];
+    if (!map.keyframes.empty()) {
+      const int to = static_cast<int>(map.keyframes.size());
+      const Rigid3 motion = map.keyframes.back().world_from_camera.inverse() * poses[i];
+      map.motions.push_back({to - 1, to, Similarity3(motion), 1e-3, 0.01, 0.01});
+    }
     map.keyframes.push_back(keyframe);
     map.map_from_keyframe.push_back(map_from_world * Similarity3(poses[i]));
   }
@@ -88,6 +93,25 @@ TEST(MapTrajectory, HasNoJumps) {
   for (std::size_t i = 1; i < placed.size(); ++i) {
     EXPECT_NEAR((placed[i].translation - placed[i - 1].translation).norm(), 1.0, 0.08) << i;
   }
+}
+
+/// A place is recognized at frame 20, and the world is moved: the frames before are of the old one.
+TEST(MapTrajectory, FollowsTheWorldWhereItIsMoved) {
+  Path path(31);
+  const Path straight = path;
+  path.keep(10, {});
+  path.keep(20, {});
+  const Rigid3 moved(so3_exp({0.0, 0.3, 0.0}), {5.0, 0.0, -2.0});
+  for (std::size_t i = 20; i < path.poses.size(); ++i) {
+    path.poses[i] = moved * path.poses[i];
+  }
+  path.map.keyframes[1].world_from_camera = path.poses[20];
+  const auto placed = path.placed();
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    EXPECT_THAT(pose_of(placed[i]), IsNearMotion(straight.poses[i], 1e-10)) << i;
+  }
+  path.map.motions.clear();  // lost in between
+  EXPECT_THAT(pose_of(path.placed()[19]), IsNearMotion(straight.poses[19], 1e-10));
 }
 
 TEST(MapTrajectory, LeavesKeyframesOfAnotherRecordingAlone) {

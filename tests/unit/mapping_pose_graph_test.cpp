@@ -159,6 +159,19 @@ TEST(PoseGraph, LengthsMakeTheUnitAMetre) {
               2.0 * circle.truth[100].translation.norm(), 0.05 * 2.0 * 64.0);
 }
 
+/// A filter that is as sure as the scale drifts in a second remembers a second: twenty tenths of one
+/// are as good as one length.
+TEST(PoseGraph, LengthsThatFollowEachOtherErrAlike) {
+  KeptMap map;
+  map.keyframes.resize(3);
+  map.keyframes[1].time_s = 0.1;
+  map.keyframes[2].time_s = 50.0;
+  map.lengths = {{0, 0.0, 0.019}, {1, 0.0, 0.019}, {2, 0.0, 0.019}};
+  EXPECT_NEAR(independent_sigma(map, 1), 0.019 * std::sqrt(20.0), 1e-9);
+  EXPECT_EQ(independent_sigma(map, 0), 0.019);
+  EXPECT_EQ(independent_sigma(map, 2), 0.019);
+}
+
 TEST(PoseGraph, IsTheSameTwiceAndSoonDone) {
   Circle circle(4500, 900, 6);
   for (int i = 900; i < 4500; i += 20) {
