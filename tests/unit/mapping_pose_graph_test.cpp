@@ -159,8 +159,8 @@ TEST(PoseGraph, LengthsMakeTheUnitAMetre) {
               2.0 * circle.truth[100].translation.norm(), 0.05 * 2.0 * 64.0);
 }
 
-/// A filter that is as sure as the scale drifts in a second remembers a second: twenty tenths of one
-/// are as good as one length.
+/// A filter that is as sure as the scale drifts in a second remembers a second: twenty tenths of
+/// one are as good as one length.
 TEST(PoseGraph, LengthsThatFollowEachOtherErrAlike) {
   KeptMap map;
   map.keyframes.resize(3);

@@ -9,6 +9,10 @@ import click
 import stemvo
 
 COMMANDS = {
+    "benchmark": "Methods on KITTI's sequences, beside zero motion and published numbers",
+    "compare": "Trajectories of any program against one ground truth",
+    "paper": "The paper's tables and figures from weights and KITTI",
+    "scene": "A result for COLMAP or nerfstudio",
 }
 
 

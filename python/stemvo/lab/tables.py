@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""A table as text, Markdown, LaTeX and CSV."""
+
+import pandas as pd
+
+_LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+          "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
+
+
+LEFT = ("frames", "method", "scale from", "alignment", "note", "ran on")  # columns of words
+WIDEST = 5  # columns of a table in one of two columns of text
+
+
+def cell(value, decimals=2):
+    """For people: a number with so many decimals; nothing known: `-`."""
+    if isinstance(value, str):
+        return " ".join(value.split())
+    if value is None or pd.isna(value):
+        return "-"
+    return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)
+
+
+def formatted(frame, decimals):
+    """All cells as text. decimals: of a column's numbers; 2 where it names none."""
+    return pd.DataFrame({name: [cell(value, decimals.get(name, 2)) for value in frame[name]] for name in frame.columns}, dtype=object)
+
+
+def markdown(frame):
+    rows = [[str(name) for name in frame.columns], ["---"] * len(frame.columns), *frame.values.tolist()]
+    rows[0], rows[2:] = [_plain(text) for text in rows[0]], [[_plain(text) for text in row] for row in rows[2:]]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _plain(text):
+    return text.replace("|", "\\|")
+
+
+def latex(frame, caption, notes=()):
+    """A table by the packages booktabs and graphicx; a wide one is as wide as the text. Numbers are right."""
+    rows = [" & ".join(map(_escaped, row)) + r" \\" for row in [list(frame.columns), *frame.values.tolist()]]
+    kinds = "".join("l" if i == 0 or name in LEFT else "r" for i, name in enumerate(frame.columns))
+    is_wide = len(frame.columns) > WIDEST
+    environment = "table*" if is_wide else "table"
+    lines = [rf"\begin{{{environment}}}", r"\centering", rf"\caption{{{_escaped(caption)}}}", r"\resizebox{\textwidth}{!}{%" if is_wide else None,
+             rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", rows[0], r"\midrule", *rows[1:], r"\bottomrule", r"\end{tabular}" + "}" * is_wide,
+             *(rf"\par\footnotesize {_escaped(note)}" for note in notes), rf"\end{{{environment}}}"]
+    return "\n".join(line for line in lines if line is not None) + "\n"
+
+
+def _escaped(text):
+    return "".join(_LATEX.get(letter, letter) for letter in str(text))
+
+
+def text(frame):
+    """Columns side by side; numbers are right."""
+    rows = [list(map(str, frame.columns)), *frame.values.tolist()]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return "".join("  ".join(cell.ljust(width) if i == 0 or frame.columns[i] in LEFT else cell.rjust(width)
+                             for i, (cell, width) in enumerate(zip(row, widths))).rstrip() + "\n" for row in rows)
+
+
+def write(frame, stem, caption, notes=(), decimals=None):
+    """stem.txt, .md, .tex for people; stem.csv with all digits. Returns the text."""
+    shown = formatted(frame, decimals or {})
+    said = "".join(f"{note}\n" for note in notes)
+    files = {".txt": f"{caption}\n\n{text(shown)}{said and chr(10) + said}", ".tex": latex(shown, caption, notes),
+             ".md": f"# {caption}\n\n{markdown(shown)}" + "".join(f"\n{note}\n" for note in notes)}
+    for suffix, content in files.items():
+        stem.with_name(stem.name + suffix).write_text(content)
+    frame.to_csv(stem.with_name(stem.name + ".csv"), index=False)
+    return files[".txt"]
