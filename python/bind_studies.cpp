@@ -91,6 +91,7 @@ class PythonChannelOdometry {
   PythonChannelOdometry(const nb::object& camera, const nb::object& options) {
     Config config = config_of(options);
     config.threads = 1;
+    has_map_ = config.odometry.mode == OdometryMode::kMap;
     const FrameSource* frames = frames_of(camera);
     odometry_.emplace(config, frames != nullptr ? frames->camera : nb::cast<Camera>(camera),
                       frames != nullptr ? frames->mask : cv::Mat());
@@ -110,7 +111,8 @@ class PythonChannelOdometry {
     Frame frame;
     frame.time_s = timestamp;
     if (channel != nullptr && !pixels.empty()) {
-      frame = odometry_->prepare(*channel, pixels.clone(), timestamp);
+      // Pairs of frames have no landmarks that take their colour from it later.
+      frame = odometry_->prepare(*channel, has_map_ ? pixels.clone() : pixels, timestamp);
     }
     return odometry_->process(std::move(frame));
   }
@@ -119,6 +121,7 @@ class PythonChannelOdometry {
   }
 
  private:
+  bool has_map_ = true;
   std::optional<ChannelOdometry> odometry_;
   double last_time_s_ = -std::numeric_limits<double>::infinity();
 };

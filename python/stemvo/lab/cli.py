@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """stemvo-lab: a command NAME is the click command `command` of the module stemvo.lab.NAME, imported when it is called."""
 
-import contextlib
 import importlib
 
 import click
@@ -13,6 +12,7 @@ COMMANDS = {
     "compare": "Trajectories of any program against one ground truth",
     "paper": "The paper's tables and figures from weights and KITTI",
     "scene": "A result for COLMAP or nerfstudio",
+    "search": "Rank the filters of networks by the odometry they give",
 }
 
 
@@ -24,11 +24,15 @@ class Lazy(click.Group):
         return importlib.import_module(f"stemvo.lab.{name}").command if name in COMMANDS else None
 
     def format_commands(self, ctx, formatter):
-        with formatter.section("Commands") if COMMANDS else contextlib.nullcontext():
-            formatter.write_dl(list(COMMANDS.items()) or [("", "")])
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
 
 @click.command(cls=Lazy, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(stemvo.__version__, message="%(version)s")
 def main():
     """Studies of monocular visual odometry on learned filter channels."""
+
+
+if __name__ == "__main__":
+    main()
