@@ -12,9 +12,8 @@
 namespace stemvo {
 namespace {
 
-const std::vector<std::string> kCommands = {"run",        "evaluate", "channel", "synth",
-                                            "calibrate",  "check",    "models",  "benchmark",
-                                            "robustness", "search"};
+const std::vector<std::string> kCommands = {"run",   "evaluate", "channel",    "synth", "calibrate",
+                                            "check", "models",   "robustness", "search"};
 
 /// For a terminal of 80 columns; commands to copy stay whole.
 std::vector<std::string> lines_too_long(const std::string& help) {
@@ -98,7 +97,6 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "--out", "o"}, "INPUT"},
       {{"check", "metrics.json"}, "--against"},
       {{"runn", "x", "--out", "o"}, "robustness, search, found 'runn'"},
-      {{"benchmark", "x"}, "--out"},
   };
   for (const Misuse& misuse : cases) {
     const ProgramResult result = run_stemvo(misuse.arguments);

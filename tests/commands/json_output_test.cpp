@@ -72,7 +72,6 @@ TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
       // The drive does not tell of the camera: a result, and a failure.
       {"calibrate", {sequence_, "--out", folder_ / "calib.txt", "--json"}, "parameters", 1},
       {"models", {"--json"}, "models"},
-      {"benchmark", {drive_, "--out", folder_ / "bench", "--json"}, "sequences"},
       {"robustness",
        {sequence_, "--out", folder_ / "rob", "--kinds", "none", "--controls", "gray", "--json"},
        "rows"},

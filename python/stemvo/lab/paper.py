@@ -204,7 +204,7 @@ def write_document(out, names):
 
 
 def reproduce(weights, kitti, out, layers, chosen, frames, winner, config, others):
-    options, counted = runs.options_of(config), {}
+    options, counted = runs.options_of(None if config == "default" else config), {}
     for file in weights_in(weights):
         made, totals = export(file, layers, out)
         counted[file.stem] = made, totals
@@ -257,6 +257,6 @@ def command(weights, kitti, out, layers, filters, frames, winner, config, deepvo
             raise runs.LabError(f"--filters: expected A:B, found '{filters}'")
         out.mkdir(parents=True, exist_ok=True)
         click.echo(reproduce(weights, kitti, out, layers, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
-                             None if config == "default" else config, {"DeepVO": deepvo, "TartanVO": tartanvo}))
+                             config, {"DeepVO": deepvo, "TartanVO": tartanvo}))
     except (runs.LabError, ValueError) as error:
         raise click.ClickException(str(error)) from None

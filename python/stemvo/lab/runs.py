@@ -25,23 +25,23 @@ class LabError(Exception):
     """One line for the user."""
 
 
-def config_folder():
-    """Where paper.yaml and published.json are: in the checkout, else in the installed package."""
+def config_file(name):
+    """NAME.yaml of the program: of the checkout, else of the installed package; else the file of this name."""
     here = pathlib.Path(__file__).resolve()
-    return next(folder for folder in (here.parents[3] / "config", here.parent) if (folder / "published.json").exists())
+    ours = (here.parents[3] / f"config/{name}.yaml", here.with_name(f"{name}.yaml"))
+    return next((file for file in ours if file.exists()), pathlib.Path(name))
 
 
 def published():
-    """Official sequences and published numbers; its comments are lines of their own."""
-    lines = (config_folder() / "published.json").read_text().splitlines()
-    return json.loads("\n".join(line for line in lines if not line.startswith("//")))
+    """Official sequences and published numbers."""
+    return json.loads(pathlib.Path(__file__).with_name("published.json").read_text())
 
 
 def options_of(config=None, overrides=(), model=None):
     """Keys and values of a configuration file (`paper`: the program's own), of KEY=VALUE lines and of a model's file."""
     values = {}
     if config:
-        file = config_folder() / f"{config}.yaml" if (config_folder() / f"{config}.yaml").exists() else pathlib.Path(config)
+        file = config_file(config)
         stemvo.Options.load(file)  # whose message names file and line
         values = {f"{group}.{key}": value for group, keys in (yaml.safe_load(file.read_text()) or {}).items() if isinstance(keys, dict)
                   for key, value in keys.items()}

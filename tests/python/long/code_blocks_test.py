@@ -114,7 +114,7 @@ class CodeBlocks(unittest.TestCase):
     def run_script(self, script, folder):
         shutil.rmtree(folder / "result", ignore_errors=True)
         return subprocess.run(["bash", "-euo", "pipefail", "-c", script], cwd=folder, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
-                              env={**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"})
+                              env={**os.environ, "PATH": f"{PROGRAM.parent}:{ROOT}/build/lab/bin:{os.environ['PATH']}"})
 
     def cameras(self):
         return [block for block in documented.blocks("yaml") if "intrinsics" in yaml.safe_load(block.text)]

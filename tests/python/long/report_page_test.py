@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""report.html of run, search, benchmark and robustness in Chromium: it draws without a network, hover, wheel and keyboard work."""
+"""report.html of run, search and robustness in Chromium: it draws without a network, hover, wheel and keyboard work."""
 
 import csv
 import itertools
@@ -81,17 +81,6 @@ class ReportPage(unittest.TestCase):
         self.assertIn("Path from above", found["headings"])
         self.assertNotIn("Error over distance", found["headings"])
         self.assertIn("Command", found["headings"])
-
-    def test_benchmark(self):
-        out = self.folder / "benchmark"
-        strange = "<b>a &amp; b"  # plotly.js would make it a bold "a & b"
-        call("synth", self.folder / "drives", "--name", strange, "--frames", 20, "--width", 310, "--height", 94)
-        call("synth", self.folder / "drives", "--frames", FRAMES, "--width", 620, "--height", 188)
-        call("benchmark", self.folder / "drives", "--out", out)
-        found = look_at(out / "report.html")
-        self.expect_a_sound_page(found)
-        self.assertIn(f"00, clip 0:{FRAMES} of 4541", found["headings"])
-        self.assertIn(f"{strange}, frames 0:20", found["categories"])
 
     def test_robustness(self):
         out = self.folder / "robustness"
