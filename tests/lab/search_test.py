@@ -104,6 +104,7 @@ def test_intervals_hold_the_true_ratio():
         inside += found.low <= 1.2 <= found.high
         decided += ratios.paired_ratio([ratios.Drive(3.0 * a, b, 8)]).is_decided
     assert inside >= 90 and decided >= 90
+    assert ratios.Ratio(1.3, 1.1, 1.6).is_above(1) and not ratios.Ratio(1.3, 1.1, 1.6).is_above(1000) and not ratios.Ratio(1.3, 0.0, np.inf).is_above(1)
     assert ratios.paired_ratio([]) == (1.0, 0.0, np.inf)
     few = ratios.paired_ratio([ratios.Drive(np.ones(20), np.full(20, 2.0), 8)])
     assert few == (0.5, 0.0, np.inf)

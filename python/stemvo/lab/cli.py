@@ -12,6 +12,7 @@ COMMANDS = {
     "compare": "Trajectories of any program against one ground truth",
     "paper": "The paper's tables and figures from weights and KITTI",
     "scene": "A result for COLMAP or nerfstudio",
+    "robustness": "Compare channels on frames in worse light, weather or hands",
     "search": "Rank the filters of networks by the odometry they give",
 }
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """How many times as large the errors of one method are as those of another, on the same segments of drives."""
 
+import statistics
 import typing
 
 import numpy as np
 
 SAMPLES = 2000
 LEAST_FREEDOM = 4.0  # blocks less roads; below it the interval is everything
+NORMAL = statistics.NormalDist()
 LEAST_ERROR = 1e-9  # below it a ratio is one of roundings
 
 
@@ -18,6 +20,11 @@ class Ratio(typing.NamedTuple):
     @property
     def is_decided(self):
         return self.high < 1.0 or self.low > 1.0
+
+    def is_above(self, count):
+        """Above 1 at 95 % for so many ratios together (Bonferroni): the best of many on a short path is luck, too."""
+        wider = NORMAL.inv_cdf(1.0 - 0.025 / count) / NORMAL.inv_cdf(0.975)
+        return self.low > 0.0 and self.ratio * (self.low / self.ratio) ** wider > 1.0
 
 
 class Drive(typing.NamedTuple):

@@ -129,7 +129,7 @@ class Search:
             self.run(alive, ranking_drives, share)
             if share < 1.0:
                 told = ranking.compare({one: self.scores(one, share) for one in alive if not one[0].is_baseline})
-                alive = [one for one in alive if one[0].is_baseline or (told[one].status == "ranked" and told[one].is_equal)]
+                alive = [one for one in alive if one[0].is_baseline or (told[one].status == "ranked" and not told[one].ratio.is_above(len(told)))]
         self.run(alive, [drive for drive in self.drives if drive.held_out], 1.0)
 
     def scores(self, candidate, share, held_out=False):
