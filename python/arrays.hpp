@@ -67,5 +67,6 @@ void bind_odometry(nb::module_& module);
 void bind_recordings(nb::module_& module);
 void bind_evaluation(nb::module_& module);
 void bind_studies(nb::module_& module);
+void bind_tracking(nb::module_& module);
 
 }  // namespace stemvo::python

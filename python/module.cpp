@@ -11,4 +11,5 @@ NB_MODULE(_core, module) {
   stemvo::python::bind_odometry(module);
   stemvo::python::bind_evaluation(module);
   stemvo::python::bind_studies(module);
+  stemvo::python::bind_tracking(module);
 }

@@ -44,6 +44,17 @@ bool is_in_image(const BorderedImage& image, float x, float y) {
          y <= static_cast<float>(image.height - 1);
 }
 
+/// Makes the gradient orthogonal to {1, value}: bias and gain drop out.
+template <typename Values>
+void make_orthogonal(CoarseValues& values, Values& gx, Values& gy) {
+  const auto value = Values(values.data()) - Values(values.data()).mean();
+  const float norm_sq = std::max(value.square().sum(), kMinNormSq);
+  for (Values* gradient : {&gx, &gy}) {
+    *gradient -= gradient->mean();
+    *gradient -= value * ((value * *gradient).sum() / norm_sq);
+  }
+}
+
 void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
   const PatchKernels& kernels = patch_kernels();
   const float left = x - 0.5F * (kCoarseSide - 1);
@@ -52,20 +63,17 @@ void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coa
   CoarseValues before;
   kernels.sample_coarse(image, left - 1.0F, top, before);
   kernels.sample_coarse(image, left + 1.0F, top, coarse.gx);
-  float xx = 0.0F;
-  float xy = 0.0F;
-  float yy = 0.0F;
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    coarse.gx[i] = 0.5F * (coarse.gx[i] - before[i]);
-  }
+  using Values = Eigen::Map<Eigen::Array<float, kCoarseSide * kCoarseSide, 1>>;
+  Values gx(coarse.gx.data());
+  Values gy(coarse.gy.data());
+  gx = 0.5F * (gx - Values(before.data()));
   kernels.sample_coarse(image, left, top - 1.0F, before);
   kernels.sample_coarse(image, left, top + 1.0F, coarse.gy);
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    coarse.gy[i] = 0.5F * (coarse.gy[i] - before[i]);
-    xx += coarse.gx[i] * coarse.gx[i];
-    xy += coarse.gx[i] * coarse.gy[i];
-    yy += coarse.gy[i] * coarse.gy[i];
-  }
+  gy = 0.5F * (gy - Values(before.data()));
+  make_orthogonal(coarse.value, gx, gy);
+  const float xx = gx.square().sum();
+  const float xy = (gx * gy).sum();
+  const float yy = gy.square().sum();
   const float determinant = xx * yy - xy * xy;
   const float inverse =
       determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;

@@ -26,6 +26,10 @@ cv::Point pixel_of(const cv::Mat& image, const cv::Point2f& uv) {
           std::clamp(cvRound(uv.y), 0, image.rows - 1)};
 }
 
+/// Corners are looked for at half the size where that is at hand: the patch that is tracked is
+/// several pixels wide, and any pixel of a corner will do.
+std::size_t detection_level(const ImagePyramid& image) { return image.levels.size() > 1 ? 1 : 0; }
+
 bool is_allowed(const cv::Mat& mask, const cv::Point2f& uv) {
   return mask.empty() || mask.at<unsigned char>(pixel_of(mask, uv)) != 0;
 }
@@ -143,23 +147,37 @@ void PointFrontEnd::match_projections(View& view) {
   }
 }
 
-/// Corners are looked for at half the size where that is at hand: the patch that is tracked is
-/// several pixels wide, and any pixel of a corner will do.
+std::vector<cv::Point2f> PointFrontEnd::corners(const ImagePyramid& image,
+                                                const cv::Mat& mask,
+                                                const FeatureOptions& options) {
+  const std::size_t level = detection_level(image);
+  const auto to_pixels = static_cast<float>(1 << level);
+  const double min_distance =
+      options.min_distance_px / (image.channel.map.scale.minCoeff() * to_pixels);
+  std::vector<cv::Point2f> found;
+  cv::goodFeaturesToTrack(image.levels[level], found, /*maxCorners=*/0, options.corner_quality,
+                          min_distance, mask, /*blockSize=*/3);
+  for (cv::Point2f& corner : found) {
+    corner *= to_pixels;
+  }
+  return found;
+}
+
 void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
   match_projections(view);
   const ImagePyramid& image = *view.image;
-  const std::size_t level = image.levels.size() > 1 ? 1 : 0;
-  const cv::Mat& pixels = image.levels[level];
-  const float to_pixels = level > 0 ? 2.0F : 1.0F;
+  const std::size_t level = detection_level(image);
+  const cv::Size size = image.levels[level].size();
+  const auto to_pixels = static_cast<float>(1 << level);
   const double min_distance =
       options_.min_distance_px / (image.channel.map.scale.minCoeff() * to_pixels);
   GridQuota quota(options_, image.channel.pixels.size());
   PixelMap map = image.channel.map;
   map.scale *= to_pixels;
-  cv::Mat mask = image.mask_of(map, pixels.size());
+  cv::Mat mask = image.mask_of(map, size);
   if (mask.empty()) {
-    mask = cv::Mat(pixels.size(), CV_8U, cv::Scalar(255));
+    mask = cv::Mat(size, CV_8U, cv::Scalar(255));
   }
   std::vector<Point> kept;
   kept.reserve(view.points.size());
@@ -174,12 +192,8 @@ void PointFrontEnd::replenish(View& view) {
   }
   std::ranges::sort(kept, {}, &Point::id);
   view.points = std::move(kept);
-
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(pixels, corners, /*maxCorners=*/0, options_.corner_quality, min_distance,
-                          mask, /*blockSize=*/3);
-  for (const cv::Point2f& corner : corners) {  // strongest first
-    const Point point{corner * to_pixels, next_id_};
+  for (const cv::Point2f& corner : corners(image, mask, options_)) {  // strongest first
+    const Point point{corner, next_id_};
     if (quota.take(point.uv) && begin_track(image, point)) {
       view.points.push_back(point);
       ++next_id_;

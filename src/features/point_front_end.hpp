@@ -23,6 +23,11 @@ class PointFrontEnd : public FrontEnd {
   void expect_projections(Observations projections) override {
     projections_ = std::move(projections);
   }
+  /// Where new points may begin: pixels of the image, strongest first. `mask`: of the level that
+  /// they are looked for on, 0 where none; empty: everywhere.
+  [[nodiscard]] static std::vector<cv::Point2f> corners(const ImagePyramid& image,
+                                                        const cv::Mat& mask,
+                                                        const FeatureOptions& options);
 
  protected:
   /// A point of an image, in that image's pixels.

@@ -14,6 +14,7 @@ COMMANDS = {
     "scene": "A result for COLMAP or nerfstudio",
     "robustness": "Compare channels on frames in worse light, weather or hands",
     "search": "Rank the filters of networks by the odometry they give",
+    "warps": "How far tracked points land from where they are, on each channel",
 }
 
 
