@@ -117,6 +117,9 @@ void add_options(CLI::App& command, SynthArguments& arguments) {
           "default none")
       ->type_name("MS")
       ->check(in_range(0.0, 100.0));
+  command.add_flag("--small-chip", options.small_chip,
+                   "A small camera's chip: point spread, gaps between pixels, photon and read "
+                   "noise, response curve; default: an almost perfect one");
   command.add_flag("--auto-exposure", options.follows_light,
                    "Exposure that follows the light within half a second");
   command.add_option("--width", options.width_px, "Pixels; default 1241, with --walk 640")

@@ -26,6 +26,30 @@ Vec2 sample(int k) {
           (static_cast<double>(sub_row) + 0.5) / kSubRows - 0.5};
 }
 
+/// Shares of a pixel's light: how much of each sample's cell is in the middle square of side
+/// `fill`.
+std::array<float, kSamples> sample_weights(double fill) {
+  std::array<float, kSamples> weights{};
+  weights.fill(1.0F / kSamples);
+  if (fill == 1.0) {
+    return weights;
+  }
+  const auto overlap = [&](double middle, double width) {
+    const double end = std::min(middle + 0.5 * width, 0.5 * fill);
+    return std::max(0.0, end - std::max(middle - 0.5 * width, -0.5 * fill));
+  };
+  float sum = 0.0F;
+  for (int k = 0; k < kSamples; ++k) {
+    const Vec2 at = sample(k);
+    const double area = overlap(at.x(), 1.0 / kSubColumns) * overlap(at.y(), 1.0 / kSubRows);
+    sum += weights[static_cast<std::size_t>(k)] = static_cast<float>(area);
+  }
+  for (float& weight : weights) {
+    weight /= sum;
+  }
+  return weights;
+}
+
 /// A function that is linear over the image, at a pixel.
 double at(const Vec3& linear, const Vec2& pixel) {
   return linear.x() * pixel.x() + linear.y() * pixel.y() + linear.z();
@@ -140,6 +164,8 @@ struct FramePainter {
   Eigen::Matrix3d world_from_camera;
   std::vector<ScreenFace> faces;
   cv::Range rows;
+  double fill;
+  std::array<float, kSamples> weights;            ///< of a pixel's samples; their sum is 1
   int band_begin = 0;                             ///< first row of the present band
   int row_width = camera.width_px * kSubColumns;  ///< samples
   std::vector<float> inverse_z = {};              ///< per sample of the band
@@ -213,14 +239,16 @@ struct FramePainter {
       }
       Vec2 sum(0.0, 0.0);
       int count = 0;
+      float weight = 0.0F;
       for (int k = 0; k < kSamples; ++k) {
         if (seen[static_cast<std::size_t>(k)] == *first) {
           sum += sample(k);
           ++count;
+          weight += weights[static_cast<std::size_t>(k)];
         }
       }
       const Vec2 middle = Vec2(column, row) + sum / count;
-      light += colour_of(*first, middle) * (static_cast<float>(count) / kSamples);
+      light += colour_of(*first, middle) * weight;
       if (count > max_count) {
         max_count = count;
         frame.depth_m.at<float>(row - rows.start, column) =
@@ -266,7 +294,7 @@ struct FramePainter {
       const double dx = z * (over_z.x() - t * face.inverse_z.x());
       const double dy = z * (over_z.y() - t * face.inverse_z.y());
       value = static_cast<float>(t);
-      width = static_cast<float>(std::sqrt(dx * dx + dy * dy));
+      width = static_cast<float>(fill * std::sqrt(dx * dx + dy * dy));
     };
     texture(face.texture_over_z[0], sample.u, sample.width_u);
     texture(face.texture_over_z[1], sample.v, sample.width_v);
@@ -293,8 +321,10 @@ RenderedFrame paint(std::span<const Face* const> faces,
                     const Rigid3& scene_from_camera,
                     const Camera& camera,
                     const Textures& textures,
-                    cv::Range rows) {
-  FramePainter painter{camera, textures, scene_from_camera.rotation_matrix(), {}, rows};
+                    cv::Range rows,
+                    double fill) {
+  FramePainter painter{
+      camera, textures, scene_from_camera.rotation_matrix(), {}, rows, fill, sample_weights(fill)};
   const Eigen::Matrix3d camera_from_scene = painter.world_from_camera.transpose();
   for (const Face* face : faces) {
     if (const auto seen = project_face(*face, scene_from_camera, camera_from_scene, camera)) {

@@ -25,6 +25,7 @@ struct RenderedFrame {
                                   const Rigid3& scene_from_camera,
                                   const Camera& camera,
                                   const Textures& textures,
-                                  cv::Range rows);
+                                  cv::Range rows,
+                                  double fill = 1.0);
 
 }  // namespace stemvo::synth

@@ -82,7 +82,9 @@ const Trajectory& Renderer::world_from_camera() const {
 
 RenderedFrame Renderer::render(std::size_t index) const {
   RenderedFrame frame = light_of(index);
-  frame.rgb = expose(frame.rgb, gains_[index], hash_of(noise_seed_, 'n', index));
+  const std::uint64_t noise = hash_of(noise_seed_, 'n', index);
+  frame.rgb = options_.small_chip ? expose_chip(frame.rgb, gains_[index], noise)
+                                  : expose(frame.rgb, gains_[index], noise);
   return frame;
 }
 
@@ -111,7 +113,7 @@ RenderedFrame Renderer::light_of(std::size_t index) const {
   }
   const Rigid3& pose = world_from_camera()[index];
   return paint(pointers_to(scene), seen_from(pose.translation, pose), camera_, textures_,
-               {0, camera_.height_px});
+               {0, camera_.height_px}, options_.small_chip ? chip::kFill : 1.0);
 }
 
 RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) const {
@@ -139,8 +141,8 @@ RenderedFrame Renderer::light_over_time(std::size_t index, const Scene& still) c
         traffic_->add_at(at, moving);
         std::ranges::copy(pointers_to(moving), std::back_inserter(faces));
       }
-      const RenderedFrame part =
-          paint(faces, seen_from(origin, pose_at(poses, at)), camera_, textures_, rows);
+      const RenderedFrame part = paint(faces, seen_from(origin, pose_at(poses, at)), camera_,
+                                       textures_, rows, options_.small_chip ? chip::kFill : 1.0);
       frame.rgb.rowRange(rows) += part.rgb / shutter.moments;
       if (moment == shutter.moments / 2) {
         part.depth_m.copyTo(frame.depth_m.rowRange(rows));

@@ -20,8 +20,10 @@ struct RenderOptions {
   bool traffic = false;  ///< on the street of a drive
   double rate_hz = kDriveRate_hz;
   /// The pose of a frame is that of its middle row in the middle of its exposure.
-  double exposure_s = 0.0;     ///< 0: no motion blur
-  double readout_s = 0.0;      ///< from the first row to the last; 0: all rows at once
+  double exposure_s = 0.0;  ///< 0: no motion blur
+  double readout_s = 0.0;   ///< from the first row to the last; 0: all rows at once
+  bool small_chip =
+      false;  ///< a small camera's chip (sensor.hpp) in place of an almost perfect one
   bool follows_light = false;  ///< exposure settles in half a second; else it is constant
 };
 

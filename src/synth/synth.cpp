@@ -171,7 +171,7 @@ Status render_synthetic_drive(const fs::path& out_dir,
   const double rate_hz = options.walk ? options.walk_rate_hz : synth::kDriveRate_hz;
   const synth::Renderer renderer(std::move(path), camera, options.seed,
                                  {options.visit, options.traffic, rate_hz, options.exposure_s,
-                                  options.readout_s, options.follows_light});
+                                  options.readout_s, options.small_chip, options.follows_light});
   const Trajectory& poses = renderer.world_from_camera();
   const int total = static_cast<int>(poses.size());
   const int batch = std::max(1, cv::getNumThreads());  // frames at once: bounds the memory

@@ -30,6 +30,7 @@ struct SyntheticDriveOptions {
   std::optional<double> turn_rate_deg_s = std::nullopt;  ///< of a walk, at a turn's middle
   double exposure_s = 0.0;     ///< motion blur: a frame's pose is that of its exposure's middle
   double readout_s = 0.0;      ///< rolling shutter, first to last row: the pose is the middle row's
+  bool small_chip = false;     ///< point spread, fill, noise, response of a small camera's chip
   bool follows_light = false;  ///< exposure settles in half a second; else it is constant
   std::optional<int> width_px = std::nullopt;   ///< nullopt: 1241, with a walk 640
   std::optional<int> height_px = std::nullopt;  ///< nullopt: 376, with a walk 480
