@@ -106,7 +106,7 @@ void ChannelOdometry::localize() {
   Stopwatch watch;
   work.localized = estimator_->localize(work.frame);
   if (work.frame.has_image()) {
-    front_end_->remove_outliers(work.localized.inlier_mask);
+    front_end_->remove_outliers(kept_tracks(work.localized));
     front_end_->expect_projections(std::move(work.localized.projections));
     work.frame.times.pose_ms = watch.lap_ms();
   }

@@ -48,10 +48,20 @@ struct Frame {
 struct LocalizedFrame {
   FrameResult result;             ///< all but the pose, and the road measurement
   std::vector<char> inlier_mask;  ///< one per match: it agrees with the motion
+  std::vector<char> moving_mask;  ///< one per match, or none: it moves on its own, no inlier
   Observations projections;       ///< of the landmarks without an inlier in this frame
   /// Motions that two views tell: MeasuredMotion::covariance of what is added to the pose before.
   std::optional<Matrix6d> two_view = std::nullopt;
 };
+
+/// One per match: its track goes on.
+[[nodiscard]] inline std::vector<char> kept_tracks(const LocalizedFrame& localized) {
+  std::vector<char> kept = localized.inlier_mask;
+  for (std::size_t i = 0; i < localized.moving_mask.size(); ++i) {
+    kept[i] = kept[i] != 0 || localized.moving_mask[i] != 0 ? 1 : 0;
+  }
+  return kept;
+}
 
 /// A landmark in the camera of the last keyframe that saw it, in the units of its pose in the
 /// trajectory.

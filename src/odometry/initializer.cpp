@@ -10,6 +10,7 @@
 #include "geometry/decomposition.hpp"
 #include "geometry/pose_refinement.hpp"
 #include "geometry/two_view_motion.hpp"
+#include "odometry/motion_rivals.hpp"
 
 namespace stemvo {
 namespace {
@@ -85,10 +86,24 @@ void refine(std::vector<Hypothesis>& hypotheses,
             [](const Hypothesis& a, const Hypothesis& b) { return a.cost < b.cost; });
 }
 
+/// Flags of tracks as flags of matches; `otherwise`: that of a match which is no such track.
+std::vector<char> flags_of(const Matches& matches,
+                           const std::vector<int>& track_ids,
+                           const std::vector<char>& flags,
+                           char otherwise) {
+  std::vector<char> mask(matches.track_ids.size(), otherwise);
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    const auto track = std::lower_bound(track_ids.begin(), track_ids.end(), matches.track_ids[i]);
+    if (track != track_ids.end() && *track == matches.track_ids[i]) {
+      mask[i] = flags[static_cast<std::size_t>(track - track_ids.begin())];
+    }
+  }
+  return mask;
+}
+
 }  // namespace
 
-Initializer::Initializer(const Options& config)
-    : loss_px_(config.two_view.refine_loss_px), two_view_(config) {}
+Initializer::Initializer(const Options& config) : options_(config.two_view), two_view_(config) {}
 
 void Initializer::start(View reference) { reference_ = std::move(reference); }
 
@@ -106,20 +121,31 @@ MeasuredMotion Initializer::measure(const Matches& matches,
   }
   const PointPairs pairs = common_points(reference_.points, now);
   const PixelPairs pixels(pairs.prev_uv, pairs.cur_uv);
-  MeasuredMotion motion = two_view_.measure(pixels, camera, /*is_initializing=*/true);
-  if (motion.state == FrameState::kTracking) {
-    choose_motion(pixels, camera, motion);
-  }
-  std::vector<char> mask = all;
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    const auto pair =
-        std::lower_bound(pairs.track_ids.begin(), pairs.track_ids.end(), matches.track_ids[i]);
-    if (pair != pairs.track_ids.end() && *pair == matches.track_ids[i]) {
-      mask[i] = motion.inlier_mask[static_cast<std::size_t>(pair - pairs.track_ids.begin())];
-    }
-  }
-  motion.inlier_mask = std::move(mask);
+  MeasuredMotion motion = measure_world(pixels, camera);
+  motion.inlier_mask = flags_of(matches, pairs.track_ids, motion.inlier_mask, 1);
+  motion.moving_mask = flags_of(matches, pairs.track_ids, motion.moving_mask, 0);
   return motion;
+}
+
+MeasuredMotion Initializer::measure_world(const PixelPairs& pairs, const Camera& camera) const {
+  MeasuredMotion motion = two_view_.measure(pairs, camera, /*is_initializing=*/true);
+  auto rivals = find_rivals(motion, pairs, camera, options_, two_view_);
+  if (!rivals.has_value()) {
+    if (motion.state == FrameState::kTracking) {
+      choose_motion(pairs, camera, motion);
+    }
+    motion.moving_mask.assign(pairs.size(), 0);
+    return motion;
+  }
+  MeasuredMotion& world = rivals->world;
+  const auto prev = select(pairs.prev_uv, rivals->world_party);
+  const auto cur = select(pairs.cur_uv, rivals->world_party);
+  if (world.state == FrameState::kTracking) {
+    choose_motion({prev, cur}, camera, world);
+  }
+  world.inlier_mask = scatter(world.inlier_mask, rivals->world_party);
+  world.moving_mask = std::move(rivals->moving_mask);
+  return std::move(world);
 }
 
 void Initializer::choose_motion(const PixelPairs& pairs,
@@ -127,7 +153,7 @@ void Initializer::choose_motion(const PixelPairs& pairs,
                                 MeasuredMotion& motion) const {
   motion.is_decisive = false;
   std::vector<Hypothesis> hypotheses = plausible_hypotheses(motion, pairs, camera);
-  refine(hypotheses, pairs, camera, loss_px_);
+  refine(hypotheses, pairs, camera, options_.refine_loss_px);
   if (hypotheses.empty()) {
     return;
   }
@@ -135,7 +161,7 @@ void Initializer::choose_motion(const PixelPairs& pairs,
   const std::vector<char> explained =
       test_points(hypotheses.front().cur_from_prev, pairs, camera).good_mask;
   refine(hypotheses, {select(pairs.prev_uv, explained), select(pairs.cur_uv, explained)}, camera,
-         loss_px_);
+         options_.refine_loss_px);
   const Hypothesis& best = hypotheses.front();
   const auto rival = std::find_if(
       hypotheses.begin(), hypotheses.end(),

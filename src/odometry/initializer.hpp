@@ -49,11 +49,13 @@ class Initializer {
                                                   const WindowOptions& window_options) const;
 
  private:
+  /// The motion of the camera, of things that move on their own told apart.
+  [[nodiscard]] MeasuredMotion measure_world(const PixelPairs& pairs, const Camera& camera) const;
   /// Takes the hypothesis of either model that fits best; decisive where no other fits nearly as
   /// well.
   void choose_motion(const PixelPairs& pairs, const Camera& camera, MeasuredMotion& motion) const;
 
-  double loss_px_;
+  TwoViewOptions options_;
   TwoViewEstimator two_view_;
   View reference_;
 };

@@ -32,6 +32,7 @@ struct MeasuredMotion {
   double runner_up_ratio = 1.0;    ///< of the hypothesis test; near 1: a guess
   int num_inliers = 0;
   std::vector<char> inlier_mask;              ///< one per match
+  std::vector<char> moving_mask;              ///< of an Initializer: it moves on its own
   std::optional<Eigen::Matrix3d> homography;  ///< pixels; the models that were scored
   std::optional<Eigen::Matrix3d> essential;   ///< normalised coordinates
 };

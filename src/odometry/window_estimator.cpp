@@ -36,6 +36,7 @@ WindowEstimator::WindowEstimator(const Options& config, const Camera& camera)
       refine_every_(config.ba.every_n_keyframes),
       keyframe_parallax_px_(kKeyframeParallax_px * camera.mean_focal_px() / kFocal_px),
       initializer_(config),
+      moving_(config),
       mapper_(config),
       scale_(config),
       calibration_(camera, config.camera.refine, config.threads != 1),
@@ -55,6 +56,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   FrameResult& result = localized.result;
   std::vector<char>& mask = localized.inlier_mask;
   mask.assign(frame.matches.cur_uv.size(), 1);
+  moving_.leave_out(frame.matches, mask);
   result.state = find_pose(frame, localized);
   was_static_ = frame.has_image() ? result.state != FrameState::kTracking : was_static_;
   result.num_matches = static_cast<int>(mask.size());
@@ -112,7 +114,8 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
                                                 LocalizedFrame& localized) {
   is_initializing_ = false;
   world_from_camera_ = found.world_from_camera;
-  mark_outliers(frame.matches, localized.inlier_mask);
+  mark_outliers(frame.matches, localization_.inlier_bound_px, localized.inlier_mask);
+  follow_things(frame.matches, localized);
   Observations now = current_points(frame.matches, localized.inlier_mask);
   const Rigid3 before = last_moving_.world_from_camera;
   const double bound_px = kTurnFlow * min_flow_px();
@@ -150,6 +153,7 @@ FrameState WindowEstimator::measure_since_reference(const Frame& frame,
   }
   add_scores(motion, localized.result);
   localized.inlier_mask = motion.inlier_mask;
+  localized.moving_mask = motion.moving_mask;
   return accept_motion(frame, motion, localized);
 }
 
@@ -174,6 +178,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   if (is_tracking && motion.is_decisive &&
       open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
                    frame.time_s, frame.road})) {
+    moving_.begin(frame.matches, motion.moving_mask);
     return FrameState::kInitializing;
   }
   // Until there is a first map, the position is held; later the camera goes on as fast as it was.
@@ -191,6 +196,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
 void WindowEstimator::reset_reference(View reference) {
   initializer_.start(std::move(reference));
   still_s_ = 0.0;
+  moving_.clear();
   is_initializing_ = true;
 }
 
@@ -226,22 +232,6 @@ bool WindowEstimator::open_window(View view) {
 
 double WindowEstimator::min_flow_px() const {
   return (was_static_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
-}
-
-void WindowEstimator::mark_outliers(const Matches& matches, std::vector<char>& mask) const {
-  const Rigid3 camera_from_world = world_from_camera_.inverse();
-  if (is_last_localized_ && matches.prev_frame == last_.frame) {
-    mask = epipolar_inliers(camera_from_world * last_.world_from_camera,
-                            {matches.prev_uv, matches.cur_uv}, camera(),
-                            localization_.inlier_bound_px);
-  }
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    const auto landmark = window_.landmarks.find(matches.track_ids[i]);
-    if (landmark != window_.landmarks.end()) {
-      mask[i] = is_near(camera_from_world, landmark->second, matches.cur_uv[i], camera(),
-                        localization_.inlier_bound_px);
-    }
-  }
 }
 
 void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {

@@ -13,6 +13,7 @@
 #include "odometry/localization.hpp"
 #include "odometry/metric_scale.hpp"
 #include "odometry/motion_covariance.hpp"
+#include "odometry/moving_tracks.hpp"
 #include "odometry/self_calibration.hpp"
 #include "odometry/window.hpp"
 #include "odometry/window_history.hpp"
@@ -78,7 +79,9 @@ class WindowEstimator final : public Estimator {
   /// Least flow that counts as motion.
   [[nodiscard]] double min_flow_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
-  void mark_outliers(const Matches& matches, std::vector<char>& mask) const;
+  void mark_outliers(const Matches& matches, double bound_px, std::vector<char>& mask) const;
+  /// Tracks of things that move on their own are no inliers, and go on.
+  void follow_things(const Matches& matches, LocalizedFrame& localized);
 
   // After localization.
   [[nodiscard]] bool is_keyframe(const View& view) const;
@@ -101,6 +104,7 @@ class WindowEstimator final : public Estimator {
   double keyframe_parallax_px_;
 
   Initializer initializer_;
+  MovingTracks moving_;
   bool is_initializing_ = true;
   Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;

@@ -71,7 +71,7 @@ class EstimatorRun {
       id += kManyTracks * num_rejected_[id];
     }
     LocalizedFrame localized = estimator_.localize(frame);
-    inlier_mask = localized.inlier_mask;
+    inlier_mask = kept_tracks(localized);
     point_ids = points;
     for (std::size_t k = 0; k < inlier_mask.size(); ++k) {
       num_rejected_[points[k]] += inlier_mask[k] == 0 ? 1 : 0;
@@ -106,7 +106,7 @@ class EstimatorRun {
   std::function<std::shared_ptr<const RoadImage>(int)> road;  ///< of the drive's frames, or none
   std::function<std::shared_ptr<const ImagePyramid>(int)> pyramid;  ///< likewise
   std::vector<FrameResult> results;
-  std::vector<char> inlier_mask;  ///< of the last frame
+  std::vector<char> inlier_mask;  ///< of the last frame: the tracks that go on
   std::vector<int> point_ids;     ///< of the same matches
 
  private:

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "odometry/moving_tracks.hpp"
+#include "odometry/window_estimator.hpp"
+#include "support/estimator_run.hpp"
+
+namespace stemvo {
+namespace {
+
+using testing::DriveTracks;
+using testing::EstimatorRun;
+
+/// A street that winds a little, 0.8 m a frame.
+DriveTracks street(int num_frames, std::uint64_t seed) {
+  std::vector<Rigid3> path(1);
+  while (static_cast<int>(path.size()) < num_frames) {
+    const double bend = 0.016 * std::sin(0.08 * static_cast<double>(path.size()));
+    path.push_back(path.back() * Rigid3(so3_exp({0.0, bend, 0.0}), {0.5 * bend, 0.0, 0.8}));
+  }
+  return {path, testing::points_along(path, 18 * num_frames, seed), 0.1, seed};
+}
+
+/// A plane full of corners before this part of the image, which it crosses at `px_per_frame`; what
+/// leaves it on one side comes in on the other as another track.
+void put_plane_before(DriveTracks& drive, double from, double to, double px_per_frame) {
+  constexpr int kNumCorners = 150;
+  const double left = from * drive.camera.width_px;
+  const double width = (to - from) * drive.camera.width_px;
+  testing::SceneRandom random(5);
+  std::vector<Eigen::Vector2d> corners;
+  for (int i = 0; i < kNumCorners; ++i) {
+    corners.emplace_back(random.uniform(0.0, width), random.uniform(5.0, 370.0));
+  }
+  for (int frame = 0; frame < drive.num_frames(); ++frame) {
+    auto& seen = drive.observations[static_cast<std::size_t>(frame)];
+    std::erase_if(seen, [&](const auto& point) {
+      return point.second.x() >= left && point.second.x() < left + width;
+    });
+    for (int i = 0; i < kNumCorners; ++i) {
+      const Eigen::Vector2d& corner = corners[static_cast<std::size_t>(i)];
+      const double at = corner.x() + px_per_frame * frame;
+      const int lap = static_cast<int>(at / width);
+      const Eigen::Vector2d noise = random.noise(0.1);
+      seen.emplace(100000 + 1000 * lap + i,
+                   Eigen::Vector2d(left + at - lap * width, corner.y()) + noise);
+    }
+  }
+}
+
+/// Rotation, and shape of the path, once a map is open.
+void expect_true_path(const DriveTracks& drive, const WindowEstimator& estimator, double max_rad) {
+  const std::vector<Rigid3>& found = estimator.trajectory();
+  const std::size_t open = 2;
+  const Rigid3 truth = drive.world_from_camera[open].inverse() * drive.world_from_camera.back();
+  const Rigid3 estimate = found[open].inverse() * found.back();
+  EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), max_rad);
+  EXPECT_LT((estimate.translation.normalized() - truth.translation.normalized()).norm(), max_rad);
+}
+
+struct Panel {
+  double from;
+  double to;
+  double px_per_frame;
+};
+
+class MovingThings : public ::testing::TestWithParam<Panel> {};
+
+TEST_P(MovingThings, ThePathIsTheWorldsFromTheFirstFrameOn) {
+  const auto [from, to, px_per_frame] = GetParam();
+  DriveTracks drive = street(40, 3);
+  put_plane_before(drive, from, to, px_per_frame);
+  WindowEstimator estimator(testing::config_without_scale(), drive.camera);
+  EstimatorRun run(estimator, drive);
+  run.add_all();
+  EXPECT_GT(run.count(FrameState::kTracking), 34);
+  expect_true_path(drive, estimator, 0.02);
+}
+
+INSTANTIATE_TEST_SUITE_P(Panels,
+                         MovingThings,
+                         ::testing::Values(Panel{0.333, 0.667, 2.0},
+                                           Panel{0.333, 0.667, 5.0},
+                                           Panel{0.333, 0.667, 10.0}));
+
+TEST(CellVotes, ATexturedCellHasNoMoreThanOneVote) {
+  const Camera camera = testing::kitti_camera();
+  std::vector<Eigen::Vector2d> uv(50, {10.0, 10.0});  // all in one cell, half of them agree
+  std::vector<char> agrees(uv.size(), 1);
+  std::fill(agrees.begin(), agrees.begin() + 25, char{0});
+  EXPECT_NEAR(cell_votes(uv, agrees, camera), 0.5, 1e-12);
+  uv.emplace_back(600.0, 200.0);
+  agrees.push_back(1);
+  EXPECT_NEAR(cell_votes(uv, agrees, camera), 1.5, 1e-12);
+}
+
+/// A flock that goes right in a still world: ids 0 to 39 go, 100 to 139 stay.
+Matches flock(int frame, double px_per_frame) {
+  Matches matches;
+  testing::SceneRandom random(8);
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Vector2d corner(random.uniform(400.0, 600.0), random.uniform(100.0, 250.0));
+    matches.track_ids.push_back(i);
+    matches.prev_uv.emplace_back(corner.x() + px_per_frame * (frame - 1), corner.y());
+    matches.cur_uv.emplace_back(corner.x() + px_per_frame * frame, corner.y());
+  }
+  for (int i = 100; i < 140; ++i) {
+    const Eigen::Vector2d corner(random.uniform(0.0, 300.0), random.uniform(100.0, 250.0));
+    matches.track_ids.push_back(i);
+    matches.prev_uv.push_back(corner);
+    matches.cur_uv.push_back(corner);
+  }
+  return matches;
+}
+
+TEST(MovingTracks, TracksJoinAThingAndLeaveIt) {
+  constexpr std::size_t kFlock = 40;
+  const Camera camera = testing::kitti_camera();
+  MovingTracks moving{Options()};
+  Matches matches = flock(1, 3.0);
+  std::vector<char> fits_world(matches.track_ids.size(), 1);
+  std::fill(fits_world.begin(), fits_world.begin() + kFlock, char{0});
+  // One of the flock is not named at first, one of the world is.
+  std::vector<char> named(fits_world.size(), 0);
+  std::fill(named.begin() + 1, named.begin() + kFlock, char{1});
+  named.back() = 1;
+  moving.begin(matches, named);
+  for (int frame = 1; frame <= 4; ++frame) {
+    moving.observe(flock(frame, 3.0), fits_world, camera);
+  }
+  const std::vector<char> flags = moving.flags(matches);
+  EXPECT_EQ(std::count(flags.begin(), flags.begin() + kFlock, char{1}), kFlock);
+  EXPECT_EQ(std::count(flags.begin() + kFlock, flags.end(), char{1}), 0);
+}
+
+}  // namespace
+}  // namespace stemvo
