@@ -7,6 +7,8 @@ import re
 import shutil
 import subprocess
 
+import numpy as np
+import onnx
 import pandas as pd
 import pytest
 from click.testing import CliRunner
@@ -81,6 +83,18 @@ def test_figures(made):
     for name in ("figure1", "figure3", "figure5"):
         assert (made / f"{name}.svg").stat().st_size > 1000
     assert not (made / "figure4.svg").exists()
+
+
+def test_all_layers_of_a_network(tmp_path):
+    random, nodes, weights = np.random.default_rng(1), [], []
+    for number, (inputs, filters) in enumerate(((3, 4), (4, 6))):
+        weights.append(onnx.numpy_helper.from_array(random.standard_normal((filters, inputs, 3, 3)).astype(np.float32), f"w{number}"))
+        nodes.append(onnx.helper.make_node("Conv", ["x" if number == 0 else "y0", f"w{number}"], [f"y{number}"], strides=[2, 2], pads=[1, 1, 1, 1]))
+    graph = onnx.helper.make_graph(nodes, "two", [onnx.helper.make_tensor_value_info("x", 1, [1, 3, "h", "w"])],
+                                   [onnx.helper.make_tensor_value_info("y1", 1, [1, 6, "a", "b"])], weights)
+    onnx.save(onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8), tmp_path / "two.onnx")
+    layers, totals = paper.export(tmp_path / "two.onnx", "all", tmp_path, "unit")
+    assert totals == (2, 10, 10, 0) and [(layer.name, layer.filters, layer.stride_px) for layer in layers] == [("y0", 4, 2), ("y1", 6, 4)]
 
 
 @pytest.mark.skipif("STEMVO_SHARED_DATA" not in os.environ, reason="STEMVO_SHARED_DATA is not set")

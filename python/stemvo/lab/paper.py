@@ -47,8 +47,8 @@ def plain(name):
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def export(weights, layers, out):
-    """The layers of a weights file (the stem, or those named), and (layers, filters, used, not used) or None where a file does not tell."""
+def export(weights, layers, out, preprocessing=None):
+    """The layers of a weights file (the stem, those named, or `all` that the paper's rule uses), and (layers, filters, used, not used) or None where a file does not tell."""
     said = _metadata(weights) if weights.suffix == ".onnx" else {}
     if said:
         return [_layer(weights)], None
@@ -57,7 +57,10 @@ def export(weights, layers, out):
         raise runs.LabError(f"{weights}: expected an .onnx file that tools/export_stem.py of a checkout wrote")
     listed = _output(tool, weights, "--list")
     totals = re.search(r"^layers (\d+), filters (\d+), used (\d+) .*not used (\d+)", listed, re.MULTILINE)
-    written = _output(tool, weights, "--out", out / "models", *(["--layers", layers] if layers else []))
+    if layers == "all" and weights.suffix != ".npz":  # which holds one
+        layers = ",".join(re.findall(r"^(\S+) +convolution +\d+  yes$", listed, re.MULTILINE))
+    more = [*(["--layers", layers] if layers not in (None, "all") else []), *(["--preprocessing", preprocessing] if preprocessing else [])]
+    written = _output(tool, weights, "--out", out / "models", *more)
     files = re.findall(r"^(.+\.onnx): ", written, re.MULTILINE)
     return [_layer(pathlib.Path(file)) for file in files], tuple(map(int, totals.groups()))
 
@@ -203,10 +206,10 @@ def write_document(out, names):
     return (out / "paper.txt").read_text()
 
 
-def reproduce(weights, kitti, out, layers, chosen, frames, winner, config, others):
+def reproduce(weights, kitti, out, layers, preprocessing, chosen, frames, winner, config, others):
     options, counted = runs.options_of(None if config == "default" else config), {}
     for file in weights_in(weights):
-        made, totals = export(file, layers, out)
+        made, totals = export(file, layers, out, preprocessing)
         counted[file.stem] = made, totals
     every = [layer for made, _ in counted.values() for layer in made]
     sequences = runs.sequences_of(kitti, SEQUENCES)
@@ -242,21 +245,22 @@ def reproduce(weights, kitti, out, layers, chosen, frames, winner, config, other
 @click.argument("weights", type=click.Path(exists=True, path_type=pathlib.Path))
 @click.argument("kitti", type=click.Path(exists=True, file_okay=False, path_type=pathlib.Path))
 @click.option("--out", required=True, type=click.Path(path_type=pathlib.Path), help="Folder of tables, figures, paper.tex and runs/")
-@click.option("--layers", metavar="A,B,..", help="Of each network, by name (default: its stem)")
+@click.option("--layers", metavar="A,B,..", help="Of each network, by name, or all (default: its stem; deeper ones: of a whole .onnx)")
+@click.option("--preprocessing", help="What a whole .onnx is fed: none, unit, imagenet, ..")
 @click.option("--filters", metavar="A:B", help="Of each layer, in Table 2 (default: all)")
 @click.option("--frames", type=click.IntRange(2), default=200, show_default=True, help="Of the first sequence, in Table 2")
 @click.option("--filter", "winner", type=click.IntRange(0), default=10, show_default=True, help="Of the first layer, in Table 4 and the figures")
 @click.option("--config", default="paper", show_default=True, help="paper, default or a file")
 @click.option("--deepvo", type=click.Path(exists=True, file_okay=False, path_type=pathlib.Path), help="Folder of its files NN.txt: Figure 4")
 @click.option("--tartanvo", type=click.Path(exists=True, file_okay=False, path_type=pathlib.Path), help="Likewise: Figure 5")
-def command(weights, kitti, out, layers, filters, frames, winner, config, deepvo, tartanvo):
+def command(weights, kitti, out, layers, preprocessing, filters, frames, winner, config, deepvo, tartanvo):
     """The paper's tables 1, 2 and 4 and figures 1, 3, 4 and 5 from WEIGHTS (a file or a folder of them) and KITTI."""
     chosen = re.fullmatch(r"(\d+):(\d+)", filters or "0:1")
     try:
         if not chosen:
             raise runs.LabError(f"--filters: expected A:B, found '{filters}'")
         out.mkdir(parents=True, exist_ok=True)
-        click.echo(reproduce(weights, kitti, out, layers, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
+        click.echo(reproduce(weights, kitti, out, layers, preprocessing, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
                              config, {"DeepVO": deepvo, "TartanVO": tartanvo}))
     except (runs.LabError, ValueError) as error:
         raise click.ClickException(str(error)) from None
