@@ -60,7 +60,6 @@ IN_PLACE_OF = [
     (r"\bNAME\.onnx", "weights.onnx"),
     (r"\bWEIGHTS\b", "weights.npz"),
     (r"\bRECORDING\b", "KITTI/sequences/03"),
-    (r"\[(--sequences 00),02\]", r"\1"),
     (r"^(memusage|/usr/bin/time -f %R|strace -f -c -e trace=mmap) ", ""),
 ]
 
