@@ -106,3 +106,6 @@ def test_tables_escape():
     frame = tables.formatted(pd.DataFrame({"a_b": ["x|y & 5 %"], "n": [1.23456], "none": [None]}), {"n": 3})
     assert tables.markdown(frame).splitlines()[2] == "| x\\|y & 5 % | 1.235 | - |"
     assert r"x\textbar{}y \& 5 \% & 1.235 & - \\" in tables.latex(frame, "c")
+    parts = tables.latex(tables.formatted(pd.DataFrame({"a": range(100)}), {}), "c").split(r"\begin{table}")[1:]
+    assert [part.count(r" \\") - 1 for part in parts] == [45, 45, 10]
+    assert [r"\caption{c (continued)}" in part for part in parts] == [False, True, True]

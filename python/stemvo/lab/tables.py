@@ -8,6 +8,7 @@ _LATEX = {"\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"
 
 
 LEFT = ("frames", "method", "scale from", "alignment", "note", "ran on")  # columns of words
+PAGE_ROWS, MORE = 45, " (continued)"
 WIDEST = 5  # columns of a table in one of two columns of text
 
 
@@ -36,7 +37,9 @@ def _plain(text):
 
 
 def latex(frame, caption, notes=()):
-    """A table by the packages booktabs and graphicx; a wide one is as wide as the text. Numbers are right."""
+    """A table by the packages booktabs and graphicx, of as many parts as fit pages; a wide one is as wide as the text. Numbers are right."""
+    if len(frame) > PAGE_ROWS:
+        return latex(frame[:PAGE_ROWS], caption, notes) + latex(frame[PAGE_ROWS:], f"{caption.removesuffix(MORE)}{MORE}")
     rows = [" & ".join(map(_escaped, row)) + r" \\" for row in [list(frame.columns), *frame.values.tolist()]]
     kinds = "".join("l" if i == 0 or name in LEFT else "r" for i, name in enumerate(frame.columns))
     is_wide = len(frame.columns) > WIDEST
