@@ -47,8 +47,6 @@ CLI::App* add_channel(CLI::App& app, Action& action);
 CLI::App* add_synth(CLI::App& app, Action& action);
 CLI::App* add_calibrate(CLI::App& app, Action& action);
 CLI::App* add_check(CLI::App& app, Action& action);
-CLI::App* add_robustness(CLI::App& app, Action& action);
-CLI::App* add_search(CLI::App& app, Action& action);
 CLI::App* add_models(CLI::App& app, Action& action);
 
 }  // namespace stemvo::apps

@@ -134,8 +134,8 @@ int run_program(int argc, char** argv) {
         };
       },
       "Print the default configuration, every key explained");
-  for (const auto add : {add_run, add_evaluate, add_channel, add_synth, add_calibrate, add_check,
-                         add_models, add_robustness, add_search}) {
+  for (const auto add :
+       {add_run, add_evaluate, add_channel, add_synth, add_calibrate, add_check, add_models}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
     command->add_flag_callback("--json", choose_json,

@@ -15,7 +15,6 @@
 
 #include "arrays.hpp"
 #include "frames.hpp"
-#include "io/sha256.hpp"
 #include "odometry/channel_odometry.hpp"
 #include "options.hpp"
 #include "stem/hand_made.hpp"
@@ -126,8 +125,9 @@ class PythonChannelOdometry {
   double last_time_s_ = -std::numeric_limits<double>::infinity();
 };
 
-std::string model_hash(const std::string& model) {
-  return internal::sha256_hex(is_hand_made(model) ? model : value_or_raise(read_model(model)));
+nb::bytes model_bytes(const std::string& model) {
+  const std::string bytes = is_hand_made(model) ? model : value_or_raise(read_model(model));
+  return nb::bytes(bytes.data(), bytes.size());
 }
 
 void bind_channels(nb::module_& module) {
@@ -155,7 +155,7 @@ void bind_channels(nb::module_& module) {
       .def("apply", &PythonStem::apply, "image"_a.noconvert(), "camera"_a, "first"_a = 0,
            "last"_a = nb::none(),
            "Channels of the filters from `first` up to `last`, from one pass over the image");
-  module.def("model_hash", &model_hash, "model"_a, "SHA-256 of a model's file");
+  module.def("model_bytes", &model_bytes, "model"_a, "A model's file");
   module.def(
       "model_stride",
       [](const std::string& model) {

@@ -29,7 +29,6 @@ fuzz      -                    clang-16 libclang-rt-16-dev
 lab       build/lab
 lint      build/venv-lint
 peers     build/venv-peers
-ray       build/venv-ray
 root      -                    debootstrap
 tools     build/venv
 wheel     build/venv-wheel"

@@ -191,22 +191,6 @@ Metrics evaluate(std::span<const Rigid3> estimate,
   return metrics;
 }
 
-std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
-                                          std::span<const Rigid3> ground_truth,
-                                          std::span<const double> path_shares) {
-  STEMVO_CHECK(estimate.size() == ground_truth.size(), "one true pose per estimated pose");
-  STEMVO_CHECK(!estimate.empty(), "at least one pose");
-  const double path_length_m = distances_m(ground_truth).back();
-  Metrics metrics;
-  for (const double share : path_shares) {
-    if (share * path_length_m > 0.0) {
-      metrics.segment_lengths_m.push_back(share * path_length_m);
-    }
-  }
-  add_segment_errors(estimate, ground_truth, 1, metrics);
-  return metrics.t_rel_percent;
-}
-
 DenseErrors dense_errors(std::span<const Rigid3> estimate,
                          std::span<const Rigid3> ground_truth,
                          std::size_t max_segments) {

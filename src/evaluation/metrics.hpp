@@ -69,14 +69,7 @@ struct SegmentError {
                                                        std::span<const double> lengths_m,
                                                        std::size_t first_frame_step);
 
-/// t_rel of a path that may be too short for the devkit's: segments of these shares of its length,
-/// one from every frame on. nullopt: none fits (a path of length zero). Same length, at least one
-/// pose (checked).
-[[nodiscard]] std::optional<double> dense_t_rel_percent(std::span<const Rigid3> estimate,
-                                                        std::span<const Rigid3> ground_truth,
-                                                        std::span<const double> path_shares);
-
-/// Errors that two methods are compared by (paired_ratio): segments of an eighth of the path from
+/// Errors that two methods are compared by: segments of an eighth of the path from
 /// every frame on or, of more than `max_segments`, evenly spaced ones.
 struct DenseErrors {
   std::vector<double> t_percent;

@@ -30,10 +30,3 @@ function paths_from_above(heading, note, paths, unit = "m") {
 function how_to_repeat({ command, configuration }, heading) {
   return [command && { heading: "Command", text: command }, { heading, text: configuration, folded: true }];
 }
-
-// Bars from the lower to the upper end of an interval; none where it is not known.
-function interval_bars(ratios) {
-  const bar = (part) => ratios.map((ratio) => (ratio.high === null ? 0 : part(ratio)));
-  return { type: "data", symmetric: false, thickness: 1,
-           array: bar(({ ratio, high }) => high - ratio), arrayminus: bar(({ ratio, low }) => ratio - low) };
-}

@@ -27,7 +27,7 @@ struct CaptionedImage {
 [[nodiscard]] nlohmann::ordered_json path_json(std::span<const Rigid3> poses);
 
 /// Writes one HTML file that holds all it needs to be shown without a network. `content` is what
-/// the script of its key `page` (run, search, robustness) says. Texts are never taken
+/// the script of its key `page` (run) says. Texts are never taken
 /// for HTML. Error: the file cannot be written.
 [[nodiscard]] Status write_page(const std::filesystem::path& file,
                                 const nlohmann::ordered_json& content);

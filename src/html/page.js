@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Draws what the page's function makes of the content that the program put into it.
 
-const pages = { run: run_page, search: search_page, robustness: robustness_page };
+const pages = { run: run_page };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const figures = [];  // {section, div}
 let frames = [];  // a line of text for each, where there is a slider

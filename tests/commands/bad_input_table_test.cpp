@@ -8,8 +8,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "support/sealed_records.hpp"
-#include "support/search_program.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -145,54 +143,6 @@ TEST_F(BadInputTable, Images) {
        with(16, "\xff\xff\xff\xff"), with(20, "\x7f\xff\xff\xff"), with(24, "\x07"),
        with(25, "\x09"), with(29, "xxxx"), with(good.size() / 2, "xxxx"),
        with(good.size() - 12, "\xff"), text("a JPEG", "\xff\xd8\xff\xe0 and no more")});
-}
-
-/// A record of a search, merged.
-TEST_F(BadInputTable, Records) {
-  const fs::path drive = test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
-  const std::string part = folder_ / "part";
-  ASSERT_EQ(
-      run_stemvo({"search", drive / "sequences/00", "--out", part, "--exhaustive", "--filters",
-                  "0:1", "--no-baselines", "--quiet", "--set", "evaluation.segment_lengths_m=[2]"})
-          .exit_code,
-      0);
-  const fs::path records = part + "/records.jsonl";
-  const std::string good = read_file(records);
-  const auto with = [&](const std::string& from, const std::string& to) {
-    EXPECT_THAT(good, HasSubstr(from));
-    return text(from + " -> " + to, replace_first(good, from, to));
-  };
-  std::vector<Fault> more = {text("empty", ""),
-                             text("identity alone", good.substr(0, good.find('\n') + 1)),
-                             with("\"rung\":0", "\"rung\":99"),
-                             with("\"rung\":0", "\"rung\":-1"),
-                             with("\"filter\":0", "\"filter\":5"),
-                             with("\"drives\":[{", "\"drives\":[],\"x\":[{"),
-                             with("\"sequences\":[{", "\"sequences\":[],\"x\":[{"),
-                             with("\"layers\":[{", "\"layers\":[],\"x\":[{"),
-                             with("\"rungs\":[{", "\"rungs\":[],\"x\":[{"),
-                             with("\"of\":{\"program\":", "\"of\":{\"x\":"),
-                             with("\"sha256\":\"", "\"sha256\":\"0"),
-                             with("\"detected\":true", "\"detected\":1e300")};
-  // Behind a seal that fits: of the right form, and numbers that no search counts to.
-  const auto add_sealed = [&](const std::string& from, const std::string& to) {
-    EXPECT_THAT(good, HasSubstr(from));
-    more.push_back(
-        text("sealed " + from + " -> " + to, test::seal_again(replace_first(good, from, to))));
-  };
-  add_sealed("\"of\":{\"program\":", "\"of\":{\"x\":");
-  add_sealed("\"drives\":[{", "\"drives\":[],\"x\":[{");
-  add_sealed("\"sequences\":[{", "\"sequences\":[],\"x\":[{");
-  add_sealed("\"rung\":0", "\"rung\":0,\"x\":" + std::string(1000, '[') + std::string(1000, ']'));
-  for (const char* key : {"rung", "filter", "first", "last", "num_frames", "first_frame", "filters",
-                          "block", "sampling_px", "filter_frames"}) {
-    for (const char* value : {"1e300", "-1", "4294967296", "0.5"}) {
-      const std::string from = fmt::format("\"{}\":", key);
-      add_sealed(from, fmt::format("{}{},\"x\":", from, value));
-    }
-  }
-  expect_refused_with_faults(records, "\"rung\":0",
-                             {"search", "--merge", part, "--out", folder_ / "merged"}, {}, more);
 }
 
 }  // namespace

@@ -12,8 +12,8 @@
 namespace stemvo {
 namespace {
 
-const std::vector<std::string> kCommands = {"run",   "evaluate", "channel",    "synth", "calibrate",
-                                            "check", "models",   "robustness", "search"};
+const std::vector<std::string> kCommands = {"run",       "evaluate", "channel", "synth",
+                                            "calibrate", "check",    "models"};
 
 /// For a terminal of 80 columns; commands to copy stay whole.
 std::vector<std::string> lines_too_long(const std::string& help) {
@@ -73,7 +73,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{}, "expected a command"},
       {{"drive"}, "drive"},
       {{"run"}, "INPUT"},
-      {{"robustness", "x"}, "--out"},
+      {{"channel", "x"}, "--out"},
       {{"run", "x", "--out"}, "--out"},
       {{"run", "x", "y", "--out", "o"}, "y"},
       {{"run", "x", "--out", "o", "--bogus"}, "--bogus"},
@@ -96,7 +96,7 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
       {{"calibrate", "x"}, "--out"},
       {{"calibrate", "--out", "o"}, "INPUT"},
       {{"check", "metrics.json"}, "--against"},
-      {{"runn", "x", "--out", "o"}, "robustness, search, found 'runn'"},
+      {{"runn", "x", "--out", "o"}, "models, found 'runn'"},
   };
   for (const Misuse& misuse : cases) {
     const ProgramResult result = run_stemvo(misuse.arguments);

@@ -72,10 +72,6 @@ TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
       // The drive does not tell of the camera: a result, and a failure.
       {"calibrate", {sequence_, "--out", folder_ / "calib.txt", "--json"}, "parameters", 1},
       {"models", {"--json"}, "models"},
-      {"robustness",
-       {sequence_, "--out", folder_ / "rob", "--kinds", "none", "--controls", "gray", "--json"},
-       "rows"},
-      {"search", {sequence_, "--out", folder_ / "search", "--filters", "0:2", "--json"}, "filters"},
   };
   std::set<std::string> called;
   for (const Call& call : calls) {

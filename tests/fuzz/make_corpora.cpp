@@ -13,7 +13,6 @@
 #include "config/config.hpp"
 #include "evaluation/trajectory.hpp"
 #include "report/metrics_json.hpp"
-#include "search/records.hpp"
 #include "text/text_file.hpp"
 
 namespace {
@@ -119,31 +118,6 @@ void metrics(const fs::path& out) {
   Corpus::done(stemvo::write_metrics_json(corpus / "with_truth", report));
 }
 
-void records(const fs::path& out) {
-  namespace search = stemvo::search;
-  const Corpus corpus(out, "records");
-  search::SearchIdentity identity;
-  identity.program = "program";
-  identity.configuration = "seed: 1\n";
-  identity.rungs = {{0.5, 2}, {1.0, 1}};
-  identity.layers = {{.model = "net", .layer = "stem", .features = "klt", .first = 0, .last = 2}};
-  identity.sequences = {{.name = "00", .held_out = false, .num_frames = 100},
-                        {.name = "03", .held_out = true, .num_frames = 50}};
-  search::FilterRecord record;
-  record.key = identity.layers.front().key(1);
-  search::DriveScore score;
-  score.sequence = "00";
-  score.frames = 100;
-  score.detected = true;
-  score.t_rel_percent = 1.5;
-  score.dense_t_percent = {0.5, 2.0};
-  score.path_xz_m = {{0.0, 0.0}, {0.25, 1.5}};
-  record.drives = {score};
-  fs::remove(corpus / "records");
-  auto file = search::RecordFile::open(corpus / "records", identity, /*resume=*/false);
-  Corpus::done(file ? file->append({record}) : Status(file.error()));
-}
-
 void maps(const fs::path& out) {
   const Corpus corpus(out, "map_file");
   Corpus::done(stemvo::write_map_file(corpus / "small", stemvo::testing::small_map()));
@@ -205,7 +179,6 @@ int main(int num_arguments, char** arguments) {
   cameras(out);
   recordings(out);
   metrics(out);
-  records(out);
   maps(out);
   configurations(out);
   images(out);

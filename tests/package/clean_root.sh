@@ -93,17 +93,17 @@ try_completions() {
   cat >"$HOME_DIR/try.zsh" <<'END'
 compadd() { while [[ $1 != -- ]]; do shift; done; shift; for one in $@; do [[ $one == ${words[CURRENT]}* ]] && print -r -- "[$one]"; done }
 try() { words=(stemvo "$@"); CURRENT=${#words}; source /usr/share/zsh/vendor-completions/_stemvo }
-try ro; try run --fr; try run x --set stem.mo; true
+try mo; try run --fr; try run x --set stem.mo; true
 END
   cat >"$HOME_DIR/try.fish" <<'END'
-for line in 'stemvo ro' 'stemvo run --fr' 'stemvo run x --set stem.mo'
+for line in 'stemvo mo' 'stemvo run --fr' 'stemvo run x --set stem.mo'
   complete -C $line | string replace -r '.*' '[$0]'
 end
 END
   local found
   for shell in "zsh -f try.zsh" "fish try.fish"; do
     found=$(as_someone "$shell" | cut -f1 | tr -d '[]\n' | tr -s ' ')
-    [[ $found == "robustness--framesstem.model=" ]] || { echo "$shell: expected completions, found '$found'"; exit 1; }
+    [[ $found == "models--framesstem.model=" ]] || { echo "$shell: expected completions, found '$found'"; exit 1; }
   done
 }
 

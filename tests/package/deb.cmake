@@ -37,11 +37,11 @@ run("odometry" "${program}" run "${work}/drive/sequences/00" --out "${work}/resu
 expect("summary" "${output}" "report.html")
 
 file(READ "${root}/usr/share/man/man1/stemvo.1" page)
-expect("man page" "${page}" "\n.SH STEMVO ROBUSTNESS\n")
+expect("man page" "${page}" "\n.SH STEMVO MODELS\n")
 set(ENV{PATH} "${root}/usr/bin:$ENV{PATH}")
 file(WRITE "${work}/completions.sh" "source '${root}/usr/share/bash-completion/completions/stemvo'
 try() { COMP_WORDS=(stemvo \"$@\"); COMP_CWORD=$#; _stemvo; echo \"[\${COMPREPLY[*]}]\"; }
-try ro; try run --fr; try run x --set stem.mo\n")
+try mo; try run --fr; try run x --set stem.mo\n")
 run("completions" bash "${work}/completions.sh")
-expect("commands" "${output}" "\\[robustness\\]\n\\[--frames\\]")
+expect("commands" "${output}" "\\[models\\]\n\\[--frames\\]")
 expect("keys" "${output}" "\\[stem.model=\\]\n$")

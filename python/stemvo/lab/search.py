@@ -57,7 +57,7 @@ def layer_of(model, values, is_baseline=False, **more):
     values = {key: value for key, value in values.items() if key not in ("stem.model", "stem.filter")} | more
     settings = stemvo.Options(values | {"threads": 1})
     stem = _core.Stem(stemvo.Options(values | {"stem.model": model}))
-    return Layer(model, pathlib.Path(model).stem if model.endswith(".onnx") else model, _core.model_hash(model)[:16], stem.layer or "input",
+    return Layer(model, pathlib.Path(model).stem if model.endswith(".onnx") else model, hashlib.sha256(_core.model_bytes(model)).hexdigest()[:16], stem.layer or "input",
                  stem.num_filters, tuple(values.items()), values.get("features.method", "patch"),
                  hashlib.sha256((program_hash() + str(settings)).encode()).hexdigest()[:16], is_baseline)
 

@@ -43,18 +43,14 @@ RUN_ELSEWHERE = {
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
-    "tools/search_cluster.py": "tests/python/long/search_cluster_test.py",
-    "build/venv-ray/bin/ray": "tests/python/long/search_cluster_test.py",
+    "stemvo-lab search": "tests/lab/search_test.py",
+    "stemvo-lab robustness": "tests/lab/robustness_test.py",
+    "build/lab/bin/ray": "tests/lab/long/ray_test.py",
 }
 # A reader puts names in these places; the rest makes a command short.
 IN_PLACE_OF = [
     (r"--(held-out-)?frames 0:\d+", rf"--\1frames 0:{FRAMES - 1}"),
     (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
-    (r"\brobustness (.*?)( --controls \S+)? --out", r"robustness \1 --kinds none --controls gray --out"),
-    (r"--filters 0:16", "--filters 0:2"),
-    (r"--filters 16:32", "--filters 2:4"),
-    (r"--exhaustive --no-baselines", "--exhaustive --no-baselines --filters 0:2"),
-    (r"--merge default \S+ \S+ \S+", "--merge M"),
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
     (r"\bNAME\.onnx", "weights.onnx"),

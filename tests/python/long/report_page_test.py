@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""report.html of run, search and robustness in Chromium: it draws without a network, hover, wheel and keyboard work."""
+"""report.html of run in Chromium: it draws without a network, hover, wheel and keyboard work."""
 
 import csv
 import itertools
@@ -60,17 +60,6 @@ class ReportPage(unittest.TestCase):
         self.assertTrue(all(len(colours) == 1 for colours in found["colours"].values()), found["colours"])
         self.assertTrue(all(moved > 20 for moved in found["swiped"]), found["swiped"])
 
-    def test_search(self):
-        out = self.folder / "search"
-        call("search", self.folder / "drive/sequences/00", "--out", out, "--filters", "0:4", "--exhaustive")
-        found = look_at(out / "report.html")
-        self.expect_a_sound_page(found)
-        self.assertIn("Best filter: ", found["title"])
-        self.assertEqual(found["headings"], ["Filters by rank", "Error and matches", "Paths from above", "Channels", "All filters", "Command",
-                                             "Configuration of all rows"])
-        self.assertEqual(found["captions"][0], "00, frame 15")
-        self.assertEqual([caption.split(": ")[0] for caption in found["captions"][1:]], ["best filter", "median", "worst"] + 4 * ["baseline"])
-
     def test_a_recording_without_ground_truth(self):
         images = self.folder / "plain"
         shutil.copytree(self.folder / "drive/sequences/00/image_2", images)
@@ -81,13 +70,6 @@ class ReportPage(unittest.TestCase):
         self.assertIn("Path from above", found["headings"])
         self.assertNotIn("Error over distance", found["headings"])
         self.assertIn("Command", found["headings"])
-
-    def test_robustness(self):
-        out = self.folder / "robustness"
-        call("robustness", self.folder / "drive/sequences/00", "--out", out, "--frames", "0:15", "--kinds", "none,exposure_steps,gaussian_blur")
-        found = look_at(out / "report.html")
-        self.expect_a_sound_page(found)
-        self.assertEqual(found["headings"][-3:], ["All numbers", "Command", "Configuration of the judged channel"])
 
     def test_draws_everything_without_errors_or_a_network(self):
         self.expect_a_sound_page(self.found)
