@@ -53,7 +53,13 @@ void bind_result(nb::module_& module) {
           "motion_covariance", [](const FrameResult& r) { return r.motion_covariance; },
           "6x6, of the motion since the last frame: x y z, then rotation, about this frame's axes")
       .def_prop_ro("state", [](const FrameResult& r) { return std::string(to_string(r.state)); })
-      .def_prop_ro("is_measured", [](const FrameResult& r) { return is_measured(r.state); })
+      .def_prop_ro("is_measured", [](const FrameResult& r) { return r.is_measured; })
+      .def_prop_ro(
+          "map_id", [](const FrameResult& r) { return r.map_id; },
+          "The map that holds the pose, counted from 0; -1: of another recording")
+      .def_prop_ro(
+          "is_scale_new", [](const FrameResult& r) { return r.is_scale_new; },
+          "A map begins here: lengths before it had another unit")
       .def_ro("timestamp", &FrameResult::time_s, "As given")
       .def_prop_ro("num_matches", [](const FrameResult& r) { return r.num_matches; })
       .def_prop_ro("num_inliers", [](const FrameResult& r) { return r.num_inliers; })

@@ -20,12 +20,12 @@ enum class FrameState {
   kFirst,         ///< the world's origin
   kInitializing,  ///< no landmarks yet: the initial H/F selection waits for parallax, or decided
   kTracking,      ///< rotation and translation measured
-  kStationary,    ///< no motion
-  kLowParallax,   ///< rotation measured; too little parallax for a translation
-  kRotating,      ///< pure rotation measured
+  kStationary,    ///< no flow
+  kLowParallax,   ///< hardly any parallax: the position owes much to the motion before
+  kRotating,      ///< the same while the camera turns
   kGated,         ///< two_frame: rotation measured; the forward motion gate refused the direction
-  kLost,          ///< nothing measured: the last motion is continued
-  kNoImage,       ///< nothing to be seen: the last motion is continued
+  kLost,          ///< nothing measured: the last motion is continued, and fades
+  kNoImage,       ///< nothing to be seen: the same
 };
 [[nodiscard]] std::string_view to_string(FrameState state);
 /// True except for kGated, kLost and kNoImage.
@@ -69,6 +69,12 @@ struct FrameResult {
   /// The correction so far, by places that were recognized: where the frame is in the map is
   /// map_from_world * world_from_camera.
   Similarity3 map_from_world;
+  bool is_measured = true;  ///< the motion since the last frame was, not guessed
+  /// The map that holds the pose, counted from 0; before one begins, the one that is looked for. A
+  /// camera that finds itself in an older map, or whose map is joined to one, has that one's; -1:
+  /// that of another recording.
+  int map_id = 0;
+  bool is_scale_new = false;  ///< a map begins here: lengths before it had another unit
   int recognized_frame = -1;  ///< the frame whose place this one was recognized to show; -1: none
   /// Of the motion between the poses of the last frame and this one, prev_from_cur: the true motion
   /// is prev_from_cur * error. The error is x y z (the path's units, squared), then rotation about

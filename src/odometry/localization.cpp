@@ -137,35 +137,28 @@ std::optional<Localization> localize(const SeenLandmarks& seen,
   return best;
 }
 
-std::optional<Rigid3> rotation_only_pose(const Rigid3& world_from_camera,
-                                         const Eigen::Vector3d& held_position,
-                                         const SeenLandmarks& seen,
-                                         const Camera& camera,
-                                         double min_flow_px,
-                                         double bound_px) {
+std::optional<double> parallax_since_px(const Eigen::Vector3d& position,
+                                        const Rigid3& world_from_camera,
+                                        const SeenLandmarks& seen,
+                                        const Camera& camera,
+                                        double bound_px) {
   const Rigid3 camera_from_world = world_from_camera.inverse();
-  const Rigid3 held(camera_from_world.rotation, -(camera_from_world.rotation * held_position));
+  const Rigid3 held(camera_from_world.rotation, -(camera_from_world.rotation * position));
   std::vector<Eigen::Vector2d> held_uv;
   std::vector<Eigen::Vector2d> moved_uv;
-  std::vector<Eigen::Vector2d> seen_uv;
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
     const Eigen::Vector3d in_held = held * seen.points[i];
     if (in_held.z() > 0.0 &&
         is_near(camera_from_world, seen.points[i], seen.uv[i], camera, bound_px)) {
       held_uv.push_back(camera.project(in_held));
       moved_uv.push_back(camera.project(camera_from_world * seen.points[i]));
-      seen_uv.push_back(seen.uv[i]);
     }
   }
   if (held_uv.size() < kMinTurnLandmarks) {
     return std::nullopt;
   }
   const PixelPairs moved(held_uv, moved_uv);
-  if (rms_parallax_px(rotation_between(moved, camera), moved, camera) >= min_flow_px) {
-    return std::nullopt;
-  }
-  const Eigen::Quaterniond turned = rotation_between({held_uv, seen_uv}, camera) * held.rotation;
-  return Rigid3(turned.conjugate(), held_position);
+  return rms_parallax_px(rotation_between(moved, camera), moved, camera);
 }
 
 }  // namespace stemvo

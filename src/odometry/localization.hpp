@@ -59,15 +59,13 @@ struct Localization {
                                                    const Camera& camera,
                                                    const LocalizationOptions& options);
 
-/// world_from_camera with the position held, if it explains the image too: the way from there to
-/// the frame's own position moves its landmarks in the image by less than `min_flow_px` (root mean
-/// square, pixels), once a rotation has done what it can. nullopt: it moved, or too few landmarks
-/// are within `bound_px` to tell.
-[[nodiscard]] std::optional<Rigid3> rotation_only_pose(const Rigid3& world_from_camera,
-                                                       const Eigen::Vector3d& held_position,
-                                                       const SeenLandmarks& seen,
-                                                       const Camera& camera,
-                                                       double min_flow_px,
-                                                       double bound_px);
+/// How far the way from `position` to the frame's own moves its landmarks in the image (root mean
+/// square, pixels), once a rotation has done what it can. nullopt: too few landmarks are within
+/// `bound_px` to tell.
+[[nodiscard]] std::optional<double> parallax_since_px(const Eigen::Vector3d& position,
+                                                      const Rigid3& world_from_camera,
+                                                      const SeenLandmarks& seen,
+                                                      const Camera& camera,
+                                                      double bound_px);
 
 }  // namespace stemvo

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -45,24 +44,6 @@ PoseInfluences influences_at(const SeenLandmarks& seen,
   return pose_influences(world_from_camera.inverse(), seen.points, seen.uv, camera, loss_px);
 }
 
-bool is_held(FrameState state) {
-  return state == FrameState::kRotating || state == FrameState::kLowParallax;
-}
-
-/// A hidden motion moves the landmarks by less than `hidden_px`: uniform in that ellipsoid. Where
-/// the position is held, the rotation was found: it does what the translation makes it do.
-Matrix6d hidden_motion(const Matrix6d& flow, bool has_rotation, double hidden_px) {
-  const double square_px = hidden_px * hidden_px;
-  if (!has_rotation) {
-    return square_px / 8.0 * flow;  // 1 / (d + 2) in d dimensions
-  }
-  Matrix6d held = flow;
-  const Eigen::Matrix3d by_translation =
-      flow.bottomLeftCorner<3, 3>() * flow.topLeftCorner<3, 3>().inverse();
-  held.bottomRightCorner<3, 3>() = by_translation * flow.topRightCorner<3, 3>();
-  return square_px / 5.0 * held;
-}
-
 /// A shift of the principal point turns all poses alike.
 Matrix6d principal_point_term(const MotionCovariance::Motion& motion, const Matrix6d& to_cur) {
   if (!motion.camera_sigma.has_value()) {
@@ -99,8 +80,7 @@ Matrix6d two_view_motion(const MotionCovariance::Motion& motion) {
 
 }  // namespace
 
-void MotionCovariance::localized(FrameState state,
-                                 const Window& window,
+void MotionCovariance::localized(const Window& window,
                                  const Observations& points,
                                  const Rigid3& world_from_camera,
                                  const Rigid3& world_from_prev,
@@ -109,12 +89,7 @@ void MotionCovariance::localized(FrameState state,
   points_ = points;
   const SeenLandmarks now = find_seen_landmarks(window, points);
   influences_ = influences_at(now, world_from_camera, camera, loss_px);
-  if (state != FrameState::kTracking) {
-    const PoseInfluences even =
-        influences_at(now, world_from_camera, camera, std::numeric_limits<double>::infinity());
-    flow_ = even.num_points * even.covariance;
-  }
-  if (!is_prev_tracked_ || state != FrameState::kTracking) {
+  if (!is_prev_localized_) {
     return;
   }
   const SeenLandmarks before = find_seen_landmarks(window, prev_points_);
@@ -144,7 +119,7 @@ void MotionCovariance::adjusted(const Window& window,
                                 const Rigid3& world_from_prev,
                                 const Camera& camera,
                                 double loss_px) {
-  if (!is_prev_tracked_) {
+  if (!is_prev_localized_) {
     return;
   }
   const auto sum_at = [&](const Observations& seen, const Rigid3& pose) {
@@ -167,19 +142,22 @@ Matrix6d MotionCovariance::finish(const Motion& motion) {
   if (goes_on) {
     const Matrix6d change = changes_of_velocity(motion);
     const double before_s = std::exchange(unmeasured_s_, unmeasured_s_ + motion.dt_s);
-    covariance = unmeasured_s_ * motion.dt_s * motion.dt_s * change;
-    pose += (std::pow(unmeasured_s_, 3) - std::pow(before_s, 3)) / 3.0 * change;
+    const Vector6d faded = std::exchange(faded_, faded_ + motion.faded);
+    covariance = unmeasured_s_ * motion.dt_s * motion.dt_s * change + square(motion.faded);
+    pose += (std::pow(unmeasured_s_, 3) - std::pow(before_s, 3)) / 3.0 * change + square(faded_) -
+            square(faded);
   } else if (!motion.is_localized || motion.two_view.has_value()) {
     covariance = two_view_motion(motion) + pose;
     pose = motion.is_localized ? Matrix6d::Zero() : covariance;
   } else {
-    const bool is_still = motion.state == FrameState::kStationary;
-    Matrix6d own = is_still ? Matrix6d::Zero() : influences_.squared_sum();
-    if (is_still || is_held(motion.state)) {
-      own += hidden_motion(flow_, !is_still, motion.hidden_px);
-    }
+    const Matrix6d own = influences_.squared_sum();
     covariance = track_noise_.value_or(own + pose) + map_term(motion.state);
     pose = own;
+    if (motion.fused.has_value()) {
+      const Matrix6d& gain = motion.fused->gain;
+      covariance = transformed(covariance, gain) +
+                   transformed(motion.fused->expected, Matrix6d::Identity() - gain);
+    }
   }
   covariance += principal_point_term(motion, to_cur) + scale_term(motion);
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
@@ -199,7 +177,7 @@ void MotionCovariance::rescale(double factor) {
   Vector6d lengths = Vector6d::Ones();
   lengths.head<3>().setConstant(factor);
   const Matrix6d by = lengths.asDiagonal();
-  for (Matrix6d* one : {&prev_pose_, &flow_, &mean_step_, &mean_change_}) {
+  for (Matrix6d* one : {&prev_pose_, &mean_step_, &mean_change_}) {
     *one = transformed(*one, by);
   }
   if (track_noise_) {
@@ -210,6 +188,7 @@ void MotionCovariance::rescale(double factor) {
       **one = by * **one;
     }
   }
+  faded_ = by * faded_;
   for (Vector6d& influence : influences_.of_point) {
     influence = by * influence;
   }
@@ -242,11 +221,14 @@ Matrix6d MotionCovariance::map_term(FrameState state) {
 
 void MotionCovariance::learn(const Motion& motion) {
   const bool is_tracked = motion.is_localized && motion.state == FrameState::kTracking;
-  is_prev_tracked_ = is_tracked || (motion.is_localized && motion.two_view.has_value());
+  is_prev_localized_ = motion.is_localized;
   prev_points_ = std::exchange(points_, {});
   track_noise_.reset();
   step_.reset();
-  unmeasured_s_ = motion.is_localized ? 0.0 : unmeasured_s_;
+  if (motion.is_localized) {
+    unmeasured_s_ = 0.0;
+    faded_.setZero();
+  }
   std::optional<Vector6d> velocity;
   if (is_tracked) {
     const Rigid3& step = motion.prev_from_cur;

@@ -7,6 +7,7 @@
 
 #include "geometry/pose_influence.hpp"
 #include "odometry/localization.hpp"
+#include "odometry/motion_model.hpp"
 #include "odometry/window.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/frame_result.hpp"
@@ -26,8 +27,10 @@ namespace stemvo {
 /// - Tracks: how far each moves the pose before and this one, as a difference, so that what both
 ///   frames share cancels (a patch's own error, its landmark's).
 /// - The map: what an adjustment at a keyframe moves was an error until then.
-/// - A held position: what the least flow that counts as motion may hide.
-/// - A pose that goes on unmeasured: the changes of velocity so far, as a random walk.
+/// - A motion model's share of the pose: what it expects to be wrong.
+/// - A pose that goes on unmeasured: the changes of velocity so far, as a random walk, and the
+/// speed
+///   that was let go.
 /// - The camera's principal point; the scale.
 class MotionCovariance {
  public:
@@ -38,7 +41,9 @@ class MotionCovariance {
     Rigid3 prev_from_cur;       ///< between the poses as they are returned
     double dt_s = 0.0;
     double usual_step = 1.0;  ///< length of a motion of which nothing else is known
-    double hidden_px = 0.0;   ///< less flow, or parallax, counts as none
+    double hidden_px = 0.0;   ///< less flow counts as none
+    std::optional<MotionModel::Fused> fused = std::nullopt;
+    Vector6d faded = Vector6d::Zero();  ///< MotionModel::faded where nothing was measured
     /// By two views instead of the map: covariance for a translation of length 1.
     std::optional<Matrix6d> two_view;
     Camera camera;
@@ -47,8 +52,7 @@ class MotionCovariance {
   };
 
   /// A frame in the map, before its keyframe changes that; and after, where it did.
-  void localized(FrameState state,
-                 const Window& window,
+  void localized(const Window& window,
                  const Observations& points,
                  const Rigid3& world_from_camera,
                  const Rigid3& world_from_prev,
@@ -73,14 +77,13 @@ class MotionCovariance {
 
   // The frame before.
   Observations prev_points_;
-  bool is_prev_tracked_ = false;           ///< its pose was measured in the map, not held
+  bool is_prev_localized_ = false;         ///< its pose was measured in the map
   Matrix6d prev_pose_ = Matrix6d::Zero();  ///< covariance of its pose in the map
   std::optional<Vector6d> prev_velocity_;  ///< per second, where it was tracked
 
   // The frame in work, where it is in the map.
   Observations points_;
   PoseInfluences influences_;
-  Matrix6d flow_ = Matrix6d::Zero();     ///< of motions that move the landmarks by 1 px (rms)
   std::optional<Matrix6d> track_noise_;  ///< of the motion between two tracked frames
   std::optional<Vector6d> step_;         ///< that an adjustment put between their poses
 
@@ -89,7 +92,8 @@ class MotionCovariance {
   int frames_since_step_ = 0;
   Matrix6d mean_change_ = Matrix6d::Zero();  ///< of velocity: squares per second
   int num_changes_ = 0;
-  double unmeasured_s_ = 0.0;  ///< since the last localized frame
+  double unmeasured_s_ = 0.0;          ///< since the last localized frame
+  Vector6d faded_ = Vector6d::Zero();  ///< since then
 };
 
 }  // namespace stemvo

@@ -168,6 +168,7 @@ void PairEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   }
   last_image_ = frame.has_image() ? frame.number : last_image_;
   scale_.report(result);
+  result.is_measured = is_measured(result.state);
   result.camera = camera_;
   result.world_from_camera = chain_.world_from_camera();
   const double interval_s = times_s_.size() > 1 ? times_s_.back() - *(times_s_.end() - 2) : 0.0;

@@ -2,12 +2,11 @@
 #include "odometry/window_estimator.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <iterator>
 #include <utility>
 
-#include "geometry/median.hpp"
-#include "odometry/road_landmarks.hpp"
 #include "odometry/tracks.hpp"
 #include "timing/stage_timer.hpp"
 
@@ -63,7 +62,7 @@ LocalizedFrame WindowEstimator::localize(const Frame& frame) {
   result.num_inliers = static_cast<int>(std::count(mask.begin(), mask.end(), char{1}));
   if (frame.has_image() && !is_initializing_) {
     localized.projections =
-        project_lost_landmarks(window_, world_from_camera_, last_moving_.points, camera());
+        project_lost_landmarks(window_, world_from_camera_, view_.points, camera());
   }
   return localized;
 }
@@ -77,8 +76,9 @@ void WindowEstimator::advance_to(double time_s) {
 }
 
 FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& localized) {
+  fused_.reset();
   if (!frame.has_image()) {
-    world_from_camera_ = predict(trust_.trusted(frame.hints));
+    go_on(frame);
     return FrameState::kNoImage;
   }
   if (last_.frame < 0) {
@@ -87,13 +87,11 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     return FrameState::kFirst;
   }
   std::optional<StageTimer> timer;
+  bool is_still = false;
   const Observations now = current_points(frame.matches, localized.inlier_mask);
   if (!is_initializing_) {
     timer.emplace(Stage::kLocalization);
-    if (is_stationary(last_moving_.points, now, min_flow_px(), options_.min_inliers)) {
-      world_from_camera_ = last_moving_.world_from_camera;
-      return FrameState::kStationary;
-    }
+    is_still = is_stationary(moving_points_, now, min_flow_px(), options_.min_inliers);
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
   const Rigid3 start =
@@ -102,37 +100,65 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
           : predict();
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   if (found.has_value()) {
-    return accept_localization(frame, *found, localized);
+    return accept_localization(frame, found->world_from_camera, is_still, localized);
+  }
+  if (is_still) {  // few landmarks, but nothing moves
+    return FrameState::kStationary;
   }
   return relocate(frame, now, start)
-             ? accept_localization(frame, {world_from_camera_, 0}, localized)
+             ? accept_localization(frame, Rigid3(world_from_camera_), false, localized)
              : measure_since_reference(frame, now, localized);
 }
 
 FrameState WindowEstimator::accept_localization(const Frame& frame,
-                                                const Localization& found,
+                                                const Rigid3& found,
+                                                bool is_still,
                                                 LocalizedFrame& localized) {
   is_initializing_ = false;
-  world_from_camera_ = found.world_from_camera;
+  const Rigid3 before = std::exchange(world_from_camera_, found);
   mark_outliers(frame.matches, localization_.inlier_bound_px, localized.inlier_mask);
   follow_things(frame.matches, localized);
   Observations now = current_points(frame.matches, localized.inlier_mask);
-  const Rigid3 before = last_moving_.world_from_camera;
-  const double bound_px = kTurnFlow * min_flow_px();
-  std::optional<Rigid3> turned;
-  if (is_last_localized_) {
-    turned = rotation_only_pose(world_from_camera_, before.translation,
-                                find_seen_landmarks(window_, now), camera(), bound_px,
-                                localization_.inlier_bound_px);
-  }
-  world_from_camera_ = turned.value_or(world_from_camera_);
-  last_moving_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
-  if (!turned.has_value()) {
-    return FrameState::kTracking;
+  const SeenLandmarks seen = find_seen_landmarks(window_, now);
+  const double bound_px = min_way_px();
+  const double parallax_px =
+      is_last_localized_
+          ? parallax_since_px(moved_to_, found, seen, camera(), localization_.inlier_bound_px)
+                .value_or(bound_px)
+          : bound_px;
+  const bool has_moved = parallax_px >= bound_px;
+  if (has_moved) {
+    moved_to_ = found.translation;
+  } else if (last_.frame == frame.number - 1) {
+    fuse_with_prediction(before, seen, parallax_px / bound_px);
   }
   const double turn_px =
-      camera().mean_focal_px() * before.rotation.angularDistance(turned->rotation);
-  return turn_px < bound_px ? FrameState::kLowParallax : FrameState::kRotating;
+      camera().mean_focal_px() * view_.world_from_camera.rotation.angularDistance(found.rotation);
+  view_ = {frame.number, world_from_camera_, std::move(now), frame.time_s};
+  if (is_still) {
+    return FrameState::kStationary;
+  }
+  moving_points_ = view_.points;
+  return has_moved            ? FrameState::kTracking
+         : turn_px < bound_px ? FrameState::kLowParallax
+                              : FrameState::kRotating;
+}
+
+/// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
+void WindowEstimator::fuse_with_prediction(const Rigid3& before,
+                                           const SeenLandmarks& seen,
+                                           double parallax) {
+  const Matrix6d noise = pose_influences(world_from_camera_.inverse(), seen.points, seen.uv,
+                                         camera(), localization_.loss_px)
+                             .squared_sum();
+  const double weight = std::pow(1.0 - parallax * parallax, 2);
+  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_);
+  world_from_camera_ = before * fused_->prev_from_cur;
+}
+
+/// Nothing is measured: the last motion goes on.
+void WindowEstimator::go_on(const Frame& frame) {
+  world_from_camera_ = predict(trust_.trusted(frame.hints));
 }
 
 /// There are no landmarks yet, they are out of view, or the frame shows another scene.
@@ -163,7 +189,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
                                           LocalizedFrame& localized) {
   localized.two_view = 2.0 * motion.covariance;  // of both frames, each against the reference
   if (motion.state == FrameState::kLost) {       // the last motion goes on, and no track does
-    world_from_camera_ = predict(trust_.trusted(frame.hints));
+    go_on(frame);
     reset_reference({frame.number, world_from_camera_, {}, frame.time_s, frame.road});
     std::fill(localized.inlier_mask.begin(), localized.inlier_mask.end(), char{0});
     return FrameState::kLost;
@@ -219,6 +245,7 @@ bool WindowEstimator::open_window(View view) {
   mapper_.close(window_view());
   history_.close(window_);
   window_ = std::move(*window);
+  map_ids_.begin();
   const bool has_road = reference.road != nullptr || !scale_.asks_road();
   const View& road_view = has_road ? reference : view;
   scale_.restart(road_view.road.get(), road_view.time_s);
@@ -226,7 +253,9 @@ bool WindowEstimator::open_window(View view) {
   road_pose_ = road_view.world_from_camera;
   is_initializing_ = false;
   world_from_camera_ = view.world_from_camera;
-  last_moving_ = std::move(view);
+  moved_to_ = view.world_from_camera.translation;
+  moving_points_ = view.points;
+  view_ = std::move(view);
   return true;
 }
 
@@ -234,49 +263,28 @@ double WindowEstimator::min_flow_px() const {
   return (was_static_ ? kHysteresis : 1.0) * options_.stationary_flow_px;
 }
 
+double WindowEstimator::min_way_px() const { return kTurnFlow * min_flow_px(); }
+
 void WindowEstimator::optimize(const Frame& frame, LocalizedFrame& localized) {
   FrameResult& result = localized.result;
   if (!is_initializing_ && frame.has_image()) {
-    uncertainty_.localized(result.state, window_, last_moving_.points, world_from_camera_,
-                           trajectory_.back(), camera(), localization_.loss_px);
     Keyframe& newest = window_.keyframes.back();
     if (newest.frame == frame.matches.prev_frame) {
       add_begun_points(frame.matches, localized.inlier_mask, newest.points);
     }
-    if (result.state == FrameState::kTracking && is_keyframe(last_moving_)) {
+  }
+  if (is_localized(frame)) {
+    uncertainty_.localized(window_, view_.points, world_from_camera_, trajectory_.back(), camera(),
+                           localization_.loss_px);
+    if (result.state == FrameState::kTracking && is_keyframe(view_)) {
       timed(Stage::kWindowRefinement, [&] { add_keyframe(frame); });
     }
   }
   scale_.add(frame.ways);
   measure_scale(frame, result.state);
-  scale_.report(result);
-  result.camera = camera();
-  result.camera_sigma = calibration_.camera_sigma();
-  result.world_from_camera = world_from_camera_;
-  result.map_from_world = mapper_.map_from_world();
-  result.recognized_frame = recognized_frame_;
-  metric_sigma_ = metric_sigma(result);
+  describe(frame, result);
   measure_covariance(frame, localized);
   remember(frame, result.state);
-}
-
-void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& localized) {
-  FrameResult& result = localized.result;
-  const Rigid3 last = trajectory_.empty() ? world_from_camera_ : trajectory_.back();
-  const Rigid3 world_from_prev = moved_.has_value() ? *moved_ * last : last;
-  const MotionCovariance::Motion motion{
-      .state = result.state,
-      .is_localized = frame.has_image() && !is_initializing_,
-      .prev_from_cur = world_from_prev.inverse() * world_from_camera_,
-      .dt_s = interval_s_,
-      .usual_step = speed_ * interval_s_,
-      .hidden_px = (result.state == FrameState::kStationary ? 1.0 : kTurnFlow) * min_flow_px(),
-      .two_view = localized.two_view,
-      .camera = result.camera,
-      .camera_sigma = result.camera_sigma,
-      .scale_sigma = metric_sigma(result)};
-  result.motion_covariance = uncertainty_.finish(motion);
-  add_move(last.inverse() * world_from_prev, result.motion_covariance);
 }
 
 bool WindowEstimator::is_keyframe(const View& view) const {
@@ -298,7 +306,7 @@ bool WindowEstimator::is_keyframe(const View& view) const {
 }
 
 void WindowEstimator::add_keyframe(const Frame& frame) {
-  Keyframe keyframe{frame.number, world_from_camera_, last_moving_.points};
+  Keyframe keyframe{frame.number, world_from_camera_, view_.points};
   const auto length = static_cast<std::size_t>(window_options_.num_keyframes);
   if (window_.keyframes.size() >= length) {
     const std::size_t leaving = leaving_keyframe(window_, keyframe);
@@ -313,78 +321,15 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
         window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
     refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
-    last_moving_.world_from_camera = world_from_camera_;
+    view_.world_from_camera = world_from_camera_;
   }
   cull_landmarks(window_, camera(), window_options_);
-  uncertainty_.adjusted(window_, last_moving_.points, world_from_camera_, trajectory_.back(),
-                        camera(), localization_.loss_px);
+  uncertainty_.adjusted(window_, view_.points, world_from_camera_, trajectory_.back(), camera(),
+                        localization_.loss_px);
   // The newest keyframe but one: it has its new corners.
   calibration_.observe(*std::prev(window_.keyframes.end(), 2), refinement_);
   history_.observe(window_, frame.image);
   take_in(mapper_.observe(window_view(), frame.pyramid));
-}
-
-double WindowEstimator::pixel_units() const {
-  const Rigid3 camera_from_world = world_from_camera_.inverse();
-  std::vector<double> depths;
-  for (const Eigen::Vector3d& point : find_seen_landmarks(window_, last_moving_.points).points) {
-    depths.push_back((camera_from_world * point).z());
-  }
-  return depths.empty() ? 0.0 : median(std::move(depths)) / camera().mean_focal_px();
-}
-
-void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
-  if (!frame.has_image()) {
-    scale_.keep_last("no image", frame.time_s);
-  } else if (state == FrameState::kLost) {
-    scale_.keep_last("lost", frame.time_s);
-  } else if (is_initializing_) {
-    if (state != FrameState::kFirst) {
-      scale_.set_unknown("no map");
-    }
-  } else {
-    const Eigen::Vector3d center = road_pose_.translation;
-    const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
-    const auto landmarks = scale_.asks_road() ? road_landmarks(window_, world_from_camera_,
-                                                               last_moving_.points, camera())
-                                              : std::vector<RoadLandmark>();
-    const double factor =
-        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
-                       frame.time_s, pixel_units(), landmarks);
-    if (factor != 1.0) {
-      rescale(window_, factor, center);
-      history_.rescale(factor);
-      calibration_.rescale(factor, center);
-      uncertainty_.rescale(factor);
-      for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera}) {
-        pose->translation = center + factor * (pose->translation - center);
-      }
-    }
-    road_pose_ = world_from_camera_;
-  }
-}
-
-/// The pose is final.
-void WindowEstimator::remember(const Frame& frame, FrameState state) {
-  if (frame.has_image()) {
-    const bool is_localized = !is_initializing_;
-    const bool has_opened = is_localized && state == FrameState::kInitializing;
-    if (has_opened || (is_localized && is_last_localized_)) {
-      const View& before = has_opened ? initializer_.reference() : last_;
-      velocity_ = Velocity(before.world_from_camera.inverse() * world_from_camera_,
-                           frame.time_s - before.time_s);
-      if (before.frame == frame.number - 1) {
-        trust_.compare(frame.hints,
-                       before.world_from_camera.rotation.conjugate() * world_from_camera_.rotation);
-      }
-      const double speed = velocity_.speed();
-      speed_ = speed > 0.0 && state == FrameState::kTracking ? speed : speed_;
-    }
-    is_last_localized_ = is_localized;
-    last_ = {frame.number, world_from_camera_, {}, frame.time_s, frame.road};
-  }
-  trajectory_.push_back(world_from_camera_);
-  history_.end_frame(window_);
 }
 
 }  // namespace stemvo

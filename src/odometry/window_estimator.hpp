@@ -11,8 +11,10 @@
 #include "odometry/estimator.hpp"
 #include "odometry/initializer.hpp"
 #include "odometry/localization.hpp"
+#include "odometry/map_ids.hpp"
 #include "odometry/metric_scale.hpp"
 #include "odometry/motion_covariance.hpp"
+#include "odometry/motion_model.hpp"
 #include "odometry/moving_tracks.hpp"
 #include "odometry/self_calibration.hpp"
 #include "odometry/window.hpp"
@@ -51,8 +53,11 @@ class WindowEstimator final : public Estimator {
   // Localization: what gives the frame its pose and its state.
   FrameState find_pose(const Frame& frame, LocalizedFrame& localized);
   FrameState accept_localization(const Frame& frame,
-                                 const Localization& found,
+                                 const Rigid3& found,
+                                 bool is_still,
                                  LocalizedFrame& localized);
+  void fuse_with_prediction(const Rigid3& before, const SeenLandmarks& seen, double parallax);
+  void go_on(const Frame& frame);
   /// Goes on in the map where the frame shows a kept place; false: it shows none.
   [[nodiscard]] bool relocate(const Frame& frame, const Observations& now, const Rigid3& predicted);
   FrameState measure_since_reference(const Frame& frame,
@@ -66,18 +71,24 @@ class WindowEstimator final : public Estimator {
   void advance_to(double time_s);
   /// The pose if the last motion goes on. `turned`: its rotation, where that is known.
   [[nodiscard]] Rigid3 predict(const std::optional<Eigen::Quaterniond>& turned = {}) const {
-    return world_from_camera_ * velocity_.motion(interval_s_, turned);
+    return world_from_camera_ * motion_.predict(interval_s_, turned);
+  }
+  /// The frame in work was placed in the map.
+  [[nodiscard]] bool is_localized(const Frame& frame) const {
+    return frame.has_image() && view_.frame == frame.number;
   }
   void reset_reference(View reference);
   void reset_reference_before(const Matches& matches);
   [[nodiscard]] bool open_window(View view);
   [[nodiscard]] WindowView window_view() const {
-    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_, last_moving_.frame};
+    return {window_, history_, camera(), trajectory_, times_s_, metric_sigma_, view_.frame};
   }
   /// The camera in use: SelfCalibration owns it, everything else takes it as an argument.
   [[nodiscard]] const Camera& camera() const { return calibration_.camera(); }
   /// Least flow that counts as motion.
   [[nodiscard]] double min_flow_px() const;
+  /// Least parallax that does: the position is measured well.
+  [[nodiscard]] double min_way_px() const;
   /// Matches that do not fit the pose: far from their landmark, or from their epipolar line.
   void mark_outliers(const Matches& matches, double bound_px, std::vector<char>& mask) const;
   /// Tracks of things that move on their own are no inliers, and go on.
@@ -93,6 +104,7 @@ class WindowEstimator final : public Estimator {
   /// Units of motion that move the median landmark in view by a pixel.
   [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);
+  void describe(const Frame& frame, FrameResult& result);
   void measure_covariance(const Frame& frame, LocalizedFrame& localized);
   void remember(const Frame& frame, FrameState state);
 
@@ -108,18 +120,22 @@ class WindowEstimator final : public Estimator {
   bool is_initializing_ = true;
   Window window_;  ///< initializing: empty, or one that was lost and may be seen again
   WindowHistory history_;
+  MapIds map_ids_;
   Mapper mapper_;
   MetricScale scale_;
   SelfCalibration calibration_;
   MotionCovariance uncertainty_;
-  Rigid3 world_from_camera_;  ///< of the frame in work
-  Velocity velocity_;         ///< of the last motion between localized frames
-  double assumed_step_;       ///< in the first interval, where nothing measures a length
+  Rigid3 world_from_camera_;                 ///< of the frame in work
+  MotionModel motion_;                       ///< between localized frames
+  std::optional<MotionModel::Fused> fused_;  ///< the frame in work, where parallax is low
+  double assumed_step_;  ///< in the first interval, where nothing measures a length
   HintTrust trust_;
-  double speed_ = 0.0;                  ///< of the last step measured or assumed, units per second
-  double interval_s_ = 0.0;             ///< between the frame in work and the one before
-  View last_;                           ///< the last frame with an image, without its points
-  View last_moving_;                    ///< the last frame that was not stationary
+  double speed_ = 0.0;          ///< of the last step measured or assumed, units per second
+  double interval_s_ = 0.0;     ///< between the frame in work and the one before
+  View last_;                   ///< the last frame with an image, without its points
+  View view_;                   ///< the last frame that was localized
+  Observations moving_points_;  ///< of the last one that was not stationary
+  Eigen::Vector3d moved_to_ = Eigen::Vector3d::Zero();  ///< by the last one with parallax
   Rigid3 road_pose_;                    ///< of the last frame whose road was measured
   bool is_last_localized_ = false;      ///< last_ has a pose that was measured
   bool was_static_ = false;             ///< the last image did not show new motion

@@ -31,6 +31,7 @@ bool WindowEstimator::relocate(const Frame& frame,
   mapper_.close(window_view());
   mapper_.begin_at_relocation();
   history_.close(window_);
+  map_ids_.go_back_to(found->frame);
   window_ = {};
   window_.keyframes.push_back({frame.number, found->world_from_camera, now});
   fix_landmarks(window_, camera(), found->landmarks, window_options_.max_reprojection_error_px);
@@ -38,7 +39,7 @@ bool WindowEstimator::relocate(const Frame& frame,
   calibration_.restart();
   world_from_camera_ = found->world_from_camera;
   road_pose_ = world_from_camera_;
-  velocity_ = {};
+  motion_.restart();
   is_last_localized_ = false;
   return true;
 }
@@ -50,6 +51,7 @@ void WindowEstimator::take_in(const Recognition& recognition) {
   recognized_frame_ = recognition.frame;
   if (recognition.moved.has_value()) {
     move_world(*recognition.moved);
+    map_ids_.join(recognition.frame);
   }
   fix_landmarks(window_, camera(), recognition.landmarks, kMaxPull_px);
 }
@@ -58,10 +60,12 @@ void WindowEstimator::move_world(const Similarity3& moved) {
   move(window_, moved);
   history_.rescale(moved.scale);
   calibration_.restart();
-  for (Rigid3* pose : {&world_from_camera_, &last_moving_.world_from_camera,
-                       &last_.world_from_camera, &road_pose_}) {
+  for (Rigid3* pose :
+       {&world_from_camera_, &view_.world_from_camera, &last_.world_from_camera, &road_pose_}) {
     *pose = moved * *pose;
   }
+  moved_to_ = moved * moved_to_;
+  motion_.rescale(moved.scale);
   speed_ *= moved.scale;
   moved_ = moved;
 }

@@ -68,6 +68,15 @@ double share_in_place(const std::vector<FrameResult>& frames) {
                            : 0.0;
 }
 
+void add_maps(const std::vector<FrameResult>& frames, MetricsReport& report) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    report.num_maps = std::max(report.num_maps, frames[i].map_id + 1);
+    if (frames[i].is_scale_new) {
+      report.scale_new_frames.push_back(i);
+    }
+  }
+}
+
 /// Frames that found the camera again in a place, behind one that had not measured it.
 std::size_t count_relocalizations(const std::vector<FrameResult>& frames) {
   std::size_t count = 0;
@@ -184,7 +193,8 @@ class ResultWriter {
           config.scale.source == ScaleSource::kNone ? "speed" : report.scale_source + " and speed";
     }
     report.tracked_fraction =
-        share_of(drive_.frames, [](const FrameResult& frame) { return is_measured(frame.state); });
+        share_of(drive_.frames, [](const FrameResult& frame) { return frame.is_measured; });
+    add_maps(drive_.frames, report);
     report.in_place_fraction = share_in_place(drive_.frames);
     report.camera = {drive_.frames.back().camera, drive_.frames.back().camera_sigma};
     if (config.scale.source == ScaleSource::kCameraHeight) {

@@ -10,7 +10,8 @@ namespace {
 constexpr std::string_view kHeader =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
     "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px,"
-    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw\n";
+    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw,"
+    "map_id,is_scale_new\n";
 
 constexpr std::string_view kModels[] = {"none", "homography", "essential"};  // by TwoViewModel
 
@@ -29,7 +30,7 @@ std::string frames_csv_row(std::size_t frame, double timestamp_s, const FrameRes
   const auto& sigmas = r.camera_sigma;
   return fmt::format(
       "{},{},{},{},{},{:.3f},{:.3f},{:.4f},{},{:.3f},{:.3f},{:.3f},{},{},{:.2f},{:.2f},{:.2f},{},{}"
-      ",{}\n",
+      ",{},{},{:d}\n",
       frame, timestamp_s, to_string(r.state), r.num_matches, r.num_inliers, r.homography_score,
       r.fundamental_score, r.homography_ratio, kModels[static_cast<std::size_t>(r.model)],
       r.times.stem_ms, r.times.features_ms, r.times.pose_ms, sigma, to_string(r.scale_state),
@@ -37,7 +38,7 @@ std::string frames_csv_row(std::size_t frame, double timestamp_s, const FrameRes
       sigmas ? fmt::format("{:.2f},{:.2f},{:.2f}", sigmas->fx_px, sigmas->cx_px, sigmas->cy_px)
              : ",,",
       r.recognized_frame == -1 ? "" : fmt::format("{}", r.recognized_frame),
-      correction(r.map_from_world));
+      correction(r.map_from_world), r.map_id, r.is_scale_new);
 }
 
 }  // namespace stemvo

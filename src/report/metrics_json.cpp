@@ -100,6 +100,8 @@ Json metrics_document(const MetricsReport& report) {
                {"fps", report.fps},
                {"scale_source", report.scale_source},
                {"tracked_fraction", report.tracked_fraction},
+               {"maps", report.num_maps},
+               {"scale_new_frames", report.scale_new_frames},
                {"in_place_fraction", report.in_place_fraction},
                {"camera", report.camera},
                {"road_measured_fraction", report.road_measured_fraction},

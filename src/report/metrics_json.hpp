@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "evaluation/metrics.hpp"
 #include "stemvo/camera.hpp"
@@ -39,7 +40,9 @@ struct MetricsReport {
   int filter = 0;
   double fps = 0.0;  ///< frames over wall time, process start to trajectory written
   std::string scale_source;
-  double tracked_fraction = 0.0;   ///< frames whose pose was measured, over all
+  double tracked_fraction = 0.0;              ///< frames whose pose was measured, over all
+  int num_maps = 0;                           ///< key `maps`
+  std::vector<std::size_t> scale_new_frames;  ///< where one of them began, counted from 0
   double in_place_fraction = 0.0;  ///< frames behind the first that measured no translation
   CameraReport camera;
   std::optional<double> road_measured_fraction;  ///< nullopt: the road is not asked
@@ -61,17 +64,17 @@ inline constexpr double kFewBelieved = 0.5;
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// in_place_fraction camera{fx_px,fy_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px} (as it was
-/// known in the end; sigmas are null where it is not refined) road_measured_fraction
-/// road_believed_fraction (of all frames; null where the road is not asked) alignment (of
-/// average_offset_m, t_rel_percent, r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the
-/// trajectory is up to scale, else none) path_length_m average_offset_m null_offset_m t_rel_percent
-/// r_rel_deg_per_100m segment_lengths_m segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg
-/// map{keyframes loops relocalizations adjustment_s, alignment and those behind it} (of
-/// trajectory_map_kitti.txt; null where nothing is remembered) and, only where it was asked for,
-/// timing{threads fps peak_memory_mib cpu_s other_cpu_s
-/// stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers
-/// round-trip; a number that is not finite becomes null. Error: the file cannot be written.
+/// maps scale_new_frames in_place_fraction
+/// camera{fx_px,fy_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px} (as it was known in the end;
+/// sigmas are null where it is not refined) road_measured_fraction road_believed_fraction (of all
+/// frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent,
+/// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
+/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
+/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg map{keyframes loops relocalizations
+/// adjustment_s, alignment and those behind it} (of trajectory_map_kitti.txt; null where nothing is
+/// remembered) and, only where it was asked for, timing{threads fps peak_memory_mib cpu_s
+/// other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers round-trip; a number that is
+/// not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
 

@@ -114,7 +114,7 @@ assert len(whole.map_from_camera) == len(plain) and whole.loops == [] and len(wh
 covariance = whole.keyframes[-1].covariance
 assert whole.keyframes[-1].frame == last and (covariance is None or np.all(np.linalg.eigvalsh(covariance) > 0.0))
 assert whole.keyframes[0].covariance is None and abs(whole.camera.fx / recording.camera.fx - 1.0) < 0.01
-assert np.array_equal(plain[-1].map_from_world, np.eye(4)) and plain[-1].recognized_frame is None
+assert np.array_equal(plain[-1].map_from_world, np.eye(4)) and plain[-1].recognized_frame is None and plain[-1].map_id == 0 and plain[-1].is_measured
 raises(lambda: metres.adjust_map([-7]), "covariance_of: expected frames of keyframes, found -7")
 metres.save_map(sys.argv[1] + ".map")
 visit = stemvo.Odometry(recording)

@@ -71,6 +71,41 @@ TEST(MotionCovariance, IsHonestWhateverTheNoiseOfTheTracks) {
   }
 }
 
+/// A hand that hardly moves: by the motion model as much as by the images.
+TEST(MotionCovariance, IsHonestWhereThereIsHardlyAnyParallax) {
+  std::vector<Rigid3> path;
+  double x = 0.0;
+  for (int i = 0; i < 260; ++i) {
+    x += i < 60 ? 0.02 : 0.0015 * std::sin(0.1 * i);
+    path.emplace_back(so3_exp({0.0, 0.001 * i, 0.0}), Eigen::Vector3d(x, 0.0, 0.0));
+  }
+  const DriveTracks drive(path, testing::points_of_room(2500, 4.0, 4), 0.1, 4);
+  WindowEstimator estimator(config_without_scale(), drive.camera);
+  EstimatorRun run(estimator, drive);
+  run.interval_s = 1.0 / 30.0;
+  run.add_all();
+  const double unit = testing::length_ratio(estimator.trajectory(), path, 20, 59);
+  double sum = 0.0;
+  int count = 0;
+  int inside = 0;
+  for (std::size_t i = 65; i < path.size(); ++i) {
+    if (run.results[i].state == FrameState::kTracking) {
+      continue;
+    }
+    Rigid3 motion = testing::motion_to(path, i);
+    motion.translation *= unit;
+    const double squared = testing::squared_error(testing::motion_to(estimator.trajectory(), i),
+                                                  motion, run.results[i].motion_covariance);
+    sum += squared / 6.0;
+    inside += squared < 12.592 ? 1 : 0;
+    ++count;
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_GT(sum / count, 0.1);
+  EXPECT_LT(sum / count, 1.6);
+  EXPECT_GT(inside, 0.85 * count);
+}
+
 TEST(MotionCovariance, IsFiniteAndPositiveDefiniteInEveryState) {
   std::set<FrameState> seen;
   for (const OdometryMode mode : {OdometryMode::kMap, OdometryMode::kTwoFrame}) {

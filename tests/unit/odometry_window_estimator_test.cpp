@@ -178,9 +178,9 @@ TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
   const std::size_t num_landmarks = d.estimator.window().landmarks.size();
   d.add_range(20, 60);
   d.expect_only(20, 60, FrameState::kStationary);
-  for (int i = 20; i < 60; ++i) {
-    EXPECT_EQ(d.moved(19, i), 0.0) << i;
-    EXPECT_EQ(d.pose(i).rotation.angularDistance(d.pose(19).rotation), 0.0) << i;
+  for (int i = 20; i < 60; ++i) {  // the nearest points are 4 units away
+    EXPECT_LT(d.moved(19, i), 2e-3) << i;
+    EXPECT_LT(d.pose(i).rotation.angularDistance(d.pose(19).rotation), 5e-5) << i;
   }
   EXPECT_EQ(d.estimator.window().keyframes.front().frame, oldest);
   EXPECT_EQ(d.estimator.window().landmarks.size(), num_landmarks);
@@ -189,14 +189,14 @@ TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
   expect_scale_kept(d, 59);
 }
 
-TEST(WindowEstimator, TurningOnTheSpotHoldsThePosition) {
+TEST(WindowEstimator, TurningOnTheSpotStaysThere) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.0 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 10);
   Driven d(DriveTracks(path, testing::points_along(path, 3000, 5), 0.1, 5));
   d.add_range(0, d.drive.num_frames());
   d.expect_only(20, 30, FrameState::kRotating);
   for (int i = 20; i < 30; ++i) {
-    EXPECT_EQ(d.moved(19, i), 0.0) << i;
+    EXPECT_LT(d.moved(19, i), 0.01) << i;
   }
   const Rigid3 turn = d.pose(19).inverse() * d.pose(29);
   EXPECT_NEAR(turn.angle_rad(), 20.0 * kDeg, 0.1 * kDeg);
@@ -211,11 +211,50 @@ TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   Driven d(DriveTracks(path, points, 0.1, 6));
   d.add_range(0, d.drive.num_frames());
   d.expect_only(20, 64, FrameState::kRotating);
-  EXPECT_EQ(d.moved(19, 63), 0.0);
+  EXPECT_LT(d.moved(19, 63), 0.03);
   const Rigid3 turn = d.pose(19).inverse() * d.pose(63);
   EXPECT_NEAR(turn.angle_rad(), 110.0 * kDeg, 0.5 * kDeg);
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
   EXPECT_EQ(d.run.count(FrameState::kLost), 0);
+}
+
+/// Standing for a minute before a room whose walls are 4 m away, with the noise of a real tracker.
+TEST(WindowEstimator, ACameraThatStandsDoesNotDrift) {
+  std::vector<Rigid3> path;
+  for (int i = 0; i < 1860; ++i) {
+    const double t = std::min(i, 60) / 30.0;
+    path.emplace_back(Eigen::Quaterniond::Identity(),
+                      Eigen::Vector3d(0.3 * (1.0 - std::cos(t)), 0.0, 0.3 * t));
+  }
+  Driven d(DriveTracks(path, testing::points_of_room(500, 4.0, 3), 0.1, 3));
+  d.add_range(0, d.drive.num_frames());
+  const double unit_m = 1.0 / testing::length_ratio(d.estimator.trajectory(), path, 20, 60);
+  for (int i = 70; i < d.drive.num_frames(); ++i) {
+    EXPECT_LT(unit_m * d.moved(65, i), 0.004) << i;  // 1 mm of a metre
+  }
+}
+
+/// A hand that hardly moves: the images say little, but no position is held.
+TEST(WindowEstimator, ASlowHandIsFollowedWithoutAJump) {
+  std::vector<Rigid3> path;
+  double x = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    x += i < 60 ? 0.02 : 0.001 * (1.0 + std::sin(0.05 * i));  // 0.1 px a frame
+    path.emplace_back(so3_exp({0.0, 0.002 * i, 0.0}), Eigen::Vector3d(x, 0.0, 0.0));
+  }
+  Driven d(DriveTracks(path, testing::points_of_room(2500, 4.0, 6), 0.05, 6));
+  d.run.interval_s = 1.0 / 30.0;
+  d.add_range(0, d.drive.num_frames());
+  EXPECT_GT(d.run.count(FrameState::kRotating) + d.run.count(FrameState::kStationary) +
+                d.run.count(FrameState::kLowParallax),
+            100);
+  const double unit_m = 1.0 / testing::length_ratio(d.estimator.trajectory(), path, 20, 59);
+  for (int i = 70; i < d.drive.num_frames(); ++i) {
+    EXPECT_GT(d.moved(i - 1, i), 0.0) << i;
+    EXPECT_LT(unit_m * d.moved(i - 1, i), 0.006) << i;
+  }
+  EXPECT_NEAR(unit_m * d.moved(80, 299), path[299].translation.x() - path[80].translation.x(),
+              0.02);
 }
 
 // A turn from the first frame on: nothing of it is in view in the end.
@@ -329,6 +368,66 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
                        run.results[22].world_from_camera.translation)
                           .norm();
   EXPECT_NEAR(step, testing::RoadDrive::kStep_m, 0.03 * testing::RoadDrive::kStep_m);
+}
+
+TEST(WindowEstimator, SaysWhichMapAndWhereItsUnitBegins) {
+  Driven d(car_drive(30.0, 0.8, 0.1, 8));
+  d.add_range(0, 15);
+  d.run.add_matches({}, 15);
+  for (int i = 16; i < d.drive.num_frames(); ++i) {
+    Matches other = d.drive.matches(i);
+    for (int& id : other.track_ids) {
+      id += 100000;
+    }
+    d.run.add_matches(other, i);
+  }
+  int num_new = 0;
+  for (const FrameResult& result : d.run.results) {
+    num_new += result.is_scale_new ? 1 : 0;
+    EXPECT_EQ(result.map_id, std::max(0, num_new - 1));
+    EXPECT_EQ(result.is_measured,
+              result.is_scale_new ||
+                  (is_measured(result.state) && result.state != FrameState::kInitializing));
+  }
+  EXPECT_EQ(num_new, 2);
+  EXPECT_FALSE(d.run.results[15].is_measured);
+}
+
+/// The way of the frames after `before`, in steps of the one before.
+std::vector<double> steps_without_images(Driven& d, int before, int count) {
+  std::vector<double> steps;
+  for (int i = 0; i < count; ++i) {
+    d.run.add_missing();
+    steps.push_back(d.moved(before + i, before + i + 1) / d.moved(before - 1, before));
+  }
+  return steps;
+}
+
+TEST(WindowEstimator, TheSpeedOfAHandFadesWithinASecondAndThatOfACarLasts) {
+  std::vector<Rigid3> path;
+  for (int i = 0; i < 160; ++i) {
+    path.emplace_back(Eigen::Quaterniond::Identity(),
+                      Eigen::Vector3d(0.3 * std::sin(4.0 * i / 30.0), 0.0, 0.0));
+  }
+  Driven hand(DriveTracks(path, testing::points_of_room(2500, 4.0, 10), 0.1, 10));
+  hand.run.interval_s = 1.0 / 30.0;
+  hand.add_range(0, 160);
+  const std::vector<double> fading = steps_without_images(hand, 159, 60);
+  EXPECT_NEAR(fading[3], 1.0, 1e-6);
+  EXPECT_LT(fading[31], 1e-6);
+  const auto variance = [&](std::size_t i) {
+    return hand.run.results[i].motion_covariance.diagonal().head(3).sum();
+  };
+  EXPECT_GT(variance(219), 2.0 * variance(165));
+  Driven car(car_drive(60.0, 0.8, 0.1, 8));
+  car.add_range(0, 50);
+  for (const double step : steps_without_images(car, 49, 15)) {
+    EXPECT_GT(step, 0.9);
+    EXPECT_LT(step, 1.01);
+  }
+  Driven young(car_drive(10.0, 0.8, 0.1, 8));  // nobody knows yet how long its speed lasts
+  young.add_range(0, 8);
+  EXPECT_LT(steps_without_images(young, 7, 12).back(), 1e-6);
 }
 
 TEST(WindowEstimator, TheSameTracksGiveTheSamePoses) {

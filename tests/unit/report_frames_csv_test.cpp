@@ -16,7 +16,8 @@ using ::testing::StartsWith;
 constexpr char kHeader[] =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
     "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px,"
-    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw\n";
+    "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw,"
+    "map_id,is_scale_new\n";
 
 FrameResult tracked() {
   FrameResult result;
@@ -33,6 +34,8 @@ FrameResult tracked() {
   result.camera_sigma = {3.5, 0.5, 0.75};
   result.times = {1.25, 12.5, 3.0004};
   result.recognized_frame = 12;
+  result.map_id = 2;
+  result.is_scale_new = true;
   result.map_from_world = {1.25, Eigen::Quaterniond(0.8, 0.6, 0.0, 0.0), {0.5, -1.0, 1.0 / 3.0}};
   return result;
 }
@@ -41,10 +44,10 @@ TEST(FramesCsv, HoldsOneRowPerFrame) {
   EXPECT_EQ(frames_csv_header(), kHeader);
   EXPECT_EQ(frames_csv_row(100, 10.3622, FrameResult()) + frames_csv_row(101, 10.466, tracked()),
             "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,disabled,0.00,0."
-            "00,0.00,,,,,1,0,0,0,0,0,0,1\n"
+            "00,0.00,,,,,1,0,0,0,0,0,0,1,0,0\n"
             "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
             "1.250,12.500,3.000,0.0123,held,700.00,600.50,180.25,3.50,0.50,0.75,"
-            "12,1.25,0.5,-1,0.333333333,0.6,0,0,0.8\n");
+            "12,1.25,0.5,-1,0.333333333,0.6,0,0,0.8,2,1\n");
 }
 
 /// A number format with a decimal comma and dots between thousands.

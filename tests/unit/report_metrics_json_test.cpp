@@ -38,6 +38,8 @@ MetricsReport example() {
           .fps = 31.5,
           .scale_source = "ground_truth",
           .tracked_fraction = 0.995,
+          .num_maps = 2,
+          .scale_new_frames = {1, 120},
           .camera = {{700.0, 710.0, 600.5, 180.25, 1241, 376}, CameraSigma{3.5, 0.5, 0.75}},
           .road_measured_fraction = 0.75,
           .road_believed_fraction = 0.875,
@@ -86,7 +88,9 @@ TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
       "cx_px": 600.5, "cy_px": 180.25,
       "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
   EXPECT_TRUE(json["map"].is_null());
-  EXPECT_EQ(json.size(), 25U);
+  EXPECT_EQ(json["maps"], 2);
+  EXPECT_EQ(json["scale_new_frames"], nlohmann::json({1, 120}));
+  EXPECT_EQ(json.size(), 27U);
 }
 
 TEST(MetricsJson, HoldsWhatTheMapMadeOfIt) {

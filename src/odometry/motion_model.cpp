@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/motion_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/LU>
+
+namespace stemvo {
+namespace {
+
+/// Speeds a second apart are compared over about so long.
+constexpr double kMemory_s = 5.0;
+/// A frame or two that are missed change no speed; within a second it fades to what lasts.
+constexpr double kBegins_s = 0.3;
+constexpr double kFades_s = 1.0;
+/// Pushes are means over so long.
+constexpr double kLearns_s = 1.0;
+/// A measurement so many sigmas from the prediction: something pushes.
+constexpr double kPushed = 3.0;
+
+Vector6d six_of(const Rigid3& prev_from_cur) {
+  Vector6d six;
+  six << prev_from_cur.translation, so3_log(prev_from_cur.rotation);
+  return six;
+}
+
+Rigid3 motion_of(const Vector6d& six) { return {so3_exp(six.tail<3>()), six.head<3>()}; }
+
+}  // namespace
+
+void Persistence::add(const Eigen::Vector3d& velocity, double interval_s) {
+  for (Sample& sample : recent_) {
+    sample.age_s += interval_s;
+  }
+  while (recent_.size() > 1 && recent_[1].age_s >= kFades_s) {
+    recent_.pop_front();
+  }
+  if (!recent_.empty() && recent_.front().age_s >= kFades_s) {
+    const Eigen::Vector3d& before = recent_.front().velocity;
+    const double kept = std::exp(-interval_s / kMemory_s);
+    common_ = kept * common_ + interval_s * velocity.dot(before);
+    square_ = kept * square_ + 0.5 * interval_s * (velocity.squaredNorm() + before.squaredNorm());
+  }
+  recent_.push_back({0.0, velocity});
+}
+
+void Persistence::rescale(double factor) {
+  for (Sample& sample : recent_) {
+    sample.velocity *= factor;
+  }
+  common_ *= factor * factor;
+  square_ *= factor * factor;
+}
+
+double Persistence::share_after(double unmeasured_s) const {
+  const double at = std::clamp((unmeasured_s - kBegins_s) / (kFades_s - kBegins_s), 0.0, 1.0);
+  const double fresh = 0.5 * (1.0 + std::cos(at * std::numbers::pi));
+  const double lasting = square_ > 0.0 ? std::clamp(common_ / square_, 0.0, 1.0) : 0.0;
+  return fresh + (1.0 - fresh) * std::pow(lasting, std::max(unmeasured_s, kFades_s));
+}
+
+Rigid3 MotionModel::predict(double interval_s,
+                            const std::optional<Eigen::Quaterniond>& turned) const {
+  Rigid3 motion = motion_of(interval_s * velocity_ - faded(interval_s));
+  motion.rotation = turned.value_or(motion.rotation);
+  return motion;
+}
+
+Vector6d MotionModel::faded(double interval_s) const {
+  const double middle_s = unmeasured_s_ > 0.0 ? unmeasured_s_ + 0.5 * interval_s : 0.0;
+  Vector6d share;
+  share << Eigen::Vector3d::Constant(1.0 - lasting_way_.share_after(middle_s)),
+      Eigen::Vector3d::Constant(1.0 - lasting_turn_.share_after(middle_s));
+  return interval_s * share.cwiseProduct(velocity_);
+}
+
+MotionModel::Fused MotionModel::fuse(const Rigid3& measured,
+                                     const Matrix6d& noise,
+                                     double weight,
+                                     double interval_s) {
+  const double t = interval_s;
+  if (!is_fused_) {  // the velocity is the difference of two poses
+    covariance_ << noise, noise / t, noise / t, 2.0 / (t * t) * noise;
+  }
+  advance(t);
+  const Rigid3 predicted = predict(t);
+  const Vector6d off = six_of(predicted.inverse() * measured);
+  learn(off, noise, t);
+  Vector6d diagonal;
+  diagonal << Eigen::Vector3d::Constant(pushes_[0]), Eigen::Vector3d::Constant(pushes_[1]);
+  const Matrix6d push = diagonal.cwiseMax(0.0).asDiagonal();
+  Fused fused;
+  fused.expected = t * t * covariance_.bottomRightCorner<6, 6>() + t * t * t / 3.0 * push;
+  Matrix12d pushed;
+  pushed << t * t * t / 3.0 * push, t * t / 2.0 * push, t * t / 2.0 * push, t * push;
+  covariance_ += pushed;
+
+  using Matrix126d = Eigen::Matrix<double, 12, 6>;
+  Matrix126d at_weight_0;
+  at_weight_0 << Matrix6d::Identity(), Matrix6d::Identity() / t;
+  const Matrix6d sum = covariance_.topLeftCorner<6, 6>() + noise;
+  const Matrix126d gain =
+      (1.0 - weight) * at_weight_0 + weight * (covariance_.leftCols<6>() * sum.inverse());
+  Matrix12d left = Matrix12d::Identity();
+  left.leftCols<6>() -= gain;
+  covariance_ = left * covariance_ * left.transpose() + gain * noise * gain.transpose();
+  fused.gain = gain.topRows<6>();
+  fused.prev_from_cur = predicted * motion_of(fused.gain * off);
+  velocity_ += gain.bottomRows<6>() * off;
+  is_fused_ = true;
+  return fused;
+}
+
+void MotionModel::advance(double interval_s) {
+  Matrix12d step = Matrix12d::Identity();
+  step.topRightCorner<6, 6>().diagonal().setConstant(interval_s);
+  covariance_ = step * covariance_ * step.transpose();
+}
+
+/// What is left of a prediction's error when its own and the measurement's are taken out.
+void MotionModel::learn(const Vector6d& off, const Matrix6d& noise, double interval_s) {
+  const Vector6d expected = (covariance_.topLeftCorner<6, 6>() + noise).diagonal();
+  const double to_push = 3.0 / (interval_s * interval_s * interval_s);
+  learnt_s_ = std::min(learnt_s_ + interval_s, std::max(kLearns_s, interval_s));
+  for (const int k : {0, 1}) {
+    const double square = off.segment<3>(3 * k).squaredNorm() / 3.0;
+    const double mean = expected.segment<3>(3 * k).mean();
+    const double push = to_push * (square - mean);
+    pushes_[k] += interval_s / learnt_s_ * (push - pushes_[k]);
+    if (square > kPushed * kPushed * mean) {
+      pushes_[k] = std::max(pushes_[k], push);
+    }
+  }
+}
+
+void MotionModel::measured(const Rigid3& prev_from_cur, double interval_s, bool is_fused) {
+  if (!is_fused) {
+    velocity_ = six_of(prev_from_cur) / interval_s;
+  }
+  is_fused_ = is_fused;
+  lasting_way_.add(velocity_.head<3>(), interval_s);
+  lasting_turn_.add(velocity_.tail<3>(), interval_s);
+  unmeasured_s_ = 0.0;
+}
+
+void MotionModel::lost(double interval_s) {
+  unmeasured_s_ += interval_s;
+  is_fused_ = false;
+  lasting_way_.restart();
+  lasting_turn_.restart();
+}
+
+void MotionModel::restart() {
+  lost(0.0);
+  velocity_.setZero();
+  unmeasured_s_ = 0.0;
+}
+
+void MotionModel::rescale(double factor) {
+  velocity_.head<3>() *= factor;
+  lasting_way_.rescale(factor);
+  pushes_[0] *= factor * factor;
+  Eigen::Matrix<double, 12, 1> lengths = Eigen::Matrix<double, 12, 1>::Ones();
+  lengths.head<3>().setConstant(factor);
+  lengths.segment<3>(6).setConstant(factor);
+  covariance_ = lengths.asDiagonal() * covariance_ * lengths.asDiagonal();
+}
+
+}  // namespace stemvo

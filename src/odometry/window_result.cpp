@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+#include <utility>
+#include <vector>
+
+#include "geometry/median.hpp"
+#include "odometry/road_landmarks.hpp"
+#include "odometry/window_estimator.hpp"
+
+namespace stemvo {
+
+// The end of a frame: its scale, its uncertainty, what is kept of it.
+
+/// All but what localize() told.
+void WindowEstimator::describe(const Frame& frame, FrameResult& result) {
+  scale_.report(result);
+  result.camera = camera();
+  result.camera_sigma = calibration_.camera_sigma();
+  result.world_from_camera = world_from_camera_;
+  result.is_scale_new = is_localized(frame) && result.state == FrameState::kInitializing;
+  const bool has_position = !is_initializing_ || (result.state != FrameState::kInitializing &&
+                                                  result.state != FrameState::kLowParallax);
+  result.is_measured = is_measured(result.state) && has_position;
+  result.map_id = map_ids_.now();
+  result.map_from_world = mapper_.map_from_world();
+  result.recognized_frame = recognized_frame_;
+  metric_sigma_ = metric_sigma(result);
+}
+
+void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& localized) {
+  FrameResult& result = localized.result;
+  const Rigid3 last = trajectory_.empty() ? world_from_camera_ : trajectory_.back();
+  const Rigid3 world_from_prev = moved_.has_value() ? *moved_ * last : last;
+  const MotionCovariance::Motion motion{
+      .state = result.state,
+      .is_localized = is_localized(frame),
+      .prev_from_cur = world_from_prev.inverse() * world_from_camera_,
+      .dt_s = interval_s_,
+      .usual_step = speed_ * interval_s_,
+      .hidden_px = result.state == FrameState::kStationary ? min_flow_px() : min_way_px(),
+      .fused = fused_,
+      .faded = motion_.faded(interval_s_),
+      .two_view = localized.two_view,
+      .camera = result.camera,
+      .camera_sigma = result.camera_sigma,
+      .scale_sigma = metric_sigma(result)};
+  result.motion_covariance = uncertainty_.finish(motion);
+  add_move(last.inverse() * world_from_prev, result.motion_covariance);
+}
+
+double WindowEstimator::pixel_units() const {
+  const Rigid3 camera_from_world = world_from_camera_.inverse();
+  std::vector<double> depths;
+  for (const Eigen::Vector3d& point : find_seen_landmarks(window_, view_.points).points) {
+    depths.push_back((camera_from_world * point).z());
+  }
+  return depths.empty() ? 0.0 : median(std::move(depths)) / camera().mean_focal_px();
+}
+
+void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
+  if (!frame.has_image()) {
+    scale_.keep_last("no image", frame.time_s);
+  } else if (state == FrameState::kLost) {
+    scale_.keep_last("lost", frame.time_s);
+  } else if (is_initializing_) {
+    if (state != FrameState::kFirst) {
+      scale_.set_unknown("no map");
+    }
+  } else {
+    const Eigen::Vector3d center = road_pose_.translation;
+    const RoadImage road = frame.road ? seen_by(*frame.road, camera()) : RoadImage{};
+    const auto landmarks = scale_.asks_road()
+                               ? road_landmarks(window_, world_from_camera_, view_.points, camera())
+                               : std::vector<RoadLandmark>();
+    const double factor =
+        scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
+                       frame.time_s, pixel_units(), landmarks);
+    if (factor != 1.0) {
+      rescale(window_, factor, center);
+      history_.rescale(factor);
+      calibration_.rescale(factor, center);
+      uncertainty_.rescale(factor);
+      motion_.rescale(factor);
+      for (Eigen::Vector3d* at :
+           {&world_from_camera_.translation, &view_.world_from_camera.translation, &moved_to_}) {
+        *at = center + factor * (*at - center);
+      }
+    }
+    road_pose_ = world_from_camera_;
+  }
+}
+
+/// The pose is final.
+void WindowEstimator::remember(const Frame& frame, FrameState state) {
+  const bool has_pose = is_localized(frame);
+  const bool has_opened = has_pose && state == FrameState::kInitializing;  // and the map with it
+  if (has_opened || (has_pose && is_last_localized_)) {
+    const View& before = has_opened ? initializer_.reference() : last_;
+    const Rigid3 motion = before.world_from_camera.inverse() * world_from_camera_;
+    motion_.measured(motion, frame.time_s - before.time_s, fused_.has_value());
+    if (before.frame == frame.number - 1) {
+      trust_.compare(frame.hints, motion.rotation);
+    }
+    const double speed = motion_.speed();
+    speed_ = speed > 0.0 && state == FrameState::kTracking ? speed : speed_;
+  } else if (!is_measured(state)) {
+    motion_.lost(interval_s_);
+  }
+  if (frame.has_image()) {
+    is_last_localized_ = has_pose;
+    last_ = {frame.number, world_from_camera_, {}, frame.time_s, frame.road};
+  }
+  trajectory_.push_back(world_from_camera_);
+  history_.end_frame(window_);
+  map_ids_.end_frame();
+}
+
+}  // namespace stemvo
