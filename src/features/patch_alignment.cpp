@@ -44,17 +44,6 @@ bool is_in_image(const BorderedImage& image, float x, float y) {
          y <= static_cast<float>(image.height - 1);
 }
 
-/// Makes the gradient orthogonal to {1, value}: bias and gain drop out.
-template <typename Values>
-void make_orthogonal(CoarseValues& values, Values& gx, Values& gy) {
-  const auto value = Values(values.data()) - Values(values.data()).mean();
-  const float norm_sq = std::max(value.square().sum(), kMinNormSq);
-  for (Values* gradient : {&gx, &gy}) {
-    *gradient -= gradient->mean();
-    *gradient -= value * ((value * *gradient).sum() / norm_sq);
-  }
-}
-
 void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coarse) {
   const PatchKernels& kernels = patch_kernels();
   const float left = x - 0.5F * (kCoarseSide - 1);
@@ -70,7 +59,9 @@ void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coa
   kernels.sample_coarse(image, left, top - 1.0F, before);
   kernels.sample_coarse(image, left, top + 1.0F, coarse.gy);
   gy = 0.5F * (gy - Values(before.data()));
-  make_orthogonal(coarse.value, gx, gy);
+  // A bias of the image drops out.
+  gx -= gx.mean();
+  gy -= gy.mean();
   const float xx = gx.square().sum();
   const float xy = (gx * gy).sum();
   const float yy = gy.square().sum();

@@ -72,20 +72,14 @@ inline Eigen::MatrixXd solve(const Eigen::MatrixXd& columns, const Eigen::Matrix
   return columns.colPivHouseholderQr().solve(right);
 }
 
-/// Columns as they are, without their part along {1, value}: gain and bias projected out.
-inline Eigen::MatrixXd without_light(const Eigen::MatrixXd& columns, const Eigen::VectorXd& value) {
-  Eigen::MatrixXd light(64, 2);
-  light << Eigen::VectorXd::Ones(64), value;
-  return columns - light * solve(light, columns);
-}
-
 /// A translation of what is at `from` in one image; from `at` in the other.
 inline Complex align_coarse(const BorderedImage& before,
                             Complex from,
                             const BorderedImage& after,
                             Complex at) {
   const Eigen::VectorXd value = samples(before, from, 1.0, linear_weight);
-  const Eigen::MatrixXd columns = without_light(gradient(before, from, linear_weight), value);
+  const Eigen::MatrixXd gradients = gradient(before, from, linear_weight);
+  const Eigen::MatrixXd columns = gradients.rowwise() - gradients.colwise().mean();  // no bias
   for (int i = 0; i < 12; ++i) {
     const Eigen::VectorXd step = solve(columns, samples(after, at, 1.0, linear_weight) - value);
     at -= Complex(step[0], step[1]);
@@ -116,7 +110,9 @@ inline PlainMatch align_fine(const BorderedImage& before,
     const Complex by_turn = std::conj(by) * offset(k);
     columns.row(k).tail(2) << by_turn.real(), -by_turn.imag();
   }
-  columns = without_light(columns, value);
+  Eigen::MatrixXd illumination(64, 2);
+  illumination << Eigen::VectorXd::Ones(64), value;
+  columns -= illumination * solve(illumination, columns);
 
   PlainMatch match{at};
   Eigen::Index num_unknowns = 2;
