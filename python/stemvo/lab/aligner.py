@@ -2,7 +2,7 @@
 """The odometry's patch aligner (src/features/patch_alignment.cpp) for JAX: differentiable, a batch at a time, two levels.
 
 Patches of 8x8: a translation on the coarser level, a similarity on the finer; inverse composition, Catmull-Rom samples, gain and
-bias projected out on the finer."""
+bias projected out on the finer, bias on the coarser."""
 
 import jax
 import jax.numpy as jnp
@@ -40,6 +40,7 @@ def _slopes(image, x, y):
 def _translation(before, after, at, start):
     value = _sample(before, at[0] + _DX, at[1] + _DY)
     jacobian = jnp.stack(_slopes(before, at[0] + _DX, at[1] + _DY), 1)
+    jacobian -= jacobian.mean(0)
     hessian = jacobian.T @ jacobian
     hessian += 1e-4 * jnp.trace(hessian) * jnp.eye(2) + 1e-9 * jnp.eye(2)
     place = start

@@ -10,6 +10,7 @@ import stemvo
 COMMANDS = {
     "benchmark": "Methods on KITTI's sequences, beside zero motion and published numbers",
     "compare": "Trajectories of any program against one ground truth",
+    "learn": "A filter, learned by gradient through the aligner",
     "paper": "The paper's tables and figures from weights and KITTI",
     "scene": "A result for COLMAP or nerfstudio",
     "robustness": "Compare channels on frames in worse light, weather or hands",
