@@ -91,7 +91,7 @@ class Adjustment {
   void add(const Error& error, int from, int to, ceres::LossFunction* loss = nullptr);
   [[nodiscard]] int num_common_landmarks(const MapEdge& edge) const;
 
-  void measure_errors();
+  void measure_errors(double sigma_factor);
   bool minimize(double tolerance, int max_iterations);
   void keep_length();
   void read_landmarks(MapAdjustment& result) const;
@@ -149,7 +149,8 @@ Eigen::Vector2d Adjustment::ray(const MapView& view) {
 
 void Adjustment::place_points() {
   const std::size_t share = std::max(kMinOfKeyframe, kMaxObservations / map_.keyframes.size());
-  for (MapTrack& track : longest_tracks(tracks_of(map_), map_.keyframes.size(), share)) {
+  for (MapTrack& track :
+       choose_tracks(tracks_of(map_), map_.keyframes.size(), share, options_.max_views)) {
     std::vector<Eigen::Vector2d> rays;
     std::ranges::transform(track, std::back_inserter(rays),
                            [&](const MapView& view) { return ray(view); });
@@ -234,7 +235,7 @@ void Adjustment::add_lengths() {
     const double distance = edge.from_to.translation.norm();
     if (distance > 3.0 * edge.sigma_translation) {
       add_distance(edge.from, edge.to, std::log(distance) + length.log_metres_per_unit,
-                   std::hypot(independent_sigma(map_, i), edge.sigma_translation / distance));
+                   independent_sigma(map_, i));
     }
   }
   if (map_.lengths.empty()) {
@@ -263,7 +264,7 @@ void Adjustment::add_camera() {
       nullptr, camera_.data())});
 }
 
-void Adjustment::measure_errors() {
+void Adjustment::measure_errors(double sigma_factor) {
   std::vector<double> errors;
   errors.reserve(corners_.size());
   for (const Corner& corner : corners_) {
@@ -272,16 +273,18 @@ void Adjustment::measure_errors() {
     errors.push_back(sigma_px_ * error.norm());
   }
   median_error_px_ = median(std::move(errors));
-  sigma_px_ = std::max(median_error_px_ / kMedianOfRayleigh, kMinSigma_px);
+  sigma_px_ = sigma_factor * std::max(median_error_px_ / kMedianOfRayleigh, kMinSigma_px);
   const double loss_px = std::max(kMinLoss_px, kLossShare * median_error_px_);
   corner_loss_.Reset(new ceres::CauchyLoss(loss_px / sigma_px_), ceres::TAKE_OWNERSHIP);
 }
 
 bool Adjustment::minimize(double tolerance, int max_iterations) {
-  measure_errors();
+  measure_errors(std::sqrt(std::max(1.0, static_cast<double>(options_.max_views))));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_SCHUR;
-  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // same bytes with any BLAS
+  if (ceres::IsSparseLinearAlgebraLibraryTypeAvailable(ceres::SUITE_SPARSE)) {
+    options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
+  }
   options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (AdjustedPoint& point : points_) {
     options.linear_solver_ordering->AddElementToGroup(point.at.data(), 0);
@@ -303,10 +306,11 @@ bool Adjustment::minimize(double tolerance, int max_iterations) {
 }
 
 bool Adjustment::solve() {
-  if (points_.empty() || !minimize(1e-3, 15) || !minimize(1e-6, 50)) {
+  if (points_.empty() || !minimize(1e-3, 15) ||
+      !minimize(options_.max_views > 0 ? 1e-4 : 1e-6, 50)) {
     return false;
   }
-  measure_errors();
+  measure_errors(1.0);
   return true;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -14,13 +15,17 @@
 namespace stemvo {
 
 struct MapAdjustmentOptions {
-  Camera camera;  ///< as it was given; without distortion
+  Camera camera;  ///< as it is known beforehand; without distortion
   /// Standard deviations of its cx, cy (px), focal length (share), k1, k2 as they are known
   /// beforehand; nullopt: the camera stays.
   std::optional<IntrinsicsDelta> camera_sigma;
   /// So many keyframes at the beginning are another recording's: their own camera is theirs.
   int num_of_other_camera = 0;
   std::vector<int> covariance_of;  ///< keyframes
+  /// Most views of a track, which then counts as one observation; 0: all, each counts, and the
+  /// longest tracks are taken: they tell a camera best. The path is told better, and ten times as
+  /// fast, by pieces of any tracks.
+  std::size_t max_views = 0;
 };
 
 /// A landmark, and who sees it.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <numeric>
 #include <unordered_map>
 #include <utility>
@@ -78,6 +79,32 @@ void join_loops(const KeptMap& map, SameLandmark& same) {
   }
 }
 
+/// Into pieces of one size.
+std::vector<MapTrack> cut(const std::vector<MapTrack>& tracks, std::size_t max_views) {
+  constexpr std::size_t kMinViews = 3;
+  std::vector<MapTrack> pieces;
+  for (const MapTrack& track : tracks) {
+    const std::size_t num_pieces = (track.size() + max_views - 1) / max_views;
+    for (std::size_t i = 0; i < num_pieces && track.size() >= kMinViews; ++i) {
+      const auto at = [&](std::size_t piece) {
+        return track.begin() + static_cast<std::ptrdiff_t>(piece * track.size() / num_pieces);
+      };
+      pieces.emplace_back(at(i), at(i + 1));
+    }
+  }
+  return pieces;
+}
+
+/// Far landmarks have the longest tracks and tell nothing of lengths: an order without a bias.
+std::uint64_t hash_of(const MapTrack& track) {
+  std::uint64_t mixed = static_cast<std::uint64_t>(track.front().keyframe) * 1'000'003U +
+                        static_cast<std::uint64_t>(track.front().corner);
+  mixed *= 0x9e3779b97f4a7c15U;
+  mixed ^= mixed >> 31U;
+  mixed *= 0xbf58476d1ce4e5b9U;
+  return mixed >> 20U;
+}
+
 }  // namespace
 
 std::vector<MapTrack> tracks_of(const KeptMap& map) {
@@ -103,10 +130,16 @@ std::vector<MapTrack> tracks_of(const KeptMap& map) {
   return tracks;
 }
 
-std::vector<MapTrack> longest_tracks(std::vector<MapTrack> tracks,
-                                     std::size_t num_keyframes,
-                                     std::size_t share) {
-  std::ranges::stable_sort(tracks, std::ranges::greater{}, &MapTrack::size);
+std::vector<MapTrack> choose_tracks(std::vector<MapTrack> tracks,
+                                    std::size_t num_keyframes,
+                                    std::size_t share,
+                                    std::size_t max_views) {
+  if (max_views > 0) {
+    tracks = cut(tracks, max_views);
+    std::ranges::stable_sort(tracks, {}, hash_of);
+  } else {
+    std::ranges::stable_sort(tracks, std::ranges::greater{}, &MapTrack::size);
+  }
   std::vector<std::size_t> num(num_keyframes);
   std::erase_if(tracks, [&](const MapTrack& track) {
     const auto count = [&](const MapView& view) -> std::size_t& {

@@ -21,9 +21,12 @@ using MapTrack = std::vector<MapView>;
 /// loop that the graph contradicts connects nothing.
 [[nodiscard]] std::vector<MapTrack> tracks_of(const KeptMap& map);
 
-/// The longest tracks: none all of whose keyframes have `share` views of longer ones.
-[[nodiscard]] std::vector<MapTrack> longest_tracks(std::vector<MapTrack> tracks,
-                                                   std::size_t num_keyframes,
-                                                   std::size_t share);
+/// None all of whose keyframes have `share` views of others that were taken before. The longest
+/// come first; with `max_views`, any: tracks are cut into pieces of no more views, at least three,
+/// and their order is that of a fixed hash.
+[[nodiscard]] std::vector<MapTrack> choose_tracks(std::vector<MapTrack> tracks,
+                                                  std::size_t num_keyframes,
+                                                  std::size_t share,
+                                                  std::size_t max_views);
 
 }  // namespace stemvo

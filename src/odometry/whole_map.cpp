@@ -38,8 +38,12 @@ WholeMap::WholeMap(const PhasedOdometry& odometry)
       trajectory(odometry.frames().estimator().trajectory()),
       times_s(odometry.frames().times_s()),
       map_from_frame(place_trajectory(trajectory, times_s, kept)),
-      camera(odometry.view().camera()),
-      camera_sigma(prior_sigma(odometry.options().camera.refine)) {}
+      camera(kept.keyframes.empty() ? odometry.view().camera() : kept.keyframes.back().camera),
+      camera_sigma(prior_sigma(odometry.options().camera.refine)) {
+  if (const auto learnt = odometry.frames().estimator().camera_estimate(); learnt && camera_sigma) {
+    camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
+  }
+}
 
 void WholeMap::close_loops() {
   if (!kept.loops.empty()) {
@@ -59,8 +63,9 @@ Status WholeMap::adjust(const std::vector<int>& frames) {
   close_loops();
   const auto is_of_other = [](const KeptKeyframe& keyframe) { return keyframe.frame < 0; };
   const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
-  const auto adjusted =
-      adjust_map(kept, {camera, camera_sigma, static_cast<int>(num_of_other), covariance_of});
+  constexpr std::size_t kMaxViews = 12;
+  const auto adjusted = adjust_map(
+      kept, {camera, camera_sigma, static_cast<int>(num_of_other), covariance_of, kMaxViews});
   if (adjusted && agrees_with_motions(kept, adjusted->map_from_keyframe)) {
     take_in(*adjusted);
   } else {

@@ -115,5 +115,20 @@ TEST(MapAdjustment, FindsPosesCameraAndDistortion) {
   }
 }
 
+TEST(MapAdjustment, FindsThePathByPiecesOfTracks) {
+  const DriveTracks drive = walk(40, 0.0, 1);
+  const KeptMap map = map_of(drive, {0.0, 0.0}, 1.0);
+  MapAdjustmentOptions options;
+  options.camera = drive.camera;
+  options.max_views = 6;
+  const auto adjusted = adjust_map(map, options);
+  ASSERT_TRUE(adjusted);
+  EXPECT_LE(worst_position(drive, *adjusted), 1e-2);
+  for (const AdjustedLandmark& landmark : adjusted->landmarks) {
+    EXPECT_GE(landmark.views.size(), 3U);
+    EXPECT_LE(landmark.views.size(), 6U);
+  }
+}
+
 }  // namespace
 }  // namespace stemvo
