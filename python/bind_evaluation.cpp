@@ -51,6 +51,9 @@ Expected<Metrics> compare(const PosesArgument& estimate,
     return fail(fmt::format("estimate: expected {} poses as in truth, found {}", true_poses->size(),
                             poses->size()));
   }
+  if (poses->size() < 2) {
+    return fail(fmt::format("estimate: expected at least 2 poses, found {}", poses->size()));
+  }
   return evaluate_aligned(*poses, *true_poses, alignment);
 }
 

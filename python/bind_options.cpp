@@ -64,7 +64,7 @@ void set_distortion(Camera& camera,
 void bind_camera(nb::module_& module) {
   nb::class_<Camera>(
       module, "Camera",
-      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3) "
+      "Pinhole camera, in pixels; distortion is none, radial-tangential (k1 k2 p1 p2 k3 ..) "
       "or equidistant (k1 k2 k3 k4)")
       .def(
           "__init__",

@@ -38,6 +38,12 @@ namespace {
 using namespace nb::literals;
 using Path = std::filesystem::path;
 
+void warn(const std::string& text) {
+  if (PyErr_WarnEx(PyExc_RuntimeWarning, text.c_str(), 1) != 0) {
+    throw nb::python_error();
+  }
+}
+
 FrameSource open_recording(const Path& path,
                            const std::optional<Path>& camera_file,
                            const std::optional<std::string>& frames,
@@ -63,7 +69,11 @@ FrameSource open_recording(const Path& path,
     const nb::gil_scoped_release release;
     return open_source(request);
   }();
-  return value_or_raise(std::move(opened));
+  FrameSource source = value_or_raise(std::move(opened));
+  for (const std::string& warning : source.warnings) {
+    warn(warning);
+  }
+  return source;
 }
 
 /// As for the program, an image that cannot be read is a warning; None stands for it.
@@ -78,9 +88,7 @@ nb::tuple frame_of(const FrameSource& source, std::size_t index) {
   if (image) {
     return nb::make_tuple(array_of(*image), source.time_s(index));
   }
-  if (PyErr_WarnEx(PyExc_RuntimeWarning, image.error().message.c_str(), 1) != 0) {
-    throw nb::python_error();
-  }
+  warn(image.error().message);
   return nb::make_tuple(nb::none(), source.time_s(index));
 }
 
@@ -99,7 +107,11 @@ CameraView view_of_file(const Path& camera_file, const std::vector<std::string>&
   CameraView made;
   made.view = value_or_raise(dataset::view_of(camera.camera, camera_file));
   made.frames.camera_height_m = camera.camera_height_m;
+  made.frames.warnings = camera.warnings;
   value_or_raise(dataset::add_view(made.frames, made.view, masks, {}));
+  for (const std::string& warning : made.frames.warnings) {
+    warn(warning);
+  }
   return made;
 }
 

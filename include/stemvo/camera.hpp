@@ -12,7 +12,7 @@ inline constexpr int kMaxImageSide_px = 32767;
 
 enum class Distortion {
   kNone,
-  kRadialTangential,  ///< OpenCV's k1 k2 p1 p2 k3
+  kRadialTangential,  ///< OpenCV's k1 k2 p1 p2 k3, k4 k5 k6, s1 s2 s3 s4
   kEquidistant,       ///< OpenCV's fisheye k1 k2 k3 k4
 };
 
@@ -27,7 +27,7 @@ struct Camera {
   int height_px = 0;
   /// The lens, which the odometry takes out of its images first. The functions below know none.
   Distortion distortion = Distortion::kNone;
-  std::array<double, 5> distortion_coefficients = {};  ///< those a model does not have are 0
+  std::array<double, 12> distortion_coefficients = {};  ///< those a model does not have are 0
 
   /// 3x3 intrinsics K.
   [[nodiscard]] Eigen::Matrix3d matrix() const {

@@ -52,8 +52,9 @@ class OdometryHandle {
   /// time that is not after its beginning, or the end of the last; a distance below 0.
   [[nodiscard]] Status add_distance(double from_s, double to_s, double metres, double sigma);
 
-  /// Is told in words when tracking begins, ends and recovers, when the scale is believed and when
-  /// no more, and why a frame could not be seen. Before the first frame.
+  /// Is told in words what is odd about the camera, when tracking begins, ends and recovers, when
+  /// the scale is believed and when no more, and why a frame could not be seen. Before the first
+  /// frame.
   void set_log(Log log);
 
   /// Landmarks that came, moved or went since `version` of the map; 0: all. They are seen from at

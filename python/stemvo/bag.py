@@ -6,6 +6,7 @@ Compressed images stay the bytes they are. The camera is that of the camera_info
 
 import argparse
 import pathlib
+import re
 import shutil
 import sys
 
@@ -25,8 +26,9 @@ IMAGE_TYPES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 ENCODINGS = {"mono8": (np.uint8, 1, (0,)), "8UC1": (np.uint8, 1, (0,)), "mono16": (np.uint16, 1, (0,)), "16UC1": (np.uint16, 1, (0,)),
              "rgb8": (np.uint8, 3, (0, 1, 2)), "bgr8": (np.uint8, 3, (2, 1, 0)), "8UC3": (np.uint8, 3, (2, 1, 0)),
              "rgba8": (np.uint8, 4, (0, 1, 2)), "bgra8": (np.uint8, 4, (2, 1, 0))}
-MODELS = {"plumb_bob": ("radial-tangential", 5), "rational_polynomial": ("radial-tangential", 5),
+MODELS = {"plumb_bob": ("radial-tangential", 5), "rational_polynomial": ("radial-tangential", 12),
           "equidistant": ("equidistant", 4), "fisheye": ("equidistant", 4)}
+RECTIFIED = re.compile(r"(^|[/_])rect(ified)?([/_]|$)")  # image_rect, image_rect_color, color/rect/image
 
 
 class BagError(Exception):
@@ -38,7 +40,7 @@ def stamp_ns(message):
 
 
 def to_pixels(message):
-    """Height x width (x 3, RGB) of 8 bit; of 16 bit the upper eight."""
+    """Height x width (x 3, RGB) of 8 bit, or of 16."""
     if message.encoding not in ENCODINGS:
         raise BagError(f"expected images of encoding {', '.join(ENCODINGS)}, found '{message.encoding}'")
     kind, channels, order = ENCODINGS[message.encoding]
@@ -49,7 +51,7 @@ def to_pixels(message):
         raise BagError(f"expected {message.height} rows of {message.step} bytes for {message.width} {message.encoding} pixels, found {data.size} bytes")
     rows = data[:message.height * message.step].reshape(message.height, message.step)[:, :row]
     pixels = np.ascontiguousarray(rows).view(sample).reshape(message.height, message.width, channels)[:, :, order]
-    return (pixels >> 8 if kind == np.uint16 else pixels).astype(np.uint8).squeeze()
+    return pixels.astype(kind).squeeze()
 
 
 def write_image(message, kind, stem):
@@ -75,6 +77,11 @@ def choose_topic(reader, asked):
     return asked or found[0]
 
 
+def numbers(info, name):
+    """Of a message of ROS 2, or of ROS 1, which writes it large."""
+    return [float(x) for x in (getattr(info, name) if hasattr(info, name) else getattr(info, name.upper()))]
+
+
 def camera_yaml(reader, topic):
     """sensor.yaml of the first camera_info beside the topic: /cam0/image_raw has /cam0/camera_info."""
     folder = topic.rsplit("/compressed", 1)[0].rsplit("/", 1)[0]
@@ -82,14 +89,25 @@ def camera_yaml(reader, topic):
     connections = [c for c in reader.connections if c.topic in wanted and c.msgtype == "sensor_msgs/msg/CameraInfo"]
     for connection, _, raw in reader.messages(connections) if connections else ():
         info = reader.deserialize(raw, connection.msgtype)
-        matrix, lens = [float(x) for x in (info.k if hasattr(info, "k") else info.K)], [float(x) for x in (info.d if hasattr(info, "d") else info.D)]
+        matrix, lens, projection = numbers(info, "k"), numbers(info, "d"), numbers(info, "p")
+        roi = info.roi
+        if max(info.binning_x, info.binning_y) > 1 or roi.x_offset or roi.y_offset or (roi.width or info.width) != info.width or (roi.height or info.height) != info.height:
+            raise BagError(f"{connection.topic}: expected the camera of whole images, found one with binning or a region of interest; see --camera")
+        of_projection = [projection[0], 0.0, projection[2], 0.0, projection[5], projection[6]]
+        if RECTIFIED.search(topic) and projection[0] > 0.0:
+            matrix, lens = of_projection, []
+            print(f"{connection.topic}: P without distortion, for {topic} is rectified", file=sys.stderr)
+        elif any(lens) and projection[0] > 0.0 and not np.allclose(of_projection, matrix[:6], atol=0.01):
+            print(f"warning: {connection.topic}: K and D, for images as the sensor gives them; for rectified ones --camera with P", file=sys.stderr)
         model, count = MODELS.get(info.distortion_model, (None, 0))
         if model is None and any(lens) or any(lens[count:]):
             raise BagError(f"{connection.topic}: expected distortion_model plumb_bob or equidistant, found '{info.distortion_model}' of {len(lens)} coefficients; see --camera")
+        if any(matrix[i] for i in (1, 3)):
+            raise BagError(f"{connection.topic}: expected a camera without skew, found {matrix}; see --camera")
         if not matrix[0] > 0.0:
             raise BagError(f"{connection.topic}: expected a calibrated camera, found focal length {matrix[0]}; see --camera")
         return (f"# {connection.topic}\nresolution: [{info.width}, {info.height}]\nintrinsics: [{matrix[0]}, {matrix[4]}, {matrix[2]}, {matrix[5]}]\n"
-                + (f"distortion_model: {model}\ndistortion_coefficients: {lens[:count]}\n" if any(lens) else "distortion_model: none\n"))
+                + (f"distortion_model: {model}\ndistortion_coefficients: {lens[:count]}\n" if any(lens) or (model == "equidistant" and lens) else "distortion_model: none\n"))
     raise BagError(f"expected messages of {' or '.join(wanted)}, or --camera FILE, found none")
 
 
@@ -127,6 +145,8 @@ def main(arguments=None):
     options = parser.parse_args(arguments)
     unfinished = options.out.parent / f"{options.out.name}.unfinished"
     try:
+        if not options.bag.exists():
+            raise BagError("expected a bag, found nothing of that name; check the path")
         if options.out.exists():
             raise BagError(f"{options.out}: expected a folder that does not exist, found one")
         shutil.rmtree(unfinished, ignore_errors=True)

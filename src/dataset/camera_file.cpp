@@ -13,12 +13,15 @@
 #include <yaml-cpp/yaml.h>
 
 #include "config/config_yaml.hpp"
-#include "dataset/frame_files.hpp"
+#include "geometry/distortion.hpp"
+#include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
 namespace {
+
+using Numbers = std::vector<double>;
 
 /// The names by which a kind of camera file says what ours says.
 struct Format {
@@ -29,13 +32,18 @@ struct Format {
   std::string intrinsics_form = "[fx, fy, cx, cy]";
   std::array<std::size_t, 4> places = {0, 1, 2, 3};  ///< of fx, fy, cx, cy among them
   std::string coefficients = "distortion_coefficients";
-  std::vector<std::string> models = {"none", "radial-tangential", "radtan", "equidistant"};
+  std::string projection = "projection_matrix";
   std::string body = "T_BS";
   bool has_more_keys = false;  ///< else a key that is not read is an error
 
   [[nodiscard]] std::vector<std::string> keys() const {
-    return {width,        height, "resolution", "camera_model", intrinsics, "distortion_model",
-            coefficients, body,   "rate_hz",    "camera_height"};
+    std::vector<std::string> keys = {
+        width,        height, "resolution", "camera_model", intrinsics, "distortion_model",
+        coefficients, body,   "rate_hz",    "camera_height"};
+    if (is_of_matrices()) {
+      keys.insert(keys.end(), {projection, "roi", "binning_x", "binning_y"});
+    }
+    return keys;
   }
   [[nodiscard]] bool is_of_matrices() const { return num_intrinsics == 9; }
 };
@@ -48,7 +56,6 @@ const Format kMatrices = {.intrinsics = "camera_matrix",
                           .num_intrinsics = 9,
                           .intrinsics_form = "data: [fx, 0, cx, 0, fy, cy, 0, 0, 1]",
                           .places = {0, 4, 2, 5},
-                          .models = {"plumb_bob", "equidistant", "fisheye", "none"},
                           .has_more_keys = true};
 
 /// ROS' message as `topic echo` prints it.
@@ -59,7 +66,7 @@ const Format kMessage = {.width = "width",
                          .intrinsics_form = "[fx, 0, cx, 0, fy, cy, 0, 0, 1]",
                          .places = kMatrices.places,
                          .coefficients = "d",
-                         .models = kMatrices.models,
+                         .projection = "p",
                          .has_more_keys = true};
 
 /// The same in capitals.
@@ -67,6 +74,7 @@ Format message_of_ros_1() {
   Format format = kMessage;
   format.intrinsics = "K";
   format.coefficients = "D";
+  format.projection = "P";
   return format;
 }
 
@@ -109,6 +117,8 @@ class Reader {
     set_size(result.camera);
     set_intrinsics(result.camera);
     set_distortion(result.camera);
+    check_part(result.camera);
+    check_projection(result);
     result.rate_hz = number("rate_hz", 1e-9, 1e5);
     result.camera_height_m = number("camera_height", 1e-9, 1000.0);
     return status_ ? Expected<CameraFile>(result) : status_.error();
@@ -213,17 +223,17 @@ class Reader {
     } else if (const Status read = add_numbers(values_.at(key), true, numbers); !read) {
       refuse(key, read.error().message);
     } else {
+      const std::size_t count = numbers.size();
       drop_zeros(key, lengths.back(), numbers);
       if (std::ranges::find(lengths, numbers.size()) == lengths.end()) {
-        refuse(key, fmt::format("expected {}, found {} numbers", expected, numbers.size()));
+        refuse(key, fmt::format("expected {}, found {} numbers", expected, count));
       }
     }
     return numbers;
   }
   /// OpenCV and ROS write coefficients with the zeros of models that have more.
   void drop_zeros(const std::string& key, std::size_t most, std::vector<double>& numbers) const {
-    while (format_.is_of_matrices() && key == format_.coefficients && numbers.size() > most &&
-           numbers.back() == 0.0) {
+    while (key == format_.coefficients && numbers.size() > most && numbers.back() == 0.0) {
       numbers.pop_back();
     }
   }
@@ -257,33 +267,89 @@ class Reader {
     camera.fy_px = numbers[places[1]];
     camera.cx_px = numbers[places[2]];
     camera.cy_px = numbers[places[3]];
-    if (!(camera.fx_px >= 1e-3) || !(camera.fy_px >= 1e-3)) {
-      refuse(key, fmt::format("expected positive focal lengths, found {} and {}", camera.fx_px,
-                              camera.fy_px));
+    if (format_.is_of_matrices() && (numbers[1] != 0.0 || numbers[3] != 0.0 || numbers[6] != 0.0 ||
+                                     numbers[7] != 0.0 || numbers[8] != 1.0)) {
+      refuse(key, fmt::format("expected {} without skew, found [{}]", format_.intrinsics_form,
+                              fmt::join(numbers, ", ")));
     }
-    if (const Status status = check_center(camera); !status) {
-      refuse(key, status.error().message);
+    if (const Status status = check_camera(camera, key); !status) {
+      const auto line = static_cast<std::size_t>(values_.at(key).Mark().line);
+      refuse(fail_at(file_, line, status.error()));
+    }
+  }
+
+  /// Of ROS: K is of the whole sensor, the images may be of a part of it.
+  void check_part(const Camera& camera) {
+    for (const char* key : {"binning_x", "binning_y"}) {
+      if (number(key, 0.0, 1e5).value_or(0.0) > 1.0) {
+        refuse(key, fmt::format("expected 0 or 1, for K is of all pixels, found {}", scalar(key)));
+      }
+    }
+    if (!has("roi") || !values_.at("roi").IsMap()) {
+      return;
+    }
+    const YAML::Node& roi = values_.at("roi");
+    const auto is_one_of = [&](const char* key, int value) {
+      const YAML::Node& found = roi[key];
+      return !found || !found.IsScalar() || found.Scalar() == "0" ||
+             found.Scalar() == std::to_string(value);
+    };
+    if (!is_one_of("x_offset", 0) || !is_one_of("y_offset", 0) ||
+        !is_one_of("width", camera.width_px) || !is_one_of("height", camera.height_px)) {
+      refuse("roi", "expected the whole image, for K is of that, found a part");
+    }
+  }
+
+  /// Of ROS: the camera of rectified images, which have no distortion.
+  void check_projection(CameraFile& result) {
+    const std::string& key = format_.projection;
+    const Camera& camera = result.camera;
+    Numbers p;
+    if (!status_ || !has(key) || !values_.at(key).IsSequence() ||
+        !add_numbers(values_.at(key), true, p) || p.size() != 12) {
+      return;
+    }
+    const auto is_near = [](double a, double b) { return std::abs(a - b) < 0.01; };
+    if (p[0] > 0.0 && is_distorted(camera) &&
+        !(is_near(p[0], camera.fx_px) && is_near(p[5], camera.fy_px) &&
+          is_near(p[2], camera.cx_px) && is_near(p[6], camera.cy_px))) {
+      result.warnings.push_back(fmt::format(
+          "{}: taken for images as the sensor gives them ({} and {}); those that are rectified "
+          "have "
+          "intrinsics [{}, {}, {}, {}], of {}, and no distortion",
+          file_.string(), format_.intrinsics, format_.coefficients, p[0], p[5], p[2], p[6], key));
     }
   }
 
   void set_distortion(Camera& camera) {
     const std::string& key = format_.coefficients;
-    std::string model = choice("distortion_model", format_.models);
-    if (model.empty() && format_.is_of_matrices()) {
-      model = is_fisheye_ ? "fisheye" : "plumb_bob";
-    }
-    const bool has_none = format_.is_of_matrices() && has(key) && values_.at(key).size() == 0;
-    std::vector<double> numbers;
+    // ROS names no model where there is no lens.
+    Numbers numbers;
+    const bool has_none = format_.is_of_matrices() && has(key) && values_.at(key).IsSequence() &&
+                          add_numbers(values_.at(key), true, numbers) &&
+                          std::ranges::all_of(numbers, [](double k) { return k == 0.0; });
+    const bool is_unnamed = format_.is_of_matrices() && scalar("distortion_model").empty();
+    std::string model =
+        is_unnamed && (has_none || !has("distortion_model"))
+            ? (is_fisheye_ ? "fisheye" : "plumb_bob")
+            : choice("distortion_model", {"none", "radial-tangential", "radtan", "plumb_bob",
+                                          "rational_polynomial", "equidistant", "fisheye"});
+    const bool is_empty = has_none && numbers.empty();
+    numbers.clear();
     if (model.empty()) {
       miss("distortion_model: none, radial-tangential or equidistant");
-    } else if (model == "none" || has_none) {
+    } else if (model == "none" || is_empty) {
       list(key, {0}, "[] for distortion_model none");
     } else if (model == "equidistant" || model == "fisheye") {
       camera.distortion = Distortion::kEquidistant;
       numbers = list(key, {4}, "[k1, k2, k3, k4]");
     } else {
       camera.distortion = Distortion::kRadialTangential;
-      numbers = list(key, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]");
+      numbers = model == "plumb_bob" && !is_unnamed
+                    ? list(key, {4, 5}, "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3]")
+                    : list(key, {4, 5, 8, 12},
+                           "[k1, k2, p1, p2] or [k1, k2, p1, p2, k3], maybe k4, k5, k6 and s1 to "
+                           "s4 behind");
     }
     if (status_) {
       std::ranges::copy(numbers, camera.distortion_coefficients.begin());
@@ -318,36 +384,7 @@ class Reader {
 }  // namespace
 
 Expected<CameraFile> read_camera_file(const std::filesystem::path& file) {
-  return Reader(file).read();
-}
-
-std::string camera_file_text(const CameraFile& file) {
-  const Camera& camera = file.camera;
-  constexpr const char* kModels[] = {"none", "radial-tangential", "equidistant"};
-  constexpr std::size_t kNumCoefficients[] = {0, 5, 4};
-  const auto model = static_cast<std::size_t>(camera.distortion);
-  std::string text = fmt::format(
-      "image_width: {}\nimage_height: {}\ncamera_model: pinhole\n"
-      "intrinsics: [{:.4f}, {:.4f}, {:.4f}, {:.4f}]  # fx, fy, cx, cy\n"
-      "distortion_model: {}\ndistortion_coefficients: [{:.6f}]\n",
-      camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px,
-      kModels[model],
-      fmt::join(camera.distortion_coefficients.begin(),
-                camera.distortion_coefficients.begin() +
-                    static_cast<std::ptrdiff_t>(kNumCoefficients[model]),
-                ", "));
-  if (file.body_from_camera) {
-    const Matrix34d matrix = file.body_from_camera->matrix();
-    const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows = matrix;
-    text += fmt::format("T_BS: [{:.9f}]\n", fmt::join(rows.data(), rows.data() + 12, ", "));
-  }
-  if (file.rate_hz) {
-    text += fmt::format("rate_hz: {}\n", *file.rate_hz);
-  }
-  if (file.camera_height_m) {
-    text += fmt::format("camera_height: {}\n", *file.camera_height_m);
-  }
-  return text;
+  return file.extension() == ".txt" ? read_colmap_camera(file) : Reader(file).read();
 }
 
 }  // namespace stemvo::dataset

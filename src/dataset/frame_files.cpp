@@ -9,6 +9,7 @@
 
 #include "dataset/ground_truth.hpp"
 #include "dataset/mask.hpp"
+#include "odometry/check_frame.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -100,13 +101,10 @@ Status add_ground_truth(FrameSource& frames,
   return {};
 }
 
-Status check_center(const Camera& camera) {
-  const bool is_inside = camera.cx_px > 0.0 && camera.cx_px < camera.width_px &&
-                         camera.cy_px > 0.0 && camera.cy_px < camera.height_px;
-  return is_inside ? Status()
-                   : Status(fail(fmt::format(
-                         "expected a principal point inside images of {}x{} pixels, found ({}, {})",
-                         camera.width_px, camera.height_px, camera.cx_px, camera.cy_px)));
+void warn_of_camera(FrameSource& frames) {
+  if (std::string doubt = doubt_of(frames.camera); !doubt.empty()) {
+    frames.warnings.push_back(std::move(doubt));
+  }
 }
 
 Expected<FrameView> view_of(const Camera& camera, const fs::path& camera_file) {
@@ -122,6 +120,7 @@ Status add_view(FrameSource& frames,
   frames.mask = view.apply_to_mask(mask);
   frames.full_size = view.full_size();
   frames.camera = view.camera();
+  warn_of_camera(frames);
   frames.read = [view, read_whole = std::move(read_whole)](std::size_t index) {
     return read_whole(index).map(
         [&](const cv::Mat& image) { return image.empty() ? image : view.apply(image); });
@@ -129,7 +128,8 @@ Status add_view(FrameSource& frames,
   return {};
 }
 
-Expected<io::ImageKind> vote_on_images(const std::vector<fs::path>& files) {
+Expected<SharedKind> vote_on_images(FrameSource& frames) {
+  const std::vector<fs::path>& files = frames.files;
   constexpr std::size_t kNumVotes = 5;
   std::string first_message;
   std::vector<io::ImageKind> votes;
@@ -146,9 +146,19 @@ Expected<io::ImageKind> vote_on_images(const std::vector<fs::path>& files) {
         fmt::format("none of {} images can be read; the first: {}", files.size(), first_message));
   }
   const auto num_votes = [&](const io::ImageKind& kind) {
-    return std::count(votes.begin(), votes.end(), kind);
+    return std::ranges::count_if(votes, [&](const io::ImageKind& other) {
+      return other.size == kind.size && other.is_color == kind.is_color;
+    });
   };
-  return *std::ranges::max_element(votes, {}, num_votes);
+  const io::ImageKind most = *std::ranges::max_element(votes, {}, num_votes);
+  const io::Levels levels = io::used_levels(votes);
+  if (levels != io::Levels()) {
+    frames.warnings.push_back(
+        fmt::format("images of 16 bits: values from {} to {}, as in the first ones, are taken for "
+                    "black to white",
+                    levels.low, levels.high));
+  }
+  return SharedKind{most.size, most.is_color, levels};
 }
 
 }  // namespace stemvo::dataset

@@ -55,8 +55,8 @@ namespace stemvo::dataset {
                                       std::size_t num_files,
                                       bool is_exact);
 
-/// Error: the principal point is outside the image, or not a number.
-[[nodiscard]] Status check_center(const Camera& camera);
+/// Adds what is odd about its camera.
+void warn_of_camera(FrameSource& frames);
 
 /// Images that were listed; what the request names goes before what lies beside them.
 [[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
@@ -81,9 +81,14 @@ namespace stemvo::dataset {
                               const std::vector<std::string>& masks,
                               std::function<Expected<cv::Mat>(std::size_t)> read_whole);
 
+struct SharedKind {
+  cv::Size size;
+  bool is_color = false;
+  io::Levels levels;
+};
 /// The size and colours that most of the first five readable images have: one odd frame must not
-/// throw the rest away. Error: none can be read.
-[[nodiscard]] Expected<io::ImageKind> vote_on_images(
-    const std::vector<std::filesystem::path>& files);
+/// throw the rest away; levels that differ from all of 16 bits are a warning. Error: none can be
+/// read.
+[[nodiscard]] Expected<SharedKind> vote_on_images(FrameSource& frames);
 
 }  // namespace stemvo::dataset

@@ -35,6 +35,7 @@ struct StreamInfo {
   std::size_t expected_frames = 0;            ///< what the container says; 0: not known
   bool is_live = false;                       ///< ends when the user says so
   std::function<double(std::size_t)> time_s;  ///< of a frame that was read
+  std::function<std::size_t()> num_counted;   ///< frames so far that came without a time
 };
 
 /// True poses of some frames.
@@ -62,6 +63,7 @@ struct FrameSource {
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
   std::optional<Eigen::Quaterniond> camera_from_imu;  ///< where a camera file says it
+  std::vector<std::string> warnings;                  ///< what may be wrong with what was given
   bool is_kitti = false;                              ///< whose camera is 1.65 m above a road
   /// Frame `index` in [0, size()): CV_8UC1, or CV_8UC3 in RGB order, of the camera's size; all
   /// frames of a source alike. Several threads may call it. Of a stream, each frame once, in order;

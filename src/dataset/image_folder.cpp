@@ -42,12 +42,12 @@ Expected<std::vector<double>> find_times(const Listing& listing,
   return times_s;
 }
 
-/// Whether the images are colour. Error: not of the camera file's size.
-Expected<bool> check_images(const std::vector<fs::path>& files,
-                            const fs::path& folder,
-                            const fs::path& camera_file,
-                            const Camera& camera) {
-  STEMVO_TRY_GET(const auto kind, vote_on_images(files));
+/// Error: images that are not of the camera file's size.
+Expected<SharedKind> check_images(FrameSource& frames,
+                                  const fs::path& folder,
+                                  const fs::path& camera_file,
+                                  const Camera& camera) {
+  STEMVO_TRY_GET(const auto kind, vote_on_images(frames));
   if (kind.size != cv::Size(camera.width_px, camera.height_px)) {
     return fail(
         fmt::format("{}: expected images of {}x{} pixels, as {} says, found {}x{}; "
@@ -55,7 +55,7 @@ Expected<bool> check_images(const std::vector<fs::path>& files,
                     folder.string(), camera.width_px, camera.height_px, camera_file.string(),
                     kind.size.width, kind.size.height));
   }
-  return kind.is_color;
+  return kind;
 }
 
 }  // namespace
@@ -78,18 +78,21 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
     STEMVO_TRY(add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
                                 listing.files.size(), true));
   }
-  STEMVO_TRY_GET(const auto is_color,
-                 check_images(frames.files, listing.folder, *camera_path, camera_file.camera));
+  frames.warnings = camera_file.warnings;
+  if (!listing.warning.empty()) {
+    frames.warnings.push_back(listing.warning);
+  }
+  STEMVO_TRY_GET(const auto kind,
+                 check_images(frames, listing.folder, *camera_path, camera_file.camera));
   STEMVO_TRY_GET(const auto view, view_of(camera_file.camera, *camera_path));
   frames.kind = listing.kind;
   frames.name = listing.name;
   frames.given_calibration = camera_path;
   frames.camera_height_m = camera_file.camera_height_m;
   frames.camera_from_imu = camera_file.camera_from_imu();
-  STEMVO_TRY(add_view(frames, view, request.masks,
-                      [files = frames.files, is_color, size = view.full_size()](std::size_t i) {
-                        return io::read_image(files[i], is_color, size);
-                      }));
+  STEMVO_TRY(add_view(frames, view, request.masks, [files = frames.files, kind](std::size_t i) {
+    return io::read_image(files[i], kind.is_color, kind.size, kind.levels);
+  }));
   return frames;
 }
 

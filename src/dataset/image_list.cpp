@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <string>
 #include <system_error>
 #include <tuple>
@@ -45,6 +46,36 @@ std::string name_part(const std::string& pattern) {
   std::erase_if(part, [](unsigned char c) { return std::isalnum(c) == 0 && c != '_' && c != '-'; });
   part = part.substr(0, part.find_last_not_of("_-") + 1);
   return part.empty() ? "" : (part.find_first_of("_-") == 0 ? "" : "_") + part;
+}
+
+/// The numbers in a name, without leading zeros: of "left_007.png" those of "right_007.jpg".
+std::string numbers_of(const fs::path& file) {
+  std::string numbers;
+  for (const char c : file.stem().string()) {
+    const bool is_digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
+    const bool is_behind_digit = !numbers.empty() && numbers.back() != ' ';
+    if (is_digit ? c != '0' || is_behind_digit : is_behind_digit) {
+      numbers += is_digit ? c : ' ';
+    }
+  }
+  return numbers.substr(0, numbers.find_last_not_of(' ') + 1);
+}
+
+/// Error: two images of one number, which are two cameras or one picture twice.
+Status check_numbers(const std::vector<fs::path>& files, const fs::path& given) {
+  std::map<std::string, const fs::path*> seen;
+  for (const fs::path& file : files) {
+    const std::string numbers = numbers_of(file);
+    const auto [other, is_new] = seen.emplace(numbers, &file);
+    if (!is_new && !numbers.empty()) {
+      return fail(fmt::format(
+          "{}: expected one image of each number, found {} and {}; a quoted pattern tells which, "
+          "as '{}'",
+          given.string(), other->second->filename().string(), file.filename().string(),
+          (file.parent_path() / ("*" + file.extension().string())).string()));
+    }
+  }
+  return {};
 }
 
 bool has_image_name(const fs::path& file) {
@@ -105,6 +136,12 @@ Expected<Listing> list_images(const fs::path& given) {
   std::sort(result.files.begin(), result.files.end(), [](const fs::path& a, const fs::path& b) {
     return comes_before(a.filename().string(), b.filename().string());
   });
+  if (const Status single = check_numbers(result.files, given); !single) {
+    if (pattern == "*") {
+      return single.error();
+    }
+    result.warning = single.error().message;  // who gave a pattern may mean both
+  }
   result.name = recording_name(result.folder) + name_part(pattern);
   return result;
 }

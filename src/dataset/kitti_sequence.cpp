@@ -10,6 +10,7 @@
 #include "dataset/kitti_text.hpp"
 #include "dataset/mask.hpp"
 #include "io/image_file.hpp"
+#include "odometry/check_frame.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 
@@ -98,16 +99,17 @@ Status add_truth(const fs::path& absolute,
               : Status();
 }
 
-/// Sets the size that most images have.
-Status set_size(const fs::path& calibration, FrameSource& frames) {
-  STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames.files));
+/// Sets the size that most images have, and how one is read.
+Status set_images(const fs::path& calibration, bool is_color, FrameSource& frames) {
+  STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   frames.full_size = kind.size;
   frames.camera.width_px = kind.size.width;
   frames.camera.height_px = kind.size.height;
-  const Status status = dataset::check_center(frames.camera);
-  return status ? status
-                : Status(fail(fmt::format("{}: {}: a calibration of another image size",
-                                          calibration.string(), status.error().message)));
+  dataset::warn_of_camera(frames);
+  frames.read = [files = frames.files, is_color, kind](std::size_t index) {
+    return io::read_image(files[index], is_color, kind.size, kind.levels);
+  };
+  return check_camera(frames.camera, calibration.string());
 }
 
 }  // namespace
@@ -142,13 +144,9 @@ Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOption
   frames.name = absolute.filename().string();
   frames.camera = camera;
   frames.given_calibration = options.calibration;
-  const bool is_color = camera_index >= 2;
   STEMVO_TRY(add_truth(absolute, options, images.size(), frames));
-  STEMVO_TRY(set_size(calibration, frames));
+  STEMVO_TRY(set_images(calibration, camera_index >= 2, frames));
   STEMVO_TRY_GET(frames.mask, dataset::make_mask(options.masks, frames.full_size));
-  frames.read = [files = frames.files, is_color, size = frames.full_size](std::size_t index) {
-    return io::read_image(files[index], is_color, size);
-  };
   return frames;
 }
 

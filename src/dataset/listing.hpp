@@ -18,6 +18,7 @@ struct Listing {
   std::string name;
   std::vector<std::filesystem::path> files;  ///< at least one
   std::vector<double> times_s = {};          ///< one per file, or none
+  std::string warning = {};                  ///< images that may be two of a time
   std::optional<std::filesystem::path> camera_file = std::nullopt;
   std::optional<std::filesystem::path> times_file = std::nullopt;
   std::optional<std::filesystem::path> ground_truth = std::nullopt;
@@ -35,7 +36,7 @@ struct Listing {
 
 /// The .png, .jpg and .jpeg files of a folder, or those that a pattern names, with nothing beside
 /// them. Hidden files, whose names start with a dot, are none of them. Errors: no such folder;
-/// wildcards elsewhere than in the last part; none found.
+/// wildcards elsewhere than in the last part; none found; in a folder, two of one number.
 [[nodiscard]] Expected<Listing> list_images(const std::filesystem::path& folder_or_pattern);
 
 /// A file whose name says that it is an image.

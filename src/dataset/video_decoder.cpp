@@ -42,8 +42,8 @@ Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const
 
 }  // namespace
 
-Expected<std::unique_ptr<VideoDecoder>> decode_file(const fs::path& file) {
-  return open(file.c_str(), 0, {});
+Expected<std::unique_ptr<VideoDecoder>> decode_file(const fs::path& file, const cv::Size& size) {
+  return open(file.c_str(), 0, size);
 }
 
 Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {

@@ -31,11 +31,14 @@ class VideoDecoder {
   [[nodiscard]] virtual double rate_hz() const = 0;
   /// Time of the frame grabbed last; NaN or not increasing: the container does not say.
   [[nodiscard]] virtual double position_ms() const = 0;
+  /// How the container asked for the frames to be turned, and they were.
+  [[nodiscard]] virtual double turned_deg() const = 0;
 };
 
-/// By FFmpeg. Null: not a video. Error: the module is not where it was installed.
-[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(
-    const std::filesystem::path& file);
+/// By FFmpeg, turned as the container asks unless frames that are not have this size. Null: not a
+/// video. Error: the module is not where it was installed.
+[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::filesystem::path& file,
+                                                                  const cv::Size& size);
 /// Camera N of the machine (V4L2), asked for images of this size. Null: no such camera. Errors: as
 /// above.
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number,

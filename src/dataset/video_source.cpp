@@ -60,9 +60,17 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   const std::size_t all = stream->expected_frames();
   frames.stream =
       StreamInfo{end - range.begin, all > range.begin ? std::min(all, end) - range.begin : 0U,
-                 stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); }};
+                 stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); },
+                 [stream] { return stream->num_counted(); }};
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
+  frames.warnings = camera.warnings;
+  if (const double turned_deg = stream->turned_deg(); turned_deg != 0.0) {
+    frames.warnings.push_back(fmt::format(
+        "{}: frames are turned by {} degrees, as the container asks and players do; the "
+        "camera file is taken for one of such frames",
+        owner, turned_deg));
+  }
   frames.camera_from_imu = camera.camera_from_imu();
   if (request.ground_truth) {
     STEMVO_TRY_GET(const auto truth, read_truth(*request.ground_truth, request.camera_file));
@@ -97,7 +105,7 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
   const auto number = camera_number(request.sequence_dir);
   const cv::Size size(camera.camera.width_px, camera.camera.height_px);
   const auto stream = number ? VideoStream::open_camera(*number, size)
-                             : VideoStream::open_file(request.sequence_dir);
+                             : VideoStream::open_file(request.sequence_dir, size);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
     return open_stream(opened, camera, request);
   });

@@ -14,10 +14,11 @@ namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
 
-Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file) {
+Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& file,
+                                                              const cv::Size& size) {
   std::error_code code;
   // A relative path with a colon would be taken for an address.
-  STEMVO_TRY_GET(auto decoder, decode_file(fs::absolute(file, code)));
+  STEMVO_TRY_GET(auto decoder, decode_file(fs::absolute(file, code), size));
   if (decoder == nullptr) {
     return fail(fmt::format(
         "{}: expected a video that FFmpeg can decode, found a file it cannot (cut off, damaged, or "
@@ -46,18 +47,21 @@ std::size_t VideoStream::expected_frames() const {
   return count > 0.0 && count < 1e12 ? static_cast<std::size_t>(count) : 0U;
 }
 
-double VideoStream::next_time_s() const {
+double VideoStream::next_time_s() {
   constexpr double kMillisecond_s = 1e-3;
   if (is_live_) {
     const std::chrono::duration<double> since = std::chrono::steady_clock::now() - *started_;
     return since.count();
   }
+  constexpr double kMinTime_s = -1e6;  // FFmpeg's number for no time is far below
   const double told_s = kMillisecond_s * decoder_->position_ms();
-  if (std::isfinite(told_s) && (!last_time_s_ || told_s > *last_time_s_)) {
+  if (told_s > last_time_s_.value_or(kMinTime_s) && std::isfinite(told_s)) {
     return told_s;
   }
-  const double told_hz = decoder_->rate_hz();  // a container without times
-  return last_time_s_.value_or(0.0) + 1.0 / (told_hz > 0.0 ? told_hz : default_rate_hz_);
+  ++num_counted_;
+  const double told_hz = decoder_->rate_hz();
+  const double step_s = 1.0 / (told_hz > 0.0 ? told_hz : default_rate_hz_);
+  return last_time_s_ ? *last_time_s_ + step_s : 0.0;
 }
 
 bool VideoStream::grab() {
@@ -115,6 +119,11 @@ Expected<cv::Mat> VideoStream::read(std::size_t index) {
 double VideoStream::time_s(std::size_t index) const {
   const std::lock_guard lock(mutex_);
   return times_s_.at(index);
+}
+
+std::size_t VideoStream::num_counted() const {
+  const std::lock_guard lock(mutex_);
+  return num_counted_;
 }
 
 }  // namespace stemvo::dataset

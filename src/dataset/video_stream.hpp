@@ -21,9 +21,9 @@ namespace stemvo::dataset {
 /// Frames of a video file or a live camera, decoded one behind the other; none is kept.
 class VideoStream {
  public:
-  /// Decoded by FFmpeg. Error: no file, or not a video.
+  /// Decoded by FFmpeg, as decode_file says. Error: no file, or not a video.
   [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_file(
-      const std::filesystem::path& file);
+      const std::filesystem::path& file, const cv::Size& size);
   /// Camera N of the machine (V4L2, /dev/videoN), asked for images of this size. Error: no such
   /// camera.
   [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_camera(int number,
@@ -37,6 +37,7 @@ class VideoStream {
 
   [[nodiscard]] cv::Size size() const { return decoder_->size(); }
   [[nodiscard]] bool is_live() const { return is_live_; }
+  [[nodiscard]] double turned_deg() const { return decoder_->turned_deg(); }
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
   /// Frames per second where the container says none.
@@ -48,11 +49,13 @@ class VideoStream {
   [[nodiscard]] Expected<cv::Mat> read(std::size_t index);
   /// The time of a frame that was read, in seconds; increasing.
   [[nodiscard]] double time_s(std::size_t index) const;
+  /// Frames so far whose time the container does not say: counted from the rate.
+  [[nodiscard]] std::size_t num_counted() const;
 
  private:
   /// With the mutex held.
   [[nodiscard]] bool grab();
-  [[nodiscard]] double next_time_s() const;
+  [[nodiscard]] double next_time_s();
 
   std::unique_ptr<VideoDecoder> decoder_;
   std::string name_;
@@ -65,6 +68,7 @@ class VideoStream {
   std::size_t next_ = 0;     ///< the frame whose turn it is
   bool is_grabbed_ = false;  ///< it waits to be read
   bool is_ended_ = false;
+  std::size_t num_counted_ = 0;
   std::optional<double> last_time_s_;  ///< of the frame grabbed last
   std::deque<double> times_s_;
 };

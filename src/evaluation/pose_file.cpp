@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
 
 #include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo {
 namespace {
@@ -18,17 +20,42 @@ namespace fs = std::filesystem;
 
 enum class Format { kKitti, kTum, kEuroc };
 
+std::string with_blanks(std::string_view line) {
+  std::string text(line);
+  std::ranges::replace(text, ',', ' ');
+  return text;
+}
+
 bool is_blank(std::string_view line) { return take_word(line).empty(); }
 
-Format format_of(std::string_view text) {
+/// Of a first row whose numbers stand between commas. Nullopt: both of two formats' rows look so.
+std::optional<Format> format_of_commas(std::string_view row, bool says_nanoseconds) {
+  constexpr double kNanoseconds = 1e12;  // as seconds, 30,000 years
+  const std::vector<std::string_view> words = split_words(row);
+  if (words.size() == 12) {
+    return Format::kKitti;
+  }
+  const auto time = parse_numbers(words.empty() ? "" : words.front(), 1);
+  const bool is_long = time && time->front() > kNanoseconds;
+  if (words.size() == 8 && !says_nanoseconds) {
+    return is_long ? std::nullopt : std::optional(Format::kTum);
+  }
+  return Format::kEuroc;
+}
+
+std::optional<Format> format_of(std::string_view text) {
   bool has_comment = false;  // KITTI's have none
+  bool says_nanoseconds = false;
   for (const std::string_view line : split_lines(text)) {
     std::string_view rest = line;
     const std::string_view first = take_word(rest);
     const bool is_comment = first.starts_with('#');
     has_comment = has_comment || is_comment;
+    says_nanoseconds =
+        says_nanoseconds || (is_comment && line.find("[ns]") != std::string_view::npos);
     if (!first.empty() && !is_comment) {
-      return line.find(',') != std::string_view::npos       ? Format::kEuroc
+      return line.find(',') != std::string_view::npos
+                 ? format_of_commas(with_blanks(line), says_nanoseconds)
              : has_comment || split_words(line).size() == 8 ? Format::kTum
                                                             : Format::kKitti;
     }
@@ -74,8 +101,7 @@ Expected<TimedPose> pose_from_quaternion_row(const std::vector<double>& n) {
 
 /// The columns of the pose as a row of TUM's, whose quaternion ends with w. Those behind it
 /// (velocity, biases) are not read.
-Expected<std::string> to_tum_row(std::string line) {
-  std::ranges::replace(line, ',', ' ');
+Expected<std::string> to_tum_row(std::string_view line) {
   const std::vector<std::string_view> words = split_words(line);
   if (words.size() < 8) {
     return fail(
@@ -85,14 +111,16 @@ Expected<std::string> to_tum_row(std::string line) {
                      words[6], words[7], words[4]);
 }
 
-Expected<TimedPose> parse_row(Format format, std::string_view line) {
+Expected<TimedPose> parse_row(Format format, std::string_view given) {
+  // Fewer commas are those of decimals.
+  const bool has_commas = format != Format::kKitti || std::ranges::count(given, ',') == 11;
+  const std::string line = has_commas ? with_blanks(given) : std::string(given);
   if (format == Format::kKitti) {
     return parse_numbers(line, 12).and_then(pose_from_matrix_row);
   }
-  return (format == Format::kEuroc ? to_tum_row(std::string(line)).and_then([](const auto& row) {
-           return parse_numbers(row, 8);
-         })
-                                   : parse_numbers(line, 8))
+  return (format == Format::kEuroc
+              ? to_tum_row(line).and_then([](const auto& row) { return parse_numbers(row, 8); })
+              : parse_numbers(line, 8))
       .and_then(pose_from_quaternion_row);
 }
 
@@ -160,8 +188,16 @@ Expected<Trajectory> read_kitti_trajectory(const fs::path& file) {
 }
 
 Expected<PoseFile> read_pose_file(const fs::path& file) {
-  Expected<PoseFile> result = read_text_file(file).and_then(
-      [&](const std::string& text) { return parse_rows(file, text, format_of(text)); });
+  STEMVO_TRY_GET(const std::string text, read_text_file(file));
+  const std::optional<Format> format = format_of(text);
+  if (!format) {
+    return fail(fmt::format(
+        "{}: expected TUM's rows (seconds, x, y, z, qx, qy, qz, qw) or EuRoC's (nanoseconds, x, y, "
+        "z, qw, qx, qy, qz, .., under a comment with [ns]), found 8 numbers that begin with "
+        "nanoseconds",
+        file.string()));
+  }
+  Expected<PoseFile> result = parse_rows(file, text, *format);
   if (result) {
     sort_by_time(*result);
   }

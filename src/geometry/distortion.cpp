@@ -28,16 +28,17 @@ double divisor_of(double num_pixels) {
 
 /// Distance from the centre, without the tangential part, which is small and moves all around.
 double distorted_radius(const Camera& camera, double radius) {
-  const auto& [k1, k2, k3, k4, k5] = camera.distortion_coefficients;
+  const auto& k = camera.distortion_coefficients;
   switch (camera.distortion) {
     case Distortion::kRadialTangential: {
       const double square = radius * radius;
-      return radius * (1.0 + square * (k1 + square * (k2 + square * k5)));
+      return radius * (1.0 + square * (k[0] + square * (k[1] + square * k[4]))) /
+             (1.0 + square * (k[5] + square * (k[6] + square * k[7])));
     }
     case Distortion::kEquidistant: {
       const double angle = std::atan(radius);
       const double square = angle * angle;
-      return angle * (1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4))));
+      return angle * (1.0 + square * (k[0] + square * (k[1] + square * (k[2] + square * k[3]))));
     }
     case Distortion::kNone:
       break;
@@ -132,13 +133,15 @@ Eigen::Vector2d distort(const Camera& camera, const Eigen::Vector2d& xy) {
   }
   Eigen::Vector2d result = distorted_radius(camera, radius) / radius * xy;
   if (camera.distortion == Distortion::kRadialTangential) {
-    const double p1 = camera.distortion_coefficients[2];
-    const double p2 = camera.distortion_coefficients[3];
+    const auto& k = camera.distortion_coefficients;
+    const double p1 = k[2];
+    const double p2 = k[3];
+    const double square = radius * radius;
     const double xx = xy.x() * xy.x();
     const double yy = xy.y() * xy.y();
     const double two_xy = 2.0 * xy.x() * xy.y();
-    result.x() += p1 * two_xy + p2 * (3.0 * xx + yy);
-    result.y() += p2 * two_xy + p1 * (xx + 3.0 * yy);
+    result.x() += p1 * two_xy + p2 * (3.0 * xx + yy) + square * (k[8] + square * k[9]);
+    result.y() += p2 * two_xy + p1 * (xx + 3.0 * yy) + square * (k[10] + square * k[11]);
   }
   return result;
 }

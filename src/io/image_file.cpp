@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "io/image_file.hpp"
 
+#include <algorithm>
+#include <bit>
 #include <memory>
 #include <new>
 #include <string_view>
@@ -73,14 +75,60 @@ class JpegDecoder {
   bool is_known_ = false;
 };
 
+/// Sets what the image's values are.
+void measure_levels(const cv::Mat& image, ImageKind& kind) {
+  std::vector<std::size_t> counts(1U << 16U);
+  for (int v = 0; v < image.rows; ++v) {
+    for (const auto *at = image.ptr<std::uint16_t>(v), *end = at + image.cols * image.channels();
+         at != end; ++at) {
+      ++counts[*at];
+    }
+  }
+  const std::size_t few = image.total() * static_cast<std::size_t>(image.channels()) / 1000;
+  const auto from_end = [&](auto first, auto last) {
+    std::size_t sum = 0;
+    return std::find_if(first, last, [&](std::size_t count) { return (sum += count) > few; }) -
+           first;
+  };
+  const auto largest = static_cast<int>(counts.size()) - 1;
+  kind.used = Levels{static_cast<int>(from_end(counts.begin(), counts.end())),
+                     largest - static_cast<int>(from_end(counts.rbegin(), counts.rend()))};
+  const auto peak = std::find_if(counts.rbegin(), counts.rend(), [](auto n) { return n > 0; });
+  kind.peak = largest - static_cast<int>(peak - counts.rbegin());
+}
+
 }  // namespace
+
+Levels used_levels(const std::vector<ImageKind>& kinds) {
+  Levels used{65535, 0};
+  int peak = 0;
+  for (const ImageKind& kind : kinds) {
+    if (kind.used) {
+      used = {std::min(used.low, kind.used->low), std::max(used.high, kind.used->high)};
+      peak = std::max(peak, kind.peak);
+    }
+  }
+  const int top = static_cast<int>(std::bit_ceil(static_cast<unsigned>(peak) + 1U)) - 1;
+  const int span = used.high - used.low;
+  if (span <= 0 || 4 * span >= top) {
+    return span < 0 ? Levels() : Levels{0, std::max(top, 255)};
+  }
+  return {std::max(0, used.low - span / 2), std::min(65535, used.high + span / 2)};
+}
 
 Expected<cv::Mat> decode_image(Bytes bytes,
                                const std::string& name,
                                bool as_color,
-                               const WantedSize& wanted) {
+                               const WantedSize& wanted,
+                               const Levels& levels) {
   if (is_png(bytes)) {
-    return decode_png(bytes, name, as_color, wanted);
+    const bool is_stretched = levels != Levels() && is_16_bit_png(bytes);
+    STEMVO_TRY_GET(cv::Mat image, decode_png(bytes, name, as_color, wanted, is_stretched));
+    if (is_stretched) {
+      const double gain = 255.0 / (levels.high - levels.low);
+      image.convertTo(image, CV_8U, gain, -gain * levels.low);
+    }
+    return image;
   }
   if (is_jpeg(bytes)) {
     return JpegDecoder(bytes).decode(name, as_color, wanted);
@@ -94,15 +142,24 @@ Expected<ImageKind> read_image_kind(const fs::path& file) {
     const Bytes bytes = bytes_of(text);
     const bool is_color =
         is_png(bytes) ? is_color_png(bytes) : is_jpeg(bytes) && JpegDecoder(bytes).is_color();
-    return decode_image(bytes, file.string(), is_color, {}).map([&](const cv::Mat& image) {
-      return ImageKind{image.size(), is_color};
+    const auto image = is_png(bytes) ? decode_png(bytes, file.string(), is_color, {}, true)
+                                     : decode_image(bytes, file.string(), is_color);
+    return image.map([&](const cv::Mat& pixels) {
+      ImageKind kind{.size = pixels.size(), .is_color = is_color, .used = std::nullopt};
+      if (pixels.depth() == CV_16U) {
+        measure_levels(pixels, kind);
+      }
+      return kind;
     });
   });
 }
 
-Expected<cv::Mat> read_image(const fs::path& file, bool as_color, const WantedSize& wanted) {
+Expected<cv::Mat> read_image(const fs::path& file,
+                             bool as_color,
+                             const WantedSize& wanted,
+                             const Levels& levels) {
   return read_text_file(file).and_then([&](const std::string& text) {
-    return decode_image(bytes_of(text), file.string(), as_color, wanted);
+    return decode_image(bytes_of(text), file.string(), as_color, wanted, levels);
   });
 }
 

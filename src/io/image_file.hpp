@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -11,12 +13,24 @@
 
 namespace stemvo::io {
 
+/// Which values of 16 bits become 0 and 255; of 8 bits none change.
+struct Levels {
+  int low = 0;
+  int high = 65535;
+  bool operator==(const Levels&) const = default;
+};
+
 /// Properties that all images of a folder share.
 struct ImageKind {
   cv::Size size;
   bool is_color = false;
-  bool operator==(const ImageKind&) const = default;
+  std::optional<Levels> used;  ///< 16 bits: all but the darkest and brightest thousandth
+  int peak = 0;                ///< 16 bits: the largest value
 };
+
+/// What these images of 16 bits use: as many bits as the largest value has; less where they use
+/// less than a quarter of these, and half of that more to both sides.
+[[nodiscard]] Levels used_levels(const std::vector<ImageKind>& kinds);
 
 /// A PNG or a JPEG, told by its first bytes and decoded whole, as 8-bit image: gray (CV_8UC1), or
 /// RGB (CV_8UC3) if `as_color`. Errors (file named): neither, cut off, damaged, of another size. A
@@ -24,14 +38,16 @@ struct ImageKind {
 /// turned (EXIF).
 [[nodiscard]] Expected<cv::Mat> read_image(const std::filesystem::path& file,
                                            bool as_color,
-                                           const WantedSize& wanted = {});
+                                           const WantedSize& wanted = {},
+                                           const Levels& levels = {});
 /// Size and colours of an image that read_image takes.
 [[nodiscard]] Expected<ImageKind> read_image_kind(const std::filesystem::path& file);
 /// Does the same with a file's bytes; `name` starts its errors.
 [[nodiscard]] Expected<cv::Mat> decode_image(Bytes bytes,
                                              const std::string& name,
                                              bool as_color,
-                                             const WantedSize& wanted = {});
+                                             const WantedSize& wanted = {},
+                                             const Levels& levels = {});
 
 /// 8-bit image, gray or RGB -> the bytes of a JPEG file (baseline, colours at half the size).
 /// `quality`: 1 to 100. Throws std::bad_alloc.

@@ -18,8 +18,9 @@ namespace {
 /// owns nothing.
 class LibpngReader {
  public:
-  explicit LibpngReader(Bytes bytes)
+  LibpngReader(Bytes bytes, bool is_deep)
       : rest_(bytes),
+        is_deep_(is_deep),
         png_(png_create_read_struct_2(
             PNG_LIBPNG_VER_STRING,
             nullptr,
@@ -49,7 +50,8 @@ class LibpngReader {
     png_read_info(png_, info_);
     choose_output(as_color);
     image_.create(static_cast<int>(png_get_image_height(png_, info_)),
-                  static_cast<int>(png_get_image_width(png_, info_)), as_color ? CV_8UC3 : CV_8UC1);
+                  static_cast<int>(png_get_image_width(png_, info_)),
+                  CV_MAKETYPE(is_deep_ ? CV_16U : CV_8U, as_color ? 3 : 1));
     for (int v = 0; v < image_.rows; ++v) {
       rows_.push_back(image_.ptr(v));
     }
@@ -57,11 +59,15 @@ class LibpngReader {
     png_read_end(png_, nullptr);
     return true;
   }
-  /// Pixels of 8 bits, gray or RGB, without transparency.
+  /// Pixels of 8 or 16 bits, gray or RGB, without transparency.
   void choose_output(bool as_color) {
     const bool is_color = (png_get_color_type(png_, info_) & PNG_COLOR_MASK_COLOR) != 0;
     png_set_expand(png_);
-    png_set_strip_16(png_);
+    if (is_deep_) {
+      png_set_swap(png_);  // PNG's bytes are in the other order than a PC's
+    } else {
+      png_set_strip_16(png_);
+    }
     png_set_strip_alpha(png_);
     if (as_color && !is_color) {
       png_set_gray_to_rgb(png_);
@@ -90,6 +96,7 @@ class LibpngReader {
   }
 
   Bytes rest_;
+  bool is_deep_;
   cv::Mat image_;
   std::vector<png_bytep> rows_;
   png_structp png_;
@@ -98,7 +105,9 @@ class LibpngReader {
 
 }  // namespace
 
-cv::Mat decode_any_png(Bytes bytes, bool as_color) { return LibpngReader(bytes).decode(as_color); }
+cv::Mat decode_any_png(Bytes bytes, bool as_color, bool keeps_16_bits) {
+  return LibpngReader(bytes, keeps_16_bits && is_16_bit_png(bytes)).decode(as_color);
+}
 
 std::string encode_png(const cv::Mat& image, bool is_fast) {
   STEMVO_CHECK(!image.empty() && image.isContinuous() &&

@@ -185,6 +185,11 @@ bool is_color_png(Bytes bytes) {
   return bytes.size() > kColorType && (bytes[kColorType] & kColorBit) != 0;
 }
 
+bool is_16_bit_png(Bytes bytes) {
+  constexpr std::size_t kBitDepth = 24;  // of IHDR
+  return is_png(bytes) && bytes.size() > kBitDepth && bytes[kBitDepth] == 16;
+}
+
 cv::Mat decode_plain_png(Bytes bytes, bool as_color) {
   constexpr std::uint64_t kMaxSide = 1U << 16U;
   constexpr std::uint64_t kMaxExpansion = 1032;  // deflate makes at most that many bytes of one
@@ -230,7 +235,8 @@ Status check_size(const std::string& name, const DeclaredSize& found, const Want
 Expected<cv::Mat> decode_png(Bytes bytes,
                              const std::string& name,
                              bool as_color,
-                             const WantedSize& wanted) {
+                             const WantedSize& wanted,
+                             bool keeps_16_bits) {
   Bytes rest = bytes.subspan(kSignature.size());
   const Chunk header = next_chunk(rest);
   if (header.type == "IHDR" && header.data.size() >= 8) {
@@ -239,7 +245,7 @@ Expected<cv::Mat> decode_png(Bytes bytes,
   }
   cv::Mat image = decode_plain_png(bytes, as_color);
   if (image.empty()) {
-    image = decode_any_png(bytes, as_color);
+    image = decode_any_png(bytes, as_color, keeps_16_bits);
   }
   if (image.empty()) {
     return fail(fmt::format("{}: expected a sound PNG image, found one damaged or cut off", name));

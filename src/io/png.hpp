@@ -19,10 +19,12 @@ using WantedSize = std::optional<cv::Size>;
 
 /// The PNG, which is_png(), as 8-bit image: gray (CV_8UC1), or RGB (CV_8UC3) if `as_color`. Errors,
 /// starting with `name`: of another size; cut off or damaged. An image is never partly decoded.
+/// `keeps_16_bits`: one of 16 bits a value stays so (CV_16UC1, CV_16UC3).
 [[nodiscard]] Expected<cv::Mat> decode_png(Bytes bytes,
                                            const std::string& name,
                                            bool as_color,
-                                           const WantedSize& wanted = {});
+                                           const WantedSize& wanted = {},
+                                           bool keeps_16_bits = false);
 
 /// The common kind of PNG, which is what KITTI has, by libdeflate: in a third of the time that
 /// libpng and zlib take. Empty: the file is of another kind (other than 8-bit gray, or RGB with
@@ -32,7 +34,7 @@ using WantedSize = std::optional<cv::Size>;
 
 /// Every kind of PNG, by libpng: palettes, 16 bits a value, transparency (left out), interlaced.
 /// Empty: damaged. Throws std::bad_alloc.
-[[nodiscard]] cv::Mat decode_any_png(Bytes bytes, bool as_color);
+[[nodiscard]] cv::Mat decode_any_png(Bytes bytes, bool as_color, bool keeps_16_bits = false);
 
 /// 8-bit image, gray or RGB -> the bytes of a PNG file. `is_fast`: larger, sooner. Throws
 /// std::bad_alloc.
@@ -51,5 +53,6 @@ struct DeclaredSize {
 [[nodiscard]] bool is_png(Bytes bytes);
 /// Whether a PNG has colours; palettes are colour.
 [[nodiscard]] bool is_color_png(Bytes bytes);
+[[nodiscard]] bool is_16_bit_png(Bytes bytes);
 
 }  // namespace stemvo::io

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/degrees.hpp"
 #include "try.hpp"
 
 namespace stemvo {
@@ -45,30 +46,83 @@ Status check_rotation(const std::optional<Eigen::Quaterniond>& rotation) {
   return {};
 }
 
+double view_deg_of(const Camera& camera) {
+  return 2.0 * kDegPerRad *
+         std::atan(0.5 * std::max(camera.width_px / camera.fx_px, camera.height_px / camera.fy_px));
+}
+
+/// The principal point in halves of the image's sides: (1, 1) is the middle.
+Eigen::Vector2d center_of(const Camera& camera) {
+  return {2.0 * camera.cx_px / camera.width_px, 2.0 * camera.cy_px / camera.height_px};
+}
+
+Status check_center(const Camera& camera, const std::string& owner) {
+  // From this factor on, alike in both directions, it is the middle of images of another size.
+  constexpr double kOtherSize = 1.25;
+  const Eigen::Vector2d center = center_of(camera);
+  const double scale = std::sqrt(center.prod());
+  const double log_scale = std::abs(std::log(scale));
+  const bool is_inside = center.minCoeff() > 0.0 && center.maxCoeff() < 2.0;
+  if (is_inside && !(log_scale > std::log(kOtherSize) &&
+                     std::abs(std::log(center.x() / center.y())) < 0.5 * log_scale)) {
+    return {};
+  }
+  const std::string hint =
+      scale > 0.0 && scale < 100.0
+          ? fmt::format(": a calibration of images about {:.2g} times as large?", scale)
+          : "";
+  return fail(
+      fmt::format("{}: expected a principal point {} images of {}x{} pixels, found ({}, {}){}",
+                  owner, is_inside ? "near the middle of" : "inside", camera.width_px,
+                  camera.height_px, camera.cx_px, camera.cy_px, hint));
+}
+
 }  // namespace
 
 // Written so that NaN fails.
-Status check_camera(const Camera& camera) {
+Status check_camera(const Camera& camera, const std::string& owner) {
   const auto is_side = [](int pixels) { return pixels > 0 && pixels <= kMaxImageSide_px; };
   if (!is_side(camera.width_px) || !is_side(camera.height_px)) {
-    return fail(fmt::format("camera: expected a size of 1 to {} pixels a side, found {}x{}",
+    return fail(fmt::format("{}: expected a size of 1 to {} pixels a side, found {}x{}", owner,
                             kMaxImageSide_px, camera.width_px, camera.height_px));
   }
   if (!(camera.fx_px > 0.0 && camera.fy_px > 0.0 && std::isfinite(camera.fx_px) &&
         std::isfinite(camera.fy_px))) {
-    return fail(fmt::format("camera: expected focal lengths above 0 px, found {} and {}",
+    return fail(fmt::format("{}: expected focal lengths above 0 px, found {} and {}", owner,
                             camera.fx_px, camera.fy_px));
   }
-  if (!std::isfinite(camera.cx_px) || !std::isfinite(camera.cy_px)) {
-    return fail(fmt::format("camera: expected a finite principal point, found {}, {}", camera.cx_px,
-                            camera.cy_px));
+  if (!(view_deg_of(camera) <= 170.0)) {
+    return fail(fmt::format(
+        "{}: expected a field of view of at most 170 degrees, found {:.4g}, for focal lengths are "
+        "{} and {} pixels{}",
+        owner, view_deg_of(camera), camera.fx_px, camera.fy_px,
+        camera.fx_px < 10.0 ? "; those relative to the image's size are to be multiplied by it"
+                            : ""));
   }
+  STEMVO_TRY(check_center(camera, owner));
   if (!std::ranges::all_of(camera.distortion_coefficients,
                            [](double value) { return std::isfinite(value); })) {
-    return fail(fmt::format("camera: expected finite distortion coefficients, found [{}]",
+    return fail(fmt::format("{}: expected finite distortion coefficients, found [{}]", owner,
                             fmt::join(camera.distortion_coefficients, ", ")));
   }
   return {};
+}
+
+std::string doubt_of(const Camera& camera) {
+  constexpr double kMaxOff = 0.15;
+  constexpr double kMinView_deg = 10.0;
+  if (view_deg_of(camera) < kMinView_deg) {
+    return fmt::format("a field of view of {:.1f} degrees is small: is the focal length in pixels?",
+                       view_deg_of(camera));
+  }
+  const Eigen::Vector2d center = center_of(camera);
+  if ((center.array() - 1.0).abs().maxCoeff() <= kMaxOff) {
+    return {};
+  }
+  return fmt::format(
+      "the principal point ({:.1f}, {:.1f}) is far from the middle of images of {}x{} pixels: were "
+      "they cut, or is the calibration of another size?",
+      camera.cx_px, camera.cy_px, camera.width_px, camera.height_px);
 }
 
 Status check_mask(const cv::Mat& mask, const Camera& camera) {

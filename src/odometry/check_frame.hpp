@@ -12,8 +12,12 @@
 
 namespace stemvo {
 
-/// Error: a size of no pixels or too many, a focal length not above 0, a number that is not finite.
-[[nodiscard]] Status check_camera(const Camera& camera);
+/// Errors, starting with `owner`: a size of no pixels or too many, a focal length not above 0, a
+/// field of view over 170 degrees, a principal point outside or of images of another size, a number
+/// that is not finite.
+[[nodiscard]] Status check_camera(const Camera& camera, const std::string& owner = "camera");
+/// Says what is odd about a camera that may be right; empty: nothing.
+[[nodiscard]] std::string doubt_of(const Camera& camera);
 
 /// Error: a mask that is neither empty nor CV_8UC1 of the camera's size.
 [[nodiscard]] Status check_mask(const cv::Mat& mask, const Camera& camera);

@@ -188,6 +188,9 @@ OdometryHandle::~OdometryHandle() = default;
 
 void OdometryHandle::set_log(Log log) {
   if (impl_ != nullptr) {
+    if (const auto doubt = doubt_of(impl_->odometry.view().camera()); log && !doubt.empty()) {
+      log(LogLevel::kWarning, doubt);
+    }
     impl_->log.set(std::move(log));
   }
 }

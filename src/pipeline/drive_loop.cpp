@@ -168,6 +168,11 @@ class DriveLoop {
     if (stream.is_live) {
       drive_.interrupted = false;
     }
+    if (const std::size_t count = stream.num_counted(); count > 0) {
+      drive_.warnings.push_back(
+          fmt::format("{}: the video does not say when {} frames were taken: counted from its rate",
+                      run_.sequence.name, count));
+    }
     if (drive_.interrupted) {
       return;
     }

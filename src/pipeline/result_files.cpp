@@ -99,8 +99,8 @@ class ResultWriter {
         config_text_(config_text(run, trajectory_.size())) {
     const auto truth = sequence_.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
     matched_ = truth ? Status() : truth.error();
-    if (truth && *truth && !(*truth)->frames.empty()) {
-      truth_ = **truth;
+    if (truth && *truth) {
+      truth_ = seen_part(**truth);
     }
   }
 
@@ -135,6 +135,21 @@ class ResultWriter {
   }
 
  private:
+  /// From where the camera starts: images that cannot be read before it have no pose to compare.
+  /// Nullopt: no motion is left.
+  [[nodiscard]] std::optional<GroundTruth> seen_part(const GroundTruth& truth) const {
+    const auto first_seen = std::ranges::find_if(drive_.frames, [](const FrameResult& frame) {
+      return frame.state != FrameState::kNoImage;
+    });
+    const auto first = std::ranges::lower_bound(
+        truth.frames, static_cast<std::size_t>(first_seen - drive_.frames.begin()));
+    const auto skipped = static_cast<std::size_t>(first - truth.frames.begin());
+    if (truth.frames.size() < skipped + 2) {
+      return std::nullopt;
+    }
+    return GroundTruth{relative_to_first(std::span(truth.poses).subspan(skipped)),
+                       {first, truth.frames.end()}};
+  }
   [[nodiscard]] Status write_poses(const std::string& name, const Trajectory& poses) const {
     const std::filesystem::path& folder = request_.out_dir;
     std::vector<double> times_s;

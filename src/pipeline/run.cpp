@@ -112,6 +112,8 @@ Expected<RunSummary> finish_run(const Run& run, const RunProgress& progress) {
     return fail(fmt::format("{}: expected at least one frame that can be decoded, found none",
                             request.sequence_dir.string()));
   }
+  const auto& odd = run.sequence.warnings;
+  done.warnings.insert(done.warnings.begin(), odd.begin(), odd.end());
   MetricsReport report;
   Status written = pipeline::write_results(run, done, report);
   if (std::string warning = warn_of_road(report); !warning.empty()) {

@@ -73,6 +73,9 @@ Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
     STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, file, request));
     const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
     const Trajectory& with = pairs ? pairs->truth : truth.poses;
+    if (compared.size() < 2) {
+      return fail(file.string() + ": expected at least 2 poses, for motions are compared, found 1");
+    }
     report.rows.push_back({file.string(), evaluate_aligned(compared, with, request.alignment),
                            estimate.poses.size(), compared.size()});
   }
@@ -91,11 +94,17 @@ std::string format_evaluation_table(const EvaluationReport& report) {
     add_row(table, row, report.alignment);
   }
   add_row(table, report.zero_motion, Alignment::kNone);
+  const auto [least, most] = std::ranges::minmax(
+      report.rows, {}, [](const EvaluationRow& row) { return row.metrics.num_segments; });
+  const int few = least.metrics.num_segments;
+  const int many = most.metrics.num_segments;
   const std::string segments =
-      zero_motion.num_segments == 0
-          ? "no segment fits into the drive: no t_rel and r_rel"
-          : fmt::format("t_rel and r_rel: mean over {} segments of {}", zero_motion.num_segments,
-                        length_range(zero_motion.segment_lengths_m));
+      many == 0
+          ? fmt::format("no segment of {} fits into the drive: no t_rel and r_rel",
+                        length_range(least.metrics.segment_lengths_m))
+          : fmt::format("t_rel and r_rel: mean over {} segments of {}",
+                        few == many ? std::to_string(few) : fmt::format("{} to {}", few, many),
+                        length_range(least.metrics.segment_lengths_m));
   std::string unmatched;
   for (const EvaluationRow& row : report.rows) {
     if (row.num_pairs < row.num_poses) {

@@ -69,7 +69,10 @@ std::string head(const MetricsReport& report) {
 std::string error_table(const MetricsReport& report) {
   const Metrics& m = *report.metrics;
   const std::string segments = m.num_segments == 0
-                                   ? "no segment fits into the drive"
+                                   ? fmt::format(
+                                         "no segment of {} fits into {:.1f} m: see "
+                                         "evaluation.segment_lengths_m",
+                                         length_range(m.segment_lengths_m), m.path_length_m)
                                    : fmt::format("mean over {} segments of {}", m.num_segments,
                                                  length_range(m.segment_lengths_m));
   const std::string fitted(to_string(m.alignment));

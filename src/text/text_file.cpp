@@ -166,6 +166,28 @@ Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
   return fail(fmt::format("{}: {}", at_line(file, index + 1), error.message));
 }
 
+namespace {
+
+/// The times in seconds, where they are ms, us or ns: steps are not longer than this.
+void find_unit(std::vector<TimedRow>& rows) {
+  constexpr double kMaxStep_s = 3.0;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    steps.push_back(rows[i].time_s - rows[i - 1].time_s);
+  }
+  const auto middle = steps.begin() + std::ssize(steps) / 2;
+  std::ranges::nth_element(steps, middle);
+  double unit_s = 1.0;
+  while (!steps.empty() && unit_s > kNanosecond_s && *middle * unit_s > kMaxStep_s) {
+    unit_s = unit_s > 1e-6 ? 1e-3 * unit_s : kNanosecond_s;
+  }
+  for (TimedRow& row : rows) {
+    row.time_s *= unit_s;
+  }
+}
+
+}  // namespace
+
 Expected<std::vector<TimedRow>> read_timed_rows(const fs::path& file,
                                                 std::initializer_list<std::size_t> counts,
                                                 std::string_view form,
@@ -201,6 +223,9 @@ Expected<std::vector<TimedRow>> read_timed_rows(const fs::path& file,
   }
   if (rows.empty()) {
     return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
+  }
+  if (unit_s == 1.0) {
+    find_unit(rows);
   }
   return rows;
 }

@@ -62,8 +62,9 @@ struct TimedRow {
   std::size_t line = 0;  ///< counted from 0
 };
 /// Rows of one of these numbers of words, between commas or blanks, `#` before comments; the times
-/// rise, in this unit, or in ns where a comment says [ns]. `form` names a row. Errors, with file
-/// and line: unreadable, other rows, no row.
+/// rise, in this unit, or in ns where a comment says [ns]; seconds by default, or, where the usual
+/// step would be over 3 s, what makes it shorter: ms, us or ns. `form` names a row. Errors, with
+/// file and line: unreadable, other rows, no row.
 [[nodiscard]] Expected<std::vector<TimedRow>> read_timed_rows(
     const std::filesystem::path& file,
     std::initializer_list<std::size_t> counts,

@@ -28,18 +28,27 @@ class OpenCvDecoder final : public VideoDecoder {
   double frame_count() const override { return capture_.get(cv::CAP_PROP_FRAME_COUNT); }
   double rate_hz() const override { return capture_.get(cv::CAP_PROP_FPS); }
   double position_ms() const override { return capture_.get(cv::CAP_PROP_POS_MSEC); }
+  double turned_deg() const override {
+    return capture_.get(cv::CAP_PROP_ORIENTATION_AUTO) != 0.0
+               ? capture_.get(cv::CAP_PROP_ORIENTATION_META)
+               : 0.0;
+  }
 
  private:
   cv::VideoCapture capture_;
 };
 
-cv::VideoCapture open_file(const char* file) {
+cv::VideoCapture open_file(const char* file, const cv::Size& wanted) {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
   // A playlist may name anything.
   ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
   cv::VideoCapture capture(file, cv::CAP_FFMPEG);
-  // The sensor's rows and columns, as of JPEGs: the calibration knows nothing of a turned screen.
-  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  // As players show it, but where the calibration is of the sensor's rows and columns.
+  capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 1);
+  const cv::Size turned = OpenCvDecoder(capture).size();
+  if (turned != wanted && cv::Size(turned.height, turned.width) == wanted) {
+    capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  }
   return capture;
 }
 
@@ -54,8 +63,8 @@ cv::VideoCapture open_camera(int number, int width_px, int height_px) {
 
 extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_decoder(
     const char* file, int number, int width_px, int height_px) {
-  const cv::VideoCapture capture =
-      file != nullptr ? open_file(file) : open_camera(number, width_px, height_px);
+  const cv::VideoCapture capture = file != nullptr ? open_file(file, {width_px, height_px})
+                                                   : open_camera(number, width_px, height_px);
   return capture.isOpened() ? std::make_unique<OpenCvDecoder>(capture).release() : nullptr;
 }
 

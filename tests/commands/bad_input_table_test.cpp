@@ -24,6 +24,8 @@ TEST_F(BadInputTable, Calibration) {
        text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
        text("centre far away", "P2: 361 0 1e300 0 0 361 94 0 0 0 1 0\n"),
        text("offset far away", "P2: 361 0 310 1e200 0 361 94 0 0 0 1 0\n"),
+       text("of images twice as large", "P2: 722 0 609 0 0 722 172 0 0 0 1 0\n"),
+       text("a view of 172 degrees", "P2: 20 0 310 0 0 20 94 0 0 0 1 0\n"),
        text("negative focal length", "P2: -361 0 310 0 0 361 94 0 0 0 1 0\n")});
 }
 
@@ -42,6 +44,13 @@ TEST_F(BadInputTable, Poses) {
               "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
          text("a gap", "1 0 0 0 0 1 0 0 0 0 1 0\n\n1 0 0 0 0 1 0 0 0 0 1 1\n")});
   }
+}
+
+TEST_F(BadInputTable, OnePoseIsNotCompared) {
+  write_file(folder_ / "one.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  const ProgramResult result =
+      run_stemvo({"evaluate", "--gt", folder_ / "one.txt", folder_ / "one.txt"});
+  expect_error(result, 1, {"one.txt: expected at least 2 poses"});
 }
 
 TEST_F(BadInputTable, TumPoses) {
@@ -71,19 +80,31 @@ TEST_F(BadInputTable, CameraFile) {
   const auto with = [&](const std::string& from, const std::string& to) {
     return text(from + " -> " + to, replace_first(good, from, to));
   };
-  expect_refused_with_faults(
-      folder_ / "camera.yaml", "360.5",
-      {"run", (sequence_ / "image_2").string(), "--camera", folder_ / "camera.yaml", "--out",
-       folder_ / "out"},
-      {},
-      {text("empty", ""), with("620", "0"), with("620", "-1"), with("620", "1e9"),
-       with("620", "62.5"), with("188", "99999999999999999999"), with("360.5", "-1"),
-       with("310", "1000"), with("[0, 0, 0, 0]", "[0, 0]"),
-       with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"), with("[0, 0, 0, 0]", "[nan, 0, 0, 0]"),
-       with("radial-tangential", "fish"), with("rate_hz: 10", "rate_hz: 0"),
-       with("rate_hz: 10", "rate_hz: 1e300"), with("rate_hz", "rate"),
-       with("image_width", "image_height"), text("a list", "- 1\n- 2\n"),
-       text("two documents", good + "---\n" + good), text("a tab", "\t" + good)});
+  expect_refused_with_faults(folder_ / "camera.yaml", "360.5",
+                             {"run", (sequence_ / "image_2").string(), "--camera",
+                              folder_ / "camera.yaml", "--out", folder_ / "out"},
+                             {},
+                             {text("empty", ""),
+                              with("620", "0"),
+                              with("620", "-1"),
+                              with("620", "1e9"),
+                              with("620", "62.5"),
+                              with("188", "99999999999999999999"),
+                              with("360.5", "-1"),
+                              with("310", "1000"),
+                              with("310, 94", "609, 172"),
+                              with("360.5, 360, 310, 94", "0.58, 1.92, 0.5, 0.5"),
+                              with("[0, 0, 0, 0]", "[0, 0]"),
+                              with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"),
+                              with("[0, 0, 0, 0]", "[nan, 0, 0, 0]"),
+                              with("radial-tangential", "fish"),
+                              with("rate_hz: 10", "rate_hz: 0"),
+                              with("rate_hz: 10", "rate_hz: 1e300"),
+                              with("rate_hz", "rate"),
+                              with("image_width", "image_height"),
+                              text("a list", "- 1\n- 2\n"),
+                              text("two documents", good + "---\n" + good),
+                              text("a tab", "\t" + good)});
 }
 
 TEST_F(BadInputTable, ConfigurationFile) {

@@ -39,8 +39,8 @@ class Bag(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
         self.out = self.folder / "out"
 
-    def write(self, kind, encoding="rgb8", topic="/cam0/image_raw", stamps=None, info=True, model="plumb_bob"):
-        """A bag of the scene; `encoding` may be jpeg."""
+    def write(self, kind, encoding="rgb8", topic="/cam0/image_raw", stamps=None, info=True, model="plumb_bob", **said):
+        """A bag of the scene; `encoding` may be jpeg; `said` goes before what camera_info says."""
         is_ros1 = kind == "bag"
         store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
         file = self.folder / ("made.bag" if is_ros1 else "made_" + kind)
@@ -63,9 +63,10 @@ class Bag(unittest.TestCase):
             images = writer.add_connection(topic, image_type, typestore=store)
             if info:
                 region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
-                matrices = {"d": np.array([-0.1, 0.02, 0.0, 0.0, 0.0]), "k": np.array([150.0, 0, 79.5, 0, 151.0, 59.5, 0, 0, 1]), "r": np.eye(3).ravel(), "p": np.zeros(12)}
-                message = types["sensor_msgs/msg/CameraInfo"](header=header(FIRST_NS), height=HEIGHT, width=WIDTH, distortion_model=model, binning_x=0, binning_y=0, roi=region,
-                                                             **{(key.upper() if is_ros1 else key): value for key, value in matrices.items()})
+                matrices = {"d": np.array([-0.1, 0.02, 0.0, 0.0, 0.0]), "k": np.array([150.0, 0, 79.5, 0, 151.0, 59.5, 0, 0, 1]), "r": np.eye(3).ravel(), "p": np.zeros(12),
+                            "binning_x": 0, "binning_y": 0, "roi": region, **said}
+                message = types["sensor_msgs/msg/CameraInfo"](header=header(FIRST_NS), height=HEIGHT, width=WIDTH, distortion_model=model,
+                                                             **{(key.upper() if is_ros1 and len(key) == 1 else key): value for key, value in matrices.items()})
                 connection = writer.add_connection("/cam0/camera_info", "sensor_msgs/msg/CameraInfo", typestore=store)
                 put(connection, FIRST_NS, message, "sensor_msgs/msg/CameraInfo")
             for index in range(COUNT):
@@ -111,6 +112,8 @@ class Bag(unittest.TestCase):
                 self.assertEqual([time for time, _ in found], [FIRST_NS + index * 10**8 for index in range(COUNT)])
                 for index, (_, pixels) in enumerate(found):
                     expected = scene(index)[:, :, 1] if encoding.startswith("mono") else scene(index)
+                    if encoding == "mono16":
+                        expected = expected.astype(np.uint16) * 256 + 7
                     np.testing.assert_array_equal(pixels, expected)
 
     def test_a_lone_mcap_file_and_jpegs_as_they_are(self):
@@ -140,6 +143,30 @@ class Bag(unittest.TestCase):
         camera.write_text("resolution: [160, 120]\nintrinsics: [150, 150, 79.5, 59.5]\ndistortion_model: none\n", encoding="utf-8")
         self.assertEqual(self.convert(bag, self.out, "--camera", camera)[0], 0)
         self.assertEqual((self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8"), camera.read_text(encoding="utf-8"))
+
+    def test_a_rectified_topic_has_the_camera_of_p(self):
+        projection = np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])
+        for kind, encoding, topic in (("bag", "rgb8", "/cam0/image_rect"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")):
+            with self.subTest(topic=topic), tempfile.TemporaryDirectory() as folder:
+                self.folder, self.out = pathlib.Path(folder), pathlib.Path(folder) / "out"
+                code, _, told = self.convert(self.write(kind, encoding, topic, p=projection), self.out)
+                self.assertEqual(code, 0, told)
+                self.assertIn("P without distortion", told)
+                text = (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
+                self.assertIn("intrinsics: [140.0, 141.0, 80.5, 60.5]\ndistortion_model: none\n", text)
+
+    def test_a_topic_that_may_be_rectified_is_a_warning(self):
+        code, _, told = self.convert(self.write("bag", topic="/cam0/direct", p=np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])), self.out)
+        self.assertEqual(code, 0, told)
+        self.assertIn("warning: /cam0/camera_info: K and D", told)
+        self.assertIn("intrinsics: [150.0, 151.0, 79.5, 59.5]\ndistortion_model: radial-tangential", (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8"))
+
+    def test_parts_of_images_and_skew_are_refused(self):
+        self.expect_error(["camera of whole images"], self.write("bag", binning_x=2), self.out)
+        self.expect_error(["without skew"], self.write("sqlite3", k=np.array([150.0, 3, 79.5, 0, 151.0, 59.5, 0, 0, 1])), self.out)
+
+    def test_a_bag_that_is_not_there(self):
+        self.expect_error(["none.bag: expected a bag, found nothing"], self.folder / "none.bag", self.out)
 
     def test_what_cannot_be_converted_is_one_line(self):
         bag = self.write("bag", "yuv422")

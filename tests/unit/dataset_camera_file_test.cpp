@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <string>
 #include <vector>
 
@@ -65,8 +66,8 @@ TEST_F(CameraFileTest, ReadsEveryKey) {
   EXPECT_EQ(camera.cx_px, 325.1);
   EXPECT_EQ(camera.cy_px, 249.7);
   EXPECT_EQ(file->camera.distortion, Distortion::kRadialTangential);
-  EXPECT_THAT(file->camera.distortion_coefficients,
-              ElementsAre(0.2312, -0.7849, -0.0033, -0.0001, 0.9172));
+  EXPECT_EQ(file->camera.distortion_coefficients,
+            (std::array<double, 12>{0.2312, -0.7849, -0.0033, -0.0001, 0.9172}));
   EXPECT_EQ(file->rate_hz, 10.0);
   EXPECT_EQ(file->camera_height_m, 1.2);
 }
@@ -105,8 +106,8 @@ TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
   const auto file = read_camera_file(folder_.file("sensor.yaml", text));
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->camera.width_px, 752);
-  EXPECT_THAT(file->camera.distortion_coefficients,
-              ElementsAre(-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0));
+  EXPECT_EQ(file->camera.distortion_coefficients,
+            (std::array<double, 12>{-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0}));
   EXPECT_EQ(file->rate_hz, 20.0);
 }
 
@@ -171,8 +172,8 @@ TEST_F(CameraFileTest, OddIntrinsics) {
   };
   refused("[520, 520, 320]", {"[fx, fy, cx, cy]", "found 3"});
   refused("520", {"expected a list of numbers", "'520'"});
-  refused("[-520, 520, 320, 240]", {"positive focal lengths", "-520"});
-  refused("[520, 0, 320, 240]", {"positive focal lengths", "and 0"});
+  refused("[-520, 520, 320, 240]", {"focal lengths above 0", "-520"});
+  refused("[520, 0, 320, 240]", {"focal lengths above 0", "and 0"});
   refused("[520, nan, 320, 240]", {"expected a finite number", "nan"});
   refused("[520, .inf, 320, 240]", {"expected a finite number", "inf"});
   refused("[520, x, 320, 240]", {"expected a finite number", "'x'"});
@@ -185,7 +186,7 @@ TEST_F(CameraFileTest, OddIntrinsics) {
 TEST_F(CameraFileTest, OddDistortion) {
   expect_refused(with_line(5, "distortion_model: fov"),
                  {"camera.yaml:5: distortion_model: expected one of none, radial-tangential, "
-                  "radtan, equidistant, found 'fov'"});
+                  "radtan, plumb_bob, rational_polynomial, equidistant, fisheye, found 'fov'"});
   expect_refused(with_line(5, "distortion_model: [none]"), {"camera.yaml:5", "expected one value"});
   expect_refused(with_line(5, "distortion_model: equidistant"),
                  {"camera.yaml:6", "[k1, k2, k3, k4], found 5"});
@@ -264,7 +265,8 @@ TEST_F(CameraFileTest, KalibrsChain) {
   EXPECT_EQ(file->camera.fy_px, 191.0);
   EXPECT_EQ(file->camera.height_px, 511);
   EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);
-  EXPECT_THAT(file->camera.distortion_coefficients, ElementsAre(0.1, 0.02, -0.003, 0.0004, 0.0));
+  EXPECT_EQ(file->camera.distortion_coefficients,
+            (std::array<double, 12>{0.1, 0.02, -0.003, 0.0004, 0.0}));
   // The camera's centre in the body: -R^T t.
   ASSERT_TRUE(file->body_from_camera);
   EXPECT_LT((file->body_from_camera->translation - Eigen::Vector3d(0, -0.5, 0)).norm(), 1e-12);
@@ -292,7 +294,7 @@ void expect_their_camera(const Camera& camera) {
   EXPECT_EQ(camera.cx_px, 325.5);
   EXPECT_EQ(camera.cy_px, 249.5);
   EXPECT_EQ(camera.distortion, Distortion::kRadialTangential);
-  EXPECT_THAT(camera.distortion_coefficients, ElementsAre(0.2, -0.7, 0.0, 0.001, 0.9));
+  EXPECT_EQ(camera.distortion_coefficients, (std::array<double, 12>{0.2, -0.7, 0.0, 0.001, 0.9}));
 }
 
 TEST_F(CameraFileTest, FileStorageOfOpenCvAndCameraInfoOfRos) {
@@ -327,7 +329,7 @@ TEST_F(CameraFileTest, AMessageOfRos) {
   const auto none = read_camera_file(folder_.file("camera.yaml", message("plumb_bob\nd: []\n")));
   ASSERT_TRUE(none) << none.error().message;
   EXPECT_EQ(none->camera.distortion, Distortion::kNone);
-  expect_refused(message("rational_polynomial\nd: [1]\n"), {"camera.yaml:8: distortion_model"});
+  expect_refused(message("rational_polynomial\nd: [1]\n"), {"d: expected [k1, k2, p1, p2]"});
   expect_refused(message("plumb_bob\n"), {"d: [k1, k2, p1, p2]", "no such key"});
   std::string text = message(five);
   text.replace(text.find("- 520.0\n"), 8, "");
@@ -348,8 +350,7 @@ TEST_F(CameraFileTest, FisheyesOfOpenCvAndRos) {
   EXPECT_EQ(fisheye->camera.distortion, Distortion::kEquidistant);
   text = kRos;
   text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
-  expect_refused(text, {"camera.yaml:8: distortion_model: expected one of plumb_bob",
-                        "found 'rational_polynomial'"});
+  EXPECT_EQ(error_of(text), "(read)");
   text = kRos;
   text.replace(text.find("0, 0, 0]"), 8, "0, 0, 3]");
   expect_refused(text, {"camera.yaml:12: distortion_coefficients: expected [k1, k2, p1, p2]",

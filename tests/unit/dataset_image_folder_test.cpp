@@ -300,7 +300,7 @@ TEST_F(ImageFolderTest, KittisLayoutNeedsNoCameraFile) {
   request_ = {};
   request_.sequence_dir = folder;
   EXPECT_THAT(error_of(), HasSubstr("calib.txt")) << "KITTI's own message";
-  std::ofstream(folder / "calib.txt") << "P0: 90 0 3 0 0 90 2 0 0 0 1 0\n";
+  std::ofstream(folder / "calib.txt") << "P0: 90 0 3.5 0 0 90 2.5 0 0 0 1 0\n";
   std::ofstream(folder / "times.txt") << "0\n";
   const auto opened = open_source(request_);
   ASSERT_TRUE(opened) << opened.error().message;

@@ -267,7 +267,7 @@ TEST_F(Recordings, AFileNamedLikeAnAddressIsAFile) {
 }
 
 TEST_F(Recordings, ALiveCameraHasTheClocksTimes) {
-  auto decoder = dataset::decode_file(write_video());
+  auto decoder = dataset::decode_file(write_video(), {});
   ASSERT_TRUE(decoder) << decoder.error().message;
   auto stream = std::make_shared<dataset::VideoStream>(*std::move(decoder), "camera:0", true);
   const std::string file = camera("");

@@ -23,7 +23,7 @@ struct NamedLens {
 
 void PrintTo(const NamedLens& named, std::ostream* out) { *out << named.name; }
 
-Camera with_lens(Camera camera, Distortion distortion, const std::array<double, 5>& numbers) {
+Camera with_lens(Camera camera, Distortion distortion, const std::array<double, 12>& numbers) {
   camera.distortion = distortion;
   camera.distortion_coefficients = numbers;
   return camera;
@@ -39,6 +39,10 @@ std::vector<NamedLens> lenses() {
       {"Euroc", with_lens(euroc, radial, {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0})},
       {"Kinect", with_lens(kinect, radial, {0.2312, -0.7849, -0.0033, -0.0001, 0.9172})},
       {"Tangential", with_lens(kinect, radial, {-0.1, 0.02, 0.01, -0.008, 0.001})},
+      {"Rational", with_lens(kinect, radial, {0.4, -0.3, 0.001, -0.002, 0.05, 0.6, -0.2, 0.03})},
+      {"ThinPrism",
+       with_lens(kinect, radial,
+                 {-0.1, 0.02, 0.001, 0.002, 0, 0.05, 0.01, 0, 0.003, -0.001, -0.002, 0.001})},
       {"Fisheye", with_lens(fisheye, Distortion::kEquidistant, {0.0034, 0.0007, -0.002, 0.0002})},
       {"PureFisheye", with_lens(strong, Distortion::kEquidistant, {})},
   };

@@ -39,7 +39,7 @@ TEST(PoseFile, ErrorsNameFileAndLine) {
     const auto file = read_pose_file(folder.file("poses", text));
     return file ? "(read)" : file.error().message;
   };
-  EXPECT_THAT(error_of("#\n1,2,3,4,1,0,0,0\n1,2,3\n"),
+  EXPECT_THAT(error_of("# [ns]\n1,2,3,4,1,0,0,0\n1,2,3\n"),
               HasSubstr("poses:3: expected time, x, y, z, qw, qx, qy, qz, .., found 3 numbers"));
   EXPECT_THAT(error_of("1,2,3,4,2,0,0,0\n"), HasSubstr("poses:1: expected a quaternion"));
   EXPECT_THAT(error_of("1,2,x,4,1,0,0,0\n"), HasSubstr("poses:1: expected"));

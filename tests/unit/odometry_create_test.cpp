@@ -130,6 +130,20 @@ TEST(OdometryCreate, ACameraThatIsNoneIsAnError) {
   camera = kCamera;
   camera.cy_px = std::numeric_limits<double>::infinity();
   EXPECT_THAT(error_of({}, camera), HasSubstr("principal point"));
+  camera = kCamera;
+  camera.fx_px = camera.fy_px = 0.6;
+  EXPECT_THAT(error_of({}, camera), HasSubstr("relative to the image's size"));
+  camera = {400, 400, 319.5, 95.5, 320, 96};
+  EXPECT_THAT(error_of({}, camera), HasSubstr("a calibration of images about 2 times as large?"));
+}
+
+TEST(OdometryCreate, ACentreFarFromTheMiddleIsToldToTheLog) {
+  Camera camera = kCamera;
+  camera.cy_px = 70;
+  Odometry odometry = Odometry::create(camera).value();
+  std::string told;
+  odometry.set_log([&](LogLevel, const std::string& line) { told += line; });
+  EXPECT_THAT(told, HasSubstr("far from the middle"));
 }
 
 TEST(OdometryCreate, AModelThatCannotTakeTheFramesIsAnErrorBeforeWork) {

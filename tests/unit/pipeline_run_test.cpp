@@ -13,7 +13,6 @@
 #include <unistd.h>
 
 #include "evaluation/trajectory.hpp"
-#include "pipeline/channel_images.hpp"
 #include "pipeline/run.hpp"
 #include "report/frames_csv.hpp"
 #include "report/map_ply.hpp"
@@ -350,6 +349,16 @@ TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
   EXPECT_THAT(read_file(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
 }
 
+TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {
+  request_.config.scale_choice = ScaleChoice::kOptions;
+  fs::resize_file(request_.sequence_dir / "image_0/000000.png", 200);
+  const auto summary = run_sequence(request_);
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_NEAR(summary->report.metrics->path_length_m, (kNumFrames - 2) * kStep_m, 1e-6);
+  const nlohmann::json page = testing::report_content(read_file(request_.out_dir / "report.html"));
+  EXPECT_EQ(page["truth"]["x"].size(), kNumFrames - 1U);
+}
+
 TEST_F(PipelineRun, WrongRequestsAreFoundBeforeWorkStarts) {
   RunRequest request = request_;
   request.config.scale.step_m = 0.0;
@@ -382,24 +391,6 @@ TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
   EXPECT_EQ(read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt")->size(), 6U);
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "metrics.json"));
   EXPECT_TRUE(fs::is_regular_file(request_.out_dir / "trajectory.png"));
-}
-
-TEST_F(PipelineRun, ChannelImagesOfTheInputLayer) {
-  ChannelImagesRequest request;
-  request.sequence_dir = request_.sequence_dir;
-  request.out_dir = request_.out_dir;
-  request.config.stem.model = "input_layer";
-  request.frames = FrameRangeRequest{2, 4};
-  const auto written = write_channel_images(request);
-  ASSERT_TRUE(written) << written.error().message;
-  EXPECT_EQ(*written, 2U * (1 + 3 + 1));
-  EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
-  EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
-  request.filters = FrameRangeRequest{2, 4};
-  const auto outside = write_channel_images(request);
-  ASSERT_FALSE(outside);
-  EXPECT_THAT(outside.error().message,
-              HasSubstr("expected filters inside 0:3, found --filters 2:4"));
 }
 
 }  // namespace

@@ -234,7 +234,7 @@ TEST(MetricsTable, SaysWhatIsMissing) {
   MetricsReport report = example();
   report.metrics->t_rel_percent.reset();
   report.metrics->num_segments = 0;
-  EXPECT_THAT(format_metrics_table(report), HasSubstr("no segment fits into the drive"));
+  EXPECT_THAT(format_metrics_table(report), HasSubstr("no segment of "));
   report.metrics.reset();
   EXPECT_THAT(format_metrics_table(report), HasSubstr("No ground truth"));
 }

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "dataset/camera_file.hpp"
+#include "odometry/check_frame.hpp"
+#include "text/text_file.hpp"
+#include "try.hpp"
+
+namespace stemvo::dataset {
+namespace {
+
+/// A row is number, name, width, height, focal lengths, centre, coefficients.
+struct ColmapModel {
+  std::string_view name;
+  std::size_t num_focal = 1;
+  std::size_t num_coefficients = 0;
+  Distortion distortion = Distortion::kRadialTangential;
+};
+constexpr std::array<ColmapModel, 9> kColmapModels = {{
+    {"SIMPLE_PINHOLE"},
+    {"PINHOLE", 2},
+    {"SIMPLE_RADIAL", 1, 1},
+    {"RADIAL", 1, 2},
+    {"OPENCV", 2, 4},
+    {"FULL_OPENCV", 2, 8},
+    {"SIMPLE_RADIAL_FISHEYE", 1, 1, Distortion::kEquidistant},
+    {"RADIAL_FISHEYE", 1, 2, Distortion::kEquidistant},
+    {"OPENCV_FISHEYE", 2, 4, Distortion::kEquidistant},
+}};
+
+Expected<Camera> parse_colmap_row(const std::string& row) {
+  const std::vector<std::string_view> words = split_words(row);
+  const auto model =
+      std::ranges::find(kColmapModels, words.size() > 1 ? words[1] : "", &ColmapModel::name);
+  if (model == kColmapModels.end()) {
+    return fail(
+        fmt::format("expected COLMAP's CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS with a model from "
+                    "SIMPLE_PINHOLE "
+                    "to OPENCV_FISHEYE, found '{}'",
+                    one_line(row)));
+  }
+  std::string_view rest = row;
+  (void)take_word(rest);
+  (void)take_word(rest);
+  const std::size_t num_focal = model->num_focal;
+  STEMVO_TRY_GET(const auto n, parse_numbers(rest, 4 + num_focal + model->num_coefficients));
+  for (const double side : {n[0], n[1]}) {
+    if (!(side >= 1.0 && side <= kMaxImageSide_px)) {
+      return fail(
+          fmt::format("expected sides of 1 to {} pixels, found {}", kMaxImageSide_px, side));
+    }
+  }
+  // Its pixels' centres have halves.
+  Camera camera{n[2],
+                n[1 + num_focal],
+                n[2 + num_focal] - 0.5,
+                n[3 + num_focal] - 0.5,
+                static_cast<int>(n[0]),
+                static_cast<int>(n[1])};
+  if (model->num_coefficients > 0) {
+    camera.distortion = model->distortion;
+    std::copy(n.begin() + 4 + static_cast<std::ptrdiff_t>(num_focal), n.end(),
+              camera.distortion_coefficients.begin());
+  }
+  return camera;
+}
+
+}  // namespace
+
+Expected<CameraFile> read_colmap_camera(const std::filesystem::path& file) {
+  STEMVO_TRY_GET(const auto lines, read_lines(file, kMaxSettings_MB));
+  CameraFile result;
+  std::size_t num_cameras = 0;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (split_words(lines[i]).empty() || lines[i].starts_with('#')) {
+      continue;
+    }
+    const auto camera = parse_colmap_row(lines[i]);
+    if (!camera) {
+      return fail_at(file, i, camera.error());
+    }
+    STEMVO_TRY(check_camera(*camera, at_line(file, i + 1)));
+    result.camera = *camera;
+    ++num_cameras;
+  }
+  return num_cameras == 1
+             ? Expected<CameraFile>(result)
+             : fail(fmt::format("{}: expected one camera, found {}", file.string(), num_cameras));
+}
+
+}  // namespace stemvo::dataset

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+// Inputs that are sound by themselves and would give a wrong path: refused, read right, or said.
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "dataset/frame_files.hpp"
+#include "evaluation/pose_file.hpp"
+#include "support/temp_folder.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+using dataset::read_camera_file;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr const char* kOfRos =
+    "width: 640\nheight: 480\ndistortion_model: plumb_bob\nd: [0.2, -0.7, 0, 0.001, 0.9]\n"
+    "k: [520, 0, 325.5, 0, 521, 249.5, 0, 0, 1]\n";
+
+class DoubtfulInput : public ::testing::Test {
+ protected:
+  std::string error_of_camera(const std::string& text, const char* name = "camera.yaml") const {
+    const auto camera = read_camera_file(temp_.file(name, text));
+    return camera ? "(read)" : camera.error().message;
+  }
+  /// Images that a name and a frame of its number are given for, 32x24 pixels.
+  FrameSourceRequest write_images(
+      const std::vector<std::string>& names,
+      const cv::Mat& image = cv::Mat(24, 32, CV_8UC1, cv::Scalar(90))) const {
+    FrameSourceRequest request;
+    request.sequence_dir = temp_ / "drive";
+    fs::create_directories(request.sequence_dir);
+    for (const std::string& name : names) {
+      cv::imwrite((request.sequence_dir / name).string(), image);
+    }
+    request.camera_file = temp_.file("camera.yaml",
+                                     "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 11.5]\n"
+                                     "distortion_model: none\nrate_hz: 10\n");
+    return request;
+  }
+  static std::string error_of(const FrameSourceRequest& request) {
+    const auto source = open_source(request);
+    return source ? "(opened)" : source.error().message;
+  }
+
+  testing::TempFolder temp_;
+};
+
+TEST_F(DoubtfulInput, CamerasOfOtherImages) {
+  const auto camera = [](const std::string& size, const std::string& numbers) {
+    return "resolution: " + size + "\nintrinsics: [" + numbers + "]\ndistortion_model: none\n";
+  };
+  const std::string kitti = "721.5, 721.5, 609.6, 172.9";
+  EXPECT_EQ(error_of_camera(camera("[1242, 375]", kitti)), "(read)");
+  EXPECT_THAT(error_of_camera(camera("[416, 128]", kitti)),
+              AllOf(HasSubstr("camera.yaml:2: intrinsics: expected a principal point inside"),
+                    HasSubstr("about 2.8 times as large")));
+  EXPECT_THAT(error_of_camera(camera("[640, 192]", kitti)), HasSubstr("near the middle"));
+  EXPECT_THAT(error_of_camera(camera("[2484, 750]", kitti)), HasSubstr("0.48 times as large"));
+  EXPECT_THAT(error_of_camera(camera("[640, 192]", "0.58, 1.92, 0.5, 0.5")),
+              HasSubstr("relative to the image's size"));
+  EXPECT_EQ(error_of_camera(camera("[640, 192]", "9000, 9000, 320, 96")), "(read)");
+  EXPECT_THAT(error_of_camera(camera("[640, 192]", "20, 20, 320, 96")),
+              HasSubstr("expected a field of view of at most 170 degrees, found 172.8"));
+}
+
+TEST_F(DoubtfulInput, ACentreFarFromTheMiddleIsSaid) {
+  FrameSourceRequest request = write_images({"1.png", "2.png"});
+  EXPECT_THAT(open_source(request)->warnings, IsEmpty());
+  request.camera_file = temp_.file("cut.yaml",
+                                   "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 7]\n"
+                                   "distortion_model: none\nrate_hz: 10\n");
+  const auto cut = open_source(request);
+  ASSERT_TRUE(cut) << cut.error().message;
+  EXPECT_THAT(cut->warnings, ElementsAre(HasSubstr("(15.5, 7.0) is far from the middle")));
+  request.camera_file = temp_.file("far.yaml",
+                                   "resolution: [32, 24]\nintrinsics: [300, 300, 15.5, 11.5]\n"
+                                   "distortion_model: none\nrate_hz: 10\n");
+  EXPECT_THAT(open_source(request)->warnings,
+              ElementsAre(HasSubstr("a field of view of 6.1 degrees is small")));
+}
+
+TEST_F(DoubtfulInput, PartsOfImagesAndSkewAreRefusedByName) {
+  const std::string good = kOfRos;
+  const std::string zeros =
+      "binning_x: 0\nbinning_y: 1\nroi: {x_offset: 0, y_offset: 0, height: 0, width: 640}\n";
+  EXPECT_EQ(error_of_camera(good + zeros), "(read)");
+  EXPECT_THAT(error_of_camera(good + "binning_x: 2\n"), HasSubstr("binning_x: expected 0 or 1"));
+  EXPECT_THAT(error_of_camera(good + "roi: {x_offset: 8, y_offset: 0, height: 0, width: 0}\n"),
+              HasSubstr("roi: expected the whole image"));
+  std::string skewed = good;
+  skewed.replace(skewed.find("520, 0"), 6, "520, 3");
+  EXPECT_THAT(error_of_camera(skewed), HasSubstr("without skew, found [520, 3, "));
+}
+
+TEST_F(DoubtfulInput, TheCameraOfRectifiedImagesIsSaid) {
+  const auto warnings_of = [&](const std::string& more) {
+    const auto camera = read_camera_file(temp_.file("info.yaml", kOfRos + more));
+    EXPECT_TRUE(camera) << camera.error().message;
+    return camera ? camera->warnings : std::vector<std::string>();
+  };
+  EXPECT_THAT(warnings_of(""), IsEmpty());
+  EXPECT_THAT(warnings_of("p: [520, 0, 325.5, 0, 0, 521, 249.5, 0, 0, 0, 1, 0]\n"), IsEmpty());
+  EXPECT_THAT(warnings_of("p: [480, 0, 330, 0, 0, 500, 251, 0, 0, 0, 1, 0]\n"),
+              ElementsAre(HasSubstr("rectified have intrinsics [480, 500, 330, 251], of p")));
+}
+
+TEST_F(DoubtfulInput, NoLensInEveryForm) {
+  for (const char* lens : {"distortion_model: ''\nd: []\n", "distortion_model: plumb_bob\nd: []\n",
+                           "distortion_model: plumb_bob\nd: [0, 0, 0, 0, 0]\n",
+                           "distortion_model: none\nd: [0, 0, 0, 0]\n",
+                           "distortion_model: ''\nd: [0.0, 0.0, 0.0, 0.0, 0.0]\n"}) {
+    const auto camera = read_camera_file(
+        temp_.file("none.yaml", std::string("width: 640\nheight: 480\nk: [520, 0, 325.5, 0, 521, "
+                                            "249.5, 0, 0, 1]\n") +
+                                    lens));
+    ASSERT_TRUE(camera) << lens << camera.error().message;
+    EXPECT_EQ(camera->camera.distortion_coefficients[0], 0.0);
+  }
+}
+
+TEST_F(DoubtfulInput, TheRationalModelIsTakenAndWritten) {
+  std::string text = kOfRos;
+  text.replace(text.find("plumb_bob"), 9, "rational_polynomial");
+  text.replace(text.find("0.9]"), 4, "0.9, 0.1, 0.2, 0.3]");
+  const auto camera = read_camera_file(temp_.file("rational.yaml", text));
+  ASSERT_TRUE(camera) << camera.error().message;
+  EXPECT_EQ(camera->camera.distortion_coefficients,
+            (std::array<double, 12>{0.2, -0.7, 0, 0.001, 0.9, 0.1, 0.2, 0.3}));
+  const auto again = read_camera_file(temp_.file("ours.yaml", camera_file_text(*camera)));
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->camera.distortion_coefficients, camera->camera.distortion_coefficients);
+  text.replace(text.find("0.3]"), 4, "0.3, 0, 0, 0, 0, 0.01, 0]");
+  EXPECT_THAT(error_of_camera(text), HasSubstr("found 14 numbers"));
+}
+
+TEST_F(DoubtfulInput, CamerasOfColmap) {
+  const auto read = [&](const std::string& row) {
+    return read_camera_file(temp_.file("cameras.txt", "# Camera list\n#   CAMERA_ID, ..\n" + row));
+  };
+  const auto opencv = read("1 OPENCV 640 480 520 521 326 250 0.1 0.02 0.003 0.004\n");
+  ASSERT_TRUE(opencv) << opencv.error().message;
+  EXPECT_EQ(opencv->camera.fy_px, 521.0);
+  EXPECT_EQ(opencv->camera.cx_px, 325.5) << "the first pixel's centre is (0.5, 0.5) there";
+  EXPECT_EQ(opencv->camera.distortion, Distortion::kRadialTangential);
+  EXPECT_EQ(opencv->camera.distortion_coefficients[3], 0.004);
+  const auto radial = read("7 SIMPLE_RADIAL 640 480 520 320 240 0.1\n");
+  ASSERT_TRUE(radial) << radial.error().message;
+  EXPECT_EQ(radial->camera.fy_px, 520.0);
+  EXPECT_EQ(radial->camera.cy_px, 239.5);
+  EXPECT_EQ(read("1 OPENCV_FISHEYE 640 480 300 300 320 240 0.1 0 0 0\n")->camera.distortion,
+            Distortion::kEquidistant);
+  EXPECT_EQ(read("1 PINHOLE 640 480 520 520 320 240\n")->camera.distortion, Distortion::kNone);
+  EXPECT_THAT(read("1 FOV 640 480 520 520 320 240 0.9\n").error().message, HasSubstr(":3: "));
+  EXPECT_THAT(read("1 PINHOLE 640 480 520 320 240\n").error().message,
+              HasSubstr("expected 6 numbers, found 5"));
+  const std::string two = "1 PINHOLE 640 480 520 520 320 240\n2 PINHOLE 640 480 520 520 320 240\n";
+  EXPECT_THAT(read(two).error().message, HasSubstr("expected one camera, found 2"));
+  EXPECT_THAT(read("").error().message, HasSubstr("expected one camera, found 0"));
+}
+
+TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
+  const FrameSourceRequest same = write_images({"f1.png", "f2.png", "f2.jpg"});
+  EXPECT_THAT(error_of(same), AllOf(HasSubstr("f2."), HasSubstr("/*.png'")));
+  fs::remove_all(same.sequence_dir);
+  FrameSourceRequest stereo = write_images({"left_01.png", "left_02.png", "right_1.png"});
+  EXPECT_THAT(error_of(stereo), AllOf(HasSubstr("left_01.png"), HasSubstr("right_1.png")));
+  stereo.sequence_dir /= "left_*.png";
+  EXPECT_EQ(error_of(stereo), "(opened)");
+  stereo.sequence_dir = temp_ / "drive/*.png";
+  EXPECT_THAT(open_source(stereo)->warnings, ElementsAre(HasSubstr("right_1.png")));
+  fs::remove_all(temp_ / "drive");
+  EXPECT_EQ(error_of(write_images({"day1_1.png", "day1_2.png", "day2_1.png", "start.png"})),
+            "(opened)");
+}
+
+TEST_F(DoubtfulInput, TimesInOtherUnits) {
+  FrameSourceRequest request = write_images({"1.png", "2.png", "3.png"});
+  for (const auto& [unit, unit_s] : std::vector<std::pair<const char*, double>>{
+           {"", 1.0}, {"000", 1e-3}, {"000000", 1e-6}, {"000000000", 1e-9}}) {
+    request.times =
+        temp_.file("times.txt", fmt::format("1700000000{0}\n1700000001{0}\n1700000002{0}\n", unit));
+    const auto source = open_source(request);
+    ASSERT_TRUE(source) << source.error().message;
+    EXPECT_NEAR(source->timestamps_s[2] - source->timestamps_s[1], 1.0, 1e-6) << unit_s;
+    EXPECT_NEAR(source->timestamps_s[0], 1.7e9, 1e-3) << unit_s;
+  }
+}
+
+TEST_F(DoubtfulInput, SixteenBitsAreStretchedByWhatIsUsed) {
+  const auto read = [&](int from, int to) {
+    cv::Mat image(24, 32, CV_16UC1);
+    for (int i = 0; i < 24 * 32; ++i) {
+      image.at<std::uint16_t>(i / 32, i % 32) =
+          static_cast<std::uint16_t>(from + (to - from) * i / (24 * 32 - 1));
+    }
+    const auto source = open_source(write_images({"1.png", "2.png"}, image));
+    EXPECT_TRUE(source) << source.error().message;
+    double low = 0.0;
+    double high = 0.0;
+    cv::minMaxLoc(source->read(1).value(), &low, &high);
+    return std::vector<double>{low, high, static_cast<double>(source->warnings.size())};
+  };
+  EXPECT_THAT(read(0, 65535), ElementsAre(0, 255, 0));
+  EXPECT_THAT(read(0, 1023), ElementsAre(0, 255, 1)) << "10 bits";
+  EXPECT_THAT(read(0, 3500), ElementsAre(0, 218, 1)) << "12 bits";
+  EXPECT_THAT(read(0, 200), ElementsAre(0, 200, 1)) << "8 bits stay what they are";
+  EXPECT_THAT(read(8000, 9000), ElementsAre(64, 191, 1)) << "thermal: half more to both sides";
+}
+
+/// Frames without pictures' contents; times and turn as told.
+class ToldDecoder final : public dataset::VideoDecoder {
+ public:
+  ToldDecoder(std::vector<double> times_ms, double turned_deg)
+      : times_ms_(std::move(times_ms)), turned_deg_(turned_deg) {}
+  bool grab() override { return ++index_ < std::ssize(times_ms_); }
+  cv::Mat retrieve() override { return {24, 32, CV_8UC3, cv::Scalar::all(90)}; }
+  [[nodiscard]] cv::Size size() const override { return {32, 24}; }
+  [[nodiscard]] double frame_count() const override { return 0.0; }
+  [[nodiscard]] double rate_hz() const override { return 20.0; }
+  [[nodiscard]] double position_ms() const override {
+    return times_ms_.at(static_cast<std::size_t>(index_));
+  }
+  [[nodiscard]] double turned_deg() const override { return turned_deg_; }
+
+ private:
+  std::vector<double> times_ms_;
+  double turned_deg_;
+  std::ptrdiff_t index_ = -1;
+};
+
+class DoubtfulVideo : public DoubtfulInput {
+ protected:
+  Expected<FrameSource> open(std::vector<double> times_ms, double turned_deg) const {
+    FrameSourceRequest request = write_images({});
+    request.sequence_dir = "drive.mp4";
+    const auto stream = std::make_shared<dataset::VideoStream>(
+        std::make_unique<ToldDecoder>(std::move(times_ms), turned_deg), "drive.mp4", false);
+    return dataset::open_stream(stream, *read_camera_file(*request.camera_file), request);
+  }
+};
+
+TEST_F(DoubtfulVideo, FramesWithoutTimesAreCounted) {
+  const auto times_of = [&](const std::vector<double>& told_ms) {
+    const auto source = open(told_ms, 0.0).value();
+    std::vector<double> times_s;
+    for (std::size_t i = 0; i < told_ms.size(); ++i) {
+      EXPECT_TRUE(source.read(i));
+      times_s.push_back(source.time_s(i));
+    }
+    times_s.push_back(static_cast<double>(source.stream->num_counted()));
+    return times_s;
+  };
+  const double none = -7.7e15;  // FFmpeg's least number in ms
+  EXPECT_THAT(times_of({none, none, none}), ElementsAre(0.0, 0.05, 0.1, 3.0));
+  EXPECT_THAT(times_of({5000, 5250, 5500}), ElementsAre(5.0, 5.25, 5.5, 0.0)) << "late, no shift";
+}
+
+TEST_F(DoubtfulVideo, ATurnIsSaid) {
+  EXPECT_THAT(open({0.0}, 0.0)->warnings, IsEmpty());
+  EXPECT_THAT(open({0.0}, 180.0)->warnings, ElementsAre(HasSubstr("turned by 180 degrees")));
+}
+
+TEST_F(DoubtfulInput, TrajectoriesBetweenCommas) {
+  const auto read = [&](const std::string& text) { return read_pose_file(temp_.file("p", text)); };
+  const auto kitti = read("1,0,0,5,0,1,0,6,0,0,1,7\n");
+  ASSERT_TRUE(kitti) << kitti.error().message;
+  EXPECT_THAT(kitti->timestamps_s, IsEmpty());
+  EXPECT_EQ(kitti->poses[0].translation, Eigen::Vector3d(5, 6, 7));
+  const auto tum = read("# t,x\n1700000000.5,5,6,7,0,0,0,1\n");
+  ASSERT_TRUE(tum) << tum.error().message;
+  EXPECT_THAT(tum->timestamps_s, ElementsAre(1700000000.5));
+  EXPECT_FALSE(tum->is_of_body);
+  EXPECT_EQ(tum->poses[0].rotation.w(), 1.0) << "w comes last";
+  EXPECT_THAT(read("1700000000500000000,5,6,7,0,0,0,1\n").error().message,
+              AllOf(HasSubstr("TUM's rows"), HasSubstr("EuRoC's")));
+  EXPECT_TRUE(read("#t [ns]\n1700000000500000000,5,6,7,1,0,0,0\n")->is_of_body);
+}
+
+}  // namespace
+}  // namespace stemvo
