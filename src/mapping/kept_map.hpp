@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -49,11 +50,16 @@ struct MapEdge {
   double sigma_rad = 0.0;          ///< of the rotation, per axis
   double sigma_translation = 0.0;  ///< per axis, in units of `from`
   double sigma_log_scale = 0.0;
+
+  /// Nothing measured it, or not how long it is.
+  [[nodiscard]] bool is_guess() const { return std::max(sigma_rad, sigma_log_scale) >= 1.0; }
 };
 
 /// A place that was seen again: keyframe `to`, the later one, shows what `from` showed.
 struct Loop : MapEdge {
-  std::vector<std::pair<int, int>> corners;  ///< indices into from's and to's that are one landmark
+  /// Indices into from's and to's that are one landmark; empty: made of other loops and motions,
+  /// or where a lost frame was found.
+  std::vector<std::pair<int, int>> corners;
 };
 
 /// How long a unit is.
@@ -63,13 +69,40 @@ struct MapLength {
   double sigma = 0.0;
 };
 
+/// A keyframe that showed a kept place and is no node any more.
+struct MergedKeyframe {
+  int frame = 0;
+  Rigid3 world_from_camera;  ///< in the trajectory, as it came
+  int keyframe = 0;          ///< where its pose hangs: number of a keyframe in the map
+  Similarity3 keyframe_from_merged;
+  bool is_recognized = false;  ///< there was a loop from that keyframe to it
+};
+
 /// The map that remembers: nodes of a graph, what connects them, and where they are.
 struct KeptMap {
   std::vector<KeptKeyframe> keyframes;         ///< in the order of their frames
   std::vector<Similarity3> map_from_keyframe;  ///< one per keyframe
   std::vector<MapEdge> motions;                ///< between keyframes that follow each other
-  std::vector<Loop> loops;
-  std::vector<MapLength> lengths;  ///< where somebody measured metres
+  std::vector<Loop> loops;                     ///< that were found, or are made of such
+  std::vector<MapLength> lengths;              ///< where somebody measured metres
+  std::vector<MergedKeyframe> merged;          ///< in the order of their frames
 };
+
+/// Frames that show one place, the earlier one first; those of another recording are negative.
+[[nodiscard]] inline std::vector<std::pair<int, int>> frames_of_loops(const KeptMap& map) {
+  const auto frame_of = [&](int k) { return map.keyframes[static_cast<std::size_t>(k)].frame; };
+  std::vector<std::pair<int, int>> frames;
+  for (const MergedKeyframe& merged : map.merged) {
+    if (merged.is_recognized) {
+      frames.emplace_back(frame_of(merged.keyframe), merged.frame);
+    }
+  }
+  for (const Loop& loop : map.loops) {
+    if (!loop.corners.empty()) {
+      frames.emplace_back(frame_of(loop.from), frame_of(loop.to));
+    }
+  }
+  return frames;
+}
 
 }  // namespace stemvo

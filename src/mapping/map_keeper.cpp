@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
 #include "geometry/median.hpp"
 #include "geometry/pose_influence.hpp"
+#include "mapping/map_merge.hpp"
 #include "odometry/localization.hpp"
 
 namespace stemvo {
@@ -142,6 +144,7 @@ void MapKeeper::load(KeptMap map) {
   if (map_.keyframes.empty()) {
     return;
   }
+  find_components();
   int last_track = std::numeric_limits<int>::min();
   for (const KeptKeyframe& keyframe : map_.keyframes) {
     last_track = keyframe.corners.empty() ? last_track
@@ -158,6 +161,20 @@ void MapKeeper::load(KeptMap map) {
   }
 }
 
+/// Keyframes that measurements connect.
+void MapKeeper::find_components() {
+  std::iota(components_.begin(), components_.end(), 0);
+  const auto join = [&](const MapEdge& edge) {
+    const auto [low, high] = std::minmax({component_of(edge.from), component_of(edge.to)});
+    if (!edge.is_guess() && low != high) {
+      std::ranges::replace(components_, high, low);
+    }
+  };
+  std::ranges::for_each(map_.motions, join);
+  std::ranges::for_each(map_.loops, join);
+  num_components_ = static_cast<int>(components_.size());
+}
+
 int MapKeeper::node_of(int frame) const {
   const auto node = nodes_.find(frame);
   return node == nodes_.end() ? -1 : node->second;
@@ -170,6 +187,12 @@ bool MapKeeper::has_own(int component) const {
     }
   }
   return false;
+}
+
+bool MapKeeper::may_soon_be_joined() const {
+  constexpr std::ptrdiff_t kYoung = 30;
+  return !components_.empty() && component_ != components_.front() &&
+         std::ranges::count(components_, component_) < kYoung;
 }
 
 void MapKeeper::add_nodes(const WindowView& view) {
@@ -216,7 +239,7 @@ void MapKeeper::connect_first(KeptKeyframe& kept) {
     return;
   }
   if (node == 0) {
-    component_ = node;
+    component_ = num_components_++;
     return;
   }
   MapEdge edge = guessed_motion(map_.keyframes.back(), kept);
@@ -225,7 +248,7 @@ void MapKeeper::connect_first(KeptKeyframe& kept) {
     edge.sigma_rad = map_.motions.back().sigma_rad;
     edge.sigma_translation = map_.motions.back().sigma_translation;
   } else {
-    component_ = node;
+    component_ = num_components_++;
   }
   edge.from = node - 1;
   edge.to = node;
@@ -265,11 +288,14 @@ void MapKeeper::reopen_last(const Keyframe& keyframe) {
 
 std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
   map_.loops.push_back(loop);
-  const int older = std::min(component_of(loop.from), component_of(loop.to));
-  const int younger = std::max(component_of(loop.from), component_of(loop.to));
+  const auto [older, younger] = std::minmax({component_of(loop.from), component_of(loop.to)});
   if (older == younger) {
     return std::nullopt;
   }
+  // The guess between them counts no more.
+  std::erase_if(map_.motions, [&, younger = younger](const MapEdge& edge) {
+    return edge.is_guess() && component_of(edge.from) < younger && component_of(edge.to) == younger;
+  });
   Similarity3 moved =
       map_from_keyframe(loop.from) * loop.from_to * map_from_keyframe(loop.to).inverse();
   if (component_of(loop.from) == younger) {
@@ -282,8 +308,6 @@ std::optional<Similarity3> MapKeeper::add_loop(const Loop& loop) {
       map_.map_from_keyframe[i] = moved * map_.map_from_keyframe[i];
     }
   }
-  // The guess between them counts no more.
-  std::erase_if(map_.motions, [&](const MapEdge& edge) { return edge.to == younger; });
   if (component_ != younger) {
     return std::nullopt;
   }
@@ -326,6 +350,27 @@ void MapKeeper::apply(std::span<const Similarity3> solved) {
     map_.map_from_keyframe[i] = moved * map_.map_from_keyframe[i];
   }
   map_from_world_ = moved * map_from_world_;
+}
+
+std::vector<int> MapKeeper::merge() {
+  int end = static_cast<int>(map_.keyframes.size());
+  for (const auto& [frame, node] : nodes_) {
+    end = std::min(end, node);
+  }
+  std::vector<int> numbers = merge_known_terrain(map_, end);
+  if (numbers.empty()) {
+    return numbers;
+  }
+  for (auto& [frame, node] : nodes_) {
+    node = numbers[static_cast<std::size_t>(node)];
+  }
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] >= 0) {
+      components_[static_cast<std::size_t>(numbers[i])] = components_[i];
+    }
+  }
+  components_.resize(map_.keyframes.size());
+  return numbers;
 }
 
 void MapKeeper::keep(const WindowView& view, std::size_t leaving) {

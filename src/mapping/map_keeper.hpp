@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "mapping/kept_map.hpp"
@@ -57,7 +58,13 @@ class MapKeeper {
   /// The first nodes' map_from_keyframe as it became in the graph; the others go with the last.
   void apply(std::span<const Similarity3> solved);
 
+  /// Merges what shows kept places only. Returns the new number of each node, -1 for those that are
+  /// none any more; empty: none has changed.
+  [[nodiscard]] std::vector<int> merge();
+
   [[nodiscard]] const KeptMap& map() const { return map_; }
+  /// The keeper ends.
+  [[nodiscard]] KeptMap take_map() { return std::move(map_); }
   [[nodiscard]] KeptKeyframe& keyframe(int node) {
     return map_.keyframes[static_cast<std::size_t>(node)];
   }
@@ -74,6 +81,9 @@ class MapKeeper {
   void correct(const Similarity3& map_from_world) { map_from_world_ = map_from_world; }
   /// A map holds keyframes of this recording.
   [[nodiscard]] bool has_own(int component) const;
+  /// The window's map is young, and another one is older.
+  [[nodiscard]] bool may_soon_be_joined() const;
+  [[nodiscard]] std::span<const int> components() const { return components_; }
   [[nodiscard]] int component_of(int node) const {
     return components_[static_cast<std::size_t>(node)];
   }
@@ -82,14 +92,16 @@ class MapKeeper {
   void add_node(const WindowView& view, const Keyframe& keyframe);
   void connect_first(KeptKeyframe& kept);
   void reopen_last(const Keyframe& keyframe);
+  void find_components();
   void keep(const WindowView& view, std::size_t leaving);
 
   KeptMap map_;
-  std::vector<int> components_;  ///< of each node its map: that one's first node
+  std::vector<int> components_;  ///< of each node the map that it belongs to, the older the lower
   Similarity3 map_from_world_;
   std::map<int, int> nodes_;  ///< of the window's keyframes, by frame
-  int component_ = 0;         ///< the window's
   int last_localized_ = -1;   ///< in the window before
+  int component_ = -1;        ///< the window's
+  int num_components_ = 0;    ///< so far
   std::optional<Loop> relocation_;
 };
 

@@ -37,43 +37,69 @@ std::vector<char> find_connected(const KeptMap& map) {
   return connected;
 }
 
+/// A frame of this recording whose place in the map is known.
+struct Placed {
+  int frame = 0;
+  Similarity3 map_from_world;
+  bool is_merged = false;
+  bool is_connected = false;  ///< with the one before
+};
+
+std::vector<Placed> placed_frames(const KeptMap& map, int num_frames) {
+  const std::vector<char> connected = find_connected(map);
+  std::vector<Placed> placed;
+  const auto place = [&](const auto& keyframe, const Similarity3& at, bool is_merged,
+                         bool follows) {
+    if (keyframe.frame >= 0 && keyframe.frame < num_frames) {
+      placed.push_back({keyframe.frame, at * Similarity3(keyframe.world_from_camera.inverse()),
+                        is_merged, follows});
+    }
+  };
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    place(map.keyframes[i], map.map_from_keyframe[i], false, connected[i] != 0);
+  }
+  for (const MergedKeyframe& merged : map.merged) {
+    place(merged,
+          map.map_from_keyframe[static_cast<std::size_t>(merged.keyframe)] *
+              merged.keyframe_from_merged,
+          true, true);
+  }
+  std::ranges::sort(placed, {}, &Placed::frame);
+  // The motion from what was merged is an edge of its place now.
+  for (std::size_t i = 1; i < placed.size(); ++i) {
+    placed[i].is_connected = placed[i].is_connected || placed[i - 1].is_merged;
+  }
+  return placed;
+}
+
 }  // namespace
 
 std::vector<Similarity3> place_trajectory(std::span<const Rigid3> world_from_camera,
                                           std::span<const double> times_s,
                                           const KeptMap& map) {
   STEMVO_CHECK(world_from_camera.size() == times_s.size(), "a time per pose");
-  const auto frame_of = [](const KeptKeyframe& keyframe) { return keyframe.frame; };
-  const auto num_frames = static_cast<int>(times_s.size());
-  const auto last = std::ranges::lower_bound(map.keyframes, num_frames, {}, frame_of);
-  const std::span<const KeptKeyframe> keyframes(map.keyframes.begin(), last);
-  const auto begin = std::ranges::lower_bound(keyframes, 0, {}, frame_of);
+  const std::vector<Placed> placed = placed_frames(map, static_cast<int>(times_s.size()));
   // A keyframe's own time is of another clock.
-  const auto time_of = [&](const KeptKeyframe& keyframe) {
-    return times_s[static_cast<std::size_t>(keyframe.frame)];
+  const auto time_of = [&](const Placed& frame) {
+    return times_s[static_cast<std::size_t>(frame.frame)];
   };
-  const std::vector<char> connected = find_connected(map);
   std::vector<Similarity3> map_from_camera;
   for (std::size_t i = 0; i < world_from_camera.size(); ++i) {
-    const auto by = [&](auto keyframe) {
-      const auto number = static_cast<std::size_t>(std::distance(keyframes.begin(), keyframe));
-      return map.map_from_keyframe[number] *
-             Similarity3(keyframe->world_from_camera.inverse() * world_from_camera[i]);
+    const auto by = [&](const Placed& frame) {
+      return frame.map_from_world * Similarity3(world_from_camera[i]);
     };
-    const auto after =
-        std::ranges::lower_bound(begin, keyframes.end(), static_cast<int>(i), {}, frame_of);
-    const bool is_keyframe = after != keyframes.end() && after->frame == static_cast<int>(i);
-    if (begin == keyframes.end()) {
+    const auto after = std::ranges::lower_bound(placed, static_cast<int>(i), {}, &Placed::frame);
+    const bool is_placed = after != placed.end() && after->frame == static_cast<int>(i);
+    if (placed.empty()) {
       map_from_camera.emplace_back(world_from_camera[i]);
-    } else if (after == begin || is_keyframe) {
-      map_from_camera.push_back(by(after));
-    } else if (after == keyframes.end() ||
-               connected[static_cast<std::size_t>(after - keyframes.begin())] == 0) {
-      map_from_camera.push_back(by(std::prev(after)));
+    } else if (after == placed.begin() || is_placed) {
+      map_from_camera.push_back(by(*after));
+    } else if (after == placed.end() || !after->is_connected) {
+      map_from_camera.push_back(by(*std::prev(after)));
     } else {
-      const auto before = std::prev(after);
-      const double share = (times_s[i] - time_of(*before)) / (time_of(*after) - time_of(*before));
-      map_from_camera.push_back(between(by(before), by(after), share));
+      const Placed& before = *std::prev(after);
+      const double share = (times_s[i] - time_of(before)) / (time_of(*after) - time_of(before));
+      map_from_camera.push_back(between(by(before), by(*after), share));
     }
   }
   return map_from_camera;

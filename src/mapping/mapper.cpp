@@ -22,6 +22,10 @@ constexpr int kNodesPerKeyframe = 64;
 constexpr double kSigmaFound_rad = 0.005;
 constexpr double kSigmaFound = 0.01;
 
+/// A loop that is off by more changes the graph, all seven errors together: of a true one, whose
+/// sigmas hold, the square is 7 on average.
+constexpr double kMaxAgreeingSigmas = 3.0;
+
 /// Bounds of a loop's scale: fewer pairs of landmarks do not tell it, errors of landmarks are
 /// alike, and it is never known better.
 constexpr std::size_t kMinPairs = 10;
@@ -94,8 +98,8 @@ Recognition Mapper::observe(const WindowView& view, std::shared_ptr<const ImageP
   }
   finish_lookup();
   keeper_.add_nodes(view);
-  if (const auto loop = std::exchange(found_, {})) {
-    recognition = take_in(view, *loop);
+  if (const auto found = std::exchange(found_, {})) {
+    recognition = take_in(view, *found);
   }
   solve_graph(view);  // before anybody reads it beside the frames
   begin_lookup(view);
@@ -109,10 +113,10 @@ void Mapper::begin_lookup(const WindowView& view) {
   if (complete.frame != newest_.frame || newest_.image == nullptr) {
     return;
   }
-  LookedUp work{keeper_.node_of(complete.frame), {}, {}};
+  LookedUp work{.node = keeper_.node_of(complete.frame), .keyframe = {}, .loop = {}};
   work.keyframe = keeper_.keyframe(work.node);
   work.keyframe.corners = corners_of(view, complete);
-  if (!recognizer_.asks(work.keyframe)) {
+  if (!keeper_.may_soon_be_joined() && !recognizer_.asks(work.keyframe)) {
     return;
   }
   const double roll = image_roll_rad(keeper_.map_from_keyframe(work.node).rotation);
@@ -120,13 +124,12 @@ void Mapper::begin_lookup(const WindowView& view) {
     const StageTimer timer(Stage::kPlaces);
     KeptKeyframe& keyframe = work.keyframe;
     keyframe.descriptors = describe(image->channel, keyframe.corners, roll);
-    work.loop = recognizer_.recognize(keeper_.map(), work.node, keyframe);
+    work.loop = recognizer_.recognize(keeper_.map(), keeper_.components(), work.node, keyframe);
     if (work.loop.has_value()) {
       measure_scale(keeper_.keyframe(work.loop->from), keyframe, *work.loop);
     }
-    if (recognizer_.shows_kept_place()) {
-      keyframe.descriptors.clear();
-    } else {
+    work.is_place = !recognizer_.shows_kept_place();
+    if (work.is_place) {
       recognizer_.add(work.node, keyframe);
     }
     return work;
@@ -136,26 +139,41 @@ void Mapper::begin_lookup(const WindowView& view) {
 void Mapper::finish_lookup() {
   const auto done = std::exchange(looked_up_, {});
   if (done.valid()) {
-    found_ = keep(done.get(), keeper_);
+    keep(done.get(), keeper_);
+    found_ = done.get().loop ? std::optional(done.get()) : std::nullopt;
   }
 }
 
-std::optional<Loop> Mapper::keep(const LookedUp& found, MapKeeper& keeper) {
+void Mapper::keep(const LookedUp& found, MapKeeper& keeper) {
   KeptKeyframe& kept = keeper.keyframe(found.node);
   kept.corners = found.keyframe.corners;
-  kept.descriptors = found.keyframe.descriptors;
-  return found.loop;
+  if (found.is_place) {
+    kept.descriptors = found.keyframe.descriptors;
+  }
+}
+
+/// The newest one.
+void Mapper::add_place(int node, std::vector<Descriptor> descriptors) {
+  KeptKeyframe& keyframe = keeper_.keyframe(node);
+  keyframe.descriptors = std::move(descriptors);
+  recognizer_.add(node, keyframe);
 }
 
 /// Its newer keyframe is in the window still.
-Recognition Mapper::take_in(const WindowView& view, const Loop& loop) {
+Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
   Recognition recognition;
+  const Loop& loop = *found.loop;
   if (!is_within_drift(keeper_.graph(view), loop)) {
+    if (!found.is_place) {  // nor does it show that one
+      add_place(found.node, found.keyframe.descriptors);
+    }
     return recognition;
   }
-  has_new_loops_ = true;
   recognition.frame = keeper_.keyframe(loop.from).frame;
   recognition.moved = keeper_.add_loop(loop);
+  // A graph that says the same already needs no solving.
+  has_new_loops_ = has_new_loops_ || recognition.moved.has_value() ||
+                   sigmas_off(keeper_.map(), loop) > kMaxAgreeingSigmas;
   if (recognition.moved.has_value()) {
     solved_ = {};  // of the graph before
   }
@@ -181,6 +199,7 @@ void Mapper::solve_graph(const WindowView& view) {
       keeper_.apply(*solved.get());
     }
   }
+  merge();
   if (has_new_loops_ && !solved_.valid()) {
     has_new_loops_ = false;
     keyframes_until_solved_ =
@@ -189,6 +208,20 @@ void Mapper::solve_graph(const WindowView& view) {
       const StageTimer timer(Stage::kPoseGraph);
       return solve_pose_graph(graph) ? std::optional(graph.map_from_keyframe) : std::nullopt;
     });
+  }
+}
+
+/// While nobody reads the graph.
+void Mapper::merge() {
+  if (solved_.valid() || looked_up_.valid()) {
+    return;
+  }
+  const std::vector<int> numbers = keeper_.merge();
+  if (!numbers.empty()) {
+    recognizer_.renumber(numbers);
+    if (located_.has_value()) {
+      located_->from = numbers[static_cast<std::size_t>(located_->from)];
+    }
   }
 }
 
@@ -203,26 +236,47 @@ void Mapper::close(const WindowView& view) {
   if (is_on_) {
     finish_lookup();
     keeper_.close(view);
-    if (const auto loop = std::exchange(found_, {})) {
-      (void)take_in(view, *loop);
+    if (const auto found = std::exchange(found_, {})) {
+      (void)take_in(view, *found);
     }
     newest_ = {};
   }
 }
 
-std::optional<Relocation> Mapper::locate(const Matches& matches,
+/// The window's newest keyframe is the likeliest to be seen again. Places come in their order.
+void Mapper::keep_last_view(const WindowView& view) {
+  const auto image = std::exchange(newest_.image, {});
+  if (image == nullptr || found_.has_value() || view.window.keyframes.empty()) {
+    return;
+  }
+  const Keyframe& last = view.window.keyframes.back();
+  keeper_.add_nodes(view);
+  const int node = keeper_.node_of(last.frame);
+  if (last.frame == newest_.frame && node >= 0) {
+    KeptKeyframe& kept = keeper_.keyframe(node);
+    kept.corners = corners_of(view, last);
+    const double roll = image_roll_rad(keeper_.map_from_keyframe(node).rotation);
+    add_place(node, describe(image->channel, kept.corners, roll));
+  }
+}
+
+std::optional<Relocation> Mapper::locate(const WindowView& view,
+                                         const Matches& matches,
                                          const ImagePyramid& image,
-                                         const Camera& camera,
                                          const Rigid3& predicted) {
   finish_lookup();
-  if (!is_on_ || keeper_.map().keyframes.empty()) {
+  if (!is_on_) {
+    return std::nullopt;
+  }
+  keep_last_view(view);
+  if (keeper_.map().keyframes.empty()) {
     return std::nullopt;
   }
   const StageTimer timer(Stage::kPlaces);
   const std::vector<KeptCorner> corners = corners_of(matches);
   const double roll = image_roll_rad(keeper_.map_from_world().rotation * predicted.rotation);
-  const auto found =
-      recognizer_.locate(keeper_.map(), camera, corners, describe(image.channel, corners, roll));
+  const auto found = recognizer_.locate(keeper_.map(), view.camera, corners,
+                                        describe(image.channel, corners, roll));
   if (!found.has_value()) {
     return std::nullopt;
   }
@@ -263,7 +317,8 @@ KeptMap Mapper::map(const WindowView& view) const {
     return {};
   }
   if (looked_up_.valid()) {
-    const auto loop = keep(looked_up_.get(), keeper);
+    const std::optional<Loop>& loop = looked_up_.get().loop;
+    keep(looked_up_.get(), keeper);
     if (loop.has_value() && is_within_drift(keeper.graph(view), *loop)) {
       (void)keeper.add_loop(*loop);
     }
@@ -273,7 +328,7 @@ KeptMap Mapper::map(const WindowView& view) const {
   if (!graph.loops.empty() && solve_pose_graph(graph)) {
     keeper.apply(graph.map_from_keyframe);
   }
-  return keeper.map();
+  return keeper.take_map();
 }
 
 }  // namespace stemvo

@@ -56,10 +56,12 @@ class Mapper {
   /// A frame without a pose, or in no map yet; nullopt: it shows no kept place. `predicted`,
   /// world_from_camera, is what it has where the map is all of another recording: that one comes
   /// to this world.
-  [[nodiscard]] std::optional<Relocation> locate(const Matches& matches,
+  [[nodiscard]] std::optional<Relocation> locate(const WindowView& view,
+                                                 const Matches& matches,
                                                  const ImagePyramid& image,
-                                                 const Camera& camera,
                                                  const Rigid3& predicted);
+  /// The next frame tells whether the one that locate() was asked for shows a place.
+  [[nodiscard]] bool may_be_locating() const { return recognizer_.may_be_locating(); }
   /// The next window begins with the frame that was located last.
   void begin_at_relocation();
 
@@ -72,8 +74,9 @@ class Mapper {
   /// A keyframe that was looked up.
   struct LookedUp {
     int node = 0;
-    KeptKeyframe keyframe;  ///< corners, and descriptors where it is a place now
+    KeptKeyframe keyframe;  ///< with descriptors
     std::optional<Loop> loop;
+    bool is_place = false;  ///< now
   };
   /// The last image of a keyframe.
   struct Seen {
@@ -86,17 +89,20 @@ class Mapper {
   void begin_lookup(const WindowView& view);
   /// Waits for the lookup that was begun.
   void finish_lookup();
-  [[nodiscard]] static std::optional<Loop> keep(const LookedUp& found, MapKeeper& keeper);
-  [[nodiscard]] Recognition take_in(const WindowView& view, const Loop& loop);
+  static void keep(const LookedUp& found, MapKeeper& keeper);
+  [[nodiscard]] Recognition take_in(const WindowView& view, const LookedUp& found);
+  void add_place(int node, std::vector<Descriptor> descriptors);
+  void keep_last_view(const WindowView& view);
   void solve_graph(const WindowView& view);
+  void merge();
 
   bool is_on_;
   bool may_begin_threads_;
   MapKeeper keeper_;
   PlaceRecognizer recognizer_;  ///< the lookup's while there is one
   Seen newest_;
-  std::optional<Loop> found_;    ///< by the last lookup
-  std::optional<Loop> located_;  ///< to the last frame that was, which is no node yet
+  std::optional<LookedUp> found_;  ///< a loop, by the last lookup
+  std::optional<Loop> located_;    ///< to the last frame that was, which is no node yet
   bool has_new_loops_ = false;
   int keyframes_until_solved_ = 0;
   std::shared_future<std::optional<std::vector<Similarity3>>> solved_;

@@ -54,6 +54,12 @@ void PlaceIndex::add(int keyframe, std::span<const Descriptor> descriptors) {
   }
 }
 
+void PlaceIndex::renumber(std::span<const int> numbers) {
+  for (int& keyframe : keyframes_) {
+    keyframe = numbers[static_cast<std::size_t>(keyframe)];
+  }
+}
+
 /// Each descriptor has one vote, which the places that have its like share.
 STEMVO_INLINE void PlaceIndex::vote_for(std::span<const Descriptor> descriptors,
                                         std::span<double> votes) const {

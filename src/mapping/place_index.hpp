@@ -24,6 +24,8 @@ class PlaceIndex {
 
   /// `keyframe`: its number in the map, higher than those before.
   void add(int keyframe, std::span<const Descriptor> descriptors);
+  /// Keyframes have new numbers: that of each old one.
+  void renumber(std::span<const int> numbers);
   /// The places of numbers below `before` with the most votes, at most so many, best first.
   [[nodiscard]] std::vector<PlaceCandidate> candidates(std::span<const Descriptor> descriptors,
                                                        int before,

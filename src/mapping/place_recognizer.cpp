@@ -14,17 +14,23 @@ namespace {
 /// A keyframe is looked up that shares less than this with the last one, so many frames later.
 constexpr double kMaxShared = 0.6;
 constexpr int kMinFrames = 5;
-/// It becomes a place where it shares less than this with the last place ..
-constexpr double kMaxSharedPlace = 0.4;
+/// It becomes a place where it shares less than this with the last view that is kept ..
+constexpr double kMaxSharedPlace = 0.5;
 /// .. and shows less than this of a kept place.
 constexpr double kSamePlace = 0.3;
-/// A place is looked for among keyframes this far before that share no tracks: the window
-/// remembers the others.
-constexpr int kMinApart = 20;
+/// A place is looked for among those so many lookups before that share no tracks: the window
+/// remembers the others. It forgets those from which the camera went away, and came back: from
+/// there to here is this much of its way.
+constexpr int kMinLookupsApart = 6;
 constexpr std::size_t kMaxTracks = 4;
+constexpr double kMaxNetWay = 0.4;
 constexpr int kMaxCandidates = 3;
 /// Checks of the last lookups may confirm each other.
 constexpr int kMaxLookupsApart = 3;
+/// What joins two maps has this share of the corners, and so many such sightings that say the same:
+/// streets that share a house look alike too, but not all of it.
+constexpr double kMinJoinShare = 0.25;
+constexpr std::ptrdiff_t kMinJoinSightings = 3;
 /// Two checks that say the same differ by less: log scale, rad, share of the depth and of the way
 /// between them.
 constexpr double kMaxLogScale = 0.1;
@@ -79,19 +85,26 @@ double turn_of(const Similarity3& motion) {
   return Eigen::Quaterniond::Identity().angularDistance(motion.rotation);
 }
 
+/// How much of the view a motion changes: rad, depths.
+double change_of_view(const Similarity3& motion, double depth) {
+  return turn_of(motion) + (depth > 0.0 ? motion.translation.norm() / depth : 0.0);
+}
+
 }  // namespace
 
 void PlaceRecognizer::load(const KeptMap& map) {
-  num_loaded_ = static_cast<int>(map.keyframes.size());
-  for (int i = 0; i < num_loaded_; ++i) {
+  for (int i = 0; i < static_cast<int>(map.keyframes.size()); ++i) {
     if (!keyframe_of(map, i).descriptors.empty()) {
       add(i, keyframe_of(map, i));
+      places_.back().lookup = -kMinLookupsApart;
     }
   }
 }
 
-int PlaceRecognizer::end_of_far(int number) const {
-  return std::max(number - kMinApart, num_loaded_);
+int PlaceRecognizer::end_of_far() const {
+  const auto end =
+      std::ranges::upper_bound(places_, num_lookups_ - kMinLookupsApart, {}, &Place::lookup);
+  return end == places_.begin() ? 0 : std::prev(end)->keyframe + 1;
 }
 
 bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
@@ -101,22 +114,39 @@ bool PlaceRecognizer::asks(const KeptKeyframe& keyframe) const {
                          last_tracks_.size()));
 }
 
-std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
-                                               int number,
-                                               const KeptKeyframe& keyframe) {
+/// The keyframe is the one that is looked up now.
+void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
+  const double depth = median_depth(keyframe.corners);
+  depth_ = depth > 0.0 ? depth : depth_;
+  path_ +=
+      num_lookups_ == 0
+          ? 0.0
+          : change_of_view(Similarity3(last_pose_.inverse() * keyframe.world_from_camera), depth_);
   ++num_lookups_;
+  last_pose_ = keyframe.world_from_camera;
   last_frame_ = keyframe.frame;
   last_tracks_ = track_ids_of(keyframe);
-  shows_kept_place_ = !place_tracks_.empty() &&
-                      !is_share_below(kMaxSharedPlace, num_shared(place_tracks_, last_tracks_),
-                                      place_tracks_.size());
+  shows_kept_place_ =
+      !kept_tracks_.empty() &&
+      !is_share_below(kMaxSharedPlace, num_shared(kept_tracks_, last_tracks_), kept_tracks_.size());
   std::erase_if(sightings_, [&](const Sighting& sighting) {
     return sighting.lookup + kMaxLookupsApart < num_lookups_;
   });
-  const double depth = median_depth(keyframe.corners);
+}
+
+std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
+                                               std::span<const int> components,
+                                               int number,
+                                               const KeptKeyframe& keyframe) {
+  begin_lookup(keyframe);
+  const auto joins = [&](int place) {
+    return components[static_cast<std::size_t>(place)] !=
+               components[static_cast<std::size_t>(number)] &&
+           keyframe_of(map, place).frame >= 0;
+  };
   std::vector<int> to_check;
   for (const PlaceCandidate& candidate :
-       index_.candidates(keyframe.descriptors, end_of_far(number), kMaxCandidates)) {
+       index_.candidates(keyframe.descriptors, end_of_far(), kMaxCandidates)) {
     to_check.push_back(candidate.keyframe);
   }
   const std::size_t num_candidates = to_check.size();
@@ -131,11 +161,12 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
     if (!sighting.has_value()) {
       continue;
     }
-    if (is_confirmed(map, *sighting, depth)) {
+    if (is_confirmed(map, *sighting, joins(place))) {
       sightings_.push_back(*sighting);
-      shows_kept_place_ =
-          shows_kept_place_ ||
-          !is_share_below(kSamePlace, sighting->loop.corners.size(), keyframe.corners.size());
+      if (sighting->share >= kSamePlace) {
+        shows_kept_place_ = true;
+        kept_tracks_ = last_tracks_;
+      }
       return sighting->loop;
     }
     sightings_.push_back(*sighting);
@@ -149,7 +180,8 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
 std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
     const KeptMap& map, int place, int number, const KeptKeyframe& keyframe) const {
   const KeptKeyframe& old = keyframe_of(map, place);
-  if (place >= end_of_far(number) || num_shared(track_ids_of(old), last_tracks_) > kMaxTracks) {
+  if (place >= end_of_far() || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
+                                !has_come_back(map, place_of(place), number))) {
     return std::nullopt;
   }
   std::optional<Loop> loop = check_place(view_of(old), view_of(keyframe));
@@ -158,17 +190,28 @@ std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
   }
   loop->from = place;
   loop->to = number;
-  return Sighting{num_lookups_, std::move(*loop)};
+  const double share =
+      static_cast<double>(loop->corners.size()) / static_cast<double>(keyframe.corners.size());
+  return Sighting{num_lookups_, share, std::move(*loop)};
 }
 
-/// By another sighting, of another place.
-bool PlaceRecognizer::is_confirmed(const KeptMap& map,
-                                   const Sighting& sighting,
-                                   double depth) const {
+bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {
+  const Similarity3 net = pose_of(map, place.keyframe).inverse() * pose_of(map, number);
+  const double depth = median_depth(keyframe_of(map, place.keyframe).corners);
+  return depth > 0.0 && change_of_view(net, depth) < kMaxNetWay * (path_ - place.path);
+}
+
+/// By another sighting, of another place; of keyframes that were looked up before, too, where two
+/// maps are to be joined.
+bool PlaceRecognizer::is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const {
   const Loop& loop = sighting.loop;
+  if (joins && sighting.share < kMinJoinShare) {
+    return false;
+  }
   const Similarity3 map_from_camera = pose_of(map, loop.from) * loop.from_to;
-  return std::ranges::any_of(sightings_, [&](const Sighting& other) {
-    if (other.loop.from == loop.from) {
+  const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
+    if (other.loop.from == loop.from ||
+        (joins && (other.lookup == sighting.lookup || other.share < kMinJoinShare))) {
       return false;
     }
     const Similarity3 other_from_camera =
@@ -179,26 +222,44 @@ bool PlaceRecognizer::is_confirmed(const KeptMap& map,
     return std::abs(std::log(difference.scale)) < kMaxLogScale &&
            turn_of(difference) < kMaxTurn_rad &&
            difference.translation.norm() <
-               kMaxShift * (depth + other_from_camera.translation.norm());
+               kMaxShift * (depth_ + other_from_camera.translation.norm());
   });
+  return num >= (joins ? kMinJoinSightings - 1 : 1);
+}
+
+const PlaceRecognizer::Place& PlaceRecognizer::place_of(int keyframe) const {
+  return *std::ranges::lower_bound(places_, keyframe, {}, &Place::keyframe);
 }
 
 std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
-  const auto at = std::ranges::lower_bound(places_, place);
+  const auto at = std::ranges::lower_bound(places_, place, {}, &Place::keyframe);
   std::vector<int> neighbours;
   if (at != places_.begin()) {
-    neighbours.push_back(*std::prev(at));
+    neighbours.push_back(std::prev(at)->keyframe);
   }
   if (at != places_.end() && std::next(at) != places_.end()) {
-    neighbours.push_back(*std::next(at));
+    neighbours.push_back(std::next(at)->keyframe);
   }
   return neighbours;
 }
 
 void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
   index_.add(number, keyframe.descriptors);
-  places_.push_back(number);
-  place_tracks_ = track_ids_of(keyframe);
+  places_.push_back({number, num_lookups_, path_});
+  kept_tracks_ = track_ids_of(keyframe);
+}
+
+void PlaceRecognizer::renumber(std::span<const int> numbers) {
+  const auto number_of = [&](int keyframe) { return numbers[static_cast<std::size_t>(keyframe)]; };
+  index_.renumber(numbers);
+  for (Place& place : places_) {
+    place.keyframe = number_of(place.keyframe);
+  }
+  for (Sighting& sighting : sightings_) {
+    sighting.loop.from = number_of(sighting.loop.from);
+    sighting.loop.to = number_of(sighting.loop.to);
+  }
+  std::erase_if(sightings_, [](const Sighting& sighting) { return sighting.loop.to < 0; });
 }
 
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
@@ -206,6 +267,7 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                                                     const std::vector<KeptCorner>& corners,
                                                     const std::vector<Descriptor>& descriptors) {
   const std::vector<Similarity3> before = std::exchange(located_, {});
+  may_be_locating_ = false;
   std::vector<int> to_check;
   for (const PlaceCandidate& candidate :
        index_.candidates(descriptors, static_cast<int>(map.keyframes.size()), kMaxCandidates)) {
@@ -249,6 +311,7 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
       std::ranges::copy(neighbours_of(place), std::back_inserter(to_check));
     }
   }
+  may_be_locating_ = before.empty() && !located_.empty();
   return std::nullopt;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -39,7 +40,10 @@ class PlaceRecognizer {
   /// The keyframe, which has landmarks as they are now and a descriptor per corner, is to be the
   /// map's keyframe `number`. Reads of the map places far before it, and where keyframes are.
   /// The loop's corners are those of both keyframes as they are given here.
+  /// `components`: of each keyframe of the map the one it belongs to. Where a loop is to join two
+  /// of this recording, more sightings must agree: no motion says where they lie.
   [[nodiscard]] std::optional<Loop> recognize(const KeptMap& map,
+                                              std::span<const int> components,
                                               int number,
                                               const KeptKeyframe& keyframe);
   /// The last one that was looked up shows a place that is kept: it needs not become one.
@@ -47,6 +51,12 @@ class PlaceRecognizer {
   /// It becomes a place: its descriptors and corners must stay in the map.
   void add(int number, const KeptKeyframe& keyframe);
 
+  /// Keyframes have new numbers: that of each old one, -1 where it is none any more.
+  void renumber(std::span<const int> numbers);
+
+  /// The last frame that locate() was asked for is the first that may show a place: the next one
+  /// tells.
+  [[nodiscard]] bool may_be_locating() const { return may_be_locating_; }
   /// Looks a frame without a pose up; its corners need no landmarks. Frames come in their order.
   [[nodiscard]] std::optional<LocatedFrame> locate(const KeptMap& map,
                                                    const Camera& camera,
@@ -54,30 +64,42 @@ class PlaceRecognizer {
                                                    const std::vector<Descriptor>& descriptors);
 
  private:
+  struct Place {
+    int keyframe = 0;  ///< its number
+    int lookup = 0;
+    double path = 0.0;  ///< path_ then
+  };
   /// A check that went well.
   struct Sighting {
-    int lookup = 0;  ///< its number
+    int lookup = 0;      ///< its number
+    double share = 0.0;  ///< of the keyframe's corners that agree
     Loop loop;
   };
+  void begin_lookup(const KeptKeyframe& keyframe);
+  [[nodiscard]] const Place& place_of(int keyframe) const;
   [[nodiscard]] std::optional<Sighting> look_at(const KeptMap& map,
                                                 int place,
                                                 int number,
                                                 const KeptKeyframe& keyframe) const;
-  [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, double depth) const;
-  /// Keyframes below this number are far enough before that one.
-  [[nodiscard]] int end_of_far(int number) const;
+  [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const;
+  [[nodiscard]] bool has_come_back(const KeptMap& map, const Place& place, int number) const;
+  /// Keyframes below this number are far enough before the present one.
+  [[nodiscard]] int end_of_far() const;
   /// Places just before and behind a place.
   [[nodiscard]] std::vector<int> neighbours_of(int place) const;
 
   PlaceIndex index_;
-  std::vector<int> places_;          ///< numbers of keyframes
+  std::vector<Place> places_;
   std::vector<int> last_tracks_;     ///< of the keyframe looked up last
-  std::vector<int> place_tracks_;    ///< of the last one that became a place
+  std::vector<int> kept_tracks_;     ///< of the last one that became a place, or showed one
   int last_frame_ = 0;               ///< looked up
+  Rigid3 last_pose_;                 ///< world_from_camera
+  double depth_ = 0.0;               ///< median, where it is known
+  double path_ = 0.0;                ///< how far the view has moved: rad, depths
   std::vector<Sighting> sightings_;  ///< of the last lookups
   int num_lookups_ = 0;
-  int num_loaded_ = 0;  ///< the first keyframes of the map are another recording's
   bool shows_kept_place_ = false;
+  bool may_be_locating_ = false;
   /// Where frames were located last, unconfirmed: map_from_camera.
   std::vector<Similarity3> located_;
 };

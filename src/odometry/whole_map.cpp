@@ -126,9 +126,8 @@ AdjustedMap WholeMap::answer() const {
         {landmark.id, map_from_frame[index(landmark.frame)] * landmark.in_camera.cast<double>(),
          landmark.rgb});
   }
-  for (const Loop& loop : kept.loops) {
-    map.loops.push_back(
-        {kept.keyframes[index(loop.from)].frame, kept.keyframes[index(loop.to)].frame});
+  for (const auto& [from, to] : frames_of_loops(kept)) {
+    map.loops.push_back({from, to});
   }
   return map;
 }

@@ -201,7 +201,7 @@ FrameState WindowEstimator::accept_motion(const Frame& frame,
   const Rigid3 guess =
       reference.world_from_camera * Rigid3(direction.rotation, length * direction.translation);
   const bool is_tracking = motion.state == FrameState::kTracking;
-  if (is_tracking && motion.is_decisive &&
+  if (is_tracking && motion.is_decisive && !mapper_.may_be_locating() &&
       open_window({frame.number, guess, current_points(frame.matches, motion.inlier_mask),
                    frame.time_s, frame.road})) {
     moving_.begin(frame.matches, motion.moving_mask);

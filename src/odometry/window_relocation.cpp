@@ -23,7 +23,7 @@ bool WindowEstimator::relocate(const Frame& frame,
     return false;
   }
   const std::optional<Relocation> found =
-      mapper_.locate(frame.matches, *frame.pyramid, camera(), predicted);
+      mapper_.locate(window_view(), frame.matches, *frame.pyramid, predicted);
   if (!found.has_value()) {
     return false;
   }
@@ -45,7 +45,7 @@ bool WindowEstimator::relocate(const Frame& frame,
 }
 
 void WindowEstimator::take_in(const Recognition& recognition) {
-  if (recognition.frame < 0) {
+  if (recognition.frame == -1) {
     return;
   }
   recognized_frame_ = recognition.frame;

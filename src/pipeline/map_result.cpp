@@ -55,10 +55,9 @@ MapResult finish_map(const Run& run) {
 
 std::vector<std::pair<std::size_t, std::size_t>> loops_of(const KeptMap& map) {
   std::vector<std::pair<std::size_t, std::size_t>> frames;
-  const auto frame_of = [&](int k) { return map.keyframes[static_cast<std::size_t>(k)].frame; };
-  for (const Loop& loop : map.loops) {
-    if (frame_of(loop.from) >= 0) {
-      frames.emplace_back(frame_of(loop.from), frame_of(loop.to));
+  for (const auto& [from, to] : frames_of_loops(map)) {
+    if (from >= 0) {
+      frames.emplace_back(from, to);
     }
   }
   return frames;

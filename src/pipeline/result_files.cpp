@@ -173,7 +173,7 @@ class ResultWriter {
       keep_first(written, run_.odometry.save_map(*request_.saved_map, map_->whole));
     }
     report.map = {.num_keyframes = map_->whole.kept.keyframes.size(),
-                  .num_loops = map_->whole.kept.loops.size(),
+                  .num_loops = frames_of_loops(map_->whole.kept).size(),
                   .num_relocalizations = count_relocalizations(drive_.frames),
                   .adjustment_s = map_->adjustment_s,
                   .metrics = std::nullopt};

@@ -106,5 +106,17 @@ TEST_F(MapKeeperWindows, ThatBeginBehindAreMapsOfTheirOwn) {
   EXPECT_TRUE(are_two_maps());
 }
 
+TEST(MapKeeper, PiecesOfAMapThatNothingConnectsStayPieces) {
+  KeptMap map = testing::small_map().map;
+  map.loops.clear();
+  MapKeeper whole;
+  whole.load(map);
+  EXPECT_EQ(whole.component_of(0), whole.component_of(1));
+  map.motions[0].sigma_rad = 1.0;  // a guess
+  MapKeeper pieces;
+  pieces.load(map);
+  EXPECT_NE(pieces.component_of(0), pieces.component_of(1));
+}
+
 }  // namespace
 }  // namespace stemvo

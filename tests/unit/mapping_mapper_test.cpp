@@ -156,7 +156,8 @@ TEST(Mapper, ARoomIsRecognizedOnTheSecondTurn) {
   EXPECT_EQ(one.run.count(FrameState::kLost), 0);
   EXPECT_GE(one.num_recognized(), 2);
   // One may be begun and not taken in yet.
-  EXPECT_GE(static_cast<int>(one.estimator.kept_map().loops.size()), one.num_recognized());
+  EXPECT_GE(static_cast<int>(frames_of_loops(one.estimator.kept_map()).size()),
+            one.num_recognized());
   bool is_corrected = false;
   for (int i = 0; i < drive.num_frames(); ++i) {
     const FrameResult& frame = one.result(i);

@@ -34,7 +34,8 @@ struct TwoRounds {
       return std::nullopt;
     }
     ++num_lookups;
-    const auto loop = recognizer.recognize(map, number, keyframe);
+    const std::vector<int> components(map.keyframes.size());
+    const auto loop = recognizer.recognize(map, components, number, keyframe);
     if (!recognizer.shows_kept_place()) {
       recognizer.add(number, keyframe);
       ++num_places;
