@@ -142,6 +142,7 @@ MeasuredMotion Initializer::measure_world(const PixelPairs& pairs, const Camera&
   const auto cur = select(pairs.cur_uv, rivals->world_party);
   if (world.state == FrameState::kTracking) {
     choose_motion({prev, cur}, camera, world);
+    world.is_decisive = world.is_decisive && !rivals->is_contested;
   }
   world.inlier_mask = scatter(world.inlier_mask, rivals->world_party);
   world.moving_mask = std::move(rivals->moving_mask);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "geometry/two_view_scores.hpp"
-#include "odometry/moving_tracks.hpp"
+#include "odometry/cell_votes.hpp"
 #include "odometry/tracks.hpp"
 
 namespace stemvo {
@@ -16,7 +16,7 @@ namespace {
 /// A party of fewer of the image's cells is noise, or too small to mislead.
 constexpr double kMinParty = 0.15;
 /// A motion explains matches where so many of their votes agree.
-constexpr double kExplains = 0.5;
+constexpr double kExplains = 0.75;
 /// Depth counts so many times.
 constexpr double kDepthWeight = 2.0;
 
@@ -73,7 +73,7 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
       score_homography(*all.homography, pairs, options.sigma_px).inlier_mask;
   const std::vector<char> rest = inverted(plane);
   const auto votes = [&](const std::vector<char>& agrees) {
-    return cell_votes(pairs.cur_uv, agrees, camera);
+    return cell_votes(pairs.cur_uv, agrees);
   };
   const double plane_votes = votes(plane);
   const double rest_votes = votes(rest);
@@ -94,13 +94,15 @@ std::optional<MotionRivals> find_rivals(const MeasuredMotion& all,
   }
   const bool has_depth = other.homography_ratio <= options.homography_ratio;
   if ((has_depth ? kDepthWeight : 1.0) * other_votes > plane_votes) {
-    return MotionRivals{std::move(other), rest, plane};
+    return MotionRivals{std::move(other), rest, plane, false};
   }
   MeasuredMotion world = measure_party(plane, pairs, camera, estimator);
   if (world.state == FrameState::kLost) {
     return std::nullopt;
   }
-  return MotionRivals{std::move(world), plane, std::move(other_mask)};
+  // The other one's depth may yet show.
+  const bool is_contested = kDepthWeight * other_votes > plane_votes;
+  return MotionRivals{std::move(world), plane, std::move(other_mask), is_contested};
 }
 
 }  // namespace stemvo

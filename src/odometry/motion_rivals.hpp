@@ -16,6 +16,7 @@ struct MotionRivals {
   MeasuredMotion world;           ///< its mask is one per match of `world_party`
   std::vector<char> world_party;  ///< one per match: the world's motion was measured on it
   std::vector<char> moving_mask;  ///< one per match: it moves as the thing does
+  bool is_contested = false;      ///< later frames may tell that the thing is the world
 };
 
 /// One flag per member of a party as one per match of all; others have 0.

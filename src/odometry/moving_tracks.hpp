@@ -6,22 +6,9 @@
 #include <vector>
 
 #include "features/front_end.hpp"
-#include "geometry/pixel_pairs.hpp"
-#include "stemvo/camera.hpp"
 #include "stemvo/options.hpp"
 
 namespace stemvo {
-
-/// How much of an image agrees: each cell that shows points has one vote, shared by its points, so
-/// that a textured thing has no more of them than its size. One flag per point.
-[[nodiscard]] double cell_votes(PixelPairs::Points uv,
-                                const std::vector<char>& agrees,
-                                const Camera& camera);
-
-/// The same, of each point's cell: the share of its points that agree.
-[[nodiscard]] std::vector<double> cell_shares(PixelPairs::Points uv,
-                                              const std::vector<char>& agrees,
-                                              const Camera& camera);
 
 /// Tracks of things that move on their own: neither landmarks nor voters. They are followed, so
 /// that no new corner of the same thing takes their place each frame.
@@ -34,7 +21,7 @@ class MovingTracks {
   void begin(const Matches& matches, const std::vector<char>& moving_mask);
   /// A localized frame: tracks join that move as the things do, those leave that move as the world
   /// does. `fits_world`: one per match.
-  void observe(const Matches& matches, const std::vector<char>& fits_world, const Camera& camera);
+  void observe(const Matches& matches, const std::vector<char>& fits_world);
 
   [[nodiscard]] bool empty() const { return evidence_.empty(); }
   /// One per match.

@@ -8,6 +8,7 @@
 #include "geometry/decomposition.hpp"
 #include "geometry/median.hpp"
 #include "geometry/two_view_scores.hpp"
+#include "odometry/cell_votes.hpp"
 
 namespace stemvo {
 namespace {
@@ -111,7 +112,13 @@ bool is_stationary(const Observations& before,
                    double min_flow_px,
                    int min_tracks) {
   const PointPairs pairs = common_points(before, now);
-  return pairs.size() >= min_tracks && median_flow_px({pairs.prev_uv, pairs.cur_uv}) < min_flow_px;
+  std::vector<char> stays(pairs.prev_uv.size());
+  for (std::size_t i = 0; i < stays.size(); ++i) {
+    stays[i] = (pairs.cur_uv[i] - pairs.prev_uv[i]).norm() < min_flow_px ? 1 : 0;
+  }
+  const std::vector<char> all(stays.size(), 1);
+  return pairs.size() >= min_tracks &&
+         2.0 * cell_votes(pairs.prev_uv, stays) > cell_votes(pairs.prev_uv, all);
 }
 
 double median_parallax_px(const Eigen::Quaterniond& rotation,

@@ -57,7 +57,8 @@ template <typename T>
 /// Length of the flow.
 [[nodiscard]] double median_flow_px(const PixelPairs& pairs);
 
-/// The tracks stay where they were: their median flow is less than `min_flow_px`. False where the
+/// The tracks stay where they were, with less flow than `min_flow_px`, in more than half of the
+/// image: by its cells, so that who stands still does not follow those who pass by. False where the
 /// two share fewer than `min_tracks`.
 [[nodiscard]] bool is_stationary(const Observations& before,
                                  const Observations& now,

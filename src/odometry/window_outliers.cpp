@@ -35,7 +35,7 @@ void WindowEstimator::follow_things(const Matches& matches, LocalizedFrame& loca
   }
   std::vector<char> fits_world(matches.cur_uv.size(), 1);
   mark_outliers(matches, kAgrees_px, fits_world);
-  moving_.observe(matches, fits_world, camera());
+  moving_.observe(matches, fits_world);
   localized.moving_mask = moving_.flags(matches);
   moving_.leave_out(matches, localized.inlier_mask);
 }
