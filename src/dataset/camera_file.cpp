@@ -384,7 +384,7 @@ class Reader {
 }  // namespace
 
 Expected<CameraFile> read_camera_file(const std::filesystem::path& file) {
-  return file.extension() == ".txt" ? read_colmap_camera(file) : Reader(file).read();
+  return file.filename() == "cameras.txt" ? read_colmap_camera(file) : Reader(file).read();
 }
 
 }  // namespace stemvo::dataset

@@ -32,8 +32,8 @@ struct CameraFile {
 /// with T_BS (sensor_type and comment are not read). Others, whose further keys are not read:
 /// Kalibr's camchain.yaml (cam0), OpenCV's FileStorage (camera_matrix, distortion_coefficients,
 /// fisheye_model), ROS' camera_info (the same and distortion_model; or its message as `topic echo`
-/// prints it: width, height, distortion_model, k and d, in ROS 1 K and D). A .txt is COLMAP's
-/// cameras.txt. Errors, naming file and line: unreadable, not YAML, a key missing, unknown or
+/// prints it: width, height, distortion_model, k and d, in ROS 1 K and D). cameras.txt is COLMAP's
+/// Errors, naming file and line: unreadable, not YAML, a key missing, unknown or
 /// twice, a value that cannot be, ROS' roi or binning, skew, a camera that check_camera refuses.
 [[nodiscard]] Expected<CameraFile> read_camera_file(const std::filesystem::path& file);
 /// COLMAP's cameras.txt of one camera.

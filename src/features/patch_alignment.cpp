@@ -52,19 +52,20 @@ void cut_coarse(const BorderedImage& image, float x, float y, Patch::Coarse& coa
   CoarseValues before;
   kernels.sample_coarse(image, left - 1.0F, top, before);
   kernels.sample_coarse(image, left + 1.0F, top, coarse.gx);
-  using Values = Eigen::Map<Eigen::Array<float, kCoarseSide * kCoarseSide, 1>>;
-  Values gx(coarse.gx.data());
-  Values gy(coarse.gy.data());
-  gx = 0.5F * (gx - Values(before.data()));
+  float xx = 0.0F;
+  float xy = 0.0F;
+  float yy = 0.0F;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    coarse.gx[i] = 0.5F * (coarse.gx[i] - before[i]);
+  }
   kernels.sample_coarse(image, left, top - 1.0F, before);
   kernels.sample_coarse(image, left, top + 1.0F, coarse.gy);
-  gy = 0.5F * (gy - Values(before.data()));
-  // A bias of the image drops out.
-  gx -= gx.mean();
-  gy -= gy.mean();
-  const float xx = gx.square().sum();
-  const float xy = (gx * gy).sum();
-  const float yy = gy.square().sum();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    coarse.gy[i] = 0.5F * (coarse.gy[i] - before[i]);
+    xx += coarse.gx[i] * coarse.gx[i];
+    xy += coarse.gx[i] * coarse.gy[i];
+    yy += coarse.gy[i] * coarse.gy[i];
+  }
   const float determinant = xx * yy - xy * xy;
   const float inverse =
       determinant > kMinDeterminant * xx * yy && determinant > 0.0F ? 1.0F / determinant : 0.0F;

@@ -12,8 +12,7 @@ namespace stemvo {
 /// (Baker and Matthews, Lucas-Kanade 20 years on, 2004).
 struct Patch {
   static constexpr int kNumCoarse = 4;
-  /// 8x8, moved by a translation; its gradient has mean 0: a bias drops out.
-  struct Coarse : CoarsePatch {
+  struct Coarse : CoarsePatch {            ///< 8x8, moved by a translation
     std::array<float, 3> inverse_hessian;  ///< xx, xy, yy; all 0 where it has no inverse
   };
   std::array<Coarse, kNumCoarse> coarse;  ///< of levels 1, 2, ..

@@ -78,8 +78,7 @@ inline Complex align_coarse(const BorderedImage& before,
                             const BorderedImage& after,
                             Complex at) {
   const Eigen::VectorXd value = samples(before, from, 1.0, linear_weight);
-  const Eigen::MatrixXd gradients = gradient(before, from, linear_weight);
-  const Eigen::MatrixXd columns = gradients.rowwise() - gradients.colwise().mean();  // no bias
+  const Eigen::MatrixXd columns = gradient(before, from, linear_weight);
   for (int i = 0; i < 12; ++i) {
     const Eigen::VectorXd step = solve(columns, samples(after, at, 1.0, linear_weight) - value);
     at -= Complex(step[0], step[1]);

@@ -178,7 +178,6 @@ TEST(PatchAlignment, ErrorsOverNoiseBlurAndScale) {
            {"scale 1.2", {{kX, kY, 1.2F, 0.0F}}, 0.02, 0.025, 0.93},
            {"turn 0.1", {{kX, kY, 1.0F, 0.1F}}, 0.02, 0.025, 0.99},
            {"gain 0.7, bias 20", {shifted, 0.7, 20.0}, 0.02, 0.03, 0.95},
-           {"bias 40", {shifted, 0.9, 40.0}, 0.02, 0.03, 0.99},
            {"noise 2, blur 1 px, scale 1.1",
             {{kX, kY, 1.1F, 0.0F}, 1.0, 0.0, 2.0, 1.0},
             0.2,

@@ -158,6 +158,8 @@ TEST(OdometryCreate, AFrameSmallerThanTheKernelIsAnError) {
   Camera camera = kCamera;
   camera.width_px = 1;
   camera.height_px = 1;
+  camera.cx_px = 0.5;
+  camera.cy_px = 0.5;
   Options options;
   options.stem.tracking_resolution = TrackingResolution::kHalf;
   EXPECT_THAT(error_of(options, camera), HasSubstr("found 1x1"));
