@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -71,9 +72,14 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
     const auto landmarks = scale_.asks_road()
                                ? road_landmarks(window_, world_from_camera_, view_.points, camera())
                                : std::vector<RoadLandmark>();
+    // A position that a motion model has a share in tells no length.
+    const bool is_shared = state == FrameState::kLowParallax || state == FrameState::kRotating ||
+                           state == FrameState::kStationary;
+    const double position_units =
+        is_shared ? std::numeric_limits<double>::infinity() : pixel_units();
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
-                       frame.time_s, pixel_units(), landmarks);
+                       frame.time_s, position_units, landmarks);
     if (factor != 1.0) {
       rescale(window_, factor, center);
       history_.rescale(factor);
