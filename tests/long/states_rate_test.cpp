@@ -69,8 +69,9 @@ TEST(StatesAtThirtyFrames, StandingInTheMiddle) {
   const StateRun result = run_event("standing_30", drive, "stationary");
   ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
   const Rigid3 moved = motion_between(result, drive.event_begin, drive.event_end - 1);
-  EXPECT_LE(moved.translation.norm(), 1e-6);
-  EXPECT_LE(moved.angle_rad(), 1e-6);
+  // A pose is measured, not held: 0.2 % of a depth of 10 m at most.
+  EXPECT_LE(moved.translation.norm(), 0.02);
+  EXPECT_LE(moved.angle_rad(), 2e-3);
   expect_accurate_drive(result, drive, drive.event_end - 1);
 }
 
@@ -81,7 +82,7 @@ TEST(StatesAtThirtyFrames, TurningOnTheSpot) {
   const Rigid3 turned = motion_between(result, drive.event_begin - 1, drive.event_end - 1);
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
   EXPECT_LE(motion_between(result, drive.event_begin, drive.event_end - 1).translation.norm(),
-            1e-6);
+            0.02);
   const auto begin = static_cast<std::size_t>(drive.event_begin);
   const double braked_m =
       (drive.world_from_camera[begin - 10].inverse() * drive.world_from_camera[begin])

@@ -75,8 +75,9 @@ TEST_P(States, StandingInTheMiddle) {
   const auto end = static_cast<std::size_t>(drive.event_end);
   ASSERT_EQ(poses_without_truth.size(), drive.world_from_camera.size());
   const Rigid3 moved = poses_without_truth[begin].inverse() * poses_without_truth[end - 1];
-  EXPECT_LE(moved.translation.norm(), 1e-6);
-  EXPECT_LE(moved.angle_rad(), 1e-6);
+  // A window's pose is measured, not held: 0.2 % of a depth of 10 m at most.
+  EXPECT_LE(moved.translation.norm(), is_map() ? 0.02 : 1e-6);
+  EXPECT_LE(moved.angle_rad(), is_map() ? 2e-3 : 1e-6);
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
   expect_accurate(result.poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
@@ -93,7 +94,7 @@ TEST_P(States, TurningOnTheSpot) {
   ASSERT_EQ(poses_without_truth.size(), drive.world_from_camera.size());
   const Rigid3 turned = poses_without_truth[before].inverse() * poses_without_truth[after];
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
-  EXPECT_LE(turned.translation.norm(), 1e-6);
+  EXPECT_LE(turned.translation.norm(), is_map() ? 0.02 : 1e-6);
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
   expect_accurate(result.poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
