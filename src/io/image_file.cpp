@@ -85,7 +85,7 @@ void measure_levels(const cv::Mat& image, ImageKind& kind) {
     }
   }
   const std::size_t few = image.total() * static_cast<std::size_t>(image.channels()) / 1000;
-  const auto from_end = [&](auto first, auto last) {
+  const auto from_end = [&](const auto& first, const auto& last) {
     std::size_t sum = 0;
     return std::find_if(first, last, [&](std::size_t count) { return (sum += count) > few; }) -
            first;
