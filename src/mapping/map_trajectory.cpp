@@ -21,7 +21,7 @@ Similarity3 between(const Similarity3& a, const Similarity3& b, double share) {
 /// For each keyframe whether the trajectory came to it from the one before as was measured: it did
 /// not where the world was moved, or where a lost camera was found.
 std::vector<char> find_connected(const KeptMap& map) {
-  constexpr double kMaxSigmas = 5.0;
+  constexpr double kMaxStepSigmas = 5.0;
   std::vector<char> connected(map.keyframes.size());
   for (const MapEdge& edge : map.motions) {
     const auto to = static_cast<std::size_t>(edge.to);
@@ -29,9 +29,9 @@ std::vector<char> find_connected(const KeptMap& map) {
       const Rigid3 came =
           map.keyframes[to - 1].world_from_camera.inverse() * map.keyframes[to].world_from_camera;
       connected[to] |= static_cast<char>(came.rotation.angularDistance(edge.from_to.rotation) <
-                                             kMaxSigmas * edge.sigma_rad &&
+                                             kMaxStepSigmas * edge.sigma_rad &&
                                          (came.translation - edge.from_to.translation).norm() <
-                                             kMaxSigmas * edge.sigma_translation);
+                                             kMaxStepSigmas * edge.sigma_translation);
     }
   }
   return connected;

@@ -94,7 +94,7 @@ TEST_P(States, TurningOnTheSpot) {
   ASSERT_EQ(poses_without_truth.size(), drive.world_from_camera.size());
   const Rigid3 turned = poses_without_truth[before].inverse() * poses_without_truth[after];
   EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
-  EXPECT_LE(turned.translation.norm(), is_map() ? 0.02 : 1e-6);
+  EXPECT_LE(turned.translation.norm(), is_map() ? 0.03 : 1e-6);  // 0.2 % of a depth of 15 m
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
   expect_accurate(result.poses, drive, drive.event_end - 1, num_frames, 0.05, 0.3 * kDeg);
