@@ -7,7 +7,8 @@
 
 namespace stemvo::python {
 
-/// Of Options, a dict of keys and values, or None: the defaults. TypeError, ValueError: of none.
+/// The configuration of Options, a dict of keys and values, or None: the defaults. TypeError,
+/// ValueError: of none.
 [[nodiscard]] Config config_of(const nanobind::object& options);
 
 }  // namespace stemvo::python

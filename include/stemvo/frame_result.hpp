@@ -76,8 +76,8 @@ struct FrameResult {
   int map_id = 0;
   bool is_scale_new = false;  ///< a map begins here: lengths before it had another unit
   int recognized_frame = -1;  ///< the frame whose place this one was recognized to show; -1: none
-  /// Of the motion between the poses of the last frame and this one, prev_from_cur: the true motion
-  /// is prev_from_cur * error. The error is x y z (the path's units, squared), then rotation about
+  /// The covariance of the motion from this frame to the last, prev_from_cur: the true motion is
+  /// prev_from_cur * error. The error is x y z (the path's units, squared), then rotation about
   /// x y z (rad^2), all in this frame's camera axes. Where the path is in metres the scale's sigma
   /// is in it.
   Eigen::Matrix<double, 6, 6> motion_covariance = Eigen::Matrix<double, 6, 6>::Zero();
@@ -104,7 +104,7 @@ struct MapLandmark {
   std::array<std::uint8_t, 3> rgb{};  ///< of the last view; gray where the camera is gray
 };
 
-/// What became of the map.
+/// Changes of the map.
 struct MapChanges {
   int version = 0;                     ///< to ask with the next time
   std::vector<MapLandmark> landmarks;  ///< added or moved

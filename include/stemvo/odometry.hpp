@@ -22,7 +22,7 @@ namespace stemvo {
 /// The order of a pixel's values. OpenCV's own imread and VideoCapture give kBgr.
 enum class PixelOrder { kGray, kRgb, kBgr };
 
-/// What else is known of a frame.
+/// Facts on a frame beside its image.
 struct FrameHints {
   /// CV_8UC1 of the camera's size, 0 where this frame shows what moves by itself: tracks end there
   /// and none begins. Empty: the mask of create() alone; else both count.
@@ -37,8 +37,8 @@ enum class LogLevel { kInfo, kWarning };
 /// One line, with the frame's time.
 using Log = std::function<void(LogLevel level, const std::string& line)>;
 
-/// What Odometry and AsyncOdometry share. Nothing throws for what a caller hands in. Of one that
-/// was moved from, what can fail is an Error and the rest is empty.
+/// The part that Odometry and AsyncOdometry share. Nothing throws for what a caller hands in. Of
+/// one that was moved from, what can fail is an Error and the rest is empty.
 class OdometryHandle {
  public:
   /// The camera's speed along its path, from wheels, GPS and the like, 1-sigma of m/s; its sign
@@ -61,7 +61,7 @@ class OdometryHandle {
   /// least 4 keyframes under at least 1.5 degrees of parallax, and move until they leave the
   /// window. Mode two_frame has none.
   [[nodiscard]] MapChanges landmarks_since(int version) const;
-  /// Those from id `first` on: they stay as they are.
+  /// The keyframes from id `first` on: they stay as they are.
   [[nodiscard]] std::vector<MapKeyframe> keyframes(int first = 0) const;
 
   /// The points tracked on the last image.

@@ -131,7 +131,7 @@ struct ScaleOptions {
 
 /// Everything that steers the odometry. Defaults stand here, once.
 struct Options {
-  /// Of a camera on a vehicle, `height_m` above its road: metres.
+  /// Options of a camera on a vehicle, `height_m` above its road: metres.
   [[nodiscard]] static Options driving(double height_m);
 
   StemOptions stem;

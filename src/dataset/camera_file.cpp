@@ -278,7 +278,7 @@ class Reader {
     }
   }
 
-  /// Of ROS: K is of the whole sensor, the images may be of a part of it.
+  /// ROS' K is of the whole sensor, the images may be of a part of it.
   void check_part(const Camera& camera) {
     for (const char* key : {"binning_x", "binning_y"}) {
       if (number(key, 0.0, 1e5).value_or(0.0) > 1.0) {
@@ -300,7 +300,7 @@ class Reader {
     }
   }
 
-  /// Of ROS: the camera of rectified images, which have no distortion.
+  /// ROS' P is the camera of rectified images, which have no distortion.
   void check_projection(CameraFile& result) {
     const std::string& key = format_.projection;
     const Camera& camera = result.camera;

@@ -28,7 +28,8 @@ std::string with_blanks(std::string_view line) {
 
 bool is_blank(std::string_view line) { return take_word(line).empty(); }
 
-/// Of a first row whose numbers stand between commas. Nullopt: both of two formats' rows look so.
+/// The format of a first row whose numbers stand between commas. Nullopt: two formats' rows look
+/// so.
 std::optional<Format> format_of_commas(std::string_view row, bool says_nanoseconds) {
   constexpr double kNanoseconds = 1e12;  // as seconds, 30,000 years
   const std::vector<std::string_view> words = split_words(row);

@@ -28,8 +28,8 @@ struct ImageKind {
   int peak = 0;                ///< 16 bits: the largest value
 };
 
-/// What these images of 16 bits use: as many bits as the largest value has; less where they use
-/// less than a quarter of these, and half of that more to both sides.
+/// The levels that these images of 16 bits use: as many bits as the largest value has; less where
+/// they use less than a quarter of these, and half of that more to both sides.
 [[nodiscard]] Levels used_levels(const std::vector<ImageKind>& kinds);
 
 /// A PNG or a JPEG, told by its first bytes and decoded whole, as 8-bit image: gray (CV_8UC1), or

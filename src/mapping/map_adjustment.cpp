@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <map>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
@@ -93,7 +93,6 @@ class Adjustment {
 
   void measure_errors(double sigma_factor);
   bool minimize(double tolerance, int max_iterations);
-  void keep_length();
   void read_landmarks(MapAdjustment& result) const;
   void read_poses(MapAdjustment& result) const;
   void read_covariances(MapAdjustment& result);
@@ -218,23 +217,19 @@ void Adjustment::add_edges() {
 }
 
 void Adjustment::add_lengths() {
-  std::map<int, const MapEdge*> motion_from;
+  std::vector<const MapEdge*> motion_from(map_.keyframes.size());
   for (const MapEdge& edge : map_.motions) {
-    motion_from[edge.from] = &edge;
+    motion_from[index(edge.from)] = &edge;
   }
   const auto add_distance = [&](int from, int to, double log_distance, double sigma) {
     add<1>(DistanceError{poses_[index(from)], poses_[index(to)], log_distance, sigma}, from, to);
   };
   for (std::size_t i = 0; i < map_.lengths.size(); ++i) {
     const MapLength& length = map_.lengths[i];
-    const auto found = motion_from.find(length.keyframe);
-    if (found == motion_from.end()) {
-      continue;
-    }
-    const MapEdge& edge = *found->second;
-    const double distance = edge.from_to.translation.norm();
-    if (distance > 3.0 * edge.sigma_translation) {
-      add_distance(edge.from, edge.to, std::log(distance) + length.log_metres_per_unit,
+    const MapEdge* edge = motion_from[index(length.keyframe)];
+    const double distance = edge == nullptr ? 0.0 : edge->from_to.translation.norm();
+    if (edge != nullptr && distance > 3.0 * edge->sigma_translation) {
+      add_distance(edge->from, edge->to, std::log(distance) + length.log_metres_per_unit,
                    independent_sigma(map_, i));
     }
   }

@@ -27,7 +27,7 @@ constexpr double kMaxNetWay = 0.4;
 constexpr int kMaxCandidates = 3;
 /// Checks of the last lookups may confirm each other.
 constexpr int kMaxLookupsApart = 3;
-/// What joins two maps has this share of the corners, and so many such sightings that say the same:
+/// A join of two maps takes this share of the corners, and so many sightings that say the same:
 /// streets that share a house look alike too, but not all of it.
 constexpr double kMinJoinShare = 0.25;
 constexpr std::ptrdiff_t kMinJoinSightings = 3;

@@ -25,7 +25,7 @@ namespace stemvo {
 /// The pixels as the odometry takes them; the same ones where they are already.
 [[nodiscard]] cv::Mat rgb_of(const cv::Mat& image, PixelOrder order);
 
-/// What a caller may hand in as the next frame.
+/// The rules for a caller's next frame.
 class FrameCheck {
  public:
   explicit FrameCheck(const Camera& camera) : camera_(camera) {}

@@ -10,7 +10,7 @@ namespace stemvo {
 /// FrameResult::map_id.
 class MapIds {
  public:
-  /// Of the frame in work.
+  /// The map of the frame in work.
   [[nodiscard]] int now() const { return now_; }
   void begin() { now_ = num_maps_++; }
   /// The camera is in the map of an earlier frame; one below 0 is another recording's.

@@ -34,7 +34,7 @@ namespace stemvo {
 /// - The camera's principal point; the scale.
 class MotionCovariance {
  public:
-  /// What the estimator knows of a frame's motion.
+  /// A frame's motion as the estimator knows it.
   struct Motion {
     FrameState state = FrameState::kFirst;
     bool is_localized = false;  ///< the pose was measured where later ones are

@@ -119,7 +119,7 @@ void MotionModel::advance(double interval_s) {
   covariance_ = step * covariance_ * step.transpose();
 }
 
-/// What is left of a prediction's error when its own and the measurement's are taken out.
+/// The push is the rest of a prediction's error after its own and the measurement's.
 void MotionModel::learn(const Vector6d& off, const Matrix6d& noise, double interval_s) {
   const Vector6d expected = (covariance_.topLeftCorner<6, 6>() + noise).diagonal();
   const double to_push = 3.0 / (interval_s * interval_s * interval_s);

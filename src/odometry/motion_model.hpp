@@ -32,7 +32,7 @@ class Persistence {
   double square_ = 0.0;        ///< .. their squares
 };
 
-/// What a camera's motion is expected to be: it goes on evenly, pushed by accelerations that are
+/// The expected motion of a camera: it goes on evenly, pushed by accelerations that are
 /// white noise. Motions are prev_from_cur; six numbers are x y z, then the rotation, about the
 /// camera's axes.
 class MotionModel {
@@ -61,7 +61,7 @@ class MotionModel {
   void measured(const Rigid3& prev_from_cur, double interval_s, bool is_fused);
   /// No motion was measured: the prediction was taken.
   void lost(double interval_s);
-  /// What comes next is not the motion since the frame before.
+  /// The next motion is not the one since the frame before.
   void restart();
   /// Lengths were multiplied.
   void rescale(double factor);

@@ -46,7 +46,7 @@ class OdometryLoops {
   /// Waits for all frames pushed, then PhasedOdometry::reset(). False: the run has ended before.
   [[nodiscard]] bool reset();
 
-  /// What `ask` finds out of the odometry as it was left by some frame: in `deliver` by the one
+  /// The answer of `ask` about the odometry as it was left by some frame: in `deliver` by the one
   /// delivered.
   template <typename Ask>
   [[nodiscard]] auto ask(const Ask& ask) const {

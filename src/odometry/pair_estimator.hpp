@@ -37,7 +37,8 @@ class MotionChain {
     image_time_s_ = image_time_s;
   }
   [[nodiscard]] double since_image_s() const { return time_s_ - image_time_s_; }
-  /// Of a motion that nothing measures, units or metres per second; 0 before the second frame.
+  /// The speed of a motion that nothing measures, units or metres per second; 0 before the second
+  /// frame.
   [[nodiscard]] double assumed_speed() const { return assumed_speed_; }
 
   [[nodiscard]] const Rigid3& world_from_camera() const { return world_from_camera_; }

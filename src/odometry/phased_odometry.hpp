@@ -54,7 +54,7 @@ class PhasedOdometry {
   [[nodiscard]] int num_threads() const { return options_.threads; }
   /// It holds the frames optimized.
   [[nodiscard]] const ChannelOdometry& frames() const { return channel_odometry_; }
-  /// What the camera's images are made before anything else sees them.
+  /// The view that images are turned into before anything else sees them.
   [[nodiscard]] const FrameView& view() const { return view_; }
   [[nodiscard]] const StemInfo& stem_info() const { return stem_.info(); }
 

@@ -7,7 +7,7 @@
 
 namespace stemvo {
 
-/// Who measures metres per unit.
+/// The source that measures metres per unit.
 enum class ScaleWitness {
   kRoad,  ///< the camera's height above it
   kWay,   ///< a speed or a distance from outside

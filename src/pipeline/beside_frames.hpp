@@ -13,7 +13,7 @@
 
 namespace stemvo::pipeline {
 
-/// What is known of a recording's motion beside its frames.
+/// Facts on a recording's motion beside its frames.
 struct BesideFrames {
   std::vector<Way> ways;               ///< by speeds
   std::vector<dataset::GyroRow> gyro;  ///< in the camera's axes

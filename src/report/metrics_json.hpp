@@ -60,7 +60,7 @@ struct MetricsReport {
 
 /// Frames in metres are fewer than this share: a warning.
 inline constexpr double kFewBelieved = 0.5;
-/// What to say of a road that was believed never or on few frames; empty where all is well.
+/// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 
 /// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction

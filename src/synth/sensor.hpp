@@ -18,7 +18,7 @@ inline constexpr double kSpread_px = 0.6;    ///< deviation of the lens' point s
 inline constexpr float kFullWell = 8000.0F;  ///< electrons of a white pixel at exposure 1
 inline constexpr float kRead = 12.0F;        ///< electrons, deviation
 
-/// Of linear light to the written value, both 0 to 1: highlights are compressed.
+/// The curve from linear light to the written value, both 0 to 1: highlights are compressed.
 [[nodiscard]] constexpr float response(float light) {
   constexpr float kKnee = 0.7F;
   return (1.0F + kKnee) * light / (light + kKnee);

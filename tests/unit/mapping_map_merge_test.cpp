@@ -77,7 +77,7 @@ TEST(MapMerge, ARoomThatIsSeenAgainAddsNothingButWhereTheCameraWas) {
     }
   }
   EXPECT_EQ(numbers.back(), static_cast<int>(room.map.keyframes.size()) - 1) << "it is in use";
-  // What is left says the same.
+  // The rest says the same.
   for (const MapEdge& motion : room.map.motions) {
     EXPECT_LT(sigmas_off(room.map, motion), 1e-6);
   }

@@ -15,7 +15,7 @@ Matrix6d noise_of(double units, double rad) {
   return sigma.cwiseAbs2().asDiagonal();
 }
 
-/// What a camera does that is seen with noise, frame by frame.
+/// A camera's motion that is seen with noise, frame by frame.
 struct Followed {
   MotionModel model;
   Rigid3 truth;

@@ -52,7 +52,7 @@ double unlikely(double chi2) {
 }
 
 double of_landmarks(const RoadEvidence& e) {
-  // What stands on the road hides it: a measurement that does not see it is wrong.
+  // Things that stand on the road hide it: a measurement that does not see it is wrong.
   const double above = e.measured_share > 0.0 ? kAbove * e.num_above : 0.0;
   return std::clamp(kLandmarkShare * (kOn * e.num_on + kBelow * e.num_below + above),
                     kLeastOfLandmarks, kMostOfLandmarks);

@@ -44,7 +44,7 @@ class RoadBelief {
   /// So many times the filter's sigma is the error of the scale: the filter takes the errors of
   /// neighbouring frames for independent, and their size for the given one.
   [[nodiscard]] double sigma_factor() const;
-  /// What spoke most against the road when it last did.
+  /// The strongest reason against the road when there last was one.
   [[nodiscard]] std::string_view doubt() const { return doubt_; }
 
  private:

@@ -270,7 +270,7 @@ RoadMeasurement refine(const RoadStep& step, const std::vector<Grid>& grids, Roa
     }
   }
   RoadMeasurement result = read_road(warp, covariance, step.options.camera_height_m);
-  // What agrees without the plane (far, blurred) proves none.
+  // Pixels that agree without the plane (far, blurred) prove none.
   RoadWarp no_plane = warp;
   no_plane.plane *= kNoPlane;
   const Grid& sparse = grids.front();

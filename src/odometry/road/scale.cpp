@@ -24,7 +24,7 @@ constexpr double kPlaneSigma = 0.07;
 /// One that would be on a plane twice as far away as well proves nothing.
 constexpr double kMaxLandmarkSigma = 0.2;
 
-/// What the estimators that measured say together.
+/// The joint measurement of the estimators that measured.
 struct Joined {
   int num = 0;
   double log_scale = 0.0;

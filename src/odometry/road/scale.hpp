@@ -35,7 +35,7 @@ class RoadScale {
                            const Rigid3& cur_from_prev,
                            ScaleFilter& filter,
                            const std::vector<RoadLandmark>& landmarks = {});
-  /// Of log(metres per unit) by this filter: unknown while no road is believed.
+  /// The sigma of log(metres per unit) by this filter: unknown while no road is believed.
   [[nodiscard]] double sigma(const ScaleFilter& filter) const;
   /// The map was multiplied by `factor` (new units = factor * old units).
   void rescale(double factor);

@@ -43,8 +43,6 @@ RUN_ELSEWHERE = {
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
-    "stemvo-lab search": "tests/lab/search_test.py",
-    "stemvo-lab robustness": "tests/lab/robustness_test.py",
     "build/lab/bin/ray": "tests/lab/long/ray_test.py",
 }
 # A reader puts names in these places; the rest makes a command short.
@@ -101,6 +99,7 @@ class CodeBlocks(unittest.TestCase):
         (folder / "tools").symlink_to(ROOT / "tools")
         (folder / "build/release").mkdir(parents=True)
         (folder / "build/release/stemvo").symlink_to(PROGRAM)
+        (folder / "build/lab").symlink_to(ROOT / "build/lab")
         (folder / "docs/images").mkdir(parents=True)
         (folder / "camera.yaml").write_text(camera.text)
         shutil.copy(ROOT / "examples/ci/thresholds.yaml", folder / "thresholds.yaml")
