@@ -43,13 +43,16 @@ RUN_ELSEWHERE = {
     "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
     "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
+    "stemvo-lab warps": "tests/lab/warps_test.py",
     "build/lab/bin/ray": "tests/lab/long/ray_test.py",
+    "build/lab/bin/stemvo-lab search KITTI/sequences/00 --model stems/a.onnx": "tests/lab/long/ray_test.py",
 }
 # A reader puts names in these places; the rest makes a command short.
 IN_PLACE_OF = [
     (r"--(held-out-)?frames 0:\d+", rf"--\1frames 0:{FRAMES - 1}"),
     (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
+    (r"( --model stems/(efficientnetv2b0|mobilenet025|resnet18)\.onnx){3}", ""),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),
     (r"\bNAME\.onnx", "weights.onnx"),
     (r"\bWEIGHTS\b", "weights.npz"),
