@@ -127,6 +127,15 @@ void add_threads_option(CLI::App& command, int& num_threads) {
       ->check(in_range(0, 1024));
 }
 
+void add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {
+  command
+      .add_option("--rate", rate_hz,
+                  "Of images without times: frames per second, where the camera file has no "
+                  "rate_hz; default 30")
+      ->type_name("HZ")
+      ->check(in_range(1e-6, 1e5));
+}
+
 void add_tolerance_option(CLI::App& command, double& tolerance_s) {
   command
       .add_option("--gt-tolerance", tolerance_s,

@@ -49,6 +49,9 @@ CLI::Option* add_out_folder(CLI::App& command,
 /// --threads N.
 void add_threads_option(CLI::App& command, int& num_threads);
 
+/// --rate HZ.
+void add_rate_option(CLI::App& command, std::optional<double>& rate_hz);
+
 /// --gt-tolerance S.
 void add_tolerance_option(CLI::App& command, double& tolerance_s);
 

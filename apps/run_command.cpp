@@ -136,7 +136,8 @@ void add_options(CLI::App& command, RunArguments& arguments) {
       command, "--camera", request.camera_file,
       "Camera file; INPUT may be any folder of images, a pattern or a video (see below)");
   add_file_option(command, "--times", request.times,
-                  "Of images: a time in seconds per image; default: the camera's rate_hz");
+                  "Of images: a time in seconds per image; default: counted from a rate");
+  add_rate_option(command, request.rate_hz);
   add_file_option(command, "--calib", request.calibration,
                   "Calibration instead of the folder's calib.txt, e.g. of 'stemvo calibrate'");
   add_file_option(command, "--speed", request.speeds,

@@ -70,6 +70,7 @@ std::string in_python(std::string message) {
   for (const auto& [option, argument] :
        {std::pair("--camera FILE", "camera_file"), std::pair("--camera", "camera_file"),
         std::pair("--times FILE", "times"), std::pair("--times", "times"),
+        std::pair("--rate HZ", "rate"), std::pair("--rate", "rate"),
         std::pair("--calib FILE", "calibration"), std::pair("--calib", "calibration"),
         std::pair("--gt-tolerance", "tolerance_s"), std::pair("--gt", "ground_truth"),
         std::pair("--mask", "masks"), std::pair("--frames", "frames")}) {

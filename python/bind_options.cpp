@@ -22,19 +22,29 @@ namespace {
 
 using namespace nb::literals;
 
+/// ValueError: a path of other bytes.
+std::string utf8_of(nb::handle value) {
+  const nb::str text(value);
+  const char* const utf8 = PyUnicode_AsUTF8(text.ptr());
+  if (utf8 == nullptr) {
+    PyErr_Clear();
+    throw nb::value_error(
+        fmt::format("options: expected text in UTF-8, found {}", nb::repr(value).c_str()).c_str());
+  }
+  return utf8;
+}
+
 /// As --set takes it.
 std::string text_of(nb::handle value) {
   if (value.is_none()) {
     throw nb::value_error("options: expected a value, found None");
   }
-  return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false")
-                                   : nb::str(value).c_str();
+  return PyBool_Check(value.ptr()) ? (value.is(Py_True) ? "true" : "false") : utf8_of(value);
 }
 
 void apply(Config& config, const nb::dict& values) {
   for (const auto& [key, value] : values) {
-    const Status status =
-        apply_override(config, std::string(nb::str(key).c_str()) + "=" + text_of(value));
+    const Status status = apply_override(config, utf8_of(key) + "=" + text_of(value));
     if (!status) {
       throw nb::value_error(in_python(status.error().message).c_str());
     }

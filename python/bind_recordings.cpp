@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Recordings: the program's readers in Python.
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -50,6 +51,7 @@ FrameSource open_recording(const Path& path,
                            const std::optional<Path>& ground_truth,
                            double tolerance_s,
                            const std::optional<Path>& times,
+                           const std::optional<double>& rate,
                            const std::optional<Path>& calibration,
                            const std::vector<std::string>& masks,
                            const std::string& input_camera) {
@@ -62,6 +64,7 @@ FrameSource open_recording(const Path& path,
   request.ground_truth = ground_truth;
   request.ground_truth_tolerance_s = tolerance_s;
   request.times = times;
+  request.rate_hz = rate;
   request.calibration = calibration;
   request.masks = masks;
   request.camera = input_camera;
@@ -70,8 +73,8 @@ FrameSource open_recording(const Path& path,
     return open_source(request);
   }();
   FrameSource source = value_or_raise(std::move(opened));
-  for (const std::string& warning : source.warnings) {
-    warn(warning);
+  for (const auto* lines : {&source.notes, &source.warnings}) {
+    std::ranges::for_each(*lines, [](const std::string& line) { warn(in_python(line)); });
   }
   return source;
 }
@@ -163,10 +166,10 @@ void bind_recording(nb::module_& module) {
   module.def(
       "read_recording", &open_recording, "path"_a, "camera_file"_a = nb::none(), nb::kw_only(),
       "frames"_a = nb::none(), "ground_truth"_a = nb::none(), "tolerance_s"_a = kTimeTolerance_s,
-      "times"_a = nb::none(), "calibration"_a = nb::none(), "masks"_a = std::vector<std::string>(),
-      "input_camera"_a = "auto",
+      "times"_a = nb::none(), "rate"_a = nb::none(), "calibration"_a = nb::none(),
+      "masks"_a = std::vector<std::string>(), "input_camera"_a = "auto",
       "What `stemvo run` reads, but for videos and live cameras; as its --frames 'A:B', --gt, "
-      "--gt-tolerance, --times, --calib, --mask and the key input.camera");
+      "--gt-tolerance, --times, --rate, --calib, --mask and the key input.camera");
 }
 
 }  // namespace

@@ -101,6 +101,26 @@ Status add_ground_truth(FrameSource& frames,
   return {};
 }
 
+void add_note(FrameSource& frames, const std::string& note) {
+  if (!note.empty()) {
+    frames.notes.push_back(note);
+  }
+}
+
+double rate_of(const CameraFile& camera, const FrameSourceRequest& request, FrameSource& frames) {
+  constexpr double kUsualRate_hz = 30.0;
+  if (!camera.rate_hz && !request.rate_hz) {
+    add_note(frames, fmt::format("times: {} frames per second are taken for granted; --rate HZ, "
+                                 "--times FILE or rate_hz in the camera file says another",
+                                 kUsualRate_hz));
+  } else if (camera.rate_hz && request.rate_hz && *camera.rate_hz != *request.rate_hz) {
+    frames.warnings.push_back(
+        fmt::format("--rate {}: the camera file's rate_hz goes before it: {} frames per second",
+                    *request.rate_hz, *camera.rate_hz));
+  }
+  return camera.rate_hz.value_or(request.rate_hz.value_or(kUsualRate_hz));
+}
+
 void warn_of_camera(FrameSource& frames) {
   if (std::string doubt = doubt_of(frames.camera); !doubt.empty()) {
     frames.warnings.push_back(std::move(doubt));

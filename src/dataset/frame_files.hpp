@@ -55,6 +55,12 @@ namespace stemvo::dataset {
                                       std::size_t num_files,
                                       bool is_exact);
 
+/// Adds a line for people, unless it is empty.
+void add_note(FrameSource& frames, const std::string& note);
+/// Frames per second without times: the camera file's, else those asked for, else 30, with a note.
+[[nodiscard]] double rate_of(const CameraFile& camera,
+                             const FrameSourceRequest& request,
+                             FrameSource& frames);
 /// Adds what is odd about its camera.
 void warn_of_camera(FrameSource& frames);
 

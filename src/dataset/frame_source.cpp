@@ -83,6 +83,10 @@ Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_
                     "times.txt, a video its own), found {}",
                     request.times->string(), request.sequence_dir.string()));
   }
+  if (request.rate_hz && !is_listing) {
+    return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
+                            request.sequence_dir.string()));
+  }
   return {};
 }
 

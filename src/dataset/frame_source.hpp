@@ -63,6 +63,7 @@ struct FrameSource {
   std::optional<std::filesystem::path> given_calibration;
   std::optional<double> camera_height_m;  ///< above the road, where a camera file says it
   std::optional<Eigen::Quaterniond> camera_from_imu;  ///< where a camera file says it
+  std::vector<std::string> notes;                     ///< how it was read, for people
   std::vector<std::string> warnings;                  ///< what may be wrong with what was given
   bool is_kitti = false;                              ///< whose camera is 1.65 m above a road
   /// Frame `index` in [0, size()): CV_8UC1, or CV_8UC3 in RGB order, of the camera's size; all
@@ -106,7 +107,9 @@ struct FrameSourceRequest : SequenceOptions {
   /// `camera:N`.
   std::filesystem::path sequence_dir;
   std::optional<std::filesystem::path> camera_file;  ///< in place of the recording's own
-  std::optional<std::filesystem::path> times;  ///< of images; else the recording's, or rate_hz
+  std::optional<std::filesystem::path> times;        ///< of images; else the recording's, or a rate
+  /// Frames per second of images without times; that of a camera file goes before it, 30 behind.
+  std::optional<double> rate_hz = std::nullopt;
 };
 
 /// Finds out what it is: `camera:N`; a file: a video; a folder in EuRoC's layout, TUM RGB-D's or
@@ -114,7 +117,7 @@ struct FrameSourceRequest : SequenceOptions {
 /// images, or a pattern, in the order of their names, numbers by value; else KITTI's layout. All
 /// but KITTI's are undistorted when read, colour if the images are. Errors: those of
 /// open_kitti; none of these; no camera file; a camera file that is wrong; no images;
-/// images of another size; times or poses that do not fit; a range outside.
+/// images of another size; times or poses that do not fit; a range outside; a rate beside times.
 [[nodiscard]] Expected<FrameSource> open_source(const FrameSourceRequest& request);
 
 /// A folder with some of what only KITTI's layout has: open_kitti says what is missing.

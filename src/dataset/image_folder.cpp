@@ -12,32 +12,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The times of all images.
-Expected<std::vector<double>> find_times(const Listing& listing,
-                                         const FrameSourceRequest& request,
-                                         const fs::path& camera_file,
-                                         const std::optional<double>& rate_hz) {
+/// The times of all images, where something says them.
+Expected<ImageTimes> find_times(const Listing& listing, const FrameSourceRequest& request) {
   const std::size_t num_images = listing.files.size();
-  if (const auto& file = request.times ? request.times : listing.times_file) {
-    auto read = read_kitti_times(*file, num_images);
-    if (read && read->size() != num_images) {
-      return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                              file->string(), num_images, read->size()));
-    }
-    return read;
+  const auto& file = request.times ? request.times : listing.times_file;
+  if (request.rate_hz && (file || !listing.times_s.empty())) {
+    return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
+                            file ? file->string() : "those of the list of images"));
   }
-  if (!listing.times_s.empty()) {
-    return listing.times_s;
+  if (!file) {
+    return ImageTimes{listing.times_s, listing.note};
   }
-  if (!rate_hz) {
-    return fail(
-        fmt::format("{}: expected rate_hz (frames per second) or --times FILE, found "
-                    "neither",
-                    camera_file.string()));
+  auto read = read_kitti_times(*file, num_images);
+  if (read && read->times_s.size() != num_images) {
+    return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
+                            file->string(), num_images, read->times_s.size()));
   }
+  return read;
+}
+
+/// The times of a range of images that nothing says the times of.
+std::vector<double> count_times(const FrameRange& range, double rate_hz) {
   std::vector<double> times_s;
-  for (std::size_t i = 0; i < num_images; ++i) {
-    times_s.push_back(static_cast<double>(i) / *rate_hz);
+  for (std::size_t i = range.begin; i < range.end; ++i) {
+    times_s.push_back(static_cast<double>(i) / rate_hz);
   }
   return times_s;
 }
@@ -71,14 +69,19 @@ Expected<FrameSource> open_listing(const Listing& listing, const FrameSourceRequ
   STEMVO_TRY_GET(const auto camera_file, read_camera_file(*camera_path));
   STEMVO_TRY_GET(const auto range, resolve_range(request.frames, listing.files.size(),
                                                  request.sequence_dir.string()));
-  STEMVO_TRY_GET(const auto times_s,
-                 find_times(listing, request, *camera_path, camera_file.rate_hz));
-  FrameSource frames = list_frames(range, listing.files, times_s);
+  STEMVO_TRY_GET(auto times, find_times(listing, request));
+  const bool has_times = !times.times_s.empty();
+  times.times_s.resize(listing.files.size());
+  FrameSource frames = list_frames(range, listing.files, times.times_s);
+  frames.warnings = camera_file.warnings;
+  add_note(frames, times.note);
+  if (!has_times) {
+    frames.timestamps_s = count_times(range, rate_of(camera_file, request, frames));
+  }
   if (const auto& truth = request.ground_truth ? request.ground_truth : listing.ground_truth) {
     STEMVO_TRY(add_ground_truth(frames, *truth, camera_path, request.ground_truth_tolerance_s,
                                 listing.files.size(), true));
   }
-  frames.warnings = camera_file.warnings;
   if (!listing.warning.empty()) {
     frames.warnings.push_back(listing.warning);
   }

@@ -136,9 +136,10 @@ Expected<FrameSource> open_kitti(const fs::path& directory, const SequenceOption
                  dataset::resolve_range(options.frames, images.size(), image_folder.string()));
   const fs::path calibration = options.calibration.value_or(directory / "calib.txt");
   STEMVO_TRY_GET(const auto camera, dataset::read_kitti_camera(calibration, camera_index));
-  STEMVO_TRY_GET(const auto times_s, dataset::read_kitti_times(directory / "times.txt", range.end));
+  STEMVO_TRY_GET(const auto times, dataset::read_kitti_times(directory / "times.txt", range.end));
   const fs::path absolute = dataset::absolute_folder(directory);
-  FrameSource frames = dataset::list_frames(range, images, times_s);
+  FrameSource frames = dataset::list_frames(range, images, times.times_s);
+  dataset::add_note(frames, times.note);
   frames.kind = "KITTI sequence";
   frames.is_kitti = true;
   frames.name = absolute.filename().string();

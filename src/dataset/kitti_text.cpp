@@ -92,18 +92,17 @@ Expected<std::string> replace_kitti_camera(const std::filesystem::path& file,
   return text;
 }
 
-Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file,
-                                               std::size_t num_expected) {
-  STEMVO_TRY_GET(const auto rows, read_timed_rows(file, {1}, "a time"));
-  std::vector<double> times_s;
-  for (const TimedRow& row : rows) {
-    times_s.push_back(row.time_s);
+Expected<ImageTimes> read_kitti_times(const std::filesystem::path& file, std::size_t num_expected) {
+  STEMVO_TRY_GET(const auto found, read_timed_rows(file, {1}, "a time"));
+  ImageTimes times{.times_s = {}, .note = found.note};
+  for (const TimedRow& row : found.rows) {
+    times.times_s.push_back(row.time_s);
   }
-  if (times_s.size() < num_expected) {
+  if (times.times_s.size() < num_expected) {
     return fail(fmt::format("{}: expected a time for each of {} images, found {} times",
-                            file.string(), num_expected, times_s.size()));
+                            file.string(), num_expected, times.times_s.size()));
   }
-  return times_s;
+  return times;
 }
 
 }  // namespace stemvo::dataset

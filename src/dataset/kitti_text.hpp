@@ -22,9 +22,14 @@ namespace stemvo::dataset {
                                                          const Camera& given,
                                                          const Camera& refined);
 
-/// One time in seconds per line, for at least `num_expected` images. Errors: not one finite number
-/// in a line, not increasing, fewer lines.
-[[nodiscard]] Expected<std::vector<double>> read_kitti_times(const std::filesystem::path& file,
-                                                             std::size_t num_expected);
+/// Times of images.
+struct ImageTimes {
+  std::vector<double> times_s;
+  std::string note;  ///< how they were found, for people; may be empty
+};
+/// One time per line, as read_timed_rows reads them, for at least `num_expected` images. Errors:
+/// not one finite number in a line, not increasing, fewer lines.
+[[nodiscard]] Expected<ImageTimes> read_kitti_times(const std::filesystem::path& file,
+                                                    std::size_t num_expected);
 
 }  // namespace stemvo::dataset

@@ -18,6 +18,7 @@ struct Listing {
   std::string name;
   std::vector<std::filesystem::path> files;  ///< at least one
   std::vector<double> times_s = {};          ///< one per file, or none
+  std::string note = {};                     ///< how the times were found; may be empty
   std::string warning = {};                  ///< images that may be two of a time
   std::optional<std::filesystem::path> camera_file = std::nullopt;
   std::optional<std::filesystem::path> times_file = std::nullopt;

@@ -35,12 +35,12 @@ Eigen::Vector3d rate_at(const std::vector<GyroRow>& rows, double time_s) {
 
 }  // namespace
 
-Expected<std::vector<SpeedRow>> read_speeds(const std::filesystem::path& file) {
+Expected<MotionRows<SpeedRow>> read_speeds(const std::filesystem::path& file) {
   constexpr double kSigmaShare = 0.02;
   constexpr double kMinSigma = 0.05;
-  STEMVO_TRY_GET(const auto rows, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma"));
-  std::vector<SpeedRow> speeds;
-  for (const TimedRow& row : rows) {
+  STEMVO_TRY_GET(const auto found, read_timed_rows(file, {2, 3}, "a time, m/s and maybe a sigma"));
+  MotionRows<SpeedRow> speeds{.rows = {}, .note = found.note};
+  for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
     const double sigma =
         numbers.size() > 1 ? numbers[1] : std::max(kMinSigma, kSigmaShare * std::abs(numbers[0]));
@@ -48,18 +48,18 @@ Expected<std::vector<SpeedRow>> read_speeds(const std::filesystem::path& file) {
       return fail(fmt::format("{}: expected a sigma above 0 at {} s, found {}", file.string(),
                               row.time_s, sigma));
     }
-    speeds.push_back({row.time_s, numbers[0], sigma});
+    speeds.rows.push_back({row.time_s, numbers[0], sigma});
   }
   return speeds;
 }
 
-Expected<std::vector<GyroRow>> read_gyro(const std::filesystem::path& file) {
-  STEMVO_TRY_GET(const auto rows,
+Expected<MotionRows<GyroRow>> read_gyro(const std::filesystem::path& file) {
+  STEMVO_TRY_GET(const auto found,
                  read_timed_rows(file, {4, 7}, "a time and rad/s about x, y and z"));
-  std::vector<GyroRow> rates;
-  for (const TimedRow& row : rows) {
+  MotionRows<GyroRow> rates{.rows = {}, .note = found.note};
+  for (const TimedRow& row : found.rows) {
     STEMVO_TRY_GET(const auto numbers, numbers_of(row, file));
-    rates.push_back({row.time_s, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])});
+    rates.rows.push_back({row.time_s, Eigen::Vector3d(numbers[0], numbers[1], numbers[2])});
   }
   return rates;
 }

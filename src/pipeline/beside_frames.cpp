@@ -10,11 +10,18 @@
 namespace stemvo::pipeline {
 namespace {
 
+void add_unit(const std::string& note, BesideFrames& beside) {
+  if (!note.empty()) {
+    beside.unit_notes.push_back(note);
+  }
+}
+
 Status add_speeds(const RunRequest& request, BesideFrames& beside) {
   if (request.config.scale_choice == ScaleChoice::kGroundTruth) {
     return fail("--speed: expected scale.source none or camera_height, found ground_truth");
   }
-  STEMVO_TRY_GET(const auto rows, dataset::read_speeds(*request.speeds));
+  STEMVO_TRY_GET(const auto found, dataset::read_speeds(*request.speeds));
+  const auto& rows = found.rows;
   WayInput input(request.config.scale.source);
   for (const dataset::SpeedRow& row : rows) {
     if (Status status = input.add_speed(row.time_s, row.metres_per_s, row.sigma); !status) {
@@ -23,18 +30,21 @@ Status add_speeds(const RunRequest& request, BesideFrames& beside) {
   }
   beside.ways = input.take(std::numeric_limits<double>::infinity());
   beside.note += fmt::format(", {} speeds", rows.size());
+  add_unit(found.note, beside);
   beside.spans.push_back({"--speed", rows.front().time_s, rows.back().time_s});
   return {};
 }
 
 Status add_gyro(const RunRequest& request, const FrameSource& sequence, BesideFrames& beside) {
-  STEMVO_TRY_GET(auto rows, dataset::read_gyro(*request.gyro));
+  STEMVO_TRY_GET(auto found, dataset::read_gyro(*request.gyro));
+  auto& rows = found.rows;
   const auto& camera_from_imu = sequence.camera_from_imu;
   for (dataset::GyroRow& row : rows) {
     row.rad_per_s = camera_from_imu.value_or(Eigen::Quaterniond::Identity()) * row.rad_per_s;
   }
   beside.note += fmt::format(", {} turn rates{}", rows.size(),
                              camera_from_imu ? "" : " (taken for about the camera's own axes)");
+  add_unit(found.note, beside);
   beside.spans.push_back({"--gyro", rows.front().time_s, rows.back().time_s});
   beside.gyro = std::move(rows);
   return {};

@@ -15,9 +15,10 @@ namespace stemvo::pipeline {
 
 /// Facts on a recording's motion beside its frames.
 struct BesideFrames {
-  std::vector<Way> ways;               ///< by speeds
-  std::vector<dataset::GyroRow> gyro;  ///< in the camera's axes
-  std::string note;                    ///< what there is, for the line of the input; may be empty
+  std::vector<Way> ways;                ///< by speeds
+  std::vector<dataset::GyroRow> gyro;   ///< in the camera's axes
+  std::string note;                     ///< what there is, for the line of the input; may be empty
+  std::vector<std::string> unit_notes;  ///< how times were read, a line each; may be empty
   struct Span {
     std::string option;
     double first_s;

@@ -101,10 +101,10 @@ class DriveLoop {
     drive_.frames.push_back(pose);
     const StageTimer timer(Stage::kFrameFiles);
     const double time_s = run_.sequence.time_s(i);
-    const std::string row = frames_csv_row(number, time_s, pose);
+    const Rigid3& written = drive_.trajectory.emplace_back(as_written(i, pose.world_from_camera));
+    const std::string row = frames_csv_row(number, time_s, pose, written);
     drive_.csv += row;
     rows_.add(row);
-    const Rigid3& written = drive_.trajectory.emplace_back(as_written(i, pose.world_from_camera));
     kitti_.add(kitti_row(written));
     tum_.add(tum_row(time_s, written));
     if (Clock::now() - last_written_ > std::chrono::seconds(1)) {
@@ -183,7 +183,8 @@ class DriveLoop {
     const std::size_t told = stream.expected_frames;
     if (static_cast<double>(num_done) < kMinShare * static_cast<double>(told)) {
       drive_.warnings.push_back(fmt::format(
-          "{}: the video ends after {} frames where {} were expected: it may be cut off or damaged",
+          "{}: the video ends after {} frames where its container counts {}: it was trimmed, or "
+          "may be cut off",
           run_.sequence.name, num_done, told));
     }
   }

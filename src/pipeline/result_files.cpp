@@ -9,10 +9,12 @@
 
 #include <fmt/format.h>
 
+#include "geometry/degrees.hpp"
 #include "options/visit.hpp"
 #include "pipeline/map_result.hpp"
 #include "report/evaluate_report.hpp"
 #include "report/frame_image.hpp"
+#include "report/frames_csv.hpp"
 #include "report/run_page.hpp"
 #include "report/trajectory_plot.hpp"
 #include "stemvo/version.hpp"
@@ -96,7 +98,8 @@ class ResultWriter {
         run_(run),
         drive_(drive),
         trajectory_(drive.trajectory),
-        config_text_(config_text(run, trajectory_.size())) {
+        config_text_(config_text(run, trajectory_.size())),
+        csv_(drive.csv) {
     const auto truth = sequence_.ground_truth_of(trajectory_.size());  // interrupted: fewer poses
     matched_ = truth ? Status() : truth.error();
     if (truth && *truth) {
@@ -110,6 +113,10 @@ class ResultWriter {
     Status written = write_poses("trajectory", trajectory_);
     report = make_report();
     keep_first(written, drive_.written);
+    if (truth_) {
+      csv_ = frames_csv_with_errors(drive_.csv, frame_errors(report));
+      keep_first(written, write_text_file(folder / "frames.csv", csv_));
+    }
     keep_first(written, write_text_file(folder / "config.yaml", config_text_));
     if (request_.config.odometry.mode == OdometryMode::kMap) {
       keep_first(written, write_map(report));
@@ -130,8 +137,8 @@ class ResultWriter {
       map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
     }
     return write_run_page(request_.out_dir / "report.html",
-                          {plot.title, plot.subtitle, plot.unit, report, drive_.csv, plot.estimate,
-                           map, truth_, drive_.images, config_text_, request_.command});
+                          {plot.title, plot.subtitle, plot.unit, report, csv_, plot.estimate, map,
+                           truth_, drive_.images, config_text_, request_.command});
   }
 
  private:
@@ -259,12 +266,24 @@ class ResultWriter {
                : poses;
   }
 
+  [[nodiscard]] std::vector<FrameError> frame_errors(const MetricsReport& report) const {
+    const Trajectory estimate = in_truth(trajectory_, report);
+    std::vector<FrameError> errors;
+    for (std::size_t i = 0; i < truth_->frames.size(); ++i) {
+      const Rigid3 off = truth_->poses[i].inverse() * estimate[truth_->frames[i]];
+      errors.push_back(
+          {truth_->frames[i], off.translation.norm(), kDegPerRad * so3_log(off.rotation).norm()});
+    }
+    return errors;
+  }
+
   const RunRequest& request_;
   const FrameSource& sequence_;
   const Run& run_;
   const Drive& drive_;
   const Trajectory& trajectory_;
   std::string config_text_;
+  std::string csv_;
   std::optional<GroundTruth> truth_;
   std::optional<MapResult> map_;  ///< nullopt: mode two_frame
   Status matched_;                ///< the ground truth of a stream

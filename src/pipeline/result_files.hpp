@@ -40,7 +40,7 @@ struct Run {
 struct Drive {
   std::vector<FrameResult> frames;           ///< one per frame done
   Trajectory trajectory;                     ///< as result files hold it
-  std::string csv;                           ///< frames.csv of them
+  std::string csv;                           ///< frames.csv of them, without errors
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
   std::vector<std::string> warnings;
   bool interrupted = false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline/run.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -98,6 +99,9 @@ void note_start(const Run& run, bool is_replacing) {
   request.note(fmt::format("input: {} {}, {}, {}{}", sequence.kind, sequence.name,
                            describe_size(sequence), describe_truth(request, sequence),
                            beside.note));
+  for (const std::vector<std::string>& notes : {sequence.notes, beside.unit_notes}) {
+    std::ranges::for_each(notes, request.note);
+  }
   if (is_replacing) {
     request.note(
         fmt::format("files of an earlier result in {} are replaced (another --out keeps them)",

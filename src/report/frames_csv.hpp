@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -9,17 +10,23 @@
 
 namespace stemvo {
 
-/// The header of frames.csv, with its newline. Columns: frame, timestamp_s, state, matches,
-/// inliers, s_h, s_f, r_h, model, stem_ms, features_ms, pose_ms, scale_sigma (of log(metres per
-/// unit); empty where no road is asked), scale_state (-, none, held, measured: ScaleState), fx_px,
-/// cx_px, cy_px (what was learnt of the camera), fx_sigma_px, cx_sigma_px, cy_sigma_px (empty where
-/// it is not refined), recognized_frame (whose place the frame shows; empty: none was recognized;
-/// from -2 down: of the map that was loaded), map_scale, map_x, map_y, map_z, map_qx, map_qy,
-/// map_qz, map_qw (FrameResult::map_from_world).
+/// The header of frames.csv, with its newline: docs/results.md says what each column holds.
 [[nodiscard]] std::string_view frames_csv_header();
-/// A row with its newline; the frame in the folder's numbering.
+/// A row with its newline; the frame in the folder's numbering, the pose as result files hold it.
+/// The columns of its error are empty.
 [[nodiscard]] std::string frames_csv_row(std::size_t frame,
                                          double timestamp_s,
-                                         const FrameResult& result);
+                                         const FrameResult& result,
+                                         const Rigid3& written);
+
+/// What is left of a frame's pose behind the alignment of all.
+struct FrameError {
+  std::size_t row = 0;  ///< counted from 0
+  double position_m = 0.0;
+  double rotation_deg = 0.0;
+};
+/// The table with errors of some rows, in their order.
+[[nodiscard]] std::string frames_csv_with_errors(std::string_view table,
+                                                 std::span<const FrameError> errors);
 
 }  // namespace stemvo

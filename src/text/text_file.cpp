@@ -168,8 +168,9 @@ Error fail_at(const fs::path& file, std::size_t index, const Error& error) {
 
 namespace {
 
-/// The times in seconds, where they are ms, us or ns: steps are not longer than this.
-void find_unit(std::vector<TimedRow>& rows) {
+/// The times in seconds, where they are ms, us or ns: steps are not longer than this. The unit's
+/// name, unless they are seconds.
+std::string find_unit(std::vector<TimedRow>& rows) {
   constexpr double kMaxStep_s = 3.0;
   std::vector<double> steps;
   for (std::size_t i = 1; i < rows.size(); ++i) {
@@ -177,23 +178,27 @@ void find_unit(std::vector<TimedRow>& rows) {
   }
   const auto middle = steps.begin() + std::ssize(steps) / 2;
   std::ranges::nth_element(steps, middle);
-  double unit_s = 1.0;
-  while (!steps.empty() && unit_s > kNanosecond_s && *middle * unit_s > kMaxStep_s) {
-    unit_s = unit_s > 1e-6 ? 1e-3 * unit_s : kNanosecond_s;
+  constexpr std::pair<double, const char*> kUnits[] = {
+      {1.0, ""}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {kNanosecond_s, "nanoseconds"}};
+  const auto* unit = std::begin(kUnits);
+  while (!steps.empty() && unit + 1 < std::end(kUnits) && *middle * unit->first > kMaxStep_s) {
+    ++unit;
   }
   for (TimedRow& row : rows) {
-    row.time_s *= unit_s;
+    row.time_s *= unit->first;
   }
+  return unit->second;
 }
 
 }  // namespace
 
-Expected<std::vector<TimedRow>> read_timed_rows(const fs::path& file,
-                                                std::initializer_list<std::size_t> counts,
-                                                std::string_view form,
-                                                double unit_s) {
+Expected<TimedRows> read_timed_rows(const fs::path& file,
+                                    std::initializer_list<std::size_t> counts,
+                                    std::string_view form,
+                                    double unit_s) {
   STEMVO_TRY_GET(const auto lines, read_lines(file));
-  std::vector<TimedRow> rows;
+  TimedRows result;
+  std::vector<TimedRow>& rows = result.rows;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::size_t comment = std::min(lines[i].find('#'), lines[i].size());
     if (lines[i].find("[ns]", comment) != std::string::npos) {
@@ -224,10 +229,11 @@ Expected<std::vector<TimedRow>> read_timed_rows(const fs::path& file,
   if (rows.empty()) {
     return fail(fmt::format("{}: expected rows of {}, found none", file.string(), form));
   }
-  if (unit_s == 1.0) {
-    find_unit(rows);
+  const std::string unit = unit_s == 1.0 ? find_unit(rows) : "";
+  if (!unit.empty()) {
+    result.note = fmt::format("{}: times are taken for {}, by their steps", file.string(), unit);
   }
-  return rows;
+  return result;
 }
 
 std::optional<std::size_t> parse_index(std::string_view text) {

@@ -202,7 +202,7 @@ else:
 
 # Each line must raise ValueError, or what stands behind it, with one line that holds the text.
 BAD_INPUT = """
-import pathlib, sys, numpy as np, stemvo
+import os, pathlib, sys, numpy as np, stemvo
 camera = stemvo.Camera(500, 500, 320, 94, 640, 188)
 odometry = stemvo.Odometry(camera)
 gray = np.zeros((188, 640), np.uint8)
@@ -237,7 +237,8 @@ cases = [
     (lambda: stemvo.read_recording(sys.executable), "stemvo.FrameView"),
     (lambda: stemvo.read_recording("camera:0"), "stemvo.FrameView"),
     (lambda: stemvo.read_recording(images), "expected camera_file, or camera.yaml in their folder"),
-    (lambda: stemvo.read_recording(images, camera_file), "expected rate_hz (frames per second) or times, found"),
+    (lambda: stemvo.read_recording(images, camera_file, rate=10, times="times.txt"), "rate 10: expected images without times, found"),
+    (lambda: stemvo.Options({"stem.model": pathlib.Path(os.fsdecode(b"\xff"))}), "options: expected text in UTF-8, found"),
     (lambda: stemvo.FrameView(camera_file, masks=["1,2"]), "masks: expected"),
     (lambda: stemvo.FrameView("/nowhere.yaml"), "/nowhere.yaml"),
     (lambda: stemvo.Odometry("camera"), "expected Camera, Recording or FrameView"),

@@ -188,14 +188,19 @@ TEST_F(DoubtfulInput, FramesThatAreThereTwiceAreRefused) {
 
 TEST_F(DoubtfulInput, TimesInOtherUnits) {
   FrameSourceRequest request = write_images({"1.png", "2.png", "3.png"});
-  for (const auto& [unit, unit_s] : std::vector<std::pair<const char*, double>>{
-           {"", 1.0}, {"000", 1e-3}, {"000000", 1e-6}, {"000000000", 1e-9}}) {
+  for (const auto& [unit, name] :
+       std::vector<std::pair<const char*, const char*>>{{"", ""},
+                                                        {"000", "milliseconds"},
+                                                        {"000000", "microseconds"},
+                                                        {"000000000", "nanoseconds"}}) {
     request.times =
         temp_.file("times.txt", fmt::format("1700000000{0}\n1700000001{0}\n1700000002{0}\n", unit));
     const auto source = open_source(request);
     ASSERT_TRUE(source) << source.error().message;
-    EXPECT_NEAR(source->timestamps_s[2] - source->timestamps_s[1], 1.0, 1e-6) << unit_s;
-    EXPECT_NEAR(source->timestamps_s[0], 1.7e9, 1e-3) << unit_s;
+    EXPECT_NEAR(source->timestamps_s[2] - source->timestamps_s[1], 1.0, 1e-6) << name;
+    EXPECT_NEAR(source->timestamps_s[0], 1.7e9, 1e-3) << name;
+    EXPECT_EQ(source->notes.size(), *name == '\0' ? 0U : 1U);
+    EXPECT_TRUE(source->notes.empty() || source->notes[0].find(name) != std::string::npos) << name;
   }
 }
 

@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr int kNumImages = 4;
 
@@ -198,10 +199,28 @@ TEST_F(ImageFolderTest, SizeOtherThanTheCamerasIsRefused) {
                                 HasSubstr("camera.yaml"), HasSubstr("found 32x24")));
 }
 
+TEST_F(ImageFolderTest, ARateCountsTimesWhereNothingSaysThem) {
+  const auto open = [&](const std::string& camera, std::optional<double> rate_hz) {
+    write_camera(camera);
+    request_.frames = FrameRangeRequest{1};
+    request_.rate_hz = rate_hz;
+    return open_source(request_).value();
+  };
+  const FrameSource usual = open("", std::nullopt);
+  EXPECT_THAT(usual.timestamps_s, ElementsAre(1.0 / 30.0, 2.0 / 30.0, 3.0 / 30.0));
+  EXPECT_THAT(usual.notes, ElementsAre(HasSubstr("30 frames per second are taken for granted")));
+  const FrameSource asked = open("", 20.0);
+  EXPECT_THAT(asked.timestamps_s, ElementsAre(0.05, 0.1, 0.15));
+  EXPECT_THAT(asked.notes, IsEmpty());
+  const FrameSource both = open("rate_hz: 10\n", 20.0);
+  EXPECT_THAT(both.timestamps_s, ElementsAre(0.1, 0.2, 3.0 / 10.0));
+  EXPECT_THAT(both.warnings, ElementsAre(HasSubstr("--rate 20: the camera file's rate_hz")));
+  request_.times = temp_.file("times.txt", "0\n1\n2\n3\n");
+  EXPECT_THAT(error_of(), HasSubstr("--rate 20: expected images without times, found"));
+}
+
 TEST_F(ImageFolderTest, Times) {
   write_camera("");
-  EXPECT_THAT(error_of(),
-              HasSubstr("camera.yaml: expected rate_hz (frames per second) or --times"));
   const auto with_times = [&](const std::string& text) {
     request_.times = temp_.file("times.txt", text);
     return error_of();

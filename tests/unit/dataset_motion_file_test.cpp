@@ -31,11 +31,11 @@ class MotionFile : public ::testing::Test {
 TEST_F(MotionFile, SpeedsStandBetweenCommasOrBlanksAndBringTheirSigma) {
   const auto speeds = read_speeds(write("# time, m/s\n0.1,10\n\n0.2  -1.0 # back\n0.3 4 0.25\n"));
   ASSERT_TRUE(speeds) << speeds.error().message;
-  ASSERT_EQ(speeds->size(), 3U);
-  EXPECT_EQ((*speeds)[0].sigma, 0.2);
-  EXPECT_EQ((*speeds)[1].metres_per_s, -1.0);
-  EXPECT_EQ((*speeds)[1].sigma, 0.05);
-  EXPECT_EQ((*speeds)[2].sigma, 0.25);
+  ASSERT_EQ(speeds->rows.size(), 3U);
+  EXPECT_EQ(speeds->rows[0].sigma, 0.2);
+  EXPECT_EQ(speeds->rows[1].metres_per_s, -1.0);
+  EXPECT_EQ(speeds->rows[1].sigma, 0.05);
+  EXPECT_EQ(speeds->rows[2].sigma, 0.25);
 }
 
 TEST_F(MotionFile, WhatIsNoRowIsRefusedWithItsLine) {
@@ -55,8 +55,11 @@ TEST_F(MotionFile, EurocsTimesAreNanoseconds) {
   const auto gyro = read_gyro(
       write("#timestamp [ns],w_x [rad s^-1],w_y,w_z,a_x,a_y,a_z\n2500000000,0.1,0.2,0.3,9,8,7\n"));
   ASSERT_TRUE(gyro) << gyro.error().message;
-  EXPECT_NEAR(gyro->front().time_s, 2.5, 1e-12);
-  EXPECT_EQ(gyro->front().rad_per_s, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_NEAR(gyro->rows.front().time_s, 2.5, 1e-12);
+  EXPECT_EQ(gyro->rows.front().rad_per_s, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(gyro->note, "") << "the file says the unit itself";
+  EXPECT_THAT(read_speeds(write("0 1\n100000 1\n"))->note,
+              HasSubstr("motion.txt: times are taken for microseconds, by their steps"));
 }
 
 TEST(Gyro, RatesBecomeTheRotationBetweenTwoTimes) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -18,6 +19,7 @@
 #include "report/map_ply.hpp"
 #include "support/ply_reader.hpp"
 #include "support/report_content.hpp"
+#include "support/state_runs.hpp"
 
 namespace stemvo {
 namespace {
@@ -95,7 +97,14 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->report.num_frames, 6U);
   EXPECT_EQ(summary->report.sequence, "07");
-  EXPECT_TRUE(summary->report.metrics.has_value());
+  ASSERT_TRUE(summary->report.metrics.has_value());
+  const std::string csv = read_file(request_.out_dir / "frames.csv");
+  const auto errors = test::column(csv, "error_m");
+  double sum = 0.0;
+  for (const std::string& error : errors) {
+    sum += std::pow(std::stod(error), 2) / static_cast<double>(errors.size());
+  }
+  EXPECT_NEAR(std::sqrt(sum), summary->report.metrics->ate_rmse.sim3_m, 1e-4);
   EXPECT_FALSE(summary->interrupted);
   EXPECT_TRUE(summary->warnings.empty());
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <clocale>
+#include <filesystem>
 #include <locale>
 #include <string>
 
@@ -7,17 +8,22 @@
 #include <gtest/gtest.h>
 
 #include "report/frames_csv.hpp"
+#include "support/run_program.hpp"
 
 namespace stemvo {
 namespace {
 
+namespace fs = std::filesystem;
 using ::testing::StartsWith;
 
 constexpr char kHeader[] =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
     "scale_sigma,scale_state,fx_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px,"
     "recognized_frame,map_scale,map_x,map_y,map_z,map_qx,map_qy,map_qz,map_qw,"
-    "map_id,is_scale_new\n";
+    "map_id,is_scale_new,x,y,z,qx,qy,qz,qw,"
+    "step_var_x,step_var_y,step_var_z,step_var_rx,step_var_ry,step_var_rz,error_m,error_deg\n";
+
+const Rigid3 kPose = {Eigen::Quaterniond(0.8, 0.0, 0.0, 0.6), {1.0, 2.0, -0.5}};
 
 FrameResult tracked() {
   FrameResult result;
@@ -36,18 +42,48 @@ FrameResult tracked() {
   result.recognized_frame = 12;
   result.map_id = 2;
   result.is_scale_new = true;
+  result.motion_covariance.diagonal() << 0.01, 0.02, 0.03, 0.04, 0.05, 1.2345678e-6;
   result.map_from_world = {1.25, Eigen::Quaterniond(0.8, 0.6, 0.0, 0.0), {0.5, -1.0, 1.0 / 3.0}};
   return result;
 }
 
 TEST(FramesCsv, HoldsOneRowPerFrame) {
   EXPECT_EQ(frames_csv_header(), kHeader);
-  EXPECT_EQ(frames_csv_row(100, 10.3622, FrameResult()) + frames_csv_row(101, 10.466, tracked()),
+  EXPECT_EQ(frames_csv_row(100, 10.3622, FrameResult(), Rigid3()) +
+                frames_csv_row(101, 10.466, tracked(), kPose),
             "100,10.3622,first,0,0,0.000,0.000,0.0000,none,0.000,0.000,0.000,,disabled,0.00,0."
-            "00,0.00,,,,,1,0,0,0,0,0,0,1,0,0\n"
+            "00,0.00,,,,,1,0,0,0,0,0,0,1,0,0,"
+            "0,0,0,0,0,0,1,0,0,0,0,0,0,,\n"
             "101,10.466,tracking,812,640,1234.568,4321.000,0.2222,essential,"
             "1.250,12.500,3.000,0.0123,held,700.00,600.50,180.25,3.50,0.50,0.75,"
-            "12,1.25,0.5,-1,0.333333333,0.6,0,0,0.8,2,1\n");
+            "12,1.25,0.5,-1,0.333333333,0.6,0,0,0.8,2,1,"
+            "1,2,-0.5,0,0,0.6,0.8,0.01,0.02,0.03,0.04,0.05,1.23457e-06,,\n");
+}
+
+TEST(FramesCsv, ErrorsStandInTheRowsThatHaveATruth) {
+  const std::string row = frames_csv_row(7, 0.5, tracked(), kPose);
+  const FrameError errors[] = {{1, 0.25, 1.0 / 3.0}};
+  std::string filled = row;
+  filled.replace(filled.size() - 3, 3, ",0.2500,0.3333\n");
+  EXPECT_EQ(frames_csv_with_errors(kHeader + row + row + row, errors),
+            kHeader + row + filled + row);
+}
+
+TEST(FramesCsv, EveryColumnIsOnItsPageInOrder) {
+  const std::string page = test::read_file(fs::path(STEMVO_SOURCE_DIR) / "docs/results.md");
+  const std::string table = page.substr(page.find("## frames.csv"));
+  std::string found;
+  for (std::size_t at = table.find("\n| `"); at != std::string::npos;) {
+    for (std::size_t word = at + 4; table[word - 1] == '`'; word = table.find('`', word) + 4) {
+      found += table.substr(word, table.find('`', word) - word) + ",";
+      if (table.compare(table.find('`', word), 4, "`, `") != 0) {
+        break;
+      }
+    }
+    at = table.find("\n| `", at + 1);
+  }
+  found.back() = '\n';
+  EXPECT_EQ(found, kHeader);
 }
 
 /// A number format with a decimal comma and dots between thousands.
@@ -59,7 +95,7 @@ struct CommaNumbers : std::numpunct<char> {
 
 TEST(FramesCsv, DoesNotFollowTheLocale) {
   const std::locale before = std::locale::global(std::locale(std::locale(), new CommaNumbers));
-  const std::string row = frames_csv_row(1234567, 1.5, tracked());
+  const std::string row = frames_csv_row(1234567, 1.5, tracked(), kPose);
   std::locale::global(before);
   EXPECT_THAT(row, StartsWith("1234567,1.5,tracking,812,640,1234.568,"));
 }
