@@ -125,21 +125,34 @@ TEST(RoadBelief, WhatWasWrongForLongHasToBeRightForLong) {
   EXPECT_LT(count, 30);
 }
 
-TEST(RoadBelief, TheSigmaFollowsTheSpreadOfTheMeasurements) {
+/// The sigma's mean factor in the second half of a drive; neighbouring errors correlate by
+/// `correlation`.
+double factor_of(double spread, double correlation) {
   std::mt19937 random(3);
-  const auto factor = [&](double spread) {
-    std::normal_distribution<double> noise(0.0, spread);
-    RoadBelief belief;
-    for (int i = 0; i < 200; ++i) {
-      RoadEvidence frame = good_frame();
-      frame.innovation = noise(random);
-      belief.add(frame);
-    }
-    return belief.sigma_factor();
-  };
-  EXPECT_NEAR(factor(0.5), 1.0, 0.25);
-  EXPECT_NEAR(factor(1.0), 2.0, 0.5);
-  EXPECT_EQ(factor(0.01), 0.5);
+  std::normal_distribution<double> noise(0.0, spread * std::sqrt(1.0 - correlation * correlation));
+  RoadBelief belief;
+  double sum = 0.0;
+  double error = 0.0;
+  const int num_frames = 2000;
+  for (int i = 0; i < num_frames; ++i) {
+    RoadEvidence frame = good_frame();
+    error = correlation * error + noise(random);
+    frame.innovation = error;
+    belief.add(frame);
+    sum += 2 * i < num_frames ? 0.0 : belief.sigma_factor();
+  }
+  return 2.0 * sum / num_frames;
+}
+
+TEST(RoadBelief, TheSigmaFollowsTheSpreadOfTheMeasurements) {
+  EXPECT_NEAR(factor_of(0.5, 0.6), 1.0, 0.25);
+  EXPECT_NEAR(factor_of(1.0, 0.6), 2.0, 0.5);
+  EXPECT_EQ(factor_of(0.01, 0.6), 0.5);
+}
+
+TEST(RoadBelief, TheSigmaIsSmallerWhereErrorsDoNotLast) {
+  EXPECT_NEAR(factor_of(1.0, 0.0), 1.0, 0.2);
+  EXPECT_GT(factor_of(1.0, 0.85), 2.2);
 }
 
 }  // namespace

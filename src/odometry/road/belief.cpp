@@ -40,11 +40,12 @@ constexpr double kMostOfCorrelation = 0.3;
 constexpr double kUnlikelyChi2 = 6.0;
 constexpr double kLeastOfPlane = -1.5;
 
-constexpr double kMaxInnovation2 = 9.0;
-constexpr double kMinInnovationGain = 0.04;
-/// The filter's sigma if errors last for four frames: the length of a bump or a patch of road at
-/// 1 m a frame; on real and rendered roads with true lengths this meets the error.
-constexpr double kCorrelatedFactor = 2.0;
+constexpr double kMaxInnovation = 3.0;
+/// The filter takes about so much of an innovation: errors that change sooner average out in it.
+constexpr double kFilterGain = 0.1;
+/// Mean square of a mean by this gain, of independent innovations of 1.
+constexpr double kIndependent2 = kFilterGain / (2.0 - kFilterGain);
+constexpr double kMinInnovationGain = 0.05;
 constexpr double kMinSigmaFactor = 0.5;
 
 double unlikely(double chi2) {
@@ -102,8 +103,9 @@ void RoadBelief::add(const RoadEvidence& e) {
   if (e.innovation.has_value()) {
     ++num_innovations_;
     const double gain = std::max(kMinInnovationGain, 1.0 / num_innovations_);
-    const double innovation2 = std::min(kMaxInnovation2, *e.innovation * *e.innovation);
-    innovation2_ += gain * (innovation2 - innovation2_);
+    const double innovation = std::clamp(*e.innovation, -kMaxInnovation, kMaxInnovation);
+    mean_innovation_ += kFilterGain * (innovation - mean_innovation_);
+    lasting2_ += gain * (mean_innovation_ * mean_innovation_ / kIndependent2 - lasting2_);
   }
 }
 
@@ -113,8 +115,6 @@ void RoadBelief::restart() {
   doubt_ = kUnproven;
 }
 
-double RoadBelief::sigma_factor() const {
-  return std::max(kMinSigmaFactor, kCorrelatedFactor * std::sqrt(innovation2_));
-}
+double RoadBelief::sigma_factor() const { return std::max(kMinSigmaFactor, std::sqrt(lasting2_)); }
 
 }  // namespace stemvo

@@ -42,7 +42,8 @@ class RoadBelief {
 
   [[nodiscard]] bool is_believed() const { return is_believed_; }
   /// So many times the filter's sigma is the error of the scale: the filter takes the errors of
-  /// neighbouring frames for independent, and their size for the given one.
+  /// neighbouring frames for independent, and their size for the given one. Both show in the mean
+  /// of innovations over as many frames as the filter joins.
   [[nodiscard]] double sigma_factor() const;
   /// The strongest reason against the road when there last was one.
   [[nodiscard]] std::string_view doubt() const { return doubt_; }
@@ -50,12 +51,12 @@ class RoadBelief {
  private:
   double log_odds_ = kStart;
   bool is_believed_ = false;
-  double innovation2_ = kFirstInnovation2;  ///< mean square
-  int num_innovations_ = 1;
+  double mean_innovation_ = 0.0;  ///< of the last ones
+  double lasting2_ = 2.0;         ///< its mean square, as a multiple of independent errors'
+  int num_innovations_ = 5;       ///< the first guess counts as much
   std::string_view doubt_ = kUnproven;
 
   static constexpr double kStart = -1.0;
-  static constexpr double kFirstInnovation2 = 0.5;
   static constexpr std::string_view kUnproven = "no road is proven yet";
 };
 
