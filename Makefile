@@ -2,7 +2,7 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build lab demo test test-all test-long bench test-frameworks format check-format lint docs clean
+.PHONY: help setup build lab demo test test-all test-long bench format check-format lint docs clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
@@ -11,7 +11,6 @@ help:
 	@echo "make test          install what is missing, build, run the tests"
 	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
-	@echo "make test-frameworks  compare exported stems with Keras, timm, torchvision (docs/search.md says how)"
 	@echo "make format        rewrite the C++ sources in the project's format"
 	@echo "make check-format  fail where a source is not in that format or names no licence"
 	@echo "make docs          the documentation as a site: build/docs/index.html"
@@ -44,7 +43,7 @@ test-all: test test-long
 # Without one of these groups the tests that need it are skipped.
 test-long:
 	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
-	@tools/setup.sh tools docs evo
+	@tools/setup.sh tools docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS)
 
@@ -53,10 +52,6 @@ BENCH ?=
 bench: build
 	@tools/setup.sh tools peers
 	@bench/run.py $(SEQUENCE) $(BENCH)
-
-test-frameworks:
-	@tools/setup.sh tools
-	@build/venv/bin/python -m unittest --verbose tests/frameworks/export_frameworks.py
 
 format:
 	@tools/setup.sh tools

@@ -24,7 +24,6 @@ readonly TABLE="\
 browser   build/venv-browser   chromium
 coverage  build/venv-coverage
 docs      build/venv-docs      doxygen
-evo       build/venv-evo
 fuzz      -                    clang-16 libclang-rt-16-dev
 lab       build/lab
 lint      build/venv-lint

@@ -61,12 +61,6 @@ std::string format_length(double length_m, int decimals) {
                                             : fmt::format("{:.{}f}", length_m, decimals);
 }
 
-std::string csv_cell(const std::string& text) {
-  std::ostringstream quoted;
-  quoted << std::quoted(text, '"', '"');
-  return text.find_first_of(",\"\n\r") == std::string::npos ? text : quoted.str();
-}
-
 std::string length_range(const std::vector<double>& lengths_m) {
   return lengths_m.size() == 1 ? fmt::format("{:g} m", lengths_m.front())
                                : fmt::format("{:g}..{:g} m", lengths_m.front(), lengths_m.back());

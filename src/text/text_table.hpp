@@ -29,9 +29,6 @@ class TextTable {
 /// Metres: three significant digits below 1 (and above 0.1 mm), else this many decimals.
 [[nodiscard]] std::string format_length(double length_m, int decimals);
 
-/// A cell of a CSV file, quoted where it must be (RFC 4180).
-[[nodiscard]] std::string csv_cell(const std::string& text);
-
 /// "100..800 m": first and last of the lengths.
 [[nodiscard]] std::string length_range(const std::vector<double>& lengths_m);
 

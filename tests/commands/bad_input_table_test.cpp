@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
+// Faults that any file may have, of each file that the program reads. What is wrong with one kind of file only is with the tests of
+// its reader.
 #include "support/bad_input_table.hpp"
 
-#include <algorithm>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -18,10 +18,7 @@ TEST_F(BadInputTable, Calibration) {
              "P0: 360 0 310 0 0 360 94 0 0 0 1 0\nP2: 361 0 310 0 0 361 94 0 0 0 1 0\n");
   expect_refused_with_faults(
       sequence_ / "calib.txt", "361", run(), {},
-      {large(), text("empty", ""), text("eleven numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1\n"),
-       text("thirteen numbers", "P2: 361 0 310 0 0 361 94 0 0 0 1 0 0\n"),
-       text("no focal length", "P2: 0 0 310 0 0 0 94 0 0 0 1 0\n"),
-       text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
+      {large(), text("tiny focal length", "P2: 1e-300 0 310 0 0 1e-300 94 0 0 0 1 0\n"),
        text("centre far away", "P2: 361 0 1e300 0 0 361 94 0 0 0 1 0\n"),
        text("offset far away", "P2: 361 0 310 1e200 0 361 94 0 0 0 1 0\n"),
        text("of images twice as large", "P2: 722 0 609 0 0 722 172 0 0 0 1 0\n"),
@@ -36,13 +33,7 @@ TEST_F(BadInputTable, Poses) {
     expect_refused_with_faults(
         folder_ / name, "0.125",
         {"evaluate", "--gt", folder_ / "truth.txt", folder_ / "estimate.txt"}, {},
-        {large(), text("empty", ""), text("eleven numbers", "1 0 0 0 0 1 0 0 0 0 1\n"),
-         text("no rotation", "2 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
-         text("reflection", "-1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
-         text("1e160", "1 0 0 1e160 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
-         text("three poses",
-              "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n1 0 0 0 0 1 0 0 0 0 1 1\n"),
-         text("a gap", "1 0 0 0 0 1 0 0 0 0 1 0\n\n1 0 0 0 0 1 0 0 0 0 1 1\n")});
+        {large(), text("1e160", "1 0 0 1e160 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n")});
   }
 }
 
@@ -58,17 +49,14 @@ TEST_F(BadInputTable, TumPoses) {
   write_file(folder_ / "tum.txt", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 1\n");
   expect_refused_with_faults(folder_ / "tum.txt", "2.5",
                              {"evaluate", "--gt", folder_ / "truth.txt", folder_ / "tum.txt"}, {},
-                             {text("seven numbers", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0\n"),
-                              text("no rotation", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 0\n"),
-                              text("1e160", "1.5 0 0 1e160 0 0 0 1\n2.5 0 0 1 0 0 0 1\n"),
-                              text("only a comment", "# nothing\n")});
+                             {text("no rotation", "1.5 0 0 0 0 0 0 1\n2.5 0 0 1 0 0 0 0\n"),
+                              text("1e160", "1.5 0 0 1e160 0 0 0 1\n2.5 0 0 1 0 0 0 1\n")});
 }
 
 TEST_F(BadInputTable, Times) {
   write_file(sequence_ / "times.txt", "0.0\n0.125\n0.25\n");
   expect_refused_with_faults(sequence_ / "times.txt", "0.125", run(), {"cut"},
-                             {large(), text("empty", ""), text("two columns", "0 1\n1 2\n2 3\n"),
-                              text("backwards", "2\n1\n3\n"), text("twice", "1\n1\n1\n")});
+                             {large(), text("two columns", "0 1\n1 2\n2 3\n")});
 }
 
 TEST_F(BadInputTable, CameraFile) {
@@ -84,26 +72,8 @@ TEST_F(BadInputTable, CameraFile) {
                              {"run", (sequence_ / "image_2").string(), "--camera",
                               folder_ / "camera.yaml", "--out", folder_ / "out"},
                              {},
-                             {text("empty", ""),
-                              with("620", "0"),
-                              with("620", "-1"),
-                              with("620", "1e9"),
-                              with("620", "62.5"),
-                              with("188", "99999999999999999999"),
-                              with("360.5", "-1"),
-                              with("310", "1000"),
-                              with("310, 94", "609, 172"),
-                              with("360.5, 360, 310, 94", "0.58, 1.92, 0.5, 0.5"),
-                              with("[0, 0, 0, 0]", "[0, 0]"),
-                              with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"),
-                              with("[0, 0, 0, 0]", "[nan, 0, 0, 0]"),
-                              with("radial-tangential", "fish"),
-                              with("rate_hz: 10", "rate_hz: 0"),
-                              with("rate_hz: 10", "rate_hz: 1e300"),
-                              with("rate_hz", "rate"),
-                              with("image_width", "image_height"),
-                              text("a list", "- 1\n- 2\n"),
-                              text("two documents", good + "---\n" + good),
+                             {with("188", "99999999999999999999"),
+                              with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"), text("a list", "- 1\n- 2\n"),
                               text("a tab", "\t" + good)});
 }
 
@@ -113,27 +83,15 @@ TEST_F(BadInputTable, ConfigurationFile) {
       folder_ / "my.yaml", "1.5",
       {"run", folder_ / "none", "--out", folder_ / "out", "--config", folder_ / "my.yaml"},
       {"cut", "missing"},
-      {text("unknown key", "scale: {height: 1}\n"), text("unknown group", "scales: {}\n"),
-       text("twice", "seed: 1\nseed: 2\n"), text("a list", "[1, 2]\n"),
-       text("two documents", "seed: 1\n---\nseed: 2\n"), text("an alias", "seed: *one\n"),
+      {text("an alias", "seed: *one\n"),
        text("a bomb", "a: &a [x, x, x]\nb: &b [*a, *a, *a]\nc: [*b, *b, *b]\n"),
-       text("a group for a value", "seed: {a: 1}\n"), text("a value for a group", "scale: 1\n"),
        text("no end", "stem: {model: \"gray\n")});
 }
 
 TEST_F(BadInputTable, Model) {
-  const std::string good = read_file(testing::tiny_model("plain_k4s4"));
   const std::string model = folder_ / "plain_k4s4.onnx";
-  write_file(model, good);
-  const auto says = [&](const std::string& key, const std::string& value) {
-    return text(key + " " + value, testing::with_metadata(good, key, value));
-  };
-  expect_refused_with_faults(
-      model, "weights", {"models", model}, {},
-      {text("empty", ""), says("stride", "0"), says("stride", "x"), says("kernel", "40000 4"),
-       says("kernel", "4"), says("padding", "4 0 0 0"), says("padding", "-1 0 0 0"),
-       says("filters", "0"), says("filters", "4"), says("default_filter", "3"),
-       says("filter", "9")});
+  write_file(model, read_file(testing::tiny_model("plain_k4s4")));
+  expect_refused_with_faults(model, "weights", {"models", model}, {}, {text("empty", "")});
 }
 
 TEST_F(BadInputTable, MetricsAndThresholds) {
@@ -141,14 +99,10 @@ TEST_F(BadInputTable, MetricsAndThresholds) {
   write_file(folder_ / "limits.yaml", "t_rel_percent: {max: 1.5}\n");
   const Words check = {"check", folder_ / "metrics.json", "--against", folder_ / "limits.yaml"};
   expect_refused_with_faults(folder_ / "metrics.json", "0.875", check, {"1e300"},
-                             {text("empty", ""), text("a list", "[1, 2]"), text("a number", "3"),
-                              text("more behind it", "{} {}")});
+                             {text("more behind it", "{} {}")});
   expect_refused_with_faults(
       folder_ / "limits.yaml", "1.5", check, {},
-      {text("empty", ""), text("a list", "[1, 2]"), text("no bound", "t_rel_percent: {}\n"),
-       text("unknown bound", "t_rel_percent: {most: 1}\n"),
-       text("unknown number", "t_rel: {max: 1}\n"),
-       text("two documents", "t_rel_percent: {max: 1}\n---\nt_rel_percent: {max: 2}\n")});
+      {text("two documents", "t_rel_percent: {max: 1}\n---\nt_rel_percent: {max: 2}\n")});
 }
 
 TEST_F(BadInputTable, Images) {

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
@@ -57,19 +54,10 @@ class ImageFolderRun : public ::testing::Test {
     more.insert(more.begin(), {"--camera", camera_});
     return run_path(images_.string(), more);
   }
-  ProgramResult run_with_camera(const std::string& before, const std::string& after) const {
-    std::string text = good_camera_;
-    text.replace(text.find(before), before.size(), after);
-    write_file(camera_, text);
-    return run();
-  }
   std::string config_key(const std::string& key) const {
     const std::string text = read_file(out_ + "/config.yaml");
     const std::size_t begin = text.find("  " + key + ": ") + key.size() + 4;
     return text.substr(begin, text.find('\n', begin) - begin);
-  }
-  std::size_t num_poses() const {
-    return read_kitti_trajectory(out_ + "/trajectory_kitti.txt").value().size();
   }
 
   test::TempFolder folder_;
@@ -79,24 +67,6 @@ class ImageFolderRun : public ::testing::Test {
   const std::string out_ = folder_ / "out";
   const std::string good_camera_ = camera_yaml(sequence_, {});
 };
-
-TEST_F(ImageFolderRun, GivesTheBytesOfTheSameKittiFolder) {
-  fs::create_directories(folder_.path() / "other/00");
-  for (const char* name : {"calib.txt", "times.txt"}) {
-    fs::copy_file(sequence_ / name, folder_.path() / "other/00" / name);
-  }
-  fs::copy(images_, folder_.path() / "other/00/image_2");
-  const std::string kitti = folder_ / "kitti";
-  ASSERT_EQ(run_stemvo({"run", folder_ / "other/00", "--out", kitti}).exit_code, 0);
-  write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
-  const ProgramResult result =
-      run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  for (const char* name : {"kitti", "tum"}) {
-    const std::string file = std::string("/trajectory_") + name + ".txt";
-    EXPECT_EQ(read_file(out_ + file), read_file(kitti + file)) << file;
-  }
-}
 
 TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
@@ -142,36 +112,6 @@ TEST_F(ImageFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   expect_scale({"--set", "scale.camera_height_m=1.75"}, "camera_height", "1.75");
 }
 
-TEST_F(ImageFolderRun, PatternsAndJpegs) {
-  const cv::Mat image = cv::imread((images_ / "000003.png").string());
-  cv::imwrite((images_ / "000003.jpg").string(), image);
-  const ProgramResult result =
-      run_path((images_ / "00000?.*").string(), {"--camera", camera_, "--quiet"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(num_poses(), 11U);
-  expect_error(run_path((images_ / "1*.png").string(), {"--camera", camera_}), 1,
-               {"1*.png", "expected images (.png, .jpg, .jpeg), found none"});
-  expect_error(run_path((images_ / "*.png").string()), 1, {"*.png", "expected --camera FILE"});
-  expect_error(run_path((images_ / "000000.png").string(),
-                        {(images_ / "000001.png").string(), "--camera", camera_}),
-               2, {"not expected", "; a pattern of files must be quoted"});
-}
-
-TEST_F(ImageFolderRun, ABrokenImageIsAWarningAndGetsAPose) {
-  const cv::Mat image = cv::imread((images_ / "000003.png").string());
-  fs::remove(images_ / "000003.png");
-  cv::imwrite((images_ / "000003.jpg").string(), image);
-  fs::resize_file(images_ / "000003.jpg", 5000);
-  cv::imwrite((images_ / "000005.png").string(), image(cv::Rect(0, 0, 100, 100)));
-  const ProgramResult result = run({"--quiet"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err,
-              HasSubstr("warning: " + (images_ / "000003.jpg").string() +
-                        ": expected a sound JPEG image, found damaged data (Premature end"));
-  EXPECT_THAT(result.err, HasSubstr("000005.png: expected an image of 620x188 pixels, found 100x"));
-  EXPECT_EQ(num_poses(), 10U);
-}
-
 TEST_F(ImageFolderRun, ACameraThatStandsStillIsSaidToDoSo) {
   EXPECT_THAT(run().out, Not(HasSubstr("hardly any")));
   for (const auto& file : fs::directory_iterator(images_)) {
@@ -182,16 +122,6 @@ TEST_F(ImageFolderRun, ACameraThatStandsStillIsSaidToDoSo) {
   EXPECT_THAT(run().out, HasSubstr("hardly any (100.0 % of the frames in place)"));
 }
 
-TEST_F(ImageFolderRun, NoCameraFile) {
-  expect_error(run_path(images_.string()), 1,
-               {"my images: images: expected --camera FILE", "found neither; 'stemvo run --help'"});
-  expect_error(run_path(images_.string(), {"--times", "t.txt"}), 1, {"t.txt", "--camera"});
-  expect_error(run({"--calib", "c.txt"}), 1, {"c.txt", "--camera or --calib"});
-  fs::remove(camera_);
-  expect_error(run(), 1, {"camera.yaml: cannot read: No such file"});
-  EXPECT_FALSE(fs::exists(out_));
-}
-
 TEST_F(ImageFolderRun, APatternThatTheShellReplaced) {
   std::vector<std::string> names = {"--camera", camera_};
   for (int i = 1; i < 1000; ++i) {
@@ -200,26 +130,6 @@ TEST_F(ImageFolderRun, APatternThatTheShellReplaced) {
   const ProgramResult result = run_path((images_ / "000000.png").string(), names);
   expect_error(result, 2, {"not expected", "a pattern of files must be quoted", "--help"});
   EXPECT_LT(result.err.size(), 500U);
-}
-
-TEST_F(ImageFolderRun, ErrorsOfTheReadersAreOneLine) {
-  expect_error(run_with_camera("intrinsics", "intrinsic"), 1,
-               {"camera.yaml:3: intrinsic: unknown key; known keys: image_width"});
-  write_file(camera_, good_camera_);
-  expect_error(run({"--set", "scale.source=ground_truth"}), 1,
-               {"my images: expected a pose file, which scale.source=ground_truth needs", "--gt"});
-  for (const auto& entry : fs::directory_iterator(images_)) {
-    fs::resize_file(entry.path(), 50);
-  }
-  expect_error(run(), 1, {"none of 10 images can be read", "000000.png"});
-}
-
-TEST_F(ImageFolderRun, Channel) {
-  const ProgramResult result = run_stemvo(
-      {"channel", images_.string(), "--camera", camera_, "--out", out_, "--filters", "0:1"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_TRUE(fs::exists(out_ + "/000000_filter_000.png"));
-  expect_error(run_stemvo({"channel", images_.string(), "--out", out_}), 1, {"--camera FILE"});
 }
 
 }  // namespace

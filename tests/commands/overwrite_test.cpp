@@ -17,15 +17,6 @@ class Overwrite : public ::testing::Test {
   std::string out_ = folder_ / "out";
 };
 
-TEST_F(Overwrite, SynthSparesWhatItDidNotRender) {
-  const std::string image = read_file(sequence_ / "image_2/000003.png");
-  const std::string poses = read_file(folder_ / "poses/00.txt");
-  expect_error(run_stemvo({"synth", folder_.path().string(), "--frames", "2"}), 1,
-               {"poses/00.txt", "expected poses of a rendered drive or none"});
-  EXPECT_EQ(read_file(sequence_ / "image_2/000003.png"), image);
-  EXPECT_EQ(read_file(folder_ / "poses/00.txt"), poses);
-}
-
 TEST_F(Overwrite, CalibrateSparesWhatItReads) {
   write_file(folder_ / "my.yaml", "seed: 1\n");
   fs::create_symlink(sequence_ / "times.txt", folder_ / "link.txt");

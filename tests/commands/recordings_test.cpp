@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -72,39 +71,6 @@ class RecordingsRun : public ::testing::Test {
   const std::string out_ = folder_ / "out";
   std::string camera_text_;
 };
-
-TEST_F(RecordingsRun, Euroc) {
-  const fs::path mav = folder_.path() / "V1/mav0";
-  fs::create_directories(mav / "cam0/data");
-  fs::create_directories(mav / "state_groundtruth_estimate0");
-  std::string list = "#timestamp [ns],filename\n";
-  std::string truth = "#timestamp,..\n";
-  const auto true_poses = read_kitti_trajectory(folder_ / "poses/00.txt");
-  for (int i = 0; i < kNumFrames; ++i) {
-    const long time_ns = 1400000000000000000 + 100000000L * i;
-    const std::string name = fmt::format("{}.png", time_ns);
-    fs::copy_file(image(i), mav / "cam0/data" / name);
-    list += fmt::format("{},{}\n", time_ns, name);
-    const Rigid3& pose = (*true_poses)[static_cast<std::size_t>(i)];
-    const Eigen::Quaterniond q(pose.rotation);
-    if (i != 5) {  // 3 ms late, one of them missing
-      truth += fmt::format("{},{},{},{},{},{},{},{},0,0,0,0,0,0,0,0,0\n", time_ns + 3000000,
-                           pose.translation.x(), pose.translation.y(), pose.translation.z(), q.w(),
-                           q.x(), q.y(), q.z());
-    }
-  }
-  write_file(mav / "cam0/data.csv", list);
-  write_file(mav / "cam0/sensor.yaml",
-             camera_text_ +
-                 "rate_hz: 10\nT_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n");
-  write_file(mav / "state_groundtruth_estimate0/data.csv", truth);
-  const ProgramResult result = run(folder_ / "V1");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, StartsWith("input: EuRoC recording V1, 12 frames of 620x188 pixels, "
-                                     "ground truth for 11 of 12 frames"));
-  EXPECT_EQ(poses(), expected_poses());
-  EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.2);
-}
 
 TEST_F(RecordingsRun, Tum) {
   const fs::path desk = folder_.path() / "desk";
@@ -251,28 +217,6 @@ TEST_F(RecordingsRun, FoldersOfImagesHaveTheNamesOfTheirRecordings) {
   EXPECT_THAT(run_here("second/mav0/cam0/data/").out, HasSubstr("results: results/second\n"));
   EXPECT_THAT(run_here("first/images/0*0?.png").out, HasSubstr("results: results/first_00\n"));
   EXPECT_THAT(run_here("first/images/*.png").out, HasSubstr("results: results/first_2\n"));
-}
-
-TEST_F(RecordingsRun, ACameraThatIsNotThereIsOneLine) {
-  expect_error(run(folder_ / "gone.mp4", {"--camera", camera_}), 1,
-               {"gone.mp4", "check the path", "stemvo run --help"});
-  expect_error(run("camera:987", {"--camera", camera_}), 1,
-               {"/dev/video987", "; 'ls -l /dev/video*'"});
-}
-
-TEST_F(RecordingsRun, RealRecordingsOfOthers) {
-  STEMVO_NEEDS_SHARED_DATA();
-  const fs::path data = testing::shared_data();
-  write_file(camera_,  // freiburg2, as its authors publish it
-             "resolution: [640, 480]\nintrinsics: [520.9, 521.0, 325.1, 249.7]\n"
-             "distortion_model: radial-tangential\n"
-             "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\n");
-  for (const auto& [name, more] : std::vector<std::pair<std::string, std::vector<std::string>>>{
-           {"euroc", {}}, {"tum", {"--camera", camera_}}, {"handheld", {"--frames", "0:30"}}}) {
-    const ProgramResult result = run((data / name).string(), more);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_GT(metrics().at("tracked_fraction").get<double>(), 0.5) << name;
-  }
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from evo.core import metrics, trajectory
 from evo.tools import file_interface
-from stemvo.lab import compare, paired, tables
+from stemvo.lab import bootstrap, compare, tables
 
 
 def call(out, *arguments, code=0):
@@ -39,7 +39,11 @@ def write_kitti(file, poses):
 
 def evo_of(truth_file, file, align, first=0):
     truth, estimate = (file_interface.read_kitti_poses_file(name) for name in (truth_file, file))
-    truth = trajectory.PosePath3D(poses_se3=truth.poses_se3[first:first + estimate.num_poses])
+    return evo_errors(trajectory.PosePath3D(poses_se3=truth.poses_se3[first:first + estimate.num_poses]), estimate, align)
+
+
+def evo_errors(truth, estimate, align):
+    """ATE in m, RPE of neighbours in m and degrees."""
     aligned = copy.deepcopy(estimate)
     aligned.align_origin(truth) if align == "none" else aligned.align(truth, correct_scale=align == "sim3")
     found = []
@@ -93,13 +97,13 @@ def test_intervals_hold_the_truth():
     random, inside = np.random.default_rng(5), 0
     for _ in range(200):
         noise = np.convolve(random.standard_normal(219), np.ones(20) / 20, "valid")
-        low, high = paired.difference([(noise + 1.3, np.ones(200), 20)])[1:]
+        low, high = bootstrap.difference([bootstrap.Drive(noise + 1.3, np.ones(200), 20)])[1:]
         inside += low <= 0.3 <= high
     assert 180 <= inside <= 200
-    assert paired.difference([(np.ones(9), np.zeros(9), 5)])[1:] == (-np.inf, np.inf)
+    assert bootstrap.difference([bootstrap.Drive(np.ones(9), np.zeros(9), 5)])[1:] == (-np.inf, np.inf)
     drives = [(np.full(60, 1.0) + 0.1 * random.standard_normal(60), 3), None]
-    assert paired.best_of({"a": drives, "b": [(drives[0][0] + 1.0, 3), None]}) == "a"
-    assert paired.best_of({"a": drives, "b": [(drives[0][0][::-1], 3), None]}) is None
+    assert bootstrap.best_of({"a": drives, "b": [(drives[0][0] + 1.0, 3), None]}) == "a"
+    assert bootstrap.best_of({"a": drives, "b": [(drives[0][0][::-1], 3), None]}) is None
 
 
 def test_tables_escape():

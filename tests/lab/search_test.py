@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from stemvo.lab import ranking, ratios
+from stemvo.lab import bootstrap, ranking
 from stemvo.lab.cli import main
 from stemvo.lab.rows import Rows
 
@@ -100,13 +100,13 @@ def test_intervals_hold_the_true_ratio():
     random_numbers, inside, decided = np.random.default_rng(3), 0, 0
     for _ in range(100):
         a, b = (np.convolve(random_numbers.exponential(size=87), np.ones(8) / 8, "valid") for _ in range(2))
-        found = ratios.paired_ratio([ratios.Drive(1.2 * a, b, 8)])
+        found = bootstrap.paired_ratio([bootstrap.Drive(1.2 * a, b, 8)])
         inside += found.low <= 1.2 <= found.high
-        decided += ratios.paired_ratio([ratios.Drive(3.0 * a, b, 8)]).is_decided
+        decided += bootstrap.paired_ratio([bootstrap.Drive(3.0 * a, b, 8)]).is_decided
     assert inside >= 90 and decided >= 90
-    assert ratios.Ratio(1.3, 1.1, 1.6).is_above(1) and not ratios.Ratio(1.3, 1.1, 1.6).is_above(1000) and not ratios.Ratio(1.3, 0.0, np.inf).is_above(1)
-    assert ratios.paired_ratio([]) == (1.0, 0.0, np.inf)
-    few = ratios.paired_ratio([ratios.Drive(np.ones(20), np.full(20, 2.0), 8)])
+    assert bootstrap.Ratio(1.3, 1.1, 1.6).is_above(1) and not bootstrap.Ratio(1.3, 1.1, 1.6).is_above(1000) and not bootstrap.Ratio(1.3, 0.0, np.inf).is_above(1)
+    assert bootstrap.paired_ratio([]) == (1.0, 0.0, np.inf)
+    few = bootstrap.paired_ratio([bootstrap.Drive(np.ones(20), np.full(20, 2.0), 8)])
     assert few == (0.5, 0.0, np.inf)
 
 

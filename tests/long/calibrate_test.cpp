@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <chrono>
-#include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
-#include <nlohmann/json.hpp>
 
 #include "support/program_test.hpp"
 #include "support/state_runs.hpp"
@@ -78,48 +73,6 @@ TEST_F(Calibrate, FindsTheCameraThatRenderedTheWalk) {
   std::cout << result.out;
 }
 
-// The focal length, 17 px off, is still on its way at 0.25 px a keyframe.
-TEST_F(Calibrate, FindsTheCameraWhileDrivingWhereAllIsAskedFor) {
-  sequence_ = test::render_walk_once(300) / "sequences/00";
-  const Intrinsics truth = read_intrinsics(sequence_ / "calib.txt");
-  const std::string wrong = folder_ / "wrong.txt";
-  write_intrinsics(wrong, {1.03 * truth.f, truth.cx + 4.0, truth.cy - 3.0});
-  const std::string out = folder_ / "out";
-  const ProgramResult result =
-      run_stemvo({"run", sequence_.string(), "--out", out, "--calib", wrong, "--quiet", "--set",
-                  "camera.refine=all", "--set", "scale.source=none"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const std::string csv = read_file(out + "/frames.csv");
-  const auto json = nlohmann::json::parse(read_file(out + "/metrics.json")).at("camera");
-  for (const auto& [name, expected] :
-       {std::pair("fx", truth.f), std::pair("cx", truth.cx), std::pair("cy", truth.cy)}) {
-    const std::vector<std::string> values = test::column(csv, std::string(name) + "_px");
-    const std::vector<std::string> sigmas = test::column(csv, std::string(name) + "_sigma_px");
-    ASSERT_EQ(values.size(), 300U);
-    const double sigma = std::stod(sigmas.back());
-    const double error = std::abs(std::stod(values.back()) - expected);
-    EXPECT_LT(error, 0.5 * std::abs(std::stod(values.front()) - expected)) << name;
-    EXPECT_LT(error, 2.0 * sigma) << name;
-    EXPECT_LT(sigma, 0.2 * std::stod(sigmas.front())) << name << ": of what is assumed";
-    EXPECT_NEAR(json.at(std::string(name) + "_px"), std::stod(values.back()), 0.006);
-    EXPECT_NEAR(json.at(std::string(name) + "_sigma_px"), sigma, 0.006);
-  }
-}
-
-TEST_F(Calibrate, TwoRunsGiveTheSameBytesAndTheGivenCalibrationIsLeftAlone) {
-  sequence_ = test::render_walk_once(300) / "sequences/00";
-  const std::string before = read_file(sequence_ / "calib.txt");
-  const ProgramResult first = calibrate({});
-  ASSERT_EQ(first.exit_code, 0) << first.err << first.out;
-  const std::string bytes = read_file(out_);
-  const ProgramResult second = calibrate({"--quiet"});
-  EXPECT_EQ(second.exit_code, 0);
-  EXPECT_THAT(second.out + second.err, IsEmpty());
-  EXPECT_EQ(read_file(out_), bytes);
-  EXPECT_FALSE(bytes.empty());
-  EXPECT_EQ(read_file(sequence_ / "calib.txt"), before);
-}
-
 TEST_F(Calibrate, ARunUsesTheFileItIsGivenAndNoOther) {
   const fs::path copy = test::copy_drive(folder_.path(), 12);
   const std::string wrong = folder_ / "wrong.txt";
@@ -179,39 +132,6 @@ TEST_F(Calibrate, WhatIsWrongIsSaid) {
   expect_error(run_stemvo({"calibrate", sequence_.string(), "--out", folder_ / "no/file.txt"}),
                {"no/file.txt"});
   EXPECT_FALSE(fs::exists(out_));
-}
-
-TEST_F(Calibrate, AStraightDriveDeterminesNothing) {
-  const ProgramResult result = calibrate({"--frames", "0:25"});  // one run, hardly a turn
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.out, HasSubstr("undetermined"));
-  EXPECT_THAT(result.err, HasSubstr("determines neither"));
-  EXPECT_FALSE(fs::exists(out_));
-}
-
-// The same image again and again: a camera that stands determines nothing.
-TEST_F(Calibrate, StandingStillIsAnError) {
-  sequence_ = test::copy_drive(folder_.path(), 30);
-  for (int i = 1; i < 30; ++i) {
-    char name[32];
-    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
-    fs::copy_file(sequence_ / "image_2/000000.png", sequence_ / name,
-                  fs::copy_options::overwrite_existing);
-  }
-  expect_error(calibrate({"--quiet"}), {"that move", "30 frames"});
-  EXPECT_FALSE(fs::exists(out_));
-}
-
-TEST_F(Calibrate, InterruptWritesNothingAndSaysSo) {
-  sequence_ = test::render_walk_once(300) / "sequences/00";
-  test::RunningProgram program(STEMVO_PROGRAM, {"calibrate", sequence_.string(), "--out", out_});
-  std::this_thread::sleep_for(std::chrono::milliseconds(700));
-  program.send(SIGINT);
-  const ProgramResult result = program.wait();
-  EXPECT_EQ(result.exit_code, 130) << result.err;
-  EXPECT_THAT(result.err, AllOf(HasSubstr("interrupted"), HasSubstr("was not written")));
-  EXPECT_FALSE(fs::exists(out_));
-  EXPECT_FALSE(fs::exists(out_ + ".unfinished"));
 }
 
 }  // namespace

@@ -177,29 +177,6 @@ class Cut(Files):
         self.assertIn("expected --preprocessing", self.error_of(self.path, "--layers", "front"))
         self.assertIn("--filter: expected 0 to 5, found 6", self.error_of(self.path, "--layers", "front", "--filter", "6", *options))
 
-    def test_a_known_network_is_held_against_the_first_convolution(self):
-        network(self.path)
-        options = ("--layers", "front", "--preprocessing", "none")
-        self.assertIn("whole.onnx: --network: expected the stem of ResNet-18 (64 filters 7x7, stride 2, batch norm), found 6 filters 5x5, stride 2",
-                      self.error_of(self.path, *options, "--network", "ResNet-18"))
-        self.assertEqual(self.export(self.path, *options, "--network", "ours")[-1]["network"], "ours")
-
-    def test_the_file_is_read_before_more_is_asked_for(self):
-        for content, found in ((b"text", "expected an .onnx file, found:"), (None, "expected an .onnx file, found nothing")):
-            self.path.unlink(missing_ok=True)
-            if content is not None:
-                self.path.write_bytes(content)
-            for options in ((), ("--layers", "front")):
-                self.assertIn(found, self.error_of(self.path, *options))
-
-    def test_list(self):
-        network(self.path)
-        text = export_stem.layer_list.text(export_stem.layer_list.of_graph(self.path, None))
-        self.assertRegex(text, r"front +convolution +6  yes\n")
-        self.assertRegex(text, r"last +Transpose +6  no\n")
-        self.assertRegex(text, r"second +depthwise +6  no\n")
-        self.assertIn("used 12 (in 2 convolutions)", text)
-
 
 class Window(unittest.TestCase):
     def test_equals_where_a_gradient_is_not_zero(self):

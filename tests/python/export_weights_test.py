@@ -106,17 +106,6 @@ class Keras(Weights):
         exporting.keras_named(self.folder / "resnet.h5", layers, order)
         self.check(self.folder / "resnet.h5", stem, "ResNet-50")
 
-    def test_list_has_the_totals_of_table_1(self):
-        path, _ = self.convnext("convnext.h5")
-        with contextlib.redirect_stdout(io.StringIO()) as said:
-            self.assertEqual(export_stem.main([str(path), "--list"]), 0)
-        lines = said.getvalue().splitlines()
-        self.assertRegex(lines[4], r"^convnext_tiny_stem_conv +convolution +96  in convnext_tiny_stem$")
-        self.assertIn("layers 21, filters 0, used 0 (in 0 convolutions)", lines[-1])
-        path, _ = self.resnet()
-        text = export_stem.layer_list.text(export_stem.layer_list.of_weights(path))
-        self.assertIn("used 80 (in 17 convolutions), not used 64", text)
-
 
 class Torch(Weights):
     def test_resnet(self):

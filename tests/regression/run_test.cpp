@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -72,27 +71,6 @@ TEST_F(Run, NothingLooksAhead) {
   const std::string shorter = read_file(out_ + "short/trajectory_kitti.txt");
   EXPECT_EQ(count_lines(shorter), 25);
   EXPECT_EQ(longer.substr(0, shorter.size()), shorter);
-}
-
-TEST_F(Run, MetricsHaveEveryKeyOfTheContract) {
-  ASSERT_EQ(run_drive(sequence_, out_, {"--set", kTrueScale}).exit_code, 0);
-  const nlohmann::json metrics = metrics_of(out_);
-  for (const char* key :
-       {"frames", "fps", "path_length_m", "scale_source", "average_offset_m", "null_offset_m",
-        "t_rel_percent", "r_rel_deg_per_100m", "segment_lengths_m", "segments", "ate_rmse_m",
-        "rpe_rotation_deg", "tracked_fraction", "in_place_fraction", "alignment",
-        "road_measured_fraction"}) {
-    EXPECT_TRUE(metrics.contains(key)) << key;
-  }
-  for (const char* key : {"none", "scale", "se3", "sim3"}) {
-    EXPECT_TRUE(metrics["ate_rmse_m"].contains(key)) << key;
-  }
-  EXPECT_EQ(metrics["frames"], 60);
-  EXPECT_EQ(metrics["scale_source"], "ground_truth");
-  EXPECT_GT(metrics["fps"].get<double>(), 0.0);
-  EXPECT_GE(metrics["tracked_fraction"].get<double>(), 0.95);
-  EXPECT_LT(metrics["average_offset_m"].get<double>(),
-            0.2 * metrics["null_offset_m"].get<double>());
 }
 
 /// The code for processors without AVX2: bytes of its own for any number of threads, and a path
@@ -174,70 +152,6 @@ TEST_F(Run, FramesInTheMiddleStartAtTheIdentity) {
   const nlohmann::json metrics = metrics_of(out_);
   EXPECT_LT(metrics["average_offset_m"].get<double>(),
             0.2 * metrics["null_offset_m"].get<double>());
-}
-
-TEST_F(Run, TheMapShowsTheStreetAndLeavesTheDrivenWayFree) {
-  const ProgramResult result = run_drive(
-      sequence_, out_,
-      {"--set", "odometry.mode=map", "--set", kTrueScale, "--set", "features.max_features=1000"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_LT(metrics_of(out_)["t_rel_percent"].get<double>(), 2.0);
-  const testing::PlyFile map = testing::read_ply(out_ + "/map.ply");
-  ASSERT_EQ(map.edges.size(), 59U);
-  const std::size_t num_points = map.vertices.size() - 60;
-  ASSERT_GT(num_points, 1000U);
-  std::size_t num_of_road = 0;
-  std::size_t num_in_the_way = 0;
-  std::size_t num_colored = 0;
-  for (std::size_t i = 0; i < num_points; ++i) {
-    const testing::PlyFile::Vertex& point = map.vertices[i];
-    num_colored += point.rgb[0] != point.rgb[2] ? 1 : 0;
-    float nearest = 1e9F;
-    float below = 0.0F;  // the camera there, along y
-    for (std::size_t k = num_points; k < map.vertices.size(); ++k) {
-      const Eigen::Vector3f offset = point.position - map.vertices[k].position;
-      const float across = std::hypot(offset.x(), offset.z());
-      if (across < nearest) {
-        nearest = across;
-        below = offset.y();
-      }
-    }
-    num_of_road += nearest < 3.0F && below > 1.4F && below < 1.9F ? 1 : 0;
-    num_in_the_way += nearest < 1.0F && std::abs(below) < 1.0F ? 1 : 0;
-  }
-  EXPECT_GT(num_of_road, num_points / 40);
-  EXPECT_LE(num_in_the_way, num_points / 200);
-  EXPECT_GT(num_colored, num_points / 4);
-}
-
-TEST_F(Run, BrokenFramesGetAStateAndTheRunGoesOn) {
-  const fs::path copy = test::copy_drive(folder_.path(), 20);
-  fs::resize_file(copy / "image_2/000008.png", 900);
-  fs::copy_file(rendered_drive({3, 320, 96}) / "sequences/00/image_2/000001.png",
-                copy / "image_2/000014.png", fs::copy_options::overwrite_existing);
-  const ProgramResult result = run_drive(copy, out_, {"--set", kTrueScale, "--pictures", "1"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("warning: "));
-  EXPECT_THAT(result.err, HasSubstr("000008.png"));
-  EXPECT_THAT(result.err, AllOf(HasSubstr("000014.png"), HasSubstr("320x96")));
-  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 20);
-  const std::string frames = read_file(out_ + "/frames.csv");
-  EXPECT_EQ(count_lines(frames), 21);
-  std::size_t num_missing = 0;
-  for (std::size_t at = frames.find(",no_image,"); at != std::string::npos;
-       at = frames.find(",no_image,", at + 1)) {
-    ++num_missing;
-  }
-  EXPECT_EQ(num_missing, 2U);
-  EXPECT_LT(metrics_of(out_)["tracked_fraction"].get<double>(), 0.95);
-}
-
-TEST_F(Run, BrokenFirstFrameIsNoEnd) {
-  const fs::path copy = test::copy_drive(folder_.path(), 10);
-  fs::resize_file(copy / "image_2/000000.png", 100);
-  const ProgramResult result = run_drive(copy, out_);
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 10);
 }
 
 TEST_F(Run, InterruptWritesWhatWasComputed) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 #include <string>
-#include <vector>
 
 #include "evaluation/trajectory.hpp"
 #include "support/drives.hpp"
@@ -18,7 +16,6 @@ struct StateDrive {
   Trajectory world_from_camera;
   int event_begin = 0;  ///< frames [begin, end) are the event
   int event_end = 0;
-  int rate = 1;  ///< frames per 0.1 s
 
   /// One more frame, `step_m` ahead and turned to the right.
   void drive(double step_m, double yaw_rad) {
@@ -29,8 +26,8 @@ struct StateDrive {
   /// Along a road that winds a little.
   void drive_on(int num_frames, double step_m) {
     for (int i = 0; i < num_frames; ++i) {
-      const double seconds = 0.1 * static_cast<double>(world_from_camera.size()) / rate;
-      drive(step_m, 0.01 / rate * std::sin(0.7 * seconds));
+      const double seconds = 0.1 * static_cast<double>(world_from_camera.size());
+      drive(step_m, 0.01 * std::sin(0.7 * seconds));
     }
   }
   void begin() { event_begin = static_cast<int>(world_from_camera.size()); }
@@ -41,49 +38,32 @@ inline constexpr double kDriveStep_m = 0.8;
 inline constexpr double kStepAfterCut_m = 1.2;
 inline constexpr double kTurnPerFrame_rad = 2.5 * std::numbers::pi / 180.0;
 
-/// Brakes over 0.7 s, lets `event` happen, and speeds up again; `rate` frames per 0.1 s.
-template <typename Event>
-StateDrive stop_for(const Event& event, int rate) {
-  const double step_m = kDriveStep_m / rate;
-  const int num_slow = 8 * rate;
+/// Brakes over 0.7 s, turns on the spot for so many frames, and speeds up again.
+inline StateDrive stop_for(int num_frames, double yaw_rad) {
+  constexpr int kNumSlow = 8;
   StateDrive drive;
-  drive.rate = rate;
   drive.world_from_camera.emplace_back();
-  drive.drive_on(40 * rate, step_m);
-  for (int k = num_slow - 1; k > 0; --k) {
-    drive.drive(step_m * k / num_slow, 0.0);
+  drive.drive_on(40, kDriveStep_m);
+  for (int k = kNumSlow - 1; k > 0; --k) {
+    drive.drive(kDriveStep_m * k / kNumSlow, 0.0);
   }
   drive.begin();
-  event(drive);
-  drive.end();
-  for (int k = 1; k < num_slow; ++k) {
-    drive.drive(step_m * k / num_slow, 0.0);
+  for (int i = 0; i < num_frames; ++i) {
+    drive.drive(0.0, yaw_rad);
   }
-  drive.drive_on(40 * rate, step_m);
+  drive.end();
+  for (int k = 1; k < kNumSlow; ++k) {
+    drive.drive(kDriveStep_m * k / kNumSlow, 0.0);
+  }
+  drive.drive_on(40, kDriveStep_m);
   return drive;
 }
 
 /// 2 s without motion.
-inline StateDrive standing_drive(int rate = 1) {
-  return stop_for(
-      [rate](StateDrive& drive) {
-        for (int i = 0; i < 20 * rate; ++i) {
-          drive.drive(0.0, 0.0);
-        }
-      },
-      rate);
-}
+inline StateDrive standing_drive() { return stop_for(20, 0.0); }
 
 /// 40 degrees to the right on the spot, in 1.6 s.
-inline StateDrive turning_drive(int rate = 1) {
-  return stop_for(
-      [rate](StateDrive& drive) {
-        for (int i = 0; i < 16 * rate; ++i) {
-          drive.drive(0.0, kTurnPerFrame_rad / rate);
-        }
-      },
-      rate);
-}
+inline StateDrive turning_drive() { return stop_for(16, kTurnPerFrame_rad); }
 
 /// Nothing but driving, 60 frames.
 inline StateDrive steady_drive() {
@@ -94,16 +74,15 @@ inline StateDrive steady_drive() {
 }
 
 /// From one frame to the next in another street, and faster.
-inline StateDrive cut_drive(int rate = 1) {
+inline StateDrive cut_drive() {
   StateDrive drive;
-  drive.rate = rate;
   drive.world_from_camera.emplace_back();
-  drive.drive_on(50 * rate, kDriveStep_m / rate);
+  drive.drive_on(50, kDriveStep_m);
   drive.begin();
   drive.world_from_camera.push_back(drive.world_from_camera.back() *
                                     Rigid3(so3_exp({0.0, 0.5, 0.0}), {60.0, 0.0, 40.0}));
   drive.end();
-  drive.drive_on(50 * rate, kStepAfterCut_m / rate);
+  drive.drive_on(50, kStepAfterCut_m);
   return drive;
 }
 

@@ -182,6 +182,11 @@ TEST_F(ConfigLoad, NotYamlNamesTheLine) {
   EXPECT_THAT(error_of("seed: 1\nstem: [1,\n"), StartsWith(":3: not YAML: "));
   EXPECT_THAT(error_of("seed: 1\n---\nseed: 2\n"),
               HasSubstr(":2: not YAML: expected one document, found more behind it"));
+  // yaml-cpp's LoadAll never ends here.
+  for (const char* text : {"seed: 1\n...\nseed: 2\n", "{seed: 1}\nstem: {filter: 3}\n",
+                           "{stem: {filter: 3}},\n"}) {
+    EXPECT_THAT(error_of(text), HasSubstr("more behind it")) << text;
+  }
   EXPECT_THAT(error_of(std::string("\x89PNG\r\n\x1a\n\0\0", 10)), HasSubstr(": not YAML: "));
 }
 
@@ -254,24 +259,6 @@ TEST(ConfigOverride, ErrorsAreOneLineAndLeaveTheConfigAlone) {
       error_of("evaluation.segment_lengths_m=[10,-20]"),
       "--set evaluation.segment_lengths_m: expected a number from 0.01 to 1000000, found -20");
   EXPECT_THAT(error_of("evaluation.segment_lengths_m=[10"), HasSubstr("not YAML"));
-}
-
-TEST(ConfigValidate, EveryNumberRefusesNan) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(validate(Config{}));
-  const auto refuses = [nan](auto&& member) {
-    Config config;
-    member(config) = nan;
-    return !validate(config);
-  };
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.sigma_px; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.two_view.homography_ratio; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.scale.step_m; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.features.min_distance_px; }));
-  EXPECT_TRUE(refuses([](Config& c) -> double& { return c.stem.contrast_low_percent; }));
-  Config config;
-  config.evaluation.segment_lengths_m = {100.0, nan};
-  EXPECT_FALSE(validate(config));
 }
 
 TEST(ConfigValidate, PercentilesMustBeInOrder) {

@@ -2,12 +2,10 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "dataset/frame_source.hpp"
 #include "support/temp_folder.hpp"
@@ -186,13 +184,6 @@ TEST_F(ImageFolderTest, OtherFilesAreErrorsOfTheirFrameOnly) {
   EXPECT_TRUE(opened->read(0));
 }
 
-TEST_F(ImageFolderTest, NoImageThatCanBeRead) {
-  for (int i = 0; i < kNumImages; ++i) {
-    fs::resize_file(image(i), 100);
-  }
-  EXPECT_THAT(error_of(), AllOf(HasSubstr("none of 4"), HasSubstr("frame8.jpg")));
-}
-
 TEST_F(ImageFolderTest, SizeOtherThanTheCamerasIsRefused) {
   write_camera("rate_hz: 10\n", "[24, 32]");
   EXPECT_THAT(error_of(), AllOf(HasSubstr("my drive: expected images of 24x32 pixels"),
@@ -233,24 +224,6 @@ TEST_F(ImageFolderTest, Times) {
   EXPECT_THAT(with_times("0\nnan\n2\n3\n"), HasSubstr("times.txt:2: expected a finite number"));
   request_.times = temp_ / "none.txt";
   EXPECT_THAT(error_of(), HasSubstr("none.txt"));
-}
-
-TEST_F(ImageFolderTest, Poses) {
-  const auto with_poses = [&](const std::string& text) {
-    request_.ground_truth = temp_.file("poses.txt", text);
-    return error_of();
-  };
-  EXPECT_EQ(with_poses(pose_lines(4)), "(opened)");
-  EXPECT_THAT(
-      with_poses(pose_lines(3)),
-      AllOf(HasSubstr("poses.txt: expected a pose for each of 4"), HasSubstr("found 3 poses")));
-  EXPECT_THAT(with_poses(pose_lines(5)), HasSubstr("found 5 poses"));
-  EXPECT_THAT(with_poses("1 2 3\n"), HasSubstr("poses.txt:1: expected 12 numbers, found 3"));
-}
-
-TEST_F(ImageFolderTest, RangeOutside) {
-  request_.frames = parse_frame_range("2:5").value();
-  EXPECT_THAT(error_of(), HasSubstr("expected frames inside 0:4, found --frames 2:5"));
 }
 
 TEST_F(ImageFolderTest, FolderProblems) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <limits>
 #include <string>
@@ -9,12 +8,10 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "features/patch_alignment.hpp"
 #include "stemvo/options.hpp"
-#include "support/plain_alignment.hpp"
 #include "support/planted_warps.hpp"
 
 namespace stemvo {
@@ -74,26 +71,10 @@ struct PlantedPoints {
   std::vector<cv::Point2f> start;
 };
 
-/// How far the farthest pixel of a patch (5 px from its centre) is from where plain code in double
-/// precision has it.
-double to_plain_px(const PatchMatch& found, const test::PlainMatch& plain) {
-  return std::abs(plain.at - test::Complex(found.warp.x, found.warp.y)) +
-         5.0 * std::abs(plain.turn - test::Complex(found.warp.a, found.warp.b));
-}
-
-/// Found: 0.00001 px, at most 0.00005, which is rounding (coordinates are multiples of 0.00003).
-/// At most one step: the length of a step may be on the other side of the bound that ends them.
-void expect_near_plain(const Distances& differences) {
-  EXPECT_LE(differences.quantile_px(0.5), 3e-5);
-  EXPECT_LE(differences.quantile_px(0.99), 1e-4);
-  EXPECT_LE(differences.quantile_px(1.0), 0.03);
-}
-
 Distances errors_of_patches(const PlantedPoints& points) {
   const TestPyramid before(points.before);
   const TestPyramid after(points.after);
   std::vector<double> errors_px;
-  std::vector<double> differences_px;
   for (std::size_t i = 0; i < points.from.size(); ++i) {
     const cv::Point2f& from = points.from[i];
     const cv::Point2f& start = points.start[i];
@@ -104,12 +85,7 @@ Distances errors_of_patches(const PlantedPoints& points) {
       continue;
     }
     errors_px.push_back(cv::norm(cv::Point2f(found.warp.x, found.warp.y) - points.truth[i]));
-    const test::PlainMatch plain = test::align(before.levels.data(), {from.x, from.y},
-                                               after.levels.data(), {start.x, start.y});
-    differences_px.push_back(to_plain_px(found, plain));
-    EXPECT_NEAR(found.correlation, plain.correlation, 1e-3);
   }
-  expect_near_plain({differences_px, points.from.size()});
   return {errors_px, points.from.size()};
 }
 

@@ -7,7 +7,7 @@
 
 #include "features/patch_kernels.hpp"
 #include "instruction_set.hpp"
-#include "support/plain_alignment.hpp"
+#include "support/plain_samples.hpp"
 #include "support/planted_warps.hpp"
 
 namespace stemvo {

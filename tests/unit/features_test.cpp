@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <string>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
@@ -59,22 +58,6 @@ TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
   EXPECT_GT(matches.cur_uv.size(), 150U);
   EXPECT_LE(median_error_px(matches, {-6.5, 3.5}),
             GetParam() == FeatureMethod::kPatch || GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
-}
-
-TEST_P(FrontEndTest, GivesTheSameMatchesForAnyNumberOfThreads) {
-  std::vector<Eigen::Vector2d> reference;
-  for (const int num_threads : {1, 2, 4}) {
-    cv::setNumThreads(num_threads);
-    SetUp();
-    const cv::Size size(320, 160);
-    static_cast<void>(front_end_->process(image_of(textured_image(size, {0.0, 0.0}))));
-    const Matches matches = front_end_->process(image_of(textured_image(size, {2.0, 1.0})));
-    if (reference.empty()) {
-      reference = matches.cur_uv;
-    }
-    EXPECT_EQ(matches.cur_uv, reference) << num_threads << " threads";
-  }
-  cv::setNumThreads(-1);
 }
 
 TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 #include <ceres/rotation.h>
 #include <gtest/gtest.h>
 
 #include "geometry/bundle.hpp"
-#include "geometry/normal_equations.hpp"
 #include "support/synthetic_drive_tracks.hpp"
 
 namespace stemvo {
@@ -40,41 +42,53 @@ Bundle bundle_of(const DriveTracks& drive, double push) {
   return bundle;
 }
 
+/// `camera`: the change of cx, cy, focal lengths, k1, k2.
 struct ReprojectionError {
-  const Camera& camera;
+  const Camera& given;
   Eigen::Vector2d uv;
 
   template <typename T>
-  bool operator()(const T* rotation, const T* translation, const T* point, T* residual) const {
+  bool operator()(
+      const T* rotation, const T* translation, const T* point, const T* camera, T* residual) const {
     T x[3];
     ceres::AngleAxisRotatePoint(rotation, point, x);
-    for (int i = 0; i < 3; ++i) {
-      x[i] += translation[i];
-    }
-    residual[0] = camera.fx_px * x[0] / x[2] + camera.cx_px - uv.x();
-    residual[1] = camera.fy_px * x[1] / x[2] + camera.cy_px - uv.y();
+    const T u = (x[0] + translation[0]) / (x[2] + translation[2]);
+    const T v = (x[1] + translation[1]) / (x[2] + translation[2]);
+    const T r_sq = u * u + v * v;
+    const T stretch = (1.0 + camera[2]) * (1.0 + r_sq * (camera[3] + r_sq * camera[4]));
+    residual[0] = given.fx_px * stretch * u + given.cx_px + camera[0] - uv.x();
+    residual[1] = given.fy_px * stretch * v + given.cy_px + camera[1] - uv.y();
     return true;
   }
 };
 
-/// Ceres's solution of the same problem; returns the sum of its loss, px^2.
-double solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
+/// Ceres's solution of the same problem; returns the sum of its loss, px^2, and the camera's change.
+std::pair<double, IntrinsicsDelta> solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
   ceres::Problem problem;
   std::vector<Eigen::Matrix<double, 6, 1>> poses;
   for (const Rigid3& pose : bundle.camera_from_world) {
     poses.emplace_back() << so3_log(pose.rotation), pose.translation;
   }
+  IntrinsicsDelta camera = IntrinsicsDelta::Zero();
   auto* loss = new ceres::CauchyLoss(options.loss_scale_px);
   for (const Bundle::Observation& seen : bundle.observations) {
     double* pose = poses[static_cast<std::size_t>(seen.pose)].data();
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ReprojectionError, 2, 3, 3, 3>(
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ReprojectionError, 2, 3, 3, 3, 5>(
                                  new ReprojectionError{bundle.camera, seen.uv}),
                              loss, pose, pose + 3,
-                             bundle.points[static_cast<std::size_t>(seen.point)].data());
+                             bundle.points[static_cast<std::size_t>(seen.point)].data(),
+                             camera.data());
   }
   for (int i = 0; i < options.num_fixed_poses; ++i) {
     problem.SetParameterBlockConstant(poses[static_cast<std::size_t>(i)].data());
     problem.SetParameterBlockConstant(poses[static_cast<std::size_t>(i)].data() + 3);
+  }
+  if (options.camera) {
+    const CameraInformation root = options.camera->information.llt().matrixU();
+    problem.AddResidualBlock(new ceres::NormalPrior(root, options.camera->mean), nullptr,
+                             camera.data());
+  } else {
+    problem.SetParameterBlockConstant(camera.data());
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
@@ -86,147 +100,35 @@ double solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     bundle.camera_from_world[i] = Rigid3(so3_exp(poses[i].head<3>()), poses[i].tail<3>());
   }
-  return 2.0 * summary.final_cost;
+  return {2.0 * summary.final_cost, camera};
+}
+
+CameraPrior weak_prior(double noise_px) {
+  IntrinsicsDelta sigma;
+  sigma << 10.0, 10.0, 0.003, 0.01, 0.005;
+  return {IntrinsicsDelta::Zero(),
+          (noise_px * sigma.cwiseInverse()).cwiseAbs2().asDiagonal().toDenseMatrix()};
 }
 
 TEST(Bundle, EndsWhereCeresDoes) {
-  const DriveTracks drive(8, 0.3, 5);
-  BundleOptions options;
-  options.max_iterations = 100;
-  options.min_relative_decrease = 1e-14;
-  Bundle ours = bundle_of(drive, 1.0);
-  Bundle judge = ours;
-  const BundleResult result = solve_bundle_adjustment(ours, options);
-  ASSERT_TRUE(result.is_usable);
-  const double cost = solve_by_ceres(judge, options);
-  EXPECT_NEAR(result.cost, cost, 1e-6 * cost);
-  for (std::size_t i = 0; i < ours.camera_from_world.size(); ++i) {
-    const Rigid3& a = ours.camera_from_world[i];
-    const Rigid3& b = judge.camera_from_world[i];
-    EXPECT_LE((a.translation - b.translation).norm(), 1e-5) << i;
-    EXPECT_LE(a.rotation.angularDistance(b.rotation), 1e-6) << i;
-  }
-}
-
-constexpr int kCamera = NormalEquations::kCamera;
-
-std::vector<Reprojection> reprojections_of(const Bundle& bundle) {
-  std::vector<Reprojection> at;
-  for (const Bundle::Observation& seen : bundle.observations) {
-    const Rigid3& pose = bundle.camera_from_world[static_cast<std::size_t>(seen.pose)];
-    at.emplace_back(bundle, seen, pose.rotation_matrix());
-  }
-  return at;
-}
-
-/// Errors where the unknowns move: the camera's five, the free poses' six, the points' three.
-Eigen::VectorXd errors_at(Bundle bundle, const Eigen::VectorXd& x, int num_fixed) {
-  bundle.camera.cx_px += x[0];
-  bundle.camera.cy_px += x[1];
-  bundle.camera.fx_px *= 1.0 + x[2];
-  bundle.camera.fy_px *= 1.0 + x[2];
-  bundle.radial += x.segment<2>(3);
-  int row = kCamera;
-  for (std::size_t i = static_cast<std::size_t>(num_fixed); i < bundle.camera_from_world.size();
-       ++i, row += 6) {
-    Rigid3& pose = bundle.camera_from_world[i];
-    const Eigen::Quaterniond turn = so3_exp(x.segment<3>(row));
-    pose = Rigid3(turn * pose.rotation, turn * pose.translation + x.segment<3>(row + 3));
-  }
-  for (Eigen::Vector3d& point : bundle.points) {
-    point += x.segment<3>(row);
-    row += 3;
-  }
-  Eigen::VectorXd errors(2 * std::ssize(bundle.observations));
-  row = 0;
-  for (const Reprojection& at : reprojections_of(bundle)) {
-    errors.segment<2>(row) = at.error;
-    row += 2;
-  }
-  return errors;
-}
-
-/// The normal equations of all unknowns, by differences; the gradient is the last column.
-Eigen::MatrixXd normal_equations(const Bundle& bundle, double weight, int num_fixed) {
-  const int num_poses = static_cast<int>(bundle.camera_from_world.size()) - num_fixed;
-  const Eigen::Index size = kCamera + 6 * num_poses + 3 * std::ssize(bundle.points);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(size);
-  Eigen::MatrixXd jacobian(2 * std::ssize(bundle.observations), size + 1);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    constexpr double kStep = 1e-6;
-    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(size, i);
-    jacobian.col(i) =
-        (errors_at(bundle, step, num_fixed) - errors_at(bundle, -step, num_fixed)) / (2.0 * kStep);
-  }
-  jacobian.col(size) = errors_at(bundle, zero, num_fixed);
-  return weight * jacobian.transpose() * jacobian;
-}
-
-/// With the points eliminated.
-Eigen::MatrixXd reduced(const Eigen::MatrixXd& all, Eigen::Index size, double damping) {
-  const Eigen::Index num_points = all.rows() - 1 - size;
-  Eigen::MatrixXd points = all.block(size, size, num_points, num_points);
-  points.diagonal() *= 1.0 + damping;
-  const Eigen::MatrixXd mixed = all.block(0, size, size, num_points);
-  Eigen::MatrixXd result(size, size + 1);
-  result.leftCols(size) =
-      all.topLeftCorner(size, size) - mixed * points.ldlt().solve(mixed.transpose());
-  result.col(size) = all.col(all.cols() - 1).head(size) -
-                     mixed * points.ldlt().solve(all.col(all.cols() - 1).segment(size, num_points));
-  return result;
-}
-
-/// As above, of the equations: rows and columns up to the diagonal, then the gradient.
-Eigen::MatrixXd reduced(const NormalEquations& equations) {
-  const int size = kCamera + 6 * equations.num_free_poses();
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size + 1);
-  const auto put = [&](const NormalEquations::Column& column, int num_rows, int row, int col) {
-    for (int r = 0; r < num_rows; ++r) {
-      result(row + r, col) = column[r];
-    }
-  };
-  put(equations.camera.gradient, kCamera, 0, size);
-  for (int c = 0; c < kCamera; ++c) {
-    put(equations.camera.with_camera[static_cast<std::size_t>(c)], kCamera, 0, c);
-  }
-  for (int j = 0; j < equations.num_free_poses(); ++j) {
-    const NormalEquations::Pose& pose = equations.poses[static_cast<std::size_t>(j)];
-    put(pose.gradient, 6, kCamera + 6 * j, size);
-    for (std::size_t c = 0; c < 6; ++c) {
-      const int col = kCamera + 6 * j + static_cast<int>(c);
-      put(pose.with_camera[c], kCamera, 0, col);
-      for (int i = 0; i <= j; ++i) {
-        put(equations.H_pp[equations.index_of(i, j)][c], 6, kCamera + 6 * i, col);
-      }
-    }
-  }
-  return result;
-}
-
-TEST(NormalEquations, AreTheNormalEquationsWithoutThePoints) {
-  constexpr double kDamping = 1e-3;
-  constexpr double kWeight = 0.5;
-  constexpr int kFixed = 2;
-  Bundle bundle = bundle_of(DriveTracks(6, 0.3, 8), 1.0);
-  bundle.radial = Eigen::Vector2d(0.01, -0.003);
-  bundle.points.resize(40);
-  std::erase_if(bundle.observations, [](const auto& seen) { return seen.point >= 40; });
-  const Eigen::MatrixXd all = normal_equations(bundle, kWeight, kFixed);
-  std::vector<Reprojection> at = reprojections_of(bundle);
-  for (Reprojection& one : at) {
-    one.weight = kWeight;
-  }
-  NormalEquations equations(bundle, kFixed, /*has_camera=*/true);
-  ASSERT_EQ(equations.num_free_poses(), 4);
-  equations.add_up(bundle, at, kDamping);
-  const Eigen::MatrixXd found = reduced(equations);
-  const Eigen::MatrixXd expected = reduced(all, found.rows(), kDamping);
-  for (Eigen::Index col = 0; col < found.cols(); ++col) {
-    const Eigen::Index last = std::min(col, found.rows() - 1);
-    const double squares = all.diagonal()[col < found.rows() ? col : all.rows() - 1];
-    for (Eigen::Index row = 0; row <= last; ++row) {
-      EXPECT_NEAR(found(row, col), expected(row, col), 1e-7 * std::sqrt(all(row, row) * squares))
-          << row << ", " << col;
+  for (const auto& prior : {std::optional<CameraPrior>(), std::optional(weak_prior(0.3))}) {
+    const DriveTracks drive(8, 0.3, 5);
+    BundleOptions options;
+    options.max_iterations = 200;
+    options.min_relative_decrease = 1e-14;
+    options.camera = prior;
+    Bundle ours = bundle_of(drive, 1.0);
+    Bundle judge = ours;
+    const BundleResult result = solve_bundle_adjustment(ours, options);
+    ASSERT_TRUE(result.is_usable);
+    const auto [cost, change] = solve_by_ceres(judge, options);
+    EXPECT_NEAR(result.cost, cost, 1e-6 * cost);
+    EXPECT_LE((result.camera_change - change).norm(), 1e-4);
+    for (std::size_t i = 0; i < ours.camera_from_world.size(); ++i) {
+      const Rigid3& a = ours.camera_from_world[i];
+      const Rigid3& b = judge.camera_from_world[i];
+      EXPECT_LE((a.translation - b.translation).norm(), 1e-5) << i;
+      EXPECT_LE(a.rotation.angularDistance(b.rotation), 1e-6) << i;
     }
   }
 }
@@ -285,12 +187,8 @@ TEST(Bundle, FindsAPlantedCamera) {
   options.num_fixed_poses = 1;
   options.max_iterations = 50;
   options.min_relative_decrease = 1e-8;
-  IntrinsicsDelta sigma;
-  sigma << 10.0, 10.0, 0.003, 0.01, 0.005;
   constexpr double kNoiseSq = 0.01;
-  options.camera =
-      CameraPrior{IntrinsicsDelta::Zero(),
-                  kNoiseSq * sigma.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix()};
+  options.camera = weak_prior(0.1);
   Bundle soon = bundle;
   const BundleResult result = solve_bundle_adjustment(bundle, options);
   ASSERT_TRUE(result.is_usable);

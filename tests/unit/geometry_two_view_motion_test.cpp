@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
@@ -122,44 +120,6 @@ TEST(MotionFromHomography, ADecisiveChoiceIsTheTrueMotion) {
   }
   // Most tilted planes leave two motions open.
   EXPECT_GE(num_decisive, 10);
-}
-
-/// A camera that drives one metre forward and turns right by 3 degrees, told in world terms.
-Scene forward_right_drive() {
-  const double turn_rad = 3.0 * std::numbers::pi / 180.0;
-  Eigen::Matrix3d axes_of_cur;  // its x and z axis in the previous camera
-  axes_of_cur.col(0) = Eigen::Vector3d(std::cos(turn_rad), 0.0, -std::sin(turn_rad));
-  axes_of_cur.col(1) = Eigen::Vector3d::UnitY();
-  axes_of_cur.col(2) = Eigen::Vector3d(std::sin(turn_rad), 0.0, std::cos(turn_rad));
-  const Rigid3 prev_from_cur = Rigid3::from_matrix(axes_of_cur, Eigen::Vector3d::UnitZ());
-  return make_scene({.seed = 5, .cur_from_prev = prev_from_cur.inverse()});
-}
-
-TEST(Conventions, AForwardDriveHasPositiveZAndTurnsTheRightWay) {
-  const Scene scene = forward_right_drive();
-  // Turning right moves far things to the left.
-  const Eigen::Vector3d far_ahead(0.0, 0.0, 1e6);
-  EXPECT_LT(scene.camera.project(scene.cur_from_prev * far_ahead).x(), scene.camera.cx_px - 30.0);
-  const auto motion = essential_motion(scene);
-  ASSERT_TRUE(motion.has_value());
-  EXPECT_LT(motion->cur_from_prev.translation.z(), -0.99);
-  const Rigid3 prev_from_cur = motion->cur_from_prev.inverse();
-  EXPECT_GT(prev_from_cur.translation.z(), 0.999);
-  // About y (down), forward turns towards x (right).
-  EXPECT_NEAR(so3_log(prev_from_cur.rotation).y(), 3.0 * std::numbers::pi / 180.0, 1e-9);
-  EXPECT_GT((prev_from_cur.rotation * Eigen::Vector3d::UnitZ()).x(), 0.05);
-}
-
-TEST(Conventions, TheHomographyBranchAgrees) {
-  const Rigid3 cur_from_prev = forward_right_drive().cur_from_prev;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const Scene scene = make_scene({.planar = true, .seed = seed, .cur_from_prev = cur_from_prev});
-    const auto motion = homography_motion(scene);
-    ASSERT_TRUE(motion.has_value());
-    if (is_decisive(*motion, 200)) {
-      EXPECT_GT(motion->cur_from_prev.inverse().translation.z(), 0.999);
-    }
-  }
 }
 
 TEST(MotionFrom, DegenerateModelsGiveNothing) {

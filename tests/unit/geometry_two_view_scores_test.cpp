@@ -3,9 +3,6 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <gtest/gtest.h>
 
 #include "geometry/decomposition.hpp"
@@ -141,116 +138,6 @@ TEST(HomographyRatio, IsTheShareOfTheHomography) {
   EXPECT_EQ(homography_ratio(0.0, 0.0), 0.0);
   EXPECT_EQ(homography_ratio(0.0, 5.0), 0.0);
   EXPECT_EQ(homography_ratio(5.0, 0.0), 1.0);
-}
-
-/// Mean to zero, mean distance to sqrt(2).
-Eigen::Matrix3d normalizer(const Points& points) {
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (const auto& p : points) {
-    mean += p / static_cast<double>(points.size());
-  }
-  double distance = 0.0;
-  for (const auto& p : points) {
-    distance += (p - mean).norm() / static_cast<double>(points.size());
-  }
-  const double s = std::sqrt(2.0) / distance;
-  Eigen::Matrix3d t;
-  t << s, 0.0, -s * mean.x(), 0.0, s, -s * mean.y(), 0.0, 0.0, 1.0;
-  return t;
-}
-
-struct Models {
-  Eigen::Matrix3d homography;
-  Eigen::Matrix3d fundamental;
-};
-
-/// Both models by the plain linear method from the true inliers.
-Models fit_models(const Scene& scene) {
-  Points prev;
-  Points cur;
-  for (std::size_t i = 0; i < scene.prev_uv.size(); ++i) {
-    if (scene.is_outlier[i] == 0) {
-      prev.push_back(scene.prev_uv[i]);
-      cur.push_back(scene.cur_uv[i]);
-    }
-  }
-  const Eigen::Matrix3d t1 = normalizer(prev);
-  const Eigen::Matrix3d t2 = normalizer(cur);
-  const auto rows = static_cast<Eigen::Index>(prev.size());
-  Eigen::MatrixXd for_h = Eigen::MatrixXd::Zero(2 * rows, 9);
-  Eigen::MatrixXd for_f(rows, 9);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const Eigen::RowVector3d a = (t1 * prev[k].homogeneous()).transpose();
-    const Eigen::RowVector3d b = (t2 * cur[k].homogeneous()).transpose();
-    for_h.row(2 * i) << a, Eigen::RowVector3d::Zero(), -b.x() * a;
-    for_h.row(2 * i + 1) << Eigen::RowVector3d::Zero(), a, -b.y() * a;
-    for_f.row(i) << b.x() * a, b.y() * a, a;
-  }
-  const auto solve = [](const Eigen::MatrixXd& m) {
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(m, Eigen::ComputeThinU | Eigen::ComputeFullV);
-    const Eigen::Matrix<double, 9, 1> x = svd.matrixV().col(8);
-    return Eigen::Matrix3d(x.reshaped(3, 3).transpose());
-  };
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(solve(for_f),
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d d(svd.singularValues()(0), svd.singularValues()(1), 0.0);
-  const Eigen::Matrix3d f = svd.matrixU() * d.asDiagonal() * svd.matrixV().transpose();
-  return {t2.inverse() * solve(for_h) * t1, t2.transpose() * f * t1};
-}
-
-double ratio(const Models& models, const Scene& scene) {
-  return homography_ratio(
-      score_homography(models.homography, {scene.prev_uv, scene.cur_uv}, 1.0).score,
-      score_fundamental(models.fundamental, {scene.prev_uv, scene.cur_uv}, 1.0).score);
-}
-
-TEST(ModelChoice, PlanarScenesChooseTheHomography) {
-  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    const Scene scene =
-        make_scene({.noise_px = 0.5, .outlier_ratio = 0.2, .planar = true, .seed = seed});
-    const Models truth = {
-        testing::true_homography(scene),
-        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera)};
-    EXPECT_GT(ratio(truth, scene), 0.40) << "seed " << seed;
-    EXPECT_GT(ratio(fit_models(scene), scene), 0.40) << "seed " << seed;
-  }
-}
-
-TEST(ModelChoice, GeneralScenesChooseTheFundamentalMatrix) {
-  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    const Scene scene = make_scene({.noise_px = 0.5, .outlier_ratio = 0.2, .seed = seed});
-    const Models fitted = fit_models(scene);
-    const Models truth = {
-        fitted.homography,
-        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera)};
-    EXPECT_LT(ratio(truth, scene), 0.40) << "seed " << seed;
-    EXPECT_LT(ratio(fitted, scene), 0.40) << "seed " << seed;
-  }
-}
-
-TEST(ModelChoice, PureRotationChoosesTheHomography) {
-  const Rigid3 rotation(so3_exp({0.01, 0.05, -0.01}), Eigen::Vector3d::Zero());
-  const Scene scene = make_scene({.noise_px = 0.5, .seed = 8, .cur_from_prev = rotation});
-  EXPECT_GT(ratio(fit_models(scene), scene), 0.40);
-}
-
-TEST(Scores, TrueModelsFindTheTrueInliers) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const Scene scene = make_scene({.noise_px = 0.3, .outlier_ratio = 0.3, .seed = seed});
-    const Eigen::Matrix3d f =
-        fundamental_from_essential(essential_from_motion(scene.cur_from_prev), scene.camera);
-    const ModelScore score = score_fundamental(f, {scene.prev_uv, scene.cur_uv}, 1.0);
-    int missed = 0;
-    int taken = 0;
-    for (std::size_t i = 0; i < scene.is_outlier.size(); ++i) {
-      missed += scene.is_outlier[i] == 0 && score.inlier_mask[i] == 0 ? 1 : 0;
-      taken += scene.is_outlier[i] != 0 && score.inlier_mask[i] != 0 ? 1 : 0;
-    }
-    EXPECT_EQ(missed, 0) << "seed " << seed;
-    // Outliers may lie on their epipolar line by chance.
-    EXPECT_LE(taken, 10) << "seed " << seed;
-  }
 }
 
 }  // namespace

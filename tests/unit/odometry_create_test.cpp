@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -244,20 +243,6 @@ TEST(OdometryProcess, BgrGivesTheChannelThatRgbGives) {
     EXPECT_GT(cv::norm(of_rgb.channel_image(), mistaken.channel_image(), cv::NORM_INF), 0.0);
   }
   EXPECT_GT(of_rgb.tracked_points().size(), 20U);
-}
-
-TEST(OdometryProcess, TheBuiltInNetworkIsThatOfTheModelsFolder) {
-  Options from_folder;
-  from_folder.stem.model = STEMVO_SOURCE_DIR "/models/default.onnx";
-  for (const int filter : {-1, 2, 5}) {
-    Options built_in;
-    built_in.stem.filter = from_folder.stem.filter = filter;
-    Odometry a = Odometry::create(kCamera, built_in).value();
-    Odometry b = Odometry::create(kCamera, from_folder).value();
-    ASSERT_TRUE(a.process(image_at(0), PixelOrder::kRgb, 0.0));
-    ASSERT_TRUE(b.process(image_at(0), PixelOrder::kRgb, 0.0));
-    EXPECT_EQ(cv::norm(a.channel_image(), b.channel_image(), cv::NORM_INF), 0.0) << filter;
-  }
 }
 
 }  // namespace

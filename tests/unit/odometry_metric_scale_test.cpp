@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -172,36 +171,6 @@ TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
   }
   EXPECT_GT(num_before, 20);
   EXPECT_GT(num_after, 100);
-}
-
-TEST(MetricScale, TheTrajectoryPlacesLandmarksInMetres) {
-  const RoadDrive drive(44);
-  WindowEstimator estimator(metric_config(), drive.scene.camera);
-  EstimatorRun run(estimator, drive.tracks);
-  run.road = [&](int i) { return drive.road_image(i, true); };
-  run.add_all();
-  const std::vector<KeptLandmark> landmarks = estimator.landmarks_since(0).landmarks;
-  ASSERT_GT(landmarks.size(), 200U);
-  for (const KeptLandmark& landmark : landmarks) {
-    EXPECT_LT(testing::placing_error(landmark, estimator.trajectory(), 1.0, drive.tracks), 0.05)
-        << landmark.frame;
-  }
-}
-
-TEST(MetricScale, DisabledItChangesNothing) {
-  const RoadDrive drive(2);
-  Options config;
-  config.scale.source = ScaleSource::kNone;
-  MetricScale scale(config);
-  const auto image = drive.road_image(0, true);
-  scale.restart(image.get(), 0.0);
-  EXPECT_EQ(scale.measure(image.get(), Rigid3(), 1.0, 0.01), 1.0);
-  scale.keep_last("no image", 2.0);
-  FrameResult result;
-  scale.report(result);
-  EXPECT_EQ(result.scale_state, ScaleState::kDisabled);
-  EXPECT_EQ(result.road_reason, "");
-  EXPECT_FALSE(result.scale_sigma.has_value());
 }
 
 TEST(MetricScale, AFrameWithoutARoadImageKeepsTheUnit) {

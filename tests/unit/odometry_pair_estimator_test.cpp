@@ -45,28 +45,6 @@ TEST(PairEstimator, PosesStayAsTheyCameAndThereAreNoLandmarks) {
   EXPECT_TRUE(d.estimator.landmarks_since(0).landmarks.empty());
 }
 
-TEST(PairEstimator, ALossContinuesTheMotionAndTheChainGoesOn) {
-  Driven d;
-  d.run.add_range(0, 10);
-  const Rigid3 before = d.last_motion();
-  EXPECT_EQ(d.run.add_matches({}, 10).state, FrameState::kLost);
-  EXPECT_LT((d.last_motion().translation - before.translation).norm(), 1e-9);
-  EXPECT_EQ(d.run.add(11).state, FrameState::kTracking);
-}
-
-TEST(PairEstimator, AMissingImageIsBridged) {
-  Driven d;
-  d.run.add_range(0, 10);
-  const Rigid3 before = d.estimator.trajectory().back();
-  EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);
-  EXPECT_NEAR(d.last_motion().translation.norm(), 1.0, 1e-9);
-  EXPECT_EQ(d.run.add(11).state, FrameState::kTracking);
-  const Rigid3 bridged = before.inverse() * d.estimator.trajectory().back();
-  EXPECT_NEAR(bridged.translation.norm(), 2.0, 1e-9);
-  const Rigid3 truth = d.drive.pose(9).inverse() * d.drive.pose(11);
-  EXPECT_LT(bridged.rotation.angularDistance(truth.rotation), 2e-3);
-}
-
 TEST(PairEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
   Driven d;
   EXPECT_EQ(d.run.add_missing().state, FrameState::kNoImage);

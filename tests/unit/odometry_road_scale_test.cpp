@@ -146,27 +146,6 @@ TEST(RoadScale, FindsTheUnitOfTheMapAndHoldsIt) {
   EXPECT_NEAR(std::log(estimate.metres_per_unit / (0.5 * Drive::kMetresPerUnit)), 0.0, 0.008);
 }
 
-TEST(RoadScale, WithoutARoadTheScaleStaysAndTheDoubtGrows) {
-  Drive drive;
-  Scale scale;
-  Estimate seen;
-  for (int i = 0; i < 13; ++i) {
-    seen = drive.next(scale);
-  }
-  EXPECT_TRUE(seen.is_believed);
-  Estimate lost;
-  for (int i = 0; i < 6; ++i) {
-    lost = drive.next(scale, false);
-    EXPECT_FALSE(lost.is_measured);
-    EXPECT_FALSE(lost.reason.empty());
-    EXPECT_TRUE(lost.is_believed);
-  }
-  EXPECT_EQ(lost.metres_per_unit, seen.metres_per_unit);
-  EXPECT_GT(lost.sigma, seen.sigma);
-  drive.next(scale);
-  EXPECT_TRUE(drive.next(scale).is_measured);
-}
-
 /// Drives over asphalt with landmarks of a plane that is `ratio` times as far below the camera.
 Estimate drive_with_landmarks(double ratio, double noise) {
   Drive drive;
@@ -228,18 +207,6 @@ TEST(RoadScale, ACrestIsNoBiasBecauseThePathTellsTheBend) {
   flat.path_m = 0.0;
   flat.bend_sigma_per_m = 1e-7;
   EXPECT_GT(std::abs(error_on_a_crest(flat)), 0.03);
-}
-
-TEST(RoadScale, ARestartForgetsTheUnit) {
-  Drive drive;
-  Scale scale;
-  for (int i = 0; i < 4; ++i) {
-    drive.next(scale);
-  }
-  scale.road.restart();
-  scale.filter.restart();
-  EXPECT_FALSE(drive.next(scale).is_initialized);
-  EXPECT_TRUE(drive.next(scale).is_initialized);
 }
 
 }  // namespace

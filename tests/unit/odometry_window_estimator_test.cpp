@@ -228,17 +228,6 @@ TEST(WindowEstimator, TheSpeedOfAHandFadesWithinASecondAndThatOfACarLasts) {
   EXPECT_LT(steps_without_images(young, 7, 12).back(), 1e-6);
 }
 
-TEST(WindowEstimator, TheSameTracksGiveTheSamePoses) {
-  Driven a(car_drive(12.0, 0.8, 0.3, 11));
-  Driven b(car_drive(12.0, 0.8, 0.3, 11));
-  a.add_range(0, a.drive.num_frames());
-  b.add_range(0, b.drive.num_frames());
-  for (int i = 0; i < a.drive.num_frames(); ++i) {
-    EXPECT_EQ(a.pose(i).translation, b.pose(i).translation) << i;
-    EXPECT_EQ(a.pose(i).rotation.coeffs(), b.pose(i).rotation.coeffs()) << i;
-  }
-}
-
 TEST(WindowEstimator, AMissingFrameIsAsFarOnAsItsIntervalIsLong) {
   Driven d(DriveTracks(20, 0.2, 7));
   d.add_range(0, 15);

@@ -115,17 +115,6 @@ TEST_F(FramePipeline, StopsAtTheFrameWhoseVisitorSaysSo) {
   EXPECT_EQ(visited, (std::vector<std::size_t>{0, 1, 2}));
 }
 
-TEST_F(FramePipeline, CarriesWhatAVisitorThrowsToTheCaller) {
-  PhasedOdometry piped = odometry();
-  const auto visit = [](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
-    if (i == 3) {
-      throw std::runtime_error("disk on fire");
-    }
-    return true;
-  };
-  EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
-}
-
 /// The last frame is finished after the graph has ended.
 TEST_F(FramePipeline, CarriesWhatTheVisitorThrowsAtTheFirstAndTheLastFrame) {
   for (const std::size_t bad : {std::size_t{0}, std::size_t{kNumFrames - 1}}) {
@@ -159,26 +148,6 @@ TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
     EXPECT_EQ(visited.size(), num_frames);
     EXPECT_EQ(visited.back(), num_frames - 1);
   }
-}
-
-TEST_F(FramePipeline, PartsInTheirOrderAreWhatProcessDoes) {
-  PhasedOdometry whole = odometry();
-  PhasedOdometry parts = odometry();
-  const auto process_whole = [&](std::size_t i) {
-    return process(whole, whole.prepare(sequence_->read(i).value(), sequence_->time_s(i)));
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    const cv::Mat frame = sequence_->read(i).value();
-    parts.track(parts.prepare(frame, sequence_->time_s(i)));
-    if (i > 0) {  // of the frame before
-      EXPECT_EQ(parts.optimize().num_matches, process_whole(i - 1).num_matches);
-    }
-    parts.localize();
-  }
-  const FrameResult last = parts.optimize();
-  EXPECT_GT(last.num_matches, 50);
-  EXPECT_EQ(last.time_s, sequence_->time_s(2));
-  EXPECT_EQ(last.world_from_camera.translation, process_whole(2).world_from_camera.translation);
 }
 
 }  // namespace

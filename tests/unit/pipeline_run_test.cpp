@@ -264,14 +264,6 @@ TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
   EXPECT_TRUE(fs::exists(request_.out_dir / "notes.txt"));
 }
 
-TEST_F(PipelineRun, AFolderWithAnInputIsRefused) {
-  ASSERT_TRUE(run_sequence(request_));
-  RunRequest again = request_;
-  again.ground_truth = request_.out_dir / "trajectory_kitti.txt";
-  EXPECT_THAT(error_of(again), HasSubstr("expected a folder that holds no input, found "));
-  EXPECT_TRUE(fs::exists(*again.ground_truth));
-}
-
 TEST_F(PipelineRun, TwoFramesMakeNoMap) {
   request_.config.odometry.mode = OdometryMode::kTwoFrame;
   request_.config.scale.source = ScaleSource::kConstantSpeed;

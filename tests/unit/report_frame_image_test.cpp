@@ -98,16 +98,6 @@ TEST(FrameImage, ColoursInliersByFlowAndOutliersRed) {
   EXPECT_GT(cv::norm(slow - fast), 100.0);
 }
 
-TEST(FrameImage, TakesColourFramesAsRgb) {
-  const cv::Mat blue(100, 400, CV_8UC3, cv::Scalar(10, 20, 200));
-  const cv::Mat image = draw_frame_image(blue, coarse_channel(), {}, {});
-  EXPECT_EQ(image.at<cv::Vec3b>(5, 5), cv::Vec3b(10, 20, 200));
-  const TempFolder folder;
-  ASSERT_TRUE(write_image(folder / "a.png", image));
-  const cv::Mat bgr = cv::imread((folder / "a.png").string());
-  EXPECT_EQ(bgr.at<cv::Vec3b>(5, 5), cv::Vec3b(200, 20, 10));
-}
-
 TEST(FrameImage, SurvivesWhatAnUnreadableFrameGives) {
   const Matches outside{{{-50, 0}, {0, 3}, {5, 500}}, {{900, 5}, {5, 5}, {5, -5}}, {}, 3};
   EXPECT_FALSE(draw_frame_image({}, coarse_channel(), outside, {1, 1, 0}).empty());

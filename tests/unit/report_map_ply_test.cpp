@@ -49,7 +49,8 @@ TEST(MapPly, HeaderIsTheOneThatViewersExpect) {
   EXPECT_THAT(bytes, StartsWith("ply\nformat binary_little_endian 1.0\n"));
   EXPECT_THAT(bytes, HasSubstr("element vertex 2\nproperty float x\nproperty float y\n"
                                "property float z\nproperty uchar red\nproperty uchar green\n"
-                               "property uchar blue\nelement edge 0\n"));
+                               "property uchar blue\nelement edge 0\n"
+                               "property int vertex1\nproperty int vertex2\n"));
 }
 
 TEST(MapPly, LeavesOutWhatIsNoNumber) {

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cmath>
-#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "report/trajectory_plot.hpp"
@@ -92,22 +89,6 @@ TEST(TrajectoryImage, SurvivesTextThatIsNotUtf8) {
   plot.title = "bad \xff\xc3( \xed\xa0\x80 \n end \xe2\x82";
   EXPECT_FALSE(draw_trajectory(plot).empty());
   EXPECT_THROW((void)draw_trajectory(TrajectoryPlot{}), std::logic_error);
-}
-
-TEST(TrajectoryImage, TicksAreRoundMetresAndLieOnTheGrid) {
-  // 50 m in 480 pixels of height and more: a grid line every 10 m, and one at zero.
-  const cv::Mat image = draw_trajectory(corner());
-  std::vector<int> lines;
-  for (int y = 200; y < image.rows - 130; ++y) {
-    if (image.at<cv::Vec3b>(y, 160) == cv::Vec3b(230, 230, 230) &&
-        image.at<cv::Vec3b>(y - 1, 160) != cv::Vec3b(230, 230, 230)) {
-      lines.push_back(y);
-    }
-  }
-  ASSERT_GE(lines.size(), 3U);
-  for (std::size_t i = 2; i < lines.size(); ++i) {
-    EXPECT_NEAR(lines[i] - lines[i - 1], lines[1] - lines[0], 1);
-  }
 }
 
 }  // namespace

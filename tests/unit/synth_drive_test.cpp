@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <numbers>
 #include <string>
-#include <vector>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -78,19 +76,6 @@ TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
   EXPECT_GE(word.find('e') - word.find('.'), 13U) << "12 digits or more: " << word;
 }
 
-TEST_F(SyntheticDriveTest, SeveralInOneFolder) {
-  SyntheticDriveOptions options = small(2);
-  options.name = "street";
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  for (const auto& [name, frames] : {std::pair("00", 3U), std::pair("street", 2U)}) {
-    const auto sequence = open_kitti(root_ / "out" / "sequences" / name);
-    ASSERT_TRUE(sequence) << sequence.error().message;
-    EXPECT_EQ(sequence->size(), frames);
-    EXPECT_TRUE(sequence->ground_truth);
-  }
-}
-
 TEST_F(SyntheticDriveTest, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
   for (const int kind : {0, 1, 2}) {
     SyntheticDriveOptions options = small(3);
@@ -123,14 +108,6 @@ TEST_F(SyntheticDriveTest, InterruptKeepsWhatIsDone) {
   ASSERT_TRUE(sequence) << sequence.error().message;
   EXPECT_EQ(sequence->size(), 2U);
   EXPECT_EQ(sequence->ground_truth->size(), 2U);
-}
-
-TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
-  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
-  ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_EQ(sequence->size(), 2U);
 }
 
 /// Standing, turning on the spot, and a ring driven twice over itself.
@@ -167,37 +144,6 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
     const double expected = 1.65 * 718.856 * 160 / 1241 / (47.0 - 185.2157 * 48 / 376);
     EXPECT_NEAR(static_cast<double>(z), expected, 0.12 * expected) << "frame " << i;
   }
-}
-
-/// Means of an image's quarters: the same drive for ever.
-TEST_F(SyntheticDriveTest, DefaultDriveIsWhatItAlwaysWas) {
-  SyntheticDriveOptions options = small(20);
-  options.seed = 7;
-  options.width_px = 310;
-  options.height_px = 94;
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
-  ASSERT_TRUE(sequence) << sequence.error().message;
-  const cv::Mat image = *sequence->read(19);
-  constexpr std::array<double, 4> kMeans = {124.3807, 128.3152, 97.2685, 90.0490};
-  for (int i = 0; i < 4; ++i) {
-    const cv::Scalar mean = cv::mean(image(cv::Rect(155 * (i % 2), 47 * (i / 2), 155, 47)));
-    EXPECT_NEAR((mean[0] + mean[1] + mean[2]) / 3.0, kMeans[static_cast<std::size_t>(i)], 0.01);
-  }
-}
-
-TEST_F(SyntheticDriveTest, WalkIsASequence) {
-  SyntheticDriveOptions options = small(3);
-  options.walk = true;
-  options.width_px = 80;
-  options.height_px = 60;
-  ASSERT_TRUE(render_synthetic_drive(root_ / "out", options));
-  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
-  ASSERT_TRUE(sequence) << sequence.error().message;
-  EXPECT_EQ(sequence->size(), 3U);
-  EXPECT_DOUBLE_EQ(sequence->camera.fx_px, 585.0 / 8);
-  EXPECT_DOUBLE_EQ(sequence->camera.cx_px, 40.0);
-  EXPECT_NEAR(sequence->timestamps_s[2], 2.0 / 30.0, 1e-9);
 }
 
 TEST_F(SyntheticDriveTest, WhatIsNotRenderedStaysAsItIs) {

@@ -7,7 +7,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 
 #include "report/metrics_json.hpp"
 #include "support/temp_folder.hpp"
@@ -136,23 +135,6 @@ TEST(Timing, TableHasARowPerStageAndTheWhole) {
   EXPECT_THAT(table, ContainsRegex("processor time +10\\.000 +100\\.0\n"));
   EXPECT_THAT(table, HasSubstr("\n180.0 frames/s, 400 frames, 2 threads, 222 MiB at most\n"));
   EXPECT_THAT(table, Not(HasSubstr(" \n"))) << "blanks at the end of a line";
-}
-
-TEST(Timing, JsonHasTheSameNumbers) {
-  const testing::TempFolder folder;
-  MetricsReport report;
-  report.timing = example();
-  ASSERT_TRUE(write_metrics_json(folder / "metrics.json", report));
-  const auto json = nlohmann::json::parse(testing::read_all(folder / "metrics.json"))["timing"];
-  EXPECT_EQ(json["stages"]["stem"]["calls"], 400);
-  EXPECT_EQ(json["stages"]["stem"]["median_ms"], 3.25);
-  EXPECT_EQ(json["stages"]["tracking"]["p95_ms"], 7.0);
-  EXPECT_EQ(json["stages"]["tracking"]["cpu_s"], 2.0);
-  EXPECT_EQ(json["fps"], 180.0);
-  EXPECT_EQ(json["threads"], 2);
-  EXPECT_EQ(json["peak_memory_mib"], 222.4);
-  EXPECT_EQ(json["other_cpu_s"], 0.5);
-  EXPECT_EQ(json["cpu_s"], 4.0);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@ import pandas as pd
 import tqdm
 
 import stemvo
-from stemvo.lab import figures, page, paired, runs, tables
+from stemvo.lab import bootstrap, figures, page, runs, tables
 
 COLUMNS = {"sequence": "sequence", "frames": "frames", "method": "method", "scale": "scale from", "alignment": "alignment",
            "t_rel_percent": "t_rel", "r_rel_deg_per_100m": "r_rel", "average_offset_m": "offset", "ate_rmse_m": "ATE", "note": "note"}
@@ -96,7 +96,7 @@ def told_best(methods, sequences, poses):
         errors = {method.name: [_dense(poses.get((sequence.name, method.title)), sequence) for sequence in sequences]
                   for method in methods if method.scale == scale}
         if len(errors) > 1:
-            best = paired.best_of(errors)
+            best = bootstrap.best_of(errors)
             lines.append(f"Smallest t_rel, {scale}: " + (f"{best}, told from every other method (paired moving-block bootstrap, 95 %)." if best
                                                          else "none is told from every other method (paired moving-block bootstrap, 95 %)."))
     return lines

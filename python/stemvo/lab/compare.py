@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 import stemvo
-from stemvo.lab import figures, page, paired, runs, tables
+from stemvo.lab import bootstrap, figures, page, runs, tables
 
 ALIGNMENTS = {"none": "Nothing is aligned: each path starts at the first true pose", "scale": "Each path is scaled to the truth (one factor)",
               "se3": "Each path is turned and moved onto the truth (6 degrees of freedom)",
@@ -98,9 +98,9 @@ def differences(aligned, truth):
     for (first, (mine, block)), (second, (theirs, _)) in itertools.combinations(dense.items(), 2):
         row = {"pair": f"{first} - {second}"}
         for key, title, decimals in (("t_percent", "t_rel, %", 2), ("r_deg_per_100m", "r_rel, deg/100 m", 3)):
-            middle, low, high = paired.difference([(mine[key], theirs[key], block)])
-            row[title] = f"{middle:+.{decimals}f} [{low:+.{decimals}f}, {high:+.{decimals}f}]"
-            row[f"smaller {title.split(',')[0]}"] = (first if middle < 0.0 else second) if paired.is_told(low, high) else "not told apart"
+            found = bootstrap.difference([bootstrap.Drive(mine[key], theirs[key], block)])
+            row[title] = f"{found.middle:+.{decimals}f} [{found.low:+.{decimals}f}, {found.high:+.{decimals}f}]"
+            row[f"smaller {title.split(',')[0]}"] = (first if found.middle < 0.0 else second) if found.is_told else "not told apart"
         rows.append(row)
     return pd.DataFrame(rows)
 

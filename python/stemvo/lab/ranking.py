@@ -5,7 +5,7 @@ import typing
 
 import numpy as np
 
-from stemvo.lab.ratios import Drive, Ratio, paired_ratio
+from stemvo.lab.bootstrap import Drive, Ratio, paired_ratio
 
 NUMBERS = ("t_rel_percent", "r_rel_deg_per_100m", "average_offset_m", "E_t_m", "E_r_deg", "inliers", "tracked")
 LEAST_PERCENT = 1e-6

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 import stemvo
-from stemvo.lab import ratios, score, work
+from stemvo.lab import bootstrap, score, work
 from stemvo.lab.disturbances import ALL, Disturbed, find
 from stemvo.lab.ranking import number
 from stemvo.lab.rows import Rows
@@ -120,7 +120,7 @@ class Line:
             pairs = list(zip(self.rows[judged], self.rows[control]))
             refused = any(one["refused"] for pair in pairs for one in pair)  # drives that are left would be another row
             self.verdicts[control] = tuple(
-                ratios.paired_ratio([] if refused else [ratios.Drive(*(np.array(one[name].split(), float) for one in pair), int(pair[0]["block"])) for pair in pairs])
+                bootstrap.paired_ratio([] if refused else [bootstrap.Drive(*(np.array(one[name].split(), float) for one in pair), int(pair[0]["block"])) for pair in pairs])
                 for name in ("dense_r_deg_per_100m", "dense_t_percent"))
 
     def mean(self, channel, name="r_rel_deg_per_100m"):

@@ -18,19 +18,6 @@ def numbers(t_rel, segments):
     return {"t_rel_percent": t_rel, "r_rel_deg_per_100m": 1.0, "segments": segments}
 
 
-class Means(unittest.TestCase):
-    def test_segments_are_pooled(self):
-        self.assertAlmostEqual(ablation.pooled([numbers(1.0, 30), numbers(2.0, 10)], "t_rel_percent"), 1.25)
-
-    def test_a_sequence_too_short_for_a_segment_does_not_count(self):
-        self.assertEqual(ablation.pooled([numbers(1.0, 30), numbers(None, 0)], "t_rel_percent"), 1.0)
-        self.assertIsNone(ablation.pooled([numbers(None, 0)], "t_rel_percent"))
-
-    def test_seeds_are_averaged(self):
-        self.assertAlmostEqual(ablation.averaged([numbers(1.0, 3), numbers(2.0, 3)])["t_rel_percent"], 1.5)
-        self.assertEqual(ablation.averaged([numbers(None, 0)])["t_rel_percent"], None)
-
-
 class Command(unittest.TestCase):
     def test_every_row_of_a_rendered_drive(self):
         with tempfile.TemporaryDirectory() as name:

@@ -17,7 +17,6 @@ sys.path.insert(0, str(ROOT / "bench"))
 
 import places  # noqa: E402
 import results  # noqa: E402
-import rounds  # noqa: E402
 import rows  # noqa: E402
 import run  # noqa: E402
 
@@ -27,11 +26,6 @@ NO_PEERS = "build/venv-peers is missing (tools/setup.sh peers)"
 
 
 class Statistics(unittest.TestCase):
-    def test_spread(self):
-        self.assertEqual(results.spread([3.0, 1.0, 2.0]), results.Spread(2.0, 1.0, 3.0))
-        self.assertEqual(results.spread([4.0, 1.0]), results.Spread(2.5, 1.0, 4.0))
-        self.assertEqual(results.spread([5.0]), results.Spread(5.0, 5.0, 5.0))
-
     def test_ratios_are_within_a_round(self):
         # A machine that is half as fast in the second round changes no ratio.
         self.assertEqual(results.ratios([3.0, 6.0], [1.0, 2.0]), [3.0, 3.0])
@@ -39,77 +33,13 @@ class Statistics(unittest.TestCase):
             results.ratios([1.0], [1.0, 2.0])
 
 
-class BeforeTheFirstRun(unittest.TestCase):
-    """Wrong arguments are refused at once, in one line."""
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        (self.folder / "image_0").mkdir()
-
-    def refused(self, *arguments):
-        with contextlib.redirect_stderr(io.StringIO()) as said, mock.patch.object(rounds, "run_measured") as measured:
-            self.assertEqual(run.main(["--program", sys.executable, "--only", "defaults", *map(str, arguments)]), 1)
-        measured.assert_not_called()
-        self.assertEqual(len(said.getvalue().splitlines()), 1, said.getvalue())
-        return said.getvalue()
-
-    def test_a_folder_that_is_no_sequence(self):
-        self.assertIn("/nonexist: expected a KITTI sequence (a folder with image_2 or image_0), found nothing", self.refused("/nonexist"))
-        self.assertIn(f"{__file__}: expected a KITTI sequence (a folder with image_2 or image_0), found a file", self.refused(__file__))
-        self.assertIn("expected a folder image_2 or image_0 in it, found neither", self.refused(self.folder / "image_0"))
-
-    def test_a_json_file_that_cannot_be_written(self):
-        nowhere = self.folder / "no/such/x.json"
-        self.assertIn(f"{nowhere}: expected a file that can be written, found: No such file or directory",
-                      self.refused(self.folder, "--json", nowhere))
-        self.assertIn("found: Is a directory", self.refused(self.folder, "--json", self.folder))
-
-
-class Measuring(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def measure(self, code):
-        return rounds.run_measured([sys.executable, "-c", code], os.sched_getaffinity(0), self.folder / "log")
-
-    def test_wall_time_processor_time_and_memory(self):
-        slept = self.measure("import time; time.sleep(0.5)")
-        self.assertGreater(slept.wall_s, 0.5)
-        self.assertLess(slept.cpu_s, 0.4)
-        worked = self.measure("import time\nwhile time.process_time() < 0.5: pass\nx = b'1' * 100_000_000")
-        self.assertGreater(worked.cpu_s, 0.5)
-        self.assertGreater(worked.peak_mib, slept.peak_mib + 80)
-
-    def test_a_failure_says_what_the_program_said(self):
-        with self.assertRaisesRegex(places.BenchError, "exit code 3: no such frame"):
-            self.measure("print('no such frame'); raise SystemExit(3)")
-
-
 class Rows(unittest.TestCase):
     def chosen(self, *arguments):
         return [row.name for row in rows.chosen(run.parse_arguments(["--program", sys.executable, *arguments]))]
 
-    def test_choice(self):
-        self.assertEqual(self.chosen("--without", "opencv orb,full stem"), ["defaults", "folded stem", "gray"])
-        self.assertEqual(self.chosen("--only", "gray,defaults"), ["defaults", "gray"])
-        self.assertEqual(self.chosen("--only", "defaults,before", "--add", f"before={sys.executable}"), ["defaults", "before"])
-
     def test_errors(self):
         with self.assertRaisesRegex(places.BenchError, "expected a row of defaults, .*, found 'orb'"):
             self.chosen("--only", "orb")
-        with self.assertRaisesRegex(places.BenchError, "no row is left"):
-            self.chosen("--only", "gray", "--without", "gray")
-        with self.assertRaisesRegex(places.BenchError, "/nowhere: expected a program for the row 'before'"):
-            self.chosen("--only", "before", "--add", "before=/nowhere")
-        with mock.patch.object(places, "PEER_PYTHON", pathlib.Path("/nowhere")), self.assertRaisesRegex(places.BenchError, "tools/setup.sh peers"):
-            self.chosen("--only", "opencv orb")
-        for wrong in (["--rounds", "0"], ["--add", "name"], ["--cores", "0"], ["--frames", "a:b"], ["--frames", ":"]):
-            with self.subTest(wrong), contextlib.redirect_stderr(io.StringIO()), self.assertRaises(SystemExit):
-                run.parse_arguments(wrong)
 
 
 class TinyDrive(unittest.TestCase):
@@ -158,13 +88,6 @@ class TinyDrive(unittest.TestCase):
         self.assertLess(peer["t_rel_percent"], 25, "a wrong direction or composition is far above")
         self.assertGreater(peer["t_rel_percent"], 0)
         self.assertEqual(peer["t_rel_lengths"], "per-step ground-truth scale")
-        with self.subTest("without ground truth every step is 1 long"):
-            out = self.folder / "unit.txt"
-            subprocess.run([places.PEER_PYTHON, places.PEER, self.sequence, "--out", out, "--frames", "0:4"], check=True)
-            positions = [[float(line.split()[i]) for i in (3, 7, 11)] for line in out.read_text().splitlines()]
-            self.assertEqual(len(positions), 4)
-            for a, b in zip(positions, positions[1:]):
-                self.assertAlmostEqual(sum((x - y) ** 2 for x, y in zip(a, b)), 1.0, places=6)
 
     def test_a_sequence_that_is_none(self):
         said, progress = self.bench("--only", "defaults", "--frames", "100:200", code=1)
