@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Faults that any file may have, of each file that the program reads. What is wrong with one kind of file only is with the tests of
-// its reader.
+// Faults that any file may have, of each file that the program reads. What is wrong with one kind
+// of file only is with the tests of its reader.
 #include "support/bad_input_table.hpp"
 
 #include <string>
@@ -68,13 +68,13 @@ TEST_F(BadInputTable, CameraFile) {
   const auto with = [&](const std::string& from, const std::string& to) {
     return text(from + " -> " + to, replace_first(good, from, to));
   };
-  expect_refused_with_faults(folder_ / "camera.yaml", "360.5",
-                             {"run", (sequence_ / "image_2").string(), "--camera",
-                              folder_ / "camera.yaml", "--out", folder_ / "out"},
-                             {},
-                             {with("188", "99999999999999999999"),
-                              with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"), text("a list", "- 1\n- 2\n"),
-                              text("a tab", "\t" + good)});
+  expect_refused_with_faults(
+      folder_ / "camera.yaml", "360.5",
+      {"run", (sequence_ / "image_2").string(), "--camera", folder_ / "camera.yaml", "--out",
+       folder_ / "out"},
+      {},
+      {with("188", "99999999999999999999"), with("[0, 0, 0, 0]", "[1e300, 0, 0, 0]"),
+       text("a list", "- 1\n- 2\n"), text("a tab", "\t" + good)});
 }
 
 TEST_F(BadInputTable, ConfigurationFile) {

@@ -5,7 +5,6 @@
 
 #include <gmock/gmock.h>
 
-#include "config/config.hpp"
 #include "stemvo/version.hpp"
 #include "support/program_test.hpp"
 
@@ -57,12 +56,6 @@ TEST(CommandLine, VersionIsOneLine) {
   EXPECT_EQ(result.out, "stemvo " + std::string(version()) + "\n");
 }
 
-TEST(CommandLine, DumpConfigIsTheDefaultConfiguration) {
-  const ProgramResult result = run_stemvo({"--dump-config"});
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_EQ(result.out, dump_config({}));
-}
-
 struct Misuse {
   std::vector<std::string> arguments;
   std::string says;
@@ -105,12 +98,6 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
     EXPECT_THAT(result.err, AllOf(StartsWith("error: "), HasSubstr(misuse.says)));
     EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
   }
-}
-
-TEST(CommandLine, ModelsListsTheBuiltInOnes) {
-  const ProgramResult result = run_stemvo({"models"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("default: sound"));
 }
 
 TEST(CommandLine, OutputThatCannotBeWrittenIsAnError) {

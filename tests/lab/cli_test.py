@@ -4,7 +4,9 @@
 import subprocess
 import sys
 
+import pytest
 from click.testing import CliRunner
+from stemvo.lab import runs
 from stemvo.lab.cli import COMMANDS, main
 
 
@@ -26,3 +28,22 @@ def test_help_imports_no_command():
     script = "import sys, stemvo.lab.cli as cli; cli.main(['--help'], standalone_mode=False); print([m for m in sys.modules if m in ('ray', 'pandas', 'matplotlib', 'cv2')])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_only_results_of_the_same_command_are_replaced(tmp_path):
+    out, given = tmp_path / "out", tmp_path / "truth.txt"
+    given.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
+    for _ in range(2):
+        runs.open_folder(out, "compare", [given, None, "default"])
+    with pytest.raises(runs.LabError, match="results of 'stemvo-lab search', found other files"):
+        runs.open_folder(out, "search", [])
+    with pytest.raises(runs.LabError, match="found other files"):
+        runs.open_folder(tmp_path, "compare", [])
+    (out / "truth.txt").symlink_to(given)
+    for folder, inside in ((tmp_path, given), (tmp_path, out / "truth.txt"), (out, out / "truth.txt")):
+        with pytest.raises(runs.LabError, match="expected a folder that holds no input, found .*truth.txt"):
+            runs.open_folder(folder, "compare", [inside])
+    with pytest.raises(runs.LabError, match="can be written"):
+        runs.open_folder(given / "out", "compare", [])
+    message = CliRunner().invoke(main, ["compare", str(given), "--gt", str(given), "--out", str(tmp_path)]).output
+    assert message.startswith("Error: ") and len(message.splitlines()) == 1, message

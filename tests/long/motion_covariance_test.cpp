@@ -77,7 +77,7 @@ std::vector<FrameResult> results_of(const fs::path& drive, double noise) {
   }
 }
 
-/// docs/accuracy.md has the table that this prints.
+/// docs/lab/accuracy_notes.md has the table that this prints.
 TEST(MotionCovariance, IsHonestOnRenderedDrivesWithNoiseInTheImages) {
   for (const char* kind : {"street", "turn", "walk", "courtyard"}) {
     const fs::path drive = drive_of(kind);

@@ -84,17 +84,6 @@ TEST_F(Handheld, Backwards) { expect_followed(399, -1, 400, 0.095); }
 TEST_F(Handheld, EverySecondFrame) { expect_followed(0, 2, 200, 0.065); }
 TEST_F(Handheld, EveryThirdFrame) { expect_followed(0, 3, 134, 0.055); }
 
-TEST_F(OtherCameras, HandheldJpegsWithPosesAndTimes) {
-  const fs::path data = *test::shared_data() / "handheld";
-  expect_poses(
-      {(data / "images").string(), "--camera", (data / "camera.yaml").string(), "--gt",
-       (data / "poses.txt").string(), "--times", (data / "times.txt").string(), "--frames", "0:60"},
-      60);
-  const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
-  EXPECT_EQ(metrics.at("sequence"), "handheld");
-  EXPECT_EQ(metrics.at("alignment"), "sim3");
-}
-
 TEST_F(OtherCameras, DroneOfEuroc) {
   const fs::path data = *test::shared_data() / "euroc/mav0/cam0";
   expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},

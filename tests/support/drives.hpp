@@ -104,25 +104,6 @@ inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
                      size, std::nullopt);
 }
 
-/// A drive there and back again, of links to the frames of another one, so that it lasts.
-inline void link_long_drive(const std::filesystem::path& frames_of,
-                            const std::filesystem::path& to,
-                            int num_frames) {
-  namespace fs = std::filesystem;
-  fs::create_directories(to / "image_2");
-  fs::copy(frames_of / "calib.txt", to / "calib.txt");
-  std::ofstream times(to / "times.txt");
-  for (int i = 0; i < num_frames; ++i) {
-    const auto name = [](int frame) {
-      char text[32];
-      std::snprintf(text, sizeof(text), "image_2/%06d.png", frame);
-      return std::string(text);
-    };
-    times << 0.1 * i << "\n";
-    fs::create_symlink(frames_of / name(i % 120 < 60 ? i % 120 : 119 - i % 120), to / name(i));
-  }
-}
-
 /// The first frames of the rendered drive, copied, to be broken.
 inline std::filesystem::path copy_drive(const std::filesystem::path& to, int num_frames) {
   namespace fs = std::filesystem;

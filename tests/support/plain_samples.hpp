@@ -9,7 +9,8 @@
 
 #include "features/patch_kernels.hpp"
 
-/// How an image is sampled, to be read, not to be fast. Complex numbers are points and similarities.
+/// How an image is sampled, to be read, not to be fast. Complex numbers are points and
+/// similarities.
 namespace stemvo::test {
 
 using Complex = std::complex<double>;

@@ -60,9 +60,8 @@ struct StateRun {
 inline StateRun run_states(const std::filesystem::path& sequence, const std::string& scale) {
   const TempFolder folder;
   const std::string out = folder / "result";
-  const ProgramResult done =
-      run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",
-                  "odometry.mode=map", "--set", "scale.source=" + scale});
+  const ProgramResult done = run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",
+                                         "odometry.mode=map", "--set", "scale.source=" + scale});
   EXPECT_EQ(done.exit_code, 0) << done.err;
   const std::string csv = read_file(out + "/frames.csv");
   StateRun result{column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}};

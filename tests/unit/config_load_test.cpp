@@ -183,8 +183,8 @@ TEST_F(ConfigLoad, NotYamlNamesTheLine) {
   EXPECT_THAT(error_of("seed: 1\n---\nseed: 2\n"),
               HasSubstr(":2: not YAML: expected one document, found more behind it"));
   // yaml-cpp's LoadAll never ends here.
-  for (const char* text : {"seed: 1\n...\nseed: 2\n", "{seed: 1}\nstem: {filter: 3}\n",
-                           "{stem: {filter: 3}},\n"}) {
+  for (const char* text :
+       {"seed: 1\n...\nseed: 2\n", "{seed: 1}\nstem: {filter: 3}\n", "{stem: {filter: 3}},\n"}) {
     EXPECT_THAT(error_of(text), HasSubstr("more behind it")) << text;
   }
   EXPECT_THAT(error_of(std::string("\x89PNG\r\n\x1a\n\0\0", 10)), HasSubstr(": not YAML: "));

@@ -62,7 +62,8 @@ struct ReprojectionError {
   }
 };
 
-/// Ceres's solution of the same problem; returns the sum of its loss, px^2, and the camera's change.
+/// Ceres's solution of the same problem; returns the sum of its loss, px^2, and the camera's
+/// change.
 std::pair<double, IntrinsicsDelta> solve_by_ceres(Bundle& bundle, const BundleOptions& options) {
   ceres::Problem problem;
   std::vector<Eigen::Matrix<double, 6, 1>> poses;

@@ -50,20 +50,6 @@ double motion_error(const Rigid3& found, const Rigid3& expected) {
                   direction_error_rad(found.translation, expected.translation));
 }
 
-/// How far lambda * h is from R + T n^T, for the best lambda and n.
-double reproduction_error(const Eigen::Matrix3d& h, const Rigid3& motion) {
-  Eigen::Matrix<double, 9, 4> a;
-  a.col(0) = h.reshaped();
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Matrix3d tn = motion.translation * Eigen::Vector3d::Unit(i).transpose();
-    a.col(i + 1) = -tn.reshaped();
-  }
-  const Eigen::Matrix3d r = motion.rotation_matrix();
-  const Eigen::Matrix<double, 9, 1> b = r.reshaped();
-  const Eigen::Vector4d x = (a.transpose() * a).ldlt().solve(a.transpose() * b);
-  return (a * x - b).cwiseAbs().maxCoeff();
-}
-
 TEST(DecomposeHomography, TrueMotionIsAmongTheEight) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     const PlantedPlane plane = planted_plane(seed);
@@ -74,17 +60,6 @@ TEST(DecomposeHomography, TrueMotionIsAmongTheEight) {
       best = std::min(best, motion_error(hypothesis, plane.cur_from_prev));
     }
     EXPECT_LE(best, 1e-9) << "seed " << seed;
-  }
-}
-
-TEST(DecomposeHomography, EveryHypothesisReproducesTheHomography) {
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
-    const PlantedPlane plane = planted_plane(seed);
-    const Eigen::Matrix3d h = euclidean_homography(plane);
-    for (const Rigid3& hypothesis : decompose_homography(pixel_homography(plane), kitti_camera())) {
-      EXPECT_NEAR(hypothesis.translation.norm(), 1.0, 1e-12);
-      EXPECT_LE(reproduction_error(h, hypothesis), 1e-9) << "seed " << seed;
-    }
   }
 }
 
@@ -133,16 +108,6 @@ TEST(DecomposeEssential, TrueMotionIsAmongTheFour) {
       best = std::min(best, motion_error(hypothesis, truth));
     }
     EXPECT_LE(best, 1e-9) << "seed " << seed;
-  }
-}
-
-TEST(DecomposeEssential, EveryHypothesisReproducesTheMatrixUpToSign) {
-  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
-    const Eigen::Matrix3d e = essential_from_motion(SceneRandom(seed).motion(0.5));
-    for (const Rigid3& hypothesis : decompose_essential(e)) {
-      const Eigen::Matrix3d found = essential_from_motion(hypothesis);
-      EXPECT_LE(std::min((found - e).norm(), (found + e).norm()), 1e-9) << "seed " << seed;
-    }
   }
 }
 

@@ -100,22 +100,6 @@ TEST(Timing, ThreadsAreSeenAndSharesAddUp) {
   EXPECT_GE(report.rest_cpu_s, -1e-3) << "the stages have more time than the program";
 }
 
-TEST(Timing, OneRecorderAtATime) {
-  const StageRecorder first;
-  EXPECT_ANY_THROW(StageRecorder());
-  EXPECT_EQ(StageRecorder::active(), &first);
-}
-
-TEST(Timing, PeakMemoryGrowsWithWhatIsUsed) {
-  const StageRecorder recorder;
-  const double before = recorder.report().peak_memory_mib;
-  ASSERT_GT(before, 1.0);
-  constexpr std::size_t kSize = std::size_t{1} << 28U;
-  const std::vector<char> much(kSize, 1);
-  EXPECT_GE(recorder.report().peak_memory_mib, 256.0) << much[kSize / 2];
-  EXPECT_GE(recorder.report().peak_memory_mib, before);
-}
-
 TimingReport example() {
   TimingReport report;
   report.stages = {{"stem", 400, 3.25, 4.5, 1.5}, {"tracking", 399, 5.0, 7.0, 2.0}};

@@ -164,7 +164,7 @@ def command(kitti, out, sequences, configs, overrides, model, trajectories, scal
         methods = methods_of(configs or (() if trajectories and not (overrides or model) else ("default", "paper")),
                              overrides, model, trajectories, scales)
         found = runs.sequences_of(kitti, [name for name in sequences.split(",") if name], frames)
-        out.mkdir(parents=True, exist_ok=True)
+        runs.open_folder(out, "benchmark", [kitti / "sequences", model, *(line.partition("=")[2] for line in trajectories)])
         rows, poses = measure_all(methods, found, out)
     except (runs.LabError, ValueError) as error:
         raise click.ClickException(str(error)) from None

@@ -184,7 +184,7 @@ def command(given, gt, out, align, names, camera, tolerance, first, width):
             raise runs.LabError(f"--names: expected {len(given)} different names, found {len(titles)}")
         paths = [load(file, name, gt, align, camera, tolerance, first) for file, name in zip(given, titles)]
         found, lines, positions = compare(paths, gt, camera, align)
-        out.mkdir(parents=True, exist_ok=True)
+        runs.open_folder(out, "compare", [gt, camera, *(path.file for path in paths)])
         click.echo(write_report(out, f"{' and '.join(titles)} against {gt.name}", found, lines, positions, ALIGNMENTS[align], width))
     except (runs.LabError, ValueError) as error:
         raise click.ClickException(str(error)) from None

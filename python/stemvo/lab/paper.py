@@ -8,13 +8,12 @@ import subprocess
 import sys
 
 import click
-import numpy as np
 import onnx
 import pandas as pd
 import tqdm
 
 import stemvo
-from stemvo.lab import figures, runs, tables
+from stemvo.lab import figures, runs, score, tables
 
 SEQUENCES = ("00", "02", "05", "06", "08", "09")
 TABLE_1 = {"ConvNeXtXLarge": (297, 332806, 36096, 296710), "EfficientNetV2L": (1031, 1253254, 261216, 992038),
@@ -101,13 +100,6 @@ def table_1(counted):
     return pd.DataFrame(rows)
 
 
-def mean_motion(poses):
-    """E_t in m and E_r in degrees: between consecutive poses. They take no ground truth: a camera that stands scores 0."""
-    change = np.linalg.inv(poses[:-1]) @ poses[1:]
-    cosines = np.clip((np.trace(change[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
-    return np.linalg.norm(change[:, :3, 3], axis=1).mean(), np.degrees(np.arccos(cosines)).mean()
-
-
 def filters_of(layers, chosen, is_gray):
     """(label, options, note): the input's channels, and each layer's filters. A gray image has one channel, not three."""
     colors = Layer("", "input", 3, "input_layer")
@@ -120,14 +112,14 @@ def filters_of(layers, chosen, is_gray):
 
 def table_2(layers, sequence, chosen, config, out):
     first = sequence.recording[0][0]
-    rows = [{"Layer-filter": "(the true path)", **dict(zip(("E_t, m", "E_r, deg"), mean_motion(sequence.truth))), "t_rel, %": 0.0}]
+    rows = [{"Layer-filter": "(the true path)", **dict(zip(("E_t, m", "E_r, deg"), score.mean_motion(sequence.truth))), "t_rel, %": 0.0}]
     for label, options, note in tqdm.tqdm(filters_of(layers, chosen, first.ndim == 2), desc="Table 2", disable=None):
         method = runs.Method(label, runs.TRUE_STEPS, config | options)
         row, poses = runs.run(method, sequence, out / "runs" / sequence.name / re.sub(r"[^A-Za-z0-9.]+", "_", label))
         if poses is None:
             raise runs.LabError(f"{label}: {row['problem']}")
         is_detected = row["tracked_fraction"] * len(poses) >= LEAST_MEASURED * (len(poses) - 1) + 1
-        motion = mean_motion(poses) if is_detected else (NOT_DETECTED, NOT_DETECTED)
+        motion = score.mean_motion(poses) if is_detected else (NOT_DETECTED, NOT_DETECTED)
         rows.append({"Layer-filter": label, "E_t, m": motion[0], "E_r, deg": motion[1], "t_rel, %": row["t_rel_percent"] if is_detected else None,
                      "measured, %": 100.0 * row["tracked_fraction"], "ran on": "; ".join(filter(None, (sequence.frames_text, note and "stand-in")))})
     return pd.DataFrame(rows)
@@ -259,7 +251,7 @@ def command(weights, kitti, out, layers, preprocessing, filters, frames, winner,
     try:
         if not chosen:
             raise runs.LabError(f"--filters: expected A:B, found '{filters}'")
-        out.mkdir(parents=True, exist_ok=True)
+        runs.open_folder(out, "paper", [*weights_in(weights), kitti / "sequences"])
         click.echo(reproduce(weights, kitti, out, layers, preprocessing, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
                              config, {"DeepVO": deepvo, "TartanVO": tartanvo}))
     except (runs.LabError, ValueError) as error:

@@ -9,13 +9,14 @@ import pathlib
 
 import click
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import stemvo
 from stemvo.lab import bootstrap, score, work
 from stemvo.lab.disturbances import ALL, Disturbed, find
 from stemvo.lab.ranking import number
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import LabError, options_of
+from stemvo.lab.runs import LabError, open_folder, options_of
 from stemvo.lab.search import program_hash
 
 CONTROLS = ("gray", "red", "green", "blue", "log", "census", "orb", "sift")
@@ -97,11 +98,9 @@ def recovery(is_found, is_disturbed):
 
 def jumps(is_found, poses, truth):
     """Steps between found frames whose rotation is wrong by more than a degree."""
-    steps = [np.swapaxes(one[:-1, :3, :3], 1, 2) @ one[1:, :3, :3] for one in (poses, truth)]
-    off = np.swapaxes(steps[0], 1, 2) @ steps[1]
-    cross = np.linalg.norm(np.stack([off[:, 2, 1] - off[:, 1, 2], off[:, 0, 2] - off[:, 2, 0], off[:, 1, 0] - off[:, 0, 1]]), axis=0)
-    angles = np.degrees(np.arctan2(cross, np.trace(off, axis1=1, axis2=2) - 1.0))
-    return int(np.sum((angles > JUMP_DEG) & is_found[:-1] & is_found[1:]))
+    turns = [Rotation.from_matrix(one[:, :3, :3]) for one in (poses, truth)]
+    found, true = (one[:-1].inv() * one[1:] for one in turns)
+    return int(np.sum((np.degrees((found.inv() * true).magnitude()) > JUMP_DEG) & is_found[:-1] & is_found[1:]))
 
 
 @dataclasses.dataclass
@@ -231,7 +230,7 @@ def command(drives, out, frames, kinds, controls, config, overrides, jobs, addre
         planned = [("none", "none", 0.0)] if not asked or "none" in asked else []
         for one in [find(name) for name in asked if name != "none"] if asked else ALL:
             planned += [(one.name, one.group, strength) for strength in one.strengths]
-        out.mkdir(parents=True, exist_ok=True)
+        open_folder(out, "robustness", [*(f"{drive}/times.txt" for drive in drives), config])
         rows, hashes, program = Rows(out / "rows.csv", COLUMNS, len(KEY)), {drive: drive.hash() for drive in opened}, program_hash()
         tasks = {}
         for kind, _, strength in planned:

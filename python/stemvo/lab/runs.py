@@ -25,6 +25,22 @@ class LabError(Exception):
     """One line for the user."""
 
 
+def open_folder(out, command, inputs):
+    """Creates OUT by the rule of `stemvo run`: a new folder, an empty one or results of the same command, which holds no input."""
+    root, mark = out.resolve(), f"Results of 'stemvo-lab {command}': its next run may replace them.\n"
+    for given in map(pathlib.Path, filter(None, inputs)):
+        # A link to a file may lie in the folder, or lead into it.
+        if given.exists() and any(root in (place, *place.parents) for place in (given.absolute().parent.resolve(), given.resolve().parent)):
+            raise LabError(f"{out}: expected a folder that holds no input, found {given}")
+    if out.is_dir() and any(out.iterdir()) and not ((out / ".stemvo").is_file() and (out / ".stemvo").read_text() == mark):
+        raise LabError(f"{out}: expected a new folder, an empty one or results of 'stemvo-lab {command}', found other files")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / ".stemvo").write_text(mark)
+    except OSError as error:
+        raise LabError(f"{out}: expected an output folder that can be written, found: {error.strerror}") from None
+
+
 def config_file(name):
     """NAME.yaml of the program: of the checkout, else of the installed package; else the file of this name."""
     here = pathlib.Path(__file__).resolve()

@@ -7,6 +7,7 @@ import pathlib
 import click
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import stemvo
 from stemvo.lab import runs
@@ -47,11 +48,9 @@ def write_images(recording, first, folder):
 
 
 def quaternion_of(rotation):
-    """w, x, y, z with w >= 0, by the eigenvector of Bar-Itzhack (2000)."""
-    (a, b, c), (d, e, f), (g, h, i) = rotation
-    matrix = np.array([[a - e - i, 0, 0, 0], [d + b, e - a - i, 0, 0], [g + c, h + f, i - a - e, 0], [h - f, c - g, d - b, a + e + i]]) / 3.0
-    x, y, z, w = np.linalg.eigh(matrix)[1][:, -1]
-    return np.array([w, x, y, z]) * (1.0 if w >= 0.0 else -1.0)
+    """w, x, y, z with w >= 0."""
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True)
+    return w, x, y, z
 
 
 def write_colmap(out, camera, names, poses, points):
@@ -94,6 +93,7 @@ def command(result, recording, out, kind, camera):
         pinhole = said["camera"]
         intrinsics = {"w": read.camera.width, "h": read.camera.height, "fl_x": pinhole["fx_px"], "fl_y": pinhole["fy_px"],
                       "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX}
+        runs.open_folder(out, "scene", [result / "metrics.json", recording, camera])
         names = write_images(read, first, out / "images")
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](out, intrinsics, names, poses, points)
     except (runs.LabError, ValueError, KeyError, OSError) as error:

@@ -15,7 +15,7 @@ import stemvo
 from stemvo import _core
 from stemvo.lab import ranking, score, work
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import LabError, options_of
+from stemvo.lab.runs import LabError, open_folder, options_of
 
 # A run's odometry made cheap: pairs of frames, fewer points, steps of the true length.
 DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400, "features.klt_window": 23,
@@ -241,7 +241,7 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
         candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in range(layer.num_filters)[int(first or 0) : int(last) if last else None]]
         candidates = part_of(candidates, shard) if shard else candidates
         candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
-        out.mkdir(parents=True, exist_ok=True)
+        open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
         rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)
         shares = SHARES[-1:] if exhaustive else SHARES
         from tqdm import tqdm
