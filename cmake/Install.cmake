@@ -1,5 +1,5 @@
 # `cmake --install`: the program, the library, what they need at run time, and packages for CMake and pkg-config.
-#   bin/stemvo  lib/libstemvo.a (or .so)  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
+#   bin/stemvo  lib/libstemvo.a (or .so)  lib/stemvo/{libonnxruntime.so.1,libstemvo_video.so,libstemvo_markers.so}  lib/{cmake/stemvo,pkgconfig}  include/stemvo
 #   share/stemvo/config  share/doc/stemvo
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -23,7 +23,7 @@ if(TARGET stemvo_app)
   file(RELATIVE_PATH runtime_from_bin /prefix/${CMAKE_INSTALL_BINDIR} /prefix/${runtime_dir})
   set_target_properties(stemvo_app PROPERTIES INSTALL_RPATH "$ORIGIN/${runtime_from_bin}")
   install(TARGETS stemvo_app)
-  install(TARGETS stemvo_video LIBRARY DESTINATION ${runtime_dir})
+  install(TARGETS stemvo_video stemvo_markers LIBRARY DESTINATION ${runtime_dir})
   install(FILES third_party/plotly/LICENSE.txt DESTINATION share/doc/stemvo/plotly)  # which the program writes into reports
 endif()
 

@@ -21,5 +21,5 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # ONNX Runtime is in the package, in a folder of the package's own.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${onnxruntime_dir})
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "cmake, libopencv-dev, libeigen3-dev, libceres-dev, libfmt-dev, libssl-dev")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libopencv-contrib406 | libopencv-objdetect410, cmake, libopencv-dev, libeigen3-dev, libceres-dev, libfmt-dev, libssl-dev")
 include(CPack)

@@ -12,31 +12,32 @@ namespace stemvo::dataset {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-Expected<OpenDecoder*> load_module() {
+Expected<void*> load_symbol(const fs::path& built, const char* symbol, std::string_view what) {
   std::error_code code;
   const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  const fs::path name = fs::path(STEMVO_VIDEO_MODULE).filename();
-  const std::array<fs::path, 2> places = {program.parent_path() / STEMVO_RUNTIME_FROM_BIN / name,
-                                          STEMVO_VIDEO_MODULE};  // installed, as it was built
+  const std::array<fs::path, 2> places = {
+      program.parent_path() / STEMVO_RUNTIME_FROM_BIN / built.filename(), built};  // installed
   std::string why;
   for (const fs::path& place : places) {
     // Never unloaded: decoders live as long as their videos.
     if (void* module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL)) {
-      return reinterpret_cast<OpenDecoder*>(::dlsym(module, kOpenDecoder));
+      return ::dlsym(module, symbol);
     }
     why += fmt::format("; {}", ::dlerror());
   }
-  return fail(fmt::format(
-      "{}: expected the module that decodes videos beside the program, found none that loads{}",
-      places.front().lexically_normal().string(), why));
+  return fail(
+      fmt::format("{}: expected the module that {} beside the program, found none that loads{}",
+                  places.front().lexically_normal().string(), what, why));
 }
 
+namespace {
+
 Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const cv::Size& size) {
-  static const Expected<OpenDecoder*> module = load_module();
-  return module.map([&](OpenDecoder* open_decoder) {
-    return std::unique_ptr<VideoDecoder>(open_decoder(file, number, size.width, size.height));
+  static const Expected<void*> found =
+      load_symbol(STEMVO_VIDEO_MODULE, kOpenDecoder, "decodes videos");
+  return found.map([&](void* open_decoder) {
+    return std::unique_ptr<VideoDecoder>(
+        reinterpret_cast<OpenDecoder*>(open_decoder)(file, number, size.width, size.height));
   });
 }
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include <opencv2/core.hpp>
 
@@ -34,6 +35,12 @@ class VideoDecoder {
   /// How the container asked for the frames to be turned, and they were.
   [[nodiscard]] virtual double turned_deg() const = 0;
 };
+
+/// A symbol of a module that is loaded now: where the program is installed, else as `built`. Error:
+/// the module, which does `what`, is in neither place or does not load.
+[[nodiscard]] Expected<void*> load_symbol(const std::filesystem::path& built,
+                                          const char* symbol,
+                                          std::string_view what);
 
 /// By FFmpeg, turned as the container asks unless frames that are not have this size. Null: not a
 /// video. Error: the module is not where it was installed.

@@ -9,6 +9,7 @@ import unittest
 
 PROGRAM = pathlib.Path(os.environ["STEMVO_PROGRAM"])
 MODULE = PROGRAM.parent / "libstemvo_video.so"
+MARKERS = PROGRAM.parent / "libstemvo_markers.so"
 COMMANDS = PROGRAM.parent / "compile_commands.json"
 
 
@@ -21,18 +22,22 @@ class Program(unittest.TestCase):
         self.assertIn("DYN (Position-Independent Executable file)", readelf("--file-header"))
 
     def test_is_read_only_once_it_is_relocated(self):
-        for binary in (PROGRAM, MODULE):
+        for binary in (PROGRAM, MODULE, MARKERS):
             self.assertIn("GNU_RELRO", readelf("--program-headers", binary))
             self.assertRegex(readelf("--dynamic", binary), r"FLAGS\)\s+BIND_NOW")
 
     def test_no_stack_is_executable(self):
-        for binary in (PROGRAM, MODULE):
+        for binary in (PROGRAM, MODULE, MARKERS):
             stack = next(line for line in readelf("--program-headers", binary).splitlines() if "GNU_STACK" in line)
             self.assertNotIn("E", stack.split("GNU_STACK")[1])
 
     def test_starts_without_what_only_videos_need(self):
         self.assertNotIn("videoio", readelf("--dynamic"))
         self.assertIn("videoio", readelf("--dynamic", MODULE))
+
+    def test_what_only_markers_need_is_no_dependency(self):
+        for binary in (PROGRAM, MARKERS):
+            self.assertNotRegex(readelf("--dynamic", binary), "aruco|objdetect")
 
     def test_stack_and_buffers_are_guarded(self):
         symbols = readelf("--dyn-syms")

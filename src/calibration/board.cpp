@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#include "calibration/board.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <fmt/format.h>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "calibration/markers.hpp"
+#include "text/text_file.hpp"
+#include "try.hpp"
+
+namespace stemvo {
+namespace {
+
+constexpr const char* kForms =
+    "COLUMNSxROWS:SQUARE_M (inner corners), charuco:COLUMNSxROWS:SQUARE_M:MARKER_M:DICTIONARY or "
+    "aprilgrid:COLUMNSxROWS:TAG_M:GAP_M";
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    c == at ? void(parts.emplace_back()) : parts.back().push_back(c);
+  }
+  return parts;
+}
+
+cv::Point3f on_board(double x_m, double y_m) {
+  return {static_cast<float>(x_m), static_cast<float>(y_m), 0.0F};
+}
+
+BoardPoints find_chessboard(const Board& board, const cv::Mat& gray) {
+  BoardPoints points;
+  if (!cv::findChessboardCornersSB(gray, board.cells, points.in_image,
+                                   cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY)) {
+    return {};
+  }
+  for (int row = 0; row < board.cells.height; ++row) {
+    for (int column = 0; column < board.cells.width; ++column) {
+      points.on_board.push_back(on_board(column * board.cell_m, row * board.cell_m));
+    }
+  }
+  return points;
+}
+
+/// The corners of markers by a layout that says where a marker's corner is on the board.
+template <typename Layout>
+BoardPoints corners_by(const std::vector<Marker>& markers, const Layout& layout) {
+  BoardPoints points;
+  for (const Marker& marker : markers) {
+    for (int corner = 0; corner < 4; ++corner) {
+      points.on_board.push_back(layout(marker.id, corner));
+      points.in_image.push_back(marker.corners[static_cast<std::size_t>(corner)]);
+    }
+  }
+  return points;
+}
+
+std::vector<cv::Point2f> flat(const std::vector<cv::Point3f>& points) {
+  std::vector<cv::Point2f> result;
+  std::ranges::transform(points, std::back_inserter(result),
+                         [](const cv::Point3f& p) { return cv::Point2f(p.x, p.y); });
+  return result;
+}
+
+/// The root mean square of what a plane seen by a pinhole leaves, which is the lens' part where the
+/// layout is right.
+double misfit_px(const BoardPoints& points) {
+  const cv::Mat image_from_board = cv::findHomography(flat(points.on_board), points.in_image);
+  if (image_from_board.empty()) {
+    return std::numeric_limits<double>::infinity();
+  }
+  std::vector<cv::Point2f> seen;
+  cv::perspectiveTransform(flat(points.on_board), seen, image_from_board);
+  return cv::norm(seen, points.in_image) / std::sqrt(static_cast<double>(seen.size()));
+}
+
+/// Corners of a tag in units of its sides, clockwise from the upper left.
+constexpr int kCornerX[] = {0, 1, 1, 0};
+constexpr int kCornerY[] = {0, 0, 1, 1};
+
+/// Corners to parts of a pixel. Which window is within a marker's border and the margins around it
+/// depends on the print: the one is taken that leaves the least.
+BoardPoints refined(const cv::Mat& gray,
+                    const std::vector<Marker>& markers,
+                    const BoardPoints& points) {
+  double side_px = std::numeric_limits<double>::infinity();
+  for (const Marker& marker : markers) {
+    side_px = std::min(side_px, std::sqrt(cv::contourArea(marker.corners)));
+  }
+  BoardPoints best = points;
+  double best_px = std::numeric_limits<double>::infinity();
+  for (const double share : {0.1, 0.15, 0.2}) {
+    const int half = std::clamp(static_cast<int>(share * side_px), 2, 8);
+    BoardPoints tried = points;
+    cv::cornerSubPix(gray, tried.in_image, {half, half}, {-1, -1},
+                     {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, 1e-3});
+    if (const double px = misfit_px(tried); px < best_px) {
+      best_px = px;
+      best = std::move(tried);
+    }
+  }
+  return best;
+}
+
+BoardPoints find_grid(const Board& board, const std::vector<Marker>& markers) {
+  const int columns = board.cells.width;
+  const double step_m = board.cell_m + board.other_m;
+  BoardPoints best;
+  double best_px = std::numeric_limits<double>::infinity();
+  for (const bool is_upwards : {false, true}) {
+    for (int turn = 0; turn < 4; ++turn) {
+      BoardPoints points = corners_by(markers, [&](int id, int corner) {
+        const int row = is_upwards ? board.cells.height - 1 - id / columns : id / columns;
+        const int turned = (corner + turn) % 4;
+        return on_board((id % columns) * step_m + kCornerX[turned] * board.cell_m,
+                        row * step_m + kCornerY[turned] * board.cell_m);
+      });
+      if (const double px = misfit_px(points); px < best_px) {
+        best_px = px;
+        best = std::move(points);
+      }
+    }
+  }
+  return best;
+}
+
+/// Squares that hold the markers, by their numbers; `parity`: which of the colours they are on.
+std::vector<cv::Point> marked_squares(const cv::Size& squares, int parity) {
+  std::vector<cv::Point> marked;
+  for (int y = 0; y < squares.height; ++y) {
+    for (int x = (y + parity) % 2; x < squares.width; x += 2) {
+      marked.emplace_back(x, y);
+    }
+  }
+  return marked;
+}
+
+BoardPoints charuco_markers(const Board& board, const std::vector<Marker>& markers, int parity) {
+  const std::vector<cv::Point> squares = marked_squares(board.cells, parity);
+  const double margin_m = 0.5 * (board.cell_m - board.other_m);
+  return corners_by(markers, [&](int id, int corner) {
+    const cv::Point& square = squares[static_cast<std::size_t>(id) % squares.size()];
+    return on_board(square.x * board.cell_m + margin_m + kCornerX[corner] * board.other_m,
+                    square.y * board.cell_m + margin_m + kCornerY[corner] * board.other_m);
+  });
+}
+
+/// Corners of the squares, each where the two markers that touch it say; both must be seen.
+BoardPoints find_charuco(const Board& board, const std::vector<Marker>& markers) {
+  const BoardPoints choices[] = {charuco_markers(board, markers, 1),
+                                 charuco_markers(board, markers, 0)};
+  const BoardPoints& known =
+      misfit_px(choices[0]) <= misfit_px(choices[1]) ? choices[0] : choices[1];
+  BoardPoints points;
+  for (int y = 1; y < board.cells.height; ++y) {
+    for (int x = 1; x < board.cells.width; ++x) {
+      const cv::Point3f corner = on_board(x * board.cell_m, y * board.cell_m);
+      BoardPoints around;
+      for (std::size_t i = 0; i < known.on_board.size(); ++i) {
+        const cv::Point3f off = known.on_board[i] - corner;
+        if (std::max(std::abs(off.x), std::abs(off.y)) < board.cell_m) {
+          around.on_board.push_back(known.on_board[i]);
+          around.in_image.push_back(known.in_image[i]);
+        }
+      }
+      const cv::Mat local = around.on_board.size() == 8
+                                ? cv::findHomography(flat(around.on_board), around.in_image)
+                                : cv::Mat();
+      if (!local.empty()) {
+        std::vector<cv::Point2f> seen;
+        cv::perspectiveTransform(flat({corner}), seen, local);
+        points.on_board.push_back(corner);
+        points.in_image.push_back(seen.front());
+      }
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+Expected<Board> parse_board(const std::string& text) {
+  std::vector<std::string> parts = split(text, ':');
+  Board board;
+  if (parts.front() == "charuco" || parts.front() == "aprilgrid") {
+    board.kind = parts.front() == "charuco" ? Board::Kind::kCharuco : Board::Kind::kAprilGrid;
+    board.dictionary = board.kind == Board::Kind::kAprilGrid ? "DICT_APRILTAG_36h11" : "";
+    parts.erase(parts.begin());
+    if (parts.size() == 4) {
+      board.dictionary = parts.back();
+      parts.pop_back();
+    }
+  }
+  const bool is_plain = board.kind == Board::Kind::kChessboard;
+  const std::vector<std::string> sides = split(parts.front(), 'x');
+  constexpr std::size_t kMost = 100;
+  const auto columns = parse_index(sides.front());
+  const auto rows = parse_index(sides.back());
+  const std::size_t least = is_plain ? 3 : 2;
+  const auto cell = parts.size() == (is_plain ? 2 : 3) ? parse_numbers(parts[1], 1) : fail("");
+  const auto other =
+      is_plain ? Expected<std::vector<double>>({0.0}) : parse_numbers(parts.back(), 1);
+  const bool is_sound = sides.size() == 2 && columns && rows &&
+                        std::min(*columns, *rows) >= least && std::max(*columns, *rows) <= kMost &&
+                        cell && cell->front() > 0.0 && other &&
+                        (is_plain || other->front() > 0.0) &&
+                        (board.kind != Board::Kind::kCharuco ||
+                         (other->front() < cell->front() && !board.dictionary.empty()));
+  if (!is_sound) {
+    return fail(fmt::format("--board: expected {}, found '{}'", kForms, one_line(text)));
+  }
+  board.cells = {static_cast<int>(*columns), static_cast<int>(*rows)};
+  board.cell_m = cell->front();
+  board.other_m = other->front();
+  return board;
+}
+
+Expected<BoardPoints> find_board(const Board& board, const cv::Mat& gray) {
+  if (board.kind == Board::Kind::kChessboard) {
+    return find_chessboard(board, gray);
+  }
+  STEMVO_TRY_GET(std::vector<Marker> markers, find_markers(gray, board.dictionary));
+  const int num_cells = board.cells.area();
+  const bool is_grid = board.kind == Board::Kind::kAprilGrid;
+  std::erase_if(markers, [&](const Marker& marker) {
+    return marker.id >= (is_grid ? num_cells : (num_cells + 1) / 2);
+  });
+  constexpr std::size_t kMinMarkers = 4;
+  constexpr std::size_t kMinCorners = 8;
+  if (markers.size() < kMinMarkers) {
+    return BoardPoints();
+  }
+  const BoardPoints points = is_grid ? find_grid(board, markers) : find_charuco(board, markers);
+  return points.in_image.size() < kMinCorners ? BoardPoints() : refined(gray, markers, points);
+}
+
+}  // namespace stemvo

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include "calibration/calibrate_board.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "calibration/board_coverage.hpp"
+#include "dataset/camera_file.hpp"
+#include "dataset/frame_files.hpp"
+#include "dataset/listing.hpp"
+#include "dataset/video_stream.hpp"
+#include "io/image_file.hpp"
+#include "report/frame_image.hpp"
+#include "text/text_file.hpp"
+#include "text/text_table.hpp"
+#include "try.hpp"
+
+namespace stemvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Looks for the board in pictures.
+class ViewCollector {
+ public:
+  ViewCollector(const BoardRequest& request, BoardReport& report)
+      : request_(request), report_(report) {}
+
+  /// `must_differ`: from the views so far.
+  Status add(const std::string& name, const cv::Mat& gray, bool must_differ) {
+    ++report_.num_pictures;
+    STEMVO_TRY_GET(BoardPoints points, find_board(request_.board, gray));
+    if (!points.in_image.empty() && (!must_differ || differs(points, gray.size()))) {
+      report_.views.push_back({name, std::move(points)});
+    }
+    return {};
+  }
+
+ private:
+  /// Most corners of it are elsewhere in every view so far.
+  [[nodiscard]] bool differs(const BoardPoints& points, const cv::Size& size) const {
+    constexpr double kMinShift = 0.04;  // of the image's width
+    return std::ranges::none_of(report_.views, [&](const BoardView& view) {
+      const auto& others = view.points.in_image;
+      const std::size_t count = std::min(others.size(), points.in_image.size());
+      double sum_px = 0.0;
+      for (std::size_t i = 0; i < count; ++i) {
+        sum_px += cv::norm(others[i] - points.in_image[i]);
+      }
+      return sum_px < kMinShift * size.width * static_cast<double>(count);
+    });
+  }
+
+  const BoardRequest& request_;
+  BoardReport& report_;
+};
+
+/// The size that most pictures have.
+Expected<cv::Size> look_at_images(const BoardRequest& request,
+                                  const CalibrationProgress& progress,
+                                  BoardReport& report) {
+  const fs::path inside = request.pictures / "images";
+  STEMVO_TRY_GET(const auto listing,
+                 dataset::list_images(dataset::is_folder(inside) ? inside : request.pictures));
+  FrameSource frames;
+  frames.files = listing.files;
+  STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
+  ViewCollector collector(request, report);
+  for (std::size_t i = 0; i < frames.files.size() && !report.interrupted; ++i) {
+    const auto image = io::read_image(frames.files[i], false, kind.size, kind.levels);
+    if (image) {
+      STEMVO_TRY(collector.add(frames.files[i].filename().string(), *image, false));
+    } else {
+      report.warnings.push_back(image.error().message);
+    }
+    report.interrupted = progress && !progress(i + 1, frames.files.size());
+  }
+  return kind.size;
+}
+
+Expected<cv::Size> look_at_video(const BoardRequest& request,
+                                 const CalibrationProgress& progress,
+                                 BoardReport& report) {
+  STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
+  constexpr std::size_t kMaxLooks = 300;
+  constexpr std::size_t kUsualStep = 5;
+  const std::size_t num_frames = stream->expected_frames();
+  const std::size_t step = num_frames > 0 ? num_frames / kMaxLooks + 1 : kUsualStep;
+  ViewCollector collector(request, report);
+  for (std::size_t i = 0; !report.interrupted; ++i) {
+    STEMVO_TRY_GET(const cv::Mat image, stream->read(i));
+    if (image.empty()) {
+      break;
+    }
+    if (i % step == 0) {
+      cv::Mat gray;
+      cv::cvtColor(image, gray, cv::COLOR_RGB2GRAY);
+      STEMVO_TRY(collector.add(fmt::format("frame {}", i), gray, true));
+    }
+    report.interrupted = progress && !progress(i + 1, std::max(num_frames, i + 2));
+  }
+  return stream->size();
+}
+
+std::string file_text(const BoardRequest& request, const BoardReport& report) {
+  const auto num_used = std::ranges::count_if(report.views, &BoardView::is_used);
+  std::string text = fmt::format(
+      "# {} views of the board {}: error {:.3f} px (root mean square)\n# sigma:", num_used,
+      one_line(request.board_text), report.fit.error_px);
+  for (const FittedNumber& number : report.fit.numbers) {
+    text += fmt::format(" {} {:.2g}", number.name, number.sigma);
+  }
+  dataset::CameraFile file;
+  file.camera = report.fit.camera;
+  return text + "\n" + dataset::camera_file_text(file);
+}
+
+Status write_files(const BoardRequest& request, const cv::Size& size, BoardReport& report) {
+  report.coverage_file = request.out_file;
+  report.coverage_file.replace_extension();
+  report.coverage_file += "_coverage.png";
+  STEMVO_TRY(write_text_file(request.out_file, file_text(request, report)));
+  return write_image(report.coverage_file, draw_coverage(report.views, size));
+}
+
+}  // namespace
+
+Expected<BoardReport> calibrate_board(const BoardRequest& request,
+                                      const CalibrationProgress& progress) {
+  STEMVO_TRY(check_can_write(request.out_file));
+  std::error_code code;
+  const auto look =
+      fs::is_regular_file(request.pictures, code) && !dataset::is_image_file(request.pictures)
+          ? look_at_video
+          : look_at_images;
+  BoardReport report;
+  STEMVO_TRY_GET(const cv::Size size, look(request, progress, report));
+  if (report.interrupted) {
+    return report;
+  }
+  auto fit = fit_camera(report.views, size);
+  if (!fit) {
+    return fail(fmt::format("{}: {} (in {} pictures)", request.pictures.string(),
+                            fit.error().message, report.num_pictures));
+  }
+  report.fit = *std::move(fit);
+  report.missing = missing_views(report.views, size);
+  STEMVO_TRY(write_files(request, size, report));
+  return report;
+}
+
+std::string format_board_table(const BoardReport& report) {
+  TextTable table("lrr");
+  table.add({"", "value", "sigma"});
+  table.rule();
+  for (const FittedNumber& number : report.fit.numbers) {
+    const int digits = number.name.starts_with('f') || number.name.starts_with('c') ? 2 : 5;
+    table.add({number.name, fmt::format("{:.{}f}", number.value, digits),
+               fmt::format("{:.{}f}", number.sigma, digits)});
+  }
+  const auto num_used = std::ranges::count_if(report.views, &BoardView::is_used);
+  std::string text =
+      table.str() + fmt::format("{} pictures, {} with the board, {} used: error {:.3f} px\n",
+                                report.num_pictures, report.views.size(), num_used,
+                                report.fit.error_px);
+  for (const BoardView& view : report.views) {
+    if (!view.is_used) {
+      text += fmt::format("left out: {}, whose error is {:.2f} px (blurred, bent or wrong)\n",
+                          view.name, view.error_px);
+    }
+  }
+  text += report.missing.empty() ? "the views suffice\n" : "photograph next:\n";
+  for (const std::string& one : report.missing) {
+    text += "  " + one + "\n";
+  }
+  return text;
+}
+
+}  // namespace stemvo
