@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -13,20 +12,6 @@
 
 namespace stemvo {
 namespace {
-
-/// The camera of the rendered drive's calib.txt, row P2.
-std::string camera_yaml(const fs::path& sequence, const test::DriveSize& size) {
-  const std::string text = read_file(sequence / "calib.txt");
-  double fx = 0.0;
-  double cx = 0.0;
-  double fy = 0.0;
-  double cy = 0.0;
-  std::sscanf(text.c_str() + text.find("P2:"), "P2: %lf 0 %lf %*f 0 %lf %lf", &fx, &cx, &fy, &cy);
-  return fmt::format(
-      "image_width: {}\nimage_height: {}\nintrinsics: [{}, {}, {}, {}]\n"
-      "distortion_model: none\nrate_hz: 10\n",
-      size.width_px, size.height_px, fx, fy, cx, cy);
-}
 
 /// As many lines of a rendered drive's file as there are images.
 std::string first_ten_lines(const fs::path& file) {
@@ -65,7 +50,7 @@ class ImageFolderRun : public ::testing::Test {
   const fs::path images_ = folder_.path() / "my images";
   const std::string camera_ = folder_ / "camera.yaml";
   const std::string out_ = folder_ / "out";
-  const std::string good_camera_ = camera_yaml(sequence_, {});
+  const std::string good_camera_ = camera_file_of(sequence_) + "rate_hz: 10\n";
 };
 
 TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {

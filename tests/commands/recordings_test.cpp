@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -24,19 +23,7 @@ constexpr int kNumFrames = 12;
 /// One rendered drive as others record: its images, times and camera in their layouts.
 class RecordingsRun : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const std::string calib = read_file(sequence_ / "calib.txt");
-    double fx = 0.0;
-    double cx = 0.0;
-    double fy = 0.0;
-    double cy = 0.0;
-    std::sscanf(calib.c_str() + calib.find("P2:"), "P2: %lf 0 %lf %*f 0 %lf %lf", &fx, &cx, &fy,
-                &cy);
-    camera_text_ = fmt::format(
-        "resolution: [620, 188]\nintrinsics: [{}, {}, {}, {}]\ndistortion_model: none\n", fx, fy,
-        cx, cy);
-    write_file(camera_, camera_text_);
-  }
+  void SetUp() override { write_file(camera_, camera_file_of(sequence_)); }
 
   fs::path image(int index) const { return sequence_ / fmt::format("image_2/{:06}.png", index); }
   ProgramResult run(const std::string& input, std::vector<std::string> more = {}) const {
@@ -69,25 +56,7 @@ class RecordingsRun : public ::testing::Test {
   const fs::path sequence_ = test::copy_drive(folder_.path(), kNumFrames);
   const std::string camera_ = folder_ / "camera.yaml";
   const std::string out_ = folder_ / "out";
-  std::string camera_text_;
 };
-
-TEST_F(RecordingsRun, Tum) {
-  const fs::path desk = folder_.path() / "desk";
-  fs::create_directories(desk / "rgb");
-  std::string list = "# timestamp filename\n";
-  for (int i = 0; i < kNumFrames; ++i) {
-    fs::copy_file(image(i), desk / fmt::format("rgb/{}.png", i));
-    list += fmt::format("{:.2f} rgb/{}.png\n", 1305031452.79 + 0.1 * i, i);
-  }
-  write_file(desk / "rgb.txt", list);
-  write_file(desk / "camera.yaml", camera_text_);
-  const ProgramResult result = run(desk.string(), {"--pictures", "6"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("input: TUM RGB-D recording desk"));
-  EXPECT_EQ(poses(), expected_poses());
-  EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("1305031452.789999962 "));
-}
 
 TEST_F(RecordingsRun, AVideoWithTruthByTime) {
   std::string truth;
@@ -196,27 +165,6 @@ TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {
   EXPECT_THAT(result.out, HasSubstr("results: results/00\n"));
   EXPECT_THAT(result.out + result.err, Not(HasSubstr("\x1b")));
   EXPECT_TRUE(fs::exists(folder_ / "results/00/trajectory_kitti.txt"));
-}
-
-TEST_F(RecordingsRun, FoldersOfImagesHaveTheNamesOfTheirRecordings) {
-  const fs::path here = fs::current_path();
-  fs::create_directories(folder_.path() / "first");
-  fs::create_directories(folder_.path() / "second/mav0/cam0");
-  fs::create_directory_symlink(sequence_ / "image_2", folder_.path() / "first/images");
-  fs::create_directory_symlink(sequence_ / "image_2", folder_.path() / "second/mav0/cam0/data");
-  write_file(camera_, camera_text_ + "rate_hz: 10\n");
-  const auto run_here = [&](const std::string& input) {
-    fs::current_path(folder_.path());
-    const ProgramResult result = run_stemvo({"run", input, "--camera", camera_, "--frames", "0:3"});
-    fs::current_path(here);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return result;
-  };
-  const ProgramResult first = run_here("first/images");
-  EXPECT_THAT(first.out, HasSubstr("results: results/first\n"));
-  EXPECT_THAT(run_here("second/mav0/cam0/data/").out, HasSubstr("results: results/second\n"));
-  EXPECT_THAT(run_here("first/images/0*0?.png").out, HasSubstr("results: results/first_00\n"));
-  EXPECT_THAT(run_here("first/images/*.png").out, HasSubstr("results: results/first_2\n"));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 
 #include "support/program_test.hpp"
+#include "support/shared_data.hpp"
 #include "support/state_runs.hpp"
 
 namespace stemvo {
@@ -95,11 +96,8 @@ TEST_F(Calibrate, ARunUsesTheFileItIsGivenAndNoOther) {
 
 // Many sigmas from the given one, but on a straight road a sigma is worth little.
 TEST_F(Calibrate, AStraightRoadTellsNothing) {
-  const auto data = test::shared_data();
-  if (!data) {
-    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
-  }
-  sequence_ = *data / "kitti/sequences/06";
+  STEMVO_NEEDS_SHARED_DATA();
+  sequence_ = testing::shared_data() / "kitti/sequences/06";
   const ProgramResult result = calibrate({});
   EXPECT_EQ(result.exit_code, 1) << result.out;
   EXPECT_THAT(result.err, HasSubstr("determines neither"));

@@ -28,7 +28,7 @@ class Times : public test::NeedsClips {
   void SetUp() override {
     test::NeedsClips::SetUp();
     if (!IsSkipped()) {
-      clip_.emplace(open_kitti(*test::shared_data() / "kitti/sequences/03", {}).value());
+      clip_.emplace(open_kitti(testing::shared_data() / "kitti/sequences/03", {}).value());
     }
   }
 

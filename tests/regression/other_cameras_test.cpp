@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evaluation/trajectory.hpp"
+#include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
 #include "support/state_runs.hpp"
 
@@ -18,13 +19,8 @@ namespace stemvo {
 namespace {
 
 /// Images of other people's cameras.
-class OtherCameras : public ::testing::Test {
+class OtherCameras : public test::NeedsClips {
  protected:
-  void SetUp() override {
-    if (!test::shared_data()) {
-      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
-    }
-  }
   void expect_poses(std::vector<std::string> arguments, std::size_t count) const {
     const std::string out = folder_ / "out";
     arguments.insert(arguments.begin(), "run");
@@ -43,7 +39,6 @@ class OtherCameras : public ::testing::Test {
     return static_cast<std::size_t>(
         std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
   }
-  test::TempFolder folder_;
 };
 
 /// The hand-held camera, its frames in an order of ours.
@@ -51,7 +46,7 @@ class Handheld : public OtherCameras {
  protected:
   /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
   void expect_followed(int first, int step, std::size_t count, double max_ate_m) const {
-    const fs::path data = *test::shared_data() / "handheld";
+    const fs::path data = testing::shared_data() / "handheld";
     std::vector<fs::path> images(fs::directory_iterator(data / "images"), {});
     std::sort(images.begin(), images.end());
     std::istringstream lines(read_file(data / "poses.txt"));
@@ -85,7 +80,7 @@ TEST_F(Handheld, EverySecondFrame) { expect_followed(0, 2, 200, 0.065); }
 TEST_F(Handheld, EveryThirdFrame) { expect_followed(0, 3, 134, 0.055); }
 
 TEST_F(OtherCameras, DroneOfEuroc) {
-  const fs::path data = *test::shared_data() / "euroc/mav0/cam0";
+  const fs::path data = testing::shared_data() / "euroc/mav0/cam0";
   expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
                num_images(data / "data"));
   // It hovers: nothing to make a map of, and nothing is lost.
@@ -95,7 +90,7 @@ TEST_F(OtherCameras, DroneOfEuroc) {
 }
 
 TEST_F(OtherCameras, KinectOfTum) {
-  const fs::path images = *test::shared_data() / "tum/rgb";
+  const fs::path images = testing::shared_data() / "tum/rgb";
   write_file(folder_ / "camera.yaml",
              "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
              "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"

@@ -26,7 +26,7 @@ class RoadOfClip : public test::NeedsClips {
 
   /// The first frames of clip 03, seen by a camera that is mounted otherwise.
   test::ProgramResult run(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
-    const fs::path clip = *test::shared_data() / "kitti/sequences/03";
+    const fs::path clip = testing::shared_data() / "kitti/sequences/03";
     const fs::path images = folder_ / "images";
     fs::create_directories(images);
     cv::Size size;
@@ -84,7 +84,7 @@ class HandHeld : public test::NeedsClips {};
 
 TEST_F(HandHeld, ARoomHasNoRoad) {
   const test::ProgramResult done =
-      test::run_stemvo({"run", (*test::shared_data() / "handheld").string(), "--out",
+      test::run_stemvo({"run", (testing::shared_data() / "handheld").string(), "--out",
                         folder_ / "result", "--quiet", "--frames", "0:150", "--set",
                         "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"});
   EXPECT_EQ(done.exit_code, 0) << done.err;

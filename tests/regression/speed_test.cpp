@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <random>
@@ -54,10 +53,8 @@ class Speeds : public ::testing::Test {
 };
 
 TEST_F(Speeds, MakeMetresOfAClipWithoutItsRoad) {
-  if (!test::shared_data()) {
-    GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
-  }
-  const fs::path sequence = *test::shared_data() / "kitti/sequences/03";
+  STEMVO_NEEDS_SHARED_DATA();
+  const fs::path sequence = testing::shared_data() / "kitti/sequences/03";
   EXPECT_LE(t_rel_with(sequence, 0.0), 0.6);
   const double biased = t_rel_with(sequence, 0.05);
   EXPECT_GE(biased, 4.4);

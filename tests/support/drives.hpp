@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -121,13 +120,6 @@ inline std::filesystem::path copy_drive(const std::filesystem::path& to, int num
     fs::copy_file(from / "sequences/00" / name, sequence / name);
   }
   return sequence;
-}
-
-/// The folder with real clips, where the machine has it.
-inline std::optional<std::filesystem::path> shared_data() {
-  const char* folder = std::getenv("STEMVO_SHARED_DATA");
-  return folder != nullptr && *folder != '\0' ? std::optional<std::filesystem::path>(folder)
-                                              : std::nullopt;
 }
 
 }  // namespace stemvo::test

@@ -9,6 +9,7 @@
 
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
+#include "support/shared_data.hpp"
 
 namespace stemvo::test {
 
@@ -20,9 +21,9 @@ inline void hold(Runner run_by,
                  const std::string& scale_source,
                  const std::string& thresholds,
                  const std::string& out) {
-  const auto data = shared_data();
-  const ProgramResult run = run_by({"run", (*data / "kitti/sequences" / clip).string(), "--out",
-                                    out, "--set", "scale.source=" + scale_source});
+  const ProgramResult run =
+      run_by({"run", (testing::shared_data() / "kitti/sequences" / clip).string(), "--out", out,
+              "--set", "scale.source=" + scale_source});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const ProgramResult check =
       run_stemvo({"check", out + "/metrics.json", "--against",
@@ -33,11 +34,7 @@ inline void hold(Runner run_by,
 
 class NeedsClips : public ::testing::Test {
  protected:
-  void SetUp() override {
-    if (!shared_data()) {
-      GTEST_SKIP() << "STEMVO_SHARED_DATA is not set";
-    }
-  }
+  void SetUp() override { STEMVO_NEEDS_SHARED_DATA(); }
   TempFolder folder_;
 };
 

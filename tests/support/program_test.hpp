@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,6 +32,17 @@ using ::testing::StartsWith;
 
 inline void write_file(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
+}
+
+/// A camera file that says what row P2 of a rendered sequence's calib.txt does.
+inline std::string camera_file_of(const fs::path& sequence) {
+  const std::string text = read_file(sequence / "calib.txt");
+  std::istringstream row(text.substr(text.find("P2:")));
+  const std::vector<std::string> words{std::istream_iterator<std::string>(row), {}};
+  const test::DriveSize size;
+  return fmt::format("resolution: [{}, {}]\nintrinsics: [{}, {}, {}, {}]\ndistortion_model: none\n",
+                     size.width_px, size.height_px, words.at(1), words.at(6), words.at(3),
+                     words.at(7));
 }
 
 /// One line, with the words given, and the exit code; nothing on standard output.

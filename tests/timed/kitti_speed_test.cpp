@@ -15,9 +15,11 @@ namespace {
 void expect_processor_ms_per_frame(const std::vector<std::string>& settings,
                                    const std::string& out,
                                    double bound_ms) {
-  const auto data = test::shared_data();
   std::vector<std::string> arguments = {
-      "run", (*data / "kitti/sequences/03").string(), "--out", out, "--frames", "0:200", "--quiet"};
+      "run",      (testing::shared_data() / "kitti/sequences/03").string(),
+      "--out",    out,
+      "--frames", "0:200",
+      "--quiet"};
   arguments.insert(arguments.end(), settings.begin(), settings.end());
   const test::ProgramResult run = test::run_stemvo(arguments);
   ASSERT_EQ(run.exit_code, 0) << run.err;

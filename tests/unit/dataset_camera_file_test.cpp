@@ -6,14 +6,12 @@
 #include <gmock/gmock.h>
 
 #include "dataset/camera_file.hpp"
-#include "support/shared_data.hpp"
 #include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
 
 using dataset::read_camera_file;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr const char* kGood =
@@ -72,18 +70,6 @@ TEST_F(CameraFileTest, ReadsEveryKey) {
   EXPECT_EQ(file->camera_height_m, 1.2);
 }
 
-TEST_F(CameraFileTest, OptionalKeysMayBeAbsent) {
-  const auto file = read_camera_file(folder_.file(
-      "camera.yaml",
-      "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\ndistortion_model: none\n"));
-  ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->camera.width_px, 64);
-  EXPECT_EQ(file->camera.height_px, 48);
-  EXPECT_EQ(file->camera.distortion, Distortion::kNone);
-  EXPECT_FALSE(file->rate_hz);
-  EXPECT_FALSE(file->camera_height_m);
-}
-
 TEST_F(CameraFileTest, OtherNamesOfTheModels) {
   std::string four = with_line(5, "distortion_model: radtan");
   EXPECT_EQ(error_of(four), "(read)");
@@ -93,44 +79,6 @@ TEST_F(CameraFileTest, OtherNamesOfTheModels) {
   const auto file = read_camera_file(folder_.file("camera.yaml", four));
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ(file->camera.distortion, Distortion::kEquidistant);
-}
-
-TEST_F(CameraFileTest, ReadsEurocWithItsDirectiveAndOtherKeys) {
-  const std::string text =
-      "%YAML:1.0\n# comment\n---\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n"
-      "  data: [1, 0, 0, 0.1,\n    0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: "
-      "[752, 480]\n"
-      "camera_model: pinhole\nintrinsics: [458.654, 457.296, 367.215, 248.375] #fu, fv, cu, cv\n"
-      "distortion_model: radial-tangential\n"
-      "distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n";
-  const auto file = read_camera_file(folder_.file("sensor.yaml", text));
-  ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ(file->camera.width_px, 752);
-  EXPECT_EQ(file->camera.distortion_coefficients,
-            (std::array<double, 12>{-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0}));
-  EXPECT_EQ(file->rate_hz, 20.0);
-}
-
-TEST_F(CameraFileTest, ReadsTheSharedFiles) {
-  STEMVO_NEEDS_SHARED_DATA();
-  const auto handheld = read_camera_file(testing::shared_data() / "handheld/camera.yaml");
-  ASSERT_TRUE(handheld) << handheld.error().message;
-  EXPECT_EQ(handheld->camera.fx_px, 585.0);
-  EXPECT_EQ(handheld->camera.distortion, Distortion::kNone);
-  EXPECT_EQ(handheld->rate_hz, 30.0);
-  const auto euroc = read_camera_file(testing::shared_data() / "euroc/mav0/cam0/sensor.yaml");
-  ASSERT_TRUE(euroc) << euroc.error().message;
-  EXPECT_EQ(euroc->camera.cy_px, 248.375);
-  EXPECT_EQ(euroc->camera.distortion, Distortion::kRadialTangential);
-}
-
-TEST_F(CameraFileTest, NoFile) {
-  const auto none = read_camera_file(folder_ / "camera.yaml");
-  ASSERT_FALSE(none);
-  EXPECT_THAT(none.error().message, HasSubstr("camera.yaml: cannot read: No such file"));
-  const auto folder = read_camera_file(folder_.path());
-  ASSERT_FALSE(folder);
-  EXPECT_THAT(folder.error().message, HasSubstr("found a folder"));
 }
 
 TEST_F(CameraFileTest, NoYaml) {

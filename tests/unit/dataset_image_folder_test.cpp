@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "dataset/frame_files.hpp"
 #include "dataset/frame_source.hpp"
 #include "support/temp_folder.hpp"
 
@@ -90,6 +91,8 @@ TEST_F(ImageFolderTest, OpensAPattern) {
   ASSERT_TRUE(opened) << opened.error().message;
   EXPECT_EQ(opened->size(), 2U);
   EXPECT_EQ(opened->name, "my drive_frame");
+  EXPECT_EQ(dataset::recording_name("first/images"), "first");
+  EXPECT_EQ(dataset::recording_name("second/mav0/cam0/data/"), "second");
 }
 
 TEST_F(ImageFolderTest, RangeCutsEverythingAndStartsTheTruthAtIdentity) {
@@ -283,21 +286,6 @@ TEST_F(ImageFolderTest, CoefficientsWithoutAView) {
                    "resolution: [32, 24]\nintrinsics: [30, 31, 15.5, 11.5]\nrate_hz: 10\n"
                    "distortion_model: radtan\ndistortion_coefficients: [-20, 0, 0, 0]\n");
   EXPECT_THAT(error_of(), HasSubstr("camera.yaml: expected distortion coefficients"));
-}
-
-TEST_F(ImageFolderTest, KittisLayoutNeedsNoCameraFile) {
-  const fs::path folder = temp_ / "07";
-  fs::create_directories(folder / "image_0");
-  cv::imwrite((folder / "image_0/000000.png").string(), cv::Mat(6, 8, CV_8UC1, cv::Scalar(9)));
-  request_ = {};
-  request_.sequence_dir = folder;
-  EXPECT_THAT(error_of(), HasSubstr("calib.txt")) << "KITTI's own message";
-  std::ofstream(folder / "calib.txt") << "P0: 90 0 3.5 0 0 90 2.5 0 0 0 1 0\n";
-  std::ofstream(folder / "times.txt") << "0\n";
-  const auto opened = open_source(request_);
-  ASSERT_TRUE(opened) << opened.error().message;
-  EXPECT_EQ(opened->name, "07");
-  EXPECT_EQ(opened->camera.fx_px, 90.0);
 }
 
 }  // namespace

@@ -21,17 +21,13 @@ using testing::Scene;
 
 using Points = std::vector<Eigen::Vector2d>;
 
-int count(const std::vector<char>& mask) {
-  return static_cast<int>(std::count(mask.begin(), mask.end(), 1));
-}
-
 TEST(TestPoints, ExactMatchesAreAllGood) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     const Scene scene = make_scene({.seed = seed});
     const PointTest result =
         test_points(scene.cur_from_prev, {scene.prev_uv, scene.cur_uv}, scene.camera);
     EXPECT_EQ(result.num_good, 200);
-    EXPECT_EQ(count(result.good_mask), 200);
+    EXPECT_EQ(std::ranges::count(result.good_mask, 1), 200);
   }
 }
 

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include <fmt/format.h>
@@ -30,11 +29,6 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-std::string read_file(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 /// A wall of blurred noise that the camera drives towards: a few small gray frames in KITTI's
 /// layout, as input of the gray channel.
@@ -98,7 +92,7 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   EXPECT_EQ(summary->report.num_frames, 6U);
   EXPECT_EQ(summary->report.sequence, "07");
   ASSERT_TRUE(summary->report.metrics.has_value());
-  const std::string csv = read_file(request_.out_dir / "frames.csv");
+  const std::string csv = testing::read_all(request_.out_dir / "frames.csv");
   const auto errors = test::column(csv, "error_m");
   double sum = 0.0;
   for (const std::string& error : errors) {
@@ -141,15 +135,15 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
   const auto plain = run_sequence(request_);
   ASSERT_TRUE(plain) << plain.error().message;
   EXPECT_FALSE(plain->report.timing.has_value());
-  const std::string poses = read_file(request_.out_dir / "trajectory_kitti.txt");
-  auto keys = nlohmann::ordered_json::parse(read_file(request_.out_dir / "metrics.json"));
+  const std::string poses = testing::read_all(request_.out_dir / "trajectory_kitti.txt");
+  auto keys = nlohmann::ordered_json::parse(testing::read_all(request_.out_dir / "metrics.json"));
   EXPECT_FALSE(keys.contains("timing"));
 
   request_.measure_times = true;
   const auto measured = run_sequence(request_);
   ASSERT_TRUE(measured) << measured.error().message;
-  EXPECT_EQ(read_file(request_.out_dir / "trajectory_kitti.txt"), poses);
-  auto json = nlohmann::ordered_json::parse(read_file(request_.out_dir / "metrics.json"));
+  EXPECT_EQ(testing::read_all(request_.out_dir / "trajectory_kitti.txt"), poses);
+  auto json = nlohmann::ordered_json::parse(testing::read_all(request_.out_dir / "metrics.json"));
   const auto timing = json["timing"];
   for (const char* name : {"read and decode", "stem", "contrast", "pyramid"}) {
     EXPECT_EQ(timing["stages"][name]["calls"], 6) << name;
@@ -184,8 +178,9 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   EXPECT_EQ(metrics.alignment, Alignment::kSim3);
   EXPECT_LE(metrics.average_offset_m, 0.2 * metrics.null_offset_m);
   EXPECT_GE(metrics.ate_rmse.none_m, metrics.null_offset_m * 0.5) << "two times too long";
-  EXPECT_THAT(read_file(request_.out_dir / "metrics.json"), HasSubstr("\"alignment\": \"sim3\""));
-  EXPECT_THAT(read_file(request_.out_dir / "trajectory.png"), HasSubstr("PNG"));
+  EXPECT_THAT(testing::read_all(request_.out_dir / "metrics.json"),
+              HasSubstr("\"alignment\": \"sim3\""));
+  EXPECT_THAT(testing::read_all(request_.out_dir / "trajectory.png"), HasSubstr("PNG"));
 }
 
 TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
@@ -195,8 +190,9 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
-  const nlohmann::json page = testing::report_content(read_file(request_.out_dir / "report.html"));
-  EXPECT_EQ(page["frames_csv"], read_file(request_.out_dir / "frames.csv"));
+  const nlohmann::json page =
+      testing::report_content(testing::read_all(request_.out_dir / "report.html"));
+  EXPECT_EQ(page["frames_csv"], testing::read_all(request_.out_dir / "frames.csv"));
   EXPECT_EQ(page["estimate"]["x"].size(), 1U * kNumFrames);
   EXPECT_EQ(page["truth"]["x"].size(), 2U);
   EXPECT_THAT(page["subtitle"].get<std::string>(),
@@ -250,7 +246,7 @@ TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "map.ply") << "somebody's";
   EXPECT_THAT(error_of(request_), HasSubstr("expected a new folder, an empty one or results of"));
-  EXPECT_EQ(read_file(request_.out_dir / "map.ply"), "somebody's");
+  EXPECT_EQ(testing::read_all(request_.out_dir / "map.ply"), "somebody's");
   fs::remove(request_.out_dir / "map.ply");
   request_.image_every = 1;
   ASSERT_TRUE(run_sequence(request_));
@@ -271,7 +267,8 @@ TEST_F(PipelineRun, TwoFramesMakeNoMap) {
   for (const char* name : {"map.ply", "trajectory_map_kitti.txt", "trajectory_map_tum.txt"}) {
     EXPECT_FALSE(fs::exists(request_.out_dir / name)) << name;
   }
-  EXPECT_TRUE(nlohmann::json::parse(read_file(request_.out_dir / "metrics.json"))["map"].is_null());
+  EXPECT_TRUE(
+      nlohmann::json::parse(testing::read_all(request_.out_dir / "metrics.json"))["map"].is_null());
   request_.saved_map = folder_ / "saved.map";
   EXPECT_THAT(error_of(request_), HasSubstr("--save-map: expected odometry.mode map with"));
   request_.saved_map.reset();
@@ -310,7 +307,8 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
   request_.config.seed = 42;
   ASSERT_TRUE(run_sequence(request_).value().written);
-  EXPECT_THAT(read_file(request_.out_dir / "config.yaml"), HasSubstr("# frames 0:6 of 07\n"));
+  EXPECT_THAT(testing::read_all(request_.out_dir / "config.yaml"),
+              HasSubstr("# frames 0:6 of 07\n"));
   const Expected<Config> config = load_config(request_.out_dir / "config.yaml");
   ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->seed, 42U);
@@ -347,7 +345,7 @@ TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
   EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
   EXPECT_EQ(summary->report.num_frames, 6U);
   EXPECT_LT(summary->report.tracked_fraction, 1.0);
-  EXPECT_THAT(read_file(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
+  EXPECT_THAT(testing::read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
 }
 
 TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {
@@ -356,7 +354,8 @@ TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_NEAR(summary->report.metrics->path_length_m, (kNumFrames - 2) * kStep_m, 1e-6);
-  const nlohmann::json page = testing::report_content(read_file(request_.out_dir / "report.html"));
+  const nlohmann::json page =
+      testing::report_content(testing::read_all(request_.out_dir / "report.html"));
   EXPECT_EQ(page["truth"]["x"].size(), kNumFrames - 1U);
 }
 
