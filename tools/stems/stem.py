@@ -28,8 +28,8 @@ class Stem:
     stride: int
     mean: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))  # gray levels, RGB
     padding: tuple = (0, 0, 0, 0)  # top, left, bottom, right
-    repeats_border: bool = False
     layer_norm: LayerNorm | None = None
+    repeats_border: bool = False  # beside the image, instead of zeros
 
     @property
     def filters(self):
