@@ -44,7 +44,7 @@ void fill_in(std::string& page, std::string_view place, std::string_view value) 
 Json images_json(const std::vector<CaptionedImage>& images) {
   Json list = Json::array();
   for (const CaptionedImage& image : images) {
-    list.push_back({{"caption", image.caption}, {"jpeg", base64(image.jpeg)}});
+    list.push_back({{"row", image.row}, {"caption", image.caption}, {"jpeg", base64(image.jpeg)}});
   }
   return list;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -18,9 +19,10 @@ namespace stemvo::html {
 /// An image under its text.
 struct CaptionedImage {
   std::string caption;
-  std::string jpeg;  ///< the file's bytes
+  std::string jpeg;     ///< the file's bytes
+  std::size_t row = 0;  ///< of frames.csv
 };
-/// [{caption, jpeg}], the bytes as base64.
+/// [{row, caption, jpeg}], the bytes as base64.
 [[nodiscard]] nlohmann::ordered_json images_json(const std::vector<CaptionedImage>& images);
 
 /// {x, y, z}: lists of metres to the fifth decimal, null where a position is not finite.

@@ -4,7 +4,7 @@
 const pages = { run: run_page };
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const figures = [];  // {section, div}
-let frames = [];  // a line of text for each, where there is a slider
+let frames = [], small_frames = [];  // a line of text for each, where there is a slider; images of some
 
 function element(parent, name, text, attributes) {
   const made = Object.assign(document.createElement(name), attributes || {});
@@ -38,6 +38,7 @@ function theme() {
 const touch = matchMedia("(hover: none)").matches;
 function is_space(section) { return "scene" in section.layout; }
 function follows_frames(section) { return section.frame_trace >= 0; }
+function is_plan(layout) { return layout.yaxis?.scaleanchor !== undefined; }
 function is_map(section) { return section.layout.dragmode === "pan" || is_space(section); }
 
 // One colour for a name in all figures of the page; in a figure none twice while there are enough.
@@ -88,19 +89,34 @@ function layout_of(section, div) {
   return layout;
 }
 
-// `plot_height` is without what the legend and the texts take.
-function fit_height(section, div) {
-  const { t, b } = div._fullLayout._size, height = Math.ceil(section.layout.plot_height + t + b);
-  if (Math.abs(height - div.clientHeight) < 2) return;
-  div.style.height = height + "px";
+function extent(traces, axis) {
+  const values = traces.flatMap((trace) => trace[axis]).filter(Number.isFinite);
+  return values.reduce((a, b) => Math.max(a, b), -Infinity) - values.reduce((a, b) => Math.min(a, b), Infinity);
+}
+
+// A plot without what the legend and the texts take: as high as its layout says; of paths from above, their shape, as large as
+// the page and the window let it be.
+function fit_plot({ layout, traces }, div) {
+  const { t, b, l, r } = div._fullLayout._size;
+  let height = layout.plot_height, width = div.parentElement.clientWidth - l - r;
+  if (is_plan(layout)) {
+    const x = extent(traces, "x"), y = extent(traces, "y"), slimmest = 0.6, highest = Math.max(320, Math.min(0.75 * innerHeight, 700)) - t - b;
+    const aspect = Math.min(Math.max(x / Math.max(y, 1e-9), slimmest), 1 / slimmest);  // width over height
+    height = Math.min(width / aspect, highest);
+    width = Math.max(height * aspect, Math.min(width, 140));
+  }
+  const size = { width: Math.ceil(width + l + r), height: Math.ceil(height + t + b) };
+  if (Math.abs(size.width - div.clientWidth) + Math.abs(size.height - div.clientHeight) < 3) return;
+  for (const side in size) div.style[side] = size[side] + "px";
   Plotly.Plots.resize(div);
 }
 
+function ink() { return getComputedStyle(document.documentElement).getPropertyValue("--ink").trim(); }
+
 function cursor(section) {
-  const { type, xaxis, yaxis } = section.traces[section.frame_trace];
-  const color = getComputedStyle(document.documentElement).getPropertyValue("--ink").trim();
+  const { type, xaxis, yaxis } = section.traces[section.frame_trace], color = ink();
   const point = { name: "frame chosen", showlegend: false, hoverinfo: "skip", mode: "markers", x: [], y: [] };
-  return type === "scatter3d" ? { ...point, type, z: [], marker: { size: 5, color } }
+  return type === "scatter3d" ? { ...point, type, z: [], text: [], hoverinfo: "text", marker: { size: 5, color } }  // it lies over what it marks
                               : { ...point, xaxis, yaxis, marker: { size: 12, color, symbol: "circle-open", line: { width: 3 } } };
 }
 
@@ -114,9 +130,11 @@ function add_figure(parent, drawn) {
   Plotly.newPlot(div, traces, layout_of(section, div), { responsive: true, scrollZoom: is_map(section), displaylogo: false,
                                                          modeBarButtonsToRemove: ["select2d", "lasso2d"] });
   figures.push({ section, div });
-  if (section.layout.plot_height) {
-    div.on("plotly_afterplot", () => fit_height(section, div));
-    fit_height(section, div);
+  if (section.layout.plot_height || is_plan(section.layout)) {
+    const fit = () => fit_plot(section, div);
+    div.on("plotly_afterplot", fit);
+    addEventListener("resize", fit);
+    fit();
   }
   for (const [key, axis] of Object.entries(section.layout))
     if (axis.type === "log" && div._fullLayout[key].dtick === "D1")
@@ -126,10 +144,12 @@ function add_figure(parent, drawn) {
     document.addEventListener("touchstart", (event) => div.classList.toggle("still", !div.contains(event.target)), { passive: true });
   }
   if (follows_frames(section)) {
-    div.on("plotly_hover", (event) => {
-      const point = event.points.find((found) => found.curveNumber === section.frame_trace);
-      if (point) choose(point.pointNumber ?? point.pointIndex);
-    });
+    const point_at = ({ points }) => {
+      const point = points.find((found) => found.curveNumber === section.frame_trace) ?? points[0];
+      const k = point.customdata ?? (point.curveNumber === section.frame_trace ? point.pointNumber : chosen);
+      if (k !== chosen) requestAnimationFrame(() => choose(k));  // later: drawing a space tells of the hover again
+    };
+    for (const event of ["plotly_hover", "plotly_click"]) div.on(event, point_at);  // a finger's tap is a click alone
   }
 }
 
@@ -144,9 +164,7 @@ function add_images(parent, section) {
 
 function add_section(section) {
   const main = document.querySelector("main");
-  const is_panel = section.layout?.small, last = main.lastElementChild;
-  const panels = is_panel && (last?.className === "panels" ? last : element(main, "div", undefined, { className: "panels" }));
-  const parent = element(panels || main, "section");
+  const parent = element(main, "section");
   if (section.folded) {
     const fold = element(parent, "details");
     element(fold, "summary", section.heading);
@@ -159,15 +177,29 @@ function add_section(section) {
   else add_images(parent, section);
 }
 
+function show_frame(kept) {
+  const image = document.querySelector("#frames img");
+  if (kept && kept.caption !== image.alt) Object.assign(image, { src: "data:image/jpeg;base64," + kept.jpeg, alt: kept.caption, title: kept.caption });
+}
+
 const slider = document.getElementById("frame");
+let chosen = -1;
 function choose(k) {
-  slider.value = k;
+  slider.value = chosen = k;
   document.querySelector("#frames output").textContent = frames[k];
+  show_frame(small_frames.findLast(({ row }) => row <= k) ?? small_frames[0]);
   for (const { section, div } of figures) {
     if (!follows_frames(section)) continue;
     const trace = section.traces[section.frame_trace], at = { x: [[trace.x[k]]], y: [[trace.y[k]]] };
-    if (trace.z) at.z = [[trace.z[k]]];
+    if (trace.z) Object.assign(at, { z: [[trace.z[k]]], text: [[trace.text[k]]] });
     Plotly.restyle(div, at, [section.traces.length]);
+  }
+}
+
+function draw_again() {
+  for (const { section, div } of figures) {
+    if (follows_frames(section)) Plotly.restyle(div, { "marker.color": ink() }, [section.traces.length]);
+    Plotly.relayout(div, layout_of(section, div));
   }
 }
 
@@ -184,6 +216,7 @@ async function show() {
   document.getElementById("subtitle").textContent = shown.subtitle;
   element(document.head, "script", await unpack("plotly"));
   frames = shown.frames ?? [];
+  small_frames = content.small_frames ?? [];
   shown.sections.filter(Boolean).forEach(add_section);
   if (frames.length > 0) {
     document.getElementById("frames").hidden = false;
@@ -192,7 +225,7 @@ async function show() {
     choose(0);
   }
   for (const media of [dark, matchMedia("(max-width: 530px)")])  // the ground's colour, the phone's side
-    media.addEventListener("change", () => figures.forEach(({ section, div }) => Plotly.relayout(div, layout_of(section, div))));
+    media.addEventListener("change", () => setTimeout(draw_again, 300));  // when plotly.js, which waits 100 ms, has taken the new size
   document.body.dataset.shown = "yes";
 }
 show().catch((error) => { element(document.querySelector("main"), "p", "This browser cannot draw the figures: " + error); throw error; });

@@ -129,13 +129,14 @@ class DriveLoop {
 
   void keep_image(std::size_t i, const Expected<cv::Mat>& frame, const FrameResult& pose) {
     const RunRequest& request = run_.request;
+    const std::size_t number = run_.sequence.range.begin + i;
+    drive_.small_frames.add(i, number, frame.value_or(cv::Mat()));
     const bool is_asked_for =
         request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
     const bool is_reported = is_in_report(i, expected_frames(run_.sequence, i + 1));
     if (!is_asked_for && !is_reported) {
       return;
     }
-    const std::size_t number = run_.sequence.range.begin + i;
     const ChannelOdometry& seen = run_.odometry.frames();
     const cv::Mat image = draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(),
                                            seen.inlier_mask());

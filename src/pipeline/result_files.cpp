@@ -136,9 +136,10 @@ class ResultWriter {
     if (map_ && report.map) {
       map = {in_truth(map_->trajectory, report), loops_of(map_->whole.kept)};
     }
-    return write_run_page(request_.out_dir / "report.html",
-                          {plot.title, plot.subtitle, plot.unit, report, csv_, plot.estimate, map,
-                           truth_, drive_.images, config_text_, request_.command});
+    return write_run_page(
+        request_.out_dir / "report.html",
+        {plot.title, plot.subtitle, plot.unit, report, csv_, plot.estimate, map, truth_,
+         drive_.images, drive_.small_frames.images(), config_text_, request_.command});
   }
 
  private:

@@ -12,6 +12,7 @@
 #include "odometry/phased_odometry.hpp"
 #include "pipeline/beside_frames.hpp"
 #include "pipeline/run.hpp"
+#include "report/small_frames.hpp"
 #include "stemvo/error.hpp"
 
 namespace stemvo::pipeline {
@@ -42,6 +43,7 @@ struct Drive {
   Trajectory trajectory;                     ///< as result files hold it
   std::string csv;                           ///< frames.csv of them, without errors
   std::vector<html::CaptionedImage> images;  ///< of some, for report.html
+  SmallFrames small_frames;                  ///< for report.html too
   std::vector<std::string> warnings;
   bool interrupted = false;
   Status written;  ///< of frames.csv and the images

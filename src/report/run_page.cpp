@@ -43,6 +43,7 @@ Status write_run_page(const std::filesystem::path& file, const RunPage& run) {
                   {"map", Json()},
                   {"truth", Json()},
                   {"images", html::images_json(run.images)},
+                  {"small_frames", html::images_json(run.small_frames)},
                   {"command", run.command},
                   {"configuration", run.config}};
   if (run.map) {

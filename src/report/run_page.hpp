@@ -34,8 +34,9 @@ struct RunPage {
   const std::optional<MapPage>& map;  ///< nullopt: nothing is remembered
   const std::optional<GroundTruth>& ground_truth;
   const std::vector<html::CaptionedImage>& images;
-  std::string config;   ///< YAML
-  std::string command;  ///< that repeats the run; may be empty
+  const std::vector<html::CaptionedImage>& small_frames;  ///< under the slider
+  std::string config;                                     ///< YAML
+  std::string command;                                    ///< that repeats the run; may be empty
 };
 
 /// Path from above with a slider over the frames, numbers, the path in 3D, errors over distance and

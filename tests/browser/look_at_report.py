@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Opens a report.html in Chromium without a network and prints as JSON what a reader finds.
 
-    look_at_report.py REPORT [SCREENSHOT.png]
+    look_at_report.py REPORT [SCREENSHOTS]       # SCREENSHOTS_1280.png, ..
 
 Runs in the environment of `tools/setup.sh browser`.
 """
@@ -14,8 +14,24 @@ import sys
 from playwright.sync_api import TimeoutError as Late, sync_playwright
 
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SCREENS = ((1280, 900, False), (844, 390, True), (390, 844, True))  # the last two: a phone held sideways and upright
 SLIDER, TOP_VIEW = "#frame", ".figure"
 DRAWN = "figures.every(({ div }) => Math.hypot(div._fullLayout.width - div.clientWidth, div._fullLayout.height - div.clientHeight) < 2)"
+
+
+MIDDLE = """(div) => {  // on the screen: the middle point that the figure's trace of frames has, or its first trace
+    const { section } = figures.find((figure) => figure.div === div), layout = div._fullLayout;
+    const space = layout.scene?._scene, box = (space?.container ?? div).getBoundingClientRect();
+    const { x, y, z, xaxis, yaxis } = section.traces[Math.max(section.frame_trace ?? 0, 0)];
+    const known = y.map((_, k) => k).filter((k) => y[k] !== null && x[k] !== null), k = known[Math.floor(known.length / 2)];
+    if (!z) {
+        const of = (name) => layout[name[0] + "axis" + name.slice(1)], [across, up] = [of(xaxis ?? "x"), of(yaxis ?? "y")];
+        return [box.x + across._offset + across.d2p(x[k]), box.y + up._offset + up.d2p(y[k])];
+    }
+    const { glplot, dataScale } = space, { model, view, projection } = glplot.cameraParams;
+    const times = (matrix, point) => [0, 1, 2, 3].map((row) => point.reduce((sum, value, column) => sum + matrix[4 * column + row] * value, 0));
+    const [u, v, , w] = times(projection, times(view, times(model, [x[k] * dataScale[0], y[k] * dataScale[1], z[k] * dataScale[2], 1])));
+    return [box.x + box.width * (1 + u / w) / 2, box.y + box.height * (1 - v / w) / 2]; }"""
 
 
 def open_page(browser, report, found, **options):
@@ -33,15 +49,6 @@ def x_range(page):
     return page.evaluate(f"document.querySelector('{TOP_VIEW}')._fullLayout.xaxis.range")
 
 
-def middle_of_path(page):
-    """On the screen, of the estimate's middle point in the top view."""
-    return page.evaluate(f"""(() => {{
-        const {{ section, div }} = figures[0], box = div.getBoundingClientRect(), layout = div._fullLayout;
-        const trace = section.traces[section.frame_trace], k = Math.floor(trace.x.length / 2);
-        return [box.x + layout._size.l + layout.xaxis.d2p(trace.x[k]), box.y + layout._size.t + layout.yaxis.d2p(trace.y[k])];
-    }})()""")
-
-
 def titles_in_the_way(page):
     """Those of axes that stand over another text or in a plot."""
     return page.evaluate("""figures.flatMap(({ div }) => {
@@ -52,13 +59,15 @@ def titles_in_the_way(page):
 
 
 def hard_to_read(page):
-    """Texts that a figure's edge cuts, ticks upright or over each other, rows without a label."""
+    """Texts that a figure's edge cuts, ticks upright or over each other, legends over plots, rows without a label."""
     return page.evaluate("""figures.flatMap(({ div }) => {
         const found = [], edge = div.getBoundingClientRect();
         const text_of = (element) => ({ text: element.textContent, element, box: element.getBoundingClientRect() });
         for (const { text, box } of [...div.querySelectorAll("text")].map(text_of))
             if (box.width > 0 && (box.left < edge.left - 1 || box.right > edge.right + 1 || box.top < edge.top - 1 || box.bottom > edge.bottom + 1))
                 found.push("cut: " + text);
+        const legend = div.querySelector(".legend")?.getBoundingClientRect(), plot = div.querySelector(".nsewdrag")?.getBoundingClientRect();
+        if (legend && plot && legend.bottom > plot.top + 3) found.push("legend over the plot");
         for (const axis of ["x", "y"]) {
             const ticks = [...div.querySelectorAll("." + axis + "tick text")].map(text_of);
             ticks.forEach(({ text, element, box }, i) => {
@@ -86,6 +95,12 @@ def pixels_at_edges_of_spaces(page):
         return colours.filter((colour) => colour !== colours[0]).length; }))""")
 
 
+def buttons_over_legend(page):
+    return page.evaluate("""figures.filter(({ div }) => {
+        const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
+        return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
+
+
 def swipe(page):
     """How far the page is scrolled by a finger that goes up over each figure, down at the page's end."""
     client = page.context.new_cdp_session(page)
@@ -104,14 +119,61 @@ def swipe(page):
     return moved
 
 
+def point_at_each(page, touch):
+    """The label that each figure shows under the mouse or a finger, by its heading; the figures whose label the slider does not follow."""
+    labels, stays = {}, []
+    for figure in page.locator(".figure").all():
+        heading, label = figure.get_attribute("aria-label"), figure.locator(".hovertext, .hoverlayer .legend").first
+        page.evaluate("choose(0)")
+        page.evaluate("(top) => scrollBy(0, top - 0.6 * innerHeight)", figure.evaluate(MIDDLE)[1])
+        for nudge in (0, 1, -1):  # the first tap wakes a space
+            x, y = figure.evaluate(MIDDLE)
+            (page.touchscreen.tap if touch else page.mouse.move)(x + nudge, y)
+            with contextlib.suppress(Late):
+                label.wait_for(timeout=1500)
+                break
+        labels[heading] = label.text_content() if label.count() else ""
+        with contextlib.suppress(Late):
+            if figure.evaluate("(div) => follows_frames(figures.find((figure) => figure.div === div).section)"):
+                stays.append(heading)
+                page.wait_for_function("chosen > 0", timeout=5000)
+                stays.pop()
+    return labels, stays
+
+
+def sizes_of_map(page):
+    """Of both axes of the path from above, how long they are and how long the paths."""
+    return page.evaluate("""["x", "y"].map((axis) => {
+        const { section, div } = figures[0], [low, high] = div._fullLayout[axis + "axis"].range;
+        const values = section.traces.flatMap((trace) => trace[axis]).filter(Number.isFinite);
+        return { axis: high - low, path: Math.max(...values) - Math.min(...values) }; })""")
+
+
+def change_theme(page):
+    """While the page is open: which figures and rings have not the ground's and the ink's colour."""
+    page.emulate_media(color_scheme="dark")
+    wrong = """(() => {
+        const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
+        return figures.filter(({ section, div }) => div._fullLayout.paper_bgcolor !== colour("--back") ||
+            (follows_frames(section) && div._fullData.at(-1).marker.color !== colour("--ink"))).map(({ section }) => section.heading); })()"""
+    with contextlib.suppress(Late):
+        page.wait_for_function(f"matchMedia('(prefers-color-scheme: dark)').matches && {wrong}.length === 0", timeout=10000)
+    return page.evaluate(wrong)
+
+
 def use(page, found):
     """What a page with a slider over frames does by keyboard, mouse and wheel."""
     page.focus(SLIDER)
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     found["by_keyboard"] = page.locator("#frames output").text_content()
+    found["images_under_the_slider"] = []
+    for k in (0, 19, 20):
+        page.evaluate(f"choose({k})")
+        image = page.locator("#frames img")
+        found["images_under_the_slider"].append([image.get_attribute("alt"), image.evaluate("(image) => image.decode().then(() => image.naturalWidth)")])
 
-    page.mouse.move(*middle_of_path(page))
+    page.mouse.move(*page.locator(TOP_VIEW).first.evaluate(MIDDLE))
     page.wait_for_selector(f"{TOP_VIEW} .hovertext", timeout=10000)
     found["hover"] = page.locator(f"{TOP_VIEW} .hovertext").first.text_content()
     found["by_hover"] = page.locator("#frames output").text_content()
@@ -130,9 +192,9 @@ def use(page, found):
     found["scrolled_over_a_chart"] = page.evaluate("scrollY") - before
 
 
-def look(browser, report, screenshot):
-    found = {"errors": [], "requests": []}
-    page = open_page(browser, report, found, viewport={"width": 1200, "height": 900}, color_scheme="light")
+def look(browser, report, screenshots):
+    found = {"errors": [], "requests": [], "screens": {}}
+    page = open_page(browser, report, found, viewport={"width": 1280, "height": 900}, color_scheme="light")
     found["title"] = page.title()
     found["headings"] = page.locator("h2, summary").all_text_contents()
     found["figures"] = page.evaluate("document.querySelectorAll('.main-svg').length > 0 ? figures.length : 0")
@@ -154,29 +216,31 @@ def look(browser, report, screenshot):
     found["light"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
     if page.locator(SLIDER).is_visible():
         use(page, found)
-    if screenshot:
-        page.screenshot(path=screenshot, full_page=True)
     page.close()
 
-    page = open_page(browser, report, found, viewport={"width": 360, "height": 740}, color_scheme="dark", has_touch=True, is_mobile=True)
-    found["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    found["phone_width"] = page.evaluate("document.documentElement.scrollWidth")
-    found["buttons_over_legend"] = page.evaluate("""figures.filter(({ div }) => {
-        const legend = div.querySelector(".legend"), buttons = div.querySelector(".modebar");
-        return legend && buttons.getBoundingClientRect().bottom > legend.getBoundingClientRect().top; }).length""")
-    found["titles_in_the_way"] = titles_in_the_way(page)
-    found["hard_to_read"] = hard_to_read(page)
-    found["at_edges_of_spaces"] = pixels_at_edges_of_spaces(page)
-    found["swiped"] = swipe(page)
-    page.close()
-
-    page = open_page(browser, report, found, viewport={"width": 844, "height": 390}, has_touch=True, is_mobile=True)  # held sideways
-    for size in ({"width": 844, "height": 390}, {"width": 390, "height": 844}):
-        page.set_viewport_size(size)
+    for width, height, touch in SCREENS:
+        page = open_page(browser, report, found, viewport={"width": width, "height": height}, color_scheme="light", has_touch=touch, is_mobile=touch)
+        seen = {"width": page.evaluate("document.documentElement.scrollWidth"), "titles_in_the_way": titles_in_the_way(page),
+                "hard_to_read": hard_to_read(page), "at_edges_of_spaces": pixels_at_edges_of_spaces(page), "map": sizes_of_map(page)}
+        page.set_viewport_size({"width": height, "height": width})  # turned, and back
+        page.wait_for_timeout(1000)
         page.wait_for_function(DRAWN, timeout=20000)
-        found["titles_in_the_way"] += titles_in_the_way(page)
-        found["hard_to_read"] += hard_to_read(page)
-    page.close()
+        seen["titles_in_the_way"] += titles_in_the_way(page)
+        seen["hard_to_read"] += hard_to_read(page)
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(1000)
+        page.wait_for_function(DRAWN, timeout=20000)
+        seen["hard_to_read"] += hard_to_read(page)
+        seen["labels"], seen["slider_stays"] = point_at_each(page, touch)
+        if touch:
+            seen["buttons_over_legend"] = buttons_over_legend(page)
+            seen["swiped"] = swipe(page)
+        seen["wrong_colours"] = change_theme(page)
+        seen["dark"] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+        found["screens"][str(width)] = seen
+        if screenshots:
+            page.screenshot(path=f"{screenshots}_{width}.png", full_page=True)
+        page.close()
     return found
 
 

@@ -40,8 +40,8 @@ TEST_F(HtmlPage, TextFromOutsideStaysText) {
 }
 
 TEST_F(HtmlPage, ImagesAreInIt) {
-  EXPECT_EQ(images_json({{"frame 1", "\xff\xd8\x01"}})[0],
-            (Json{{"caption", "frame 1"}, {"jpeg", "/9gB"}}));
+  EXPECT_EQ(images_json({{"frame 1", "\xff\xd8\x01", 7}})[0],
+            (Json{{"row", 7}, {"caption", "frame 1"}, {"jpeg", "/9gB"}}));
 }
 
 TEST_F(HtmlPage, PathsAreRoundedAndWhatIsNotFiniteIsNull) {

@@ -9,6 +9,7 @@
 
 #include "evaluation/pose_file.hpp"
 #include "report/run_page.hpp"
+#include "report/small_frames.hpp"
 #include "support/report_content.hpp"
 #include "support/temp_folder.hpp"
 #include "text/text_file.hpp"
@@ -17,6 +18,7 @@ namespace stemvo {
 namespace {
 
 using nlohmann::json;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// 201 frames straight ahead, a metre each; the estimate is 1 % too long and drifts up.
@@ -47,6 +49,7 @@ class RunPageTest : public ::testing::Test {
                                                          map_,
                                                          truth_,
                                                          {},
+                                                         small_frames_,
                                                          "key: value",
                                                          "stemvo run"}));
     return testing::report_content(read_text_file(folder_ / "report.html").value_or(""));
@@ -57,6 +60,7 @@ class RunPageTest : public ::testing::Test {
   std::optional<MapPage> map_;
   std::optional<GroundTruth> truth_;
   MetricsReport report_;
+  std::vector<html::CaptionedImage> small_frames_ = {{"frame 110", "\xff\xd8\x01", 10}};
 };
 
 TEST_F(RunPageTest, HoldsRowsPathsAndMetrics) {
@@ -68,6 +72,7 @@ TEST_F(RunPageTest, HoldsRowsPathsAndMetrics) {
   EXPECT_EQ(page["metrics"]["frames"], 201);
   EXPECT_THAT(page["numbers"].get<std::string>(), HasSubstr("translation t_rel"));
   EXPECT_EQ(page["stages"], "");
+  EXPECT_EQ(page["small_frames"][0]["row"], 10);
   EXPECT_EQ(page["configuration"], "key: value");
   EXPECT_EQ(page["command"], "stemvo run");
   // 1 % and a little of the climb, whatever the length; 100 m is the only length that fits in.
@@ -101,6 +106,32 @@ TEST_F(RunPageTest, WithoutGroundTruthThereIsNone) {
   const json page = content();
   EXPECT_TRUE(page["truth"].is_null());
   EXPECT_TRUE(page["metrics"]["segments"].is_null());
+}
+
+TEST(SmallFrames, EveryTenthIsKeptAndFewerWhereTheyWouldTakeTooMuch) {
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(30, 60, 90));
+  SmallFrames all;
+  for (std::size_t row = 0; row < 100; ++row) {
+    all.add(row, 1000 + row, row == 50 ? cv::Mat() : image);
+  }
+  std::vector<std::size_t> rows;
+  std::size_t bytes = 0;
+  for (const html::CaptionedImage& kept : all.images()) {
+    rows.push_back(kept.row);
+    bytes = kept.jpeg.size();
+  }
+  EXPECT_THAT(rows, ElementsAre(0, 10, 20, 30, 40, 60, 70, 80, 90));
+  EXPECT_EQ(all.images().back().caption, "frame 1090");
+
+  SmallFrames few(3 * bytes);
+  for (std::size_t row = 0; row < 100; ++row) {
+    few.add(row, row, image);
+  }
+  rows.clear();
+  for (const html::CaptionedImage& kept : few.images()) {
+    rows.push_back(kept.row);
+  }
+  EXPECT_THAT(rows, ElementsAre(0, 40, 80));
 }
 
 }  // namespace
