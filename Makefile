@@ -36,7 +36,7 @@ test: build lab
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running the tests"
-	@ctest --preset release --parallel $(JOBS)
+	@ctest --preset release --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed
 
 test-all: test test-long
 
@@ -45,7 +45,7 @@ test-long:
 	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
 	@tools/setup.sh tools docs
 	@echo "==> Running the long tests"
-	@ctest --preset long --parallel $(JOBS)
+	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed
 
 SEQUENCE ?=
 BENCH ?=
