@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
@@ -10,10 +8,10 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "config/config.hpp"
 #include "options/visit.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
@@ -26,18 +24,8 @@ using ::testing::StartsWith;
 
 class ConfigLoad : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-    file_ = std::filesystem::temp_directory_path() /
-            ("stemvo_config_" + std::to_string(::getpid()) + "_" + name + ".yaml");
-  }
-  void TearDown() override { std::filesystem::remove(file_); }
-
   Expected<Config> load(const std::string& text) { return load_config(write(text)); }
-  const std::filesystem::path& write(const std::string& text) {
-    std::ofstream(file_, std::ios::binary) << text;
-    return file_;
-  }
+  std::filesystem::path write(const std::string& text) { return folder_.file("config.yaml", text); }
   /// The error without the folder: "<name>.yaml:3: ...".
   std::string error_of(const std::string& text) {
     const Expected<Config> config = load(text);
@@ -49,7 +37,8 @@ class ConfigLoad : public ::testing::Test {
     return config.error().message.substr(file_.string().size());
   }
 
-  std::filesystem::path file_;
+  testing::TempFolder folder_;
+  const std::filesystem::path file_ = folder_ / "config.yaml";
 };
 
 TEST_F(ConfigLoad, ReadsEveryKindOfValueOverTheDefaults) {
@@ -270,9 +259,7 @@ TEST(ConfigValidate, PercentilesMustBeInOrder) {
 }
 
 TEST(ConfigFiles, DefaultYamlIsWhatTheProgramWrites) {
-  std::ifstream in(STEMVO_SOURCE_DIR "/config/default.yaml", std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(in), {});
-  EXPECT_EQ(text, dump_config({}))
+  EXPECT_EQ(testing::read_all(STEMVO_SOURCE_DIR "/config/default.yaml"), dump_config({}))
       << "config/default.yaml is stale: run 'stemvo --dump-config > config/default.yaml'";
 }
 

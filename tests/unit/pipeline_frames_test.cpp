@@ -9,10 +9,10 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <unistd.h>
 
 #include "dataset/frame_source.hpp"
 #include "pipeline/frame_pipeline.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
@@ -32,8 +32,6 @@ class FramePipeline : public ::testing::Test {
   static bool is_broken(std::size_t i) { return i == 4 || i == 5 || i + 1 == kNumFrames; }
 
   void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", ::getpid(), info->name());
     const fs::path sequence = folder_ / "sequences/08";
     fs::create_directories(sequence / "image_0");
     std::ofstream(sequence / "calib.txt") << "P0: 200 0 159.5 0 0 200 79.5 0 0 0 1 0\n";
@@ -60,14 +58,13 @@ class FramePipeline : public ::testing::Test {
     config_.stem.model = "gray";
     sequence_.emplace(open_kitti(sequence, {}).value());
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] PhasedOdometry odometry() const {
     return PhasedOdometry::create(sequence_->camera, config_).value();
   }
 
   Config config_;
-  fs::path folder_;
+  testing::TempFolder folder_;
   std::optional<FrameSource> sequence_;
 };
 

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <unistd.h>
 
 #include "evaluation/trajectory.hpp"
 #include "pipeline/run.hpp"
@@ -19,6 +18,7 @@
 #include "support/ply_reader.hpp"
 #include "support/report_content.hpp"
 #include "support/state_runs.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo {
 namespace {
@@ -38,8 +38,6 @@ class PipelineRun : public ::testing::Test {
   static constexpr double kStep_m = 0.5;
 
   void SetUp() override {
-    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / fmt::format("stemvo_{}_{}", ::getpid(), info->name());
     const fs::path sequence = folder_ / "sequences/07";
     fs::create_directories(sequence / "image_0");
     fs::create_directories(folder_ / "poses");
@@ -73,14 +71,13 @@ class PipelineRun : public ::testing::Test {
     request_.config.stem.model = "gray";
     request_.num_threads = 1;
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] std::string error_of(const RunRequest& request) const {
     const Expected<RunSummary> summary = run_sequence(request);
     return summary ? "no error" : summary.error().message;
   }
 
-  fs::path folder_;
+  testing::TempFolder folder_;
   RunRequest request_;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "stem/onnx_session.hpp"
+#include "support/temp_folder.hpp"
 
 namespace stemvo::internal {
 namespace {
@@ -19,9 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 std::string read_model(const std::string& name) {
-  std::ifstream file(std::string(STEMVO_SOURCE_DIR) + "/tests/data/stems/" + name,
-                     std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
+  return testing::read_all(std::string(STEMVO_SOURCE_DIR) + "/tests/data/stems/" + name);
 }
 
 std::string error_of(const std::string& name, const std::string& bytes) {

@@ -2,7 +2,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <numbers>
 #include <string>
 
@@ -36,15 +35,11 @@ class SyntheticDriveTest : public ::testing::Test {
     EXPECT_TRUE(write_kitti_trajectory(file, poses));
     return file;
   }
-  static std::string bytes_of(const fs::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
   std::string all_bytes(const std::string& name, int num_frames) const {
-    std::string bytes = bytes_of(root_ / name / "poses" / "00.txt");
+    std::string bytes = testing::read_all(root_ / name / "poses" / "00.txt");
     for (int i = 0; i < num_frames; ++i) {
-      bytes +=
-          bytes_of(root_ / name / "sequences" / "00" / "image_2" / fmt::format("{:06}.png", i));
+      bytes += testing::read_all(root_ / name / "sequences" / "00" / "image_2" /
+                                 fmt::format("{:06}.png", i));
     }
     return bytes;
   }
@@ -136,8 +131,8 @@ TEST_F(SyntheticDriveTest, RendersAnyGivenPoses) {
     const Rigid3 error = sequence->ground_truth->at(i).inverse() * poses[i];
     EXPECT_LT(error.translation.norm() + error.angle_rad(), 1e-8);
     // The last numbers of the file: the road before the car, which nothing may stand on.
-    const std::string depth =
-        bytes_of(root_ / "out" / "sequences" / "00" / "depth" / fmt::format("{:06}.npy", i));
+    const std::string depth = testing::read_all(root_ / "out" / "sequences" / "00" / "depth" /
+                                                fmt::format("{:06}.npy", i));
     ASSERT_EQ(depth.size(), 128U + 4U * 160U * 48U);
     float z = 0.0F;
     std::memcpy(&z, depth.data() + depth.size() - 4U * 80U, sizeof(z));
@@ -153,13 +148,13 @@ TEST_F(SyntheticDriveTest, WhatIsNotRenderedStaysAsItIs) {
   const Status refused = render_synthetic_drive(root_ / "out", small(2));
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr(folder.string()));
-  EXPECT_EQ(bytes_of(folder / "image_2/000000.png"), "a real image");
+  EXPECT_EQ(testing::read_all(folder / "image_2/000000.png"), "a real image");
 
   fs::remove_all(folder);
   fs::create_directories(root_ / "out" / "poses");
   std::ofstream(root_ / "out/poses/00.txt") << "real poses";
   EXPECT_FALSE(render_synthetic_drive(root_ / "out", small(2)));
-  EXPECT_EQ(bytes_of(root_ / "out/poses/00.txt"), "real poses");
+  EXPECT_EQ(testing::read_all(root_ / "out/poses/00.txt"), "real poses");
 }
 
 TEST_F(SyntheticDriveTest, BadInputIsOneLine) {
