@@ -9,6 +9,7 @@
 #include <limits>
 
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "instruction_set.hpp"
 
@@ -77,25 +78,51 @@ double image_roll_rad(const Eigen::Quaterniond& map_from_camera) {
 
 std::vector<Descriptor> describe(const ChannelImage& channel,
                                  std::span<const KeptCorner> corners,
-                                 double roll_rad) {
+                                 double roll_rad,
+                                 double scale) {
   const auto roll_deg = static_cast<float>(roll_rad * 180.0 / M_PI);
+  cv::Mat pixels = channel.pixels;
+  if (scale != 1.0) {
+    cv::resize(channel.pixels, pixels, {}, scale, scale,
+               scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  }
   std::vector<cv::KeyPoint> keypoints;
   for (const KeptCorner& corner : corners) {
-    const Eigen::Vector2f at = channel.map.from_input(corner.uv.cast<double>()).cast<float>();
+    // The middle of the first pixel is at (0, 0).
+    const Eigen::Vector2d at = channel.map.from_input(corner.uv.cast<double>());
+    const Eigen::Vector2f scaled = (scale * (at.array() + 0.5) - 0.5).cast<float>();
     const int index = static_cast<int>(keypoints.size());
-    keypoints.emplace_back(cv::Point2f(at.x(), at.y()), kPatch_px, roll_deg, 0.0F, 0, index);
+    keypoints.emplace_back(cv::Point2f(scaled.x(), scaled.y()), kPatch_px, roll_deg, 0.0F, 0,
+                           index);
   }
   const cv::Ptr<cv::ORB> orb =
       cv::ORB::create(std::max(1, static_cast<int>(corners.size())), 2.0F, 1, kBorder_px, 0, 2,
                       cv::ORB::HARRIS_SCORE, kPatch_px);
   cv::Mat bits;
-  orb->compute(channel.pixels, keypoints, bits);
+  orb->compute(pixels, keypoints, bits);
   std::vector<Descriptor> descriptors(corners.size());
   for (int row = 0; row < bits.rows; ++row) {
     const int index = keypoints[static_cast<std::size_t>(row)].class_id;
     std::memcpy(&descriptors[static_cast<std::size_t>(index)], bits.ptr(row), sizeof(Descriptor));
   }
   return descriptors;
+}
+
+std::span<const Descriptor> ScaledDescriptors::other(std::size_t i) {
+  if (!describe_at_) {
+    return at_one_;
+  }
+  if (others_[i].empty()) {
+    others_[i] = describe_at_(kOtherScales[i]);
+  }
+  return others_[i];
+}
+
+std::span<const Descriptor> ScaledDescriptors::for_magnification(double magnification) {
+  const auto off = [&](double scale) { return std::abs(std::log(scale * magnification)); };
+  const auto* const best = std::ranges::min_element(kOtherScales, {}, off);
+  return off(*best) < off(1.0) ? other(static_cast<std::size_t>(best - kOtherScales.begin()))
+                               : at_one_;
 }
 
 std::vector<DescriptorPair> match_descriptors(std::span<const Descriptor> first,

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -23,10 +25,37 @@ inline constexpr Descriptor kNoDescriptor{};
 
 /// ORB's 256 comparisons around each corner on the channel, turned with the image: a hand rolls the
 /// camera by 15 degrees, and a turn that is not measured at each corner costs no bits. One per
-/// corner.
+/// corner. `scale`: as if the image were larger by that.
 [[nodiscard]] std::vector<Descriptor> describe(const ChannelImage& channel,
                                                std::span<const KeptCorner> corners,
-                                               double roll_rad);
+                                               double roll_rad,
+                                               double scale = 1.0);
+
+/// A view from farther off looks like a smaller one: a frame is described at these scales, too,
+/// where nothing tells how far it is from what was seen.
+inline constexpr std::array<double, 2> kOtherScales{0.7, 1.4};
+
+/// Makes a frame's descriptors at a scale.
+using DescribeAt = std::function<std::vector<Descriptor>(double scale)>;
+
+/// A frame's descriptors at each scale, made when they are asked for.
+class ScaledDescriptors {
+ public:
+  /// `at_one`: at scale 1. Without `describe_at` there are no others.
+  ScaledDescriptors(std::span<const Descriptor> at_one, const DescribeAt& describe_at)
+      : at_one_(at_one), describe_at_(describe_at) {}
+
+  [[nodiscard]] std::span<const Descriptor> at_one() const { return at_one_; }
+  /// At kOtherScales[i].
+  [[nodiscard]] std::span<const Descriptor> other(std::size_t i);
+  /// Those nearest to a view that this one magnifies.
+  [[nodiscard]] std::span<const Descriptor> for_magnification(double magnification);
+
+ private:
+  std::span<const Descriptor> at_one_;
+  const DescribeAt& describe_at_;
+  std::array<std::vector<Descriptor>, kOtherScales.size()> others_;
+};
 
 /// Bits that differ; inside of what is compiled for a processor that counts bits, it does.
 STEMVO_INLINE int differing_bits(const Descriptor& a, const Descriptor& b) {

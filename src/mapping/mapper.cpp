@@ -15,8 +15,10 @@
 namespace stemvo {
 namespace {
 
-/// A graph of so many nodes is solved in the time of one keyframe.
-constexpr int kNodesPerKeyframe = 64;
+/// A graph of so many edges is solved in the time of one keyframe.
+constexpr std::size_t kEdgesPerKeyframe = 128;
+/// For so many times that time the next one waits: a room brings new loops with every keyframe.
+constexpr int kPause = 8;
 /// Standard deviations of where a lost frame was found, one place alone: rotation, share of the
 /// depth, scale.
 constexpr double kSigmaFound_rad = 0.005;
@@ -124,7 +126,9 @@ void Mapper::begin_lookup(const WindowView& view) {
     const StageTimer timer(Stage::kPlaces);
     KeptKeyframe& keyframe = work.keyframe;
     keyframe.descriptors = describe(image->channel, keyframe.corners, roll);
-    work.loop = recognizer_.recognize(keeper_.map(), keeper_.components(), work.node, keyframe);
+    work.loop = recognizer_.recognize(
+        keeper_.map(), keeper_.components(), work.node, keyframe,
+        [&](double scale) { return describe(image->channel, keyframe.corners, roll, scale); });
     if (work.loop.has_value()) {
       measure_scale(keeper_.keyframe(work.loop->from), keyframe, *work.loop);
     }
@@ -176,6 +180,7 @@ Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
                    sigmas_off(keeper_.map(), loop) > kMaxAgreeingSigmas;
   if (recognition.moved.has_value()) {
     solved_ = {};  // of the graph before
+    keyframes_until_next_ = 0;
   }
   const Similarity3 world_from_old =
       keeper_.map_from_world().inverse() * keeper_.map_from_keyframe(loop.from);
@@ -191,7 +196,7 @@ Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
 }
 
 /// Begins where loops have come, and takes the result in a number of keyframes later that the
-/// graph's size alone decides.
+/// graph's size alone decides. A map that was moved does not wait.
 void Mapper::solve_graph(const WindowView& view) {
   if (solved_.valid() && --keyframes_until_solved_ <= 0) {
     const auto solved = std::exchange(solved_, {});
@@ -200,10 +205,11 @@ void Mapper::solve_graph(const WindowView& view) {
     }
   }
   merge();
-  if (has_new_loops_ && !solved_.valid()) {
+  if (has_new_loops_ && !solved_.valid() && --keyframes_until_next_ <= 0) {
     has_new_loops_ = false;
-    keyframes_until_solved_ =
-        1 + static_cast<int>(keeper_.map().keyframes.size()) / kNodesPerKeyframe;
+    const std::size_t num_edges = keeper_.map().motions.size() + keeper_.map().loops.size();
+    keyframes_until_solved_ = 1 + static_cast<int>(num_edges / kEdgesPerKeyframe);
+    keyframes_until_next_ = kPause * keyframes_until_solved_;
     solved_ = begin([graph = keeper_.graph(view)]() mutable {
       const StageTimer timer(Stage::kPoseGraph);
       return solve_pose_graph(graph) ? std::optional(graph.map_from_keyframe) : std::nullopt;
@@ -275,8 +281,9 @@ std::optional<Relocation> Mapper::locate(const WindowView& view,
   const StageTimer timer(Stage::kPlaces);
   const std::vector<KeptCorner> corners = corners_of(matches);
   const double roll = image_roll_rad(keeper_.map_from_world().rotation * predicted.rotation);
-  const auto found = recognizer_.locate(keeper_.map(), view.camera, corners,
-                                        describe(image.channel, corners, roll));
+  const auto found = recognizer_.locate(
+      keeper_.map(), view.camera, corners, describe(image.channel, corners, roll),
+      [&](double scale) { return describe(image.channel, corners, roll, scale); });
   if (!found.has_value()) {
     return std::nullopt;
   }
@@ -308,6 +315,7 @@ void Mapper::begin_at_relocation() {
   if (located_.has_value()) {
     keeper_.begin_at(*std::exchange(located_, {}));
     has_new_loops_ = true;
+    keyframes_until_next_ = 0;
   }
 }
 

@@ -105,6 +105,7 @@ class Mapper {
   std::optional<Loop> located_;    ///< to the last frame that was, which is no node yet
   bool has_new_loops_ = false;
   int keyframes_until_solved_ = 0;
+  int keyframes_until_next_ = 0;  ///< once there are new loops
   std::shared_future<std::optional<std::vector<Similarity3>>> solved_;
   std::shared_future<LookedUp> looked_up_;  ///< last: it ends before what it works on
 };

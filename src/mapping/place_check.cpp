@@ -13,9 +13,15 @@
 namespace stemvo {
 namespace {
 
-/// Fewer landmarks that agree, or in fewer of the image's cells, may do so by chance.
-constexpr std::size_t kMinInliers = 30;
-constexpr int kMinCells = 12;
+/// Fewer landmarks that agree, or in fewer of the image's cells, or of the pairs that P3P was
+/// given, may do so by chance.
+struct Least {
+  std::size_t num_inliers = 30;
+  int num_cells = 12;
+  double share = 0.0;
+};
+/// The poses say already that it is the place.
+constexpr Least kLeastExpected{20, 6, 0.4};
 constexpr int kColumns = 6;
 constexpr int kRows = 4;
 /// So many of so many pairs or more are enough to look for more where a pose has them.
@@ -24,7 +30,13 @@ constexpr std::size_t kMinSample = 10;
 /// An inlier's reprojection error, at a focal length of 718 px; least of a small image.
 constexpr double kBound_px = 4.0;
 constexpr double kMinBound_px = 3.0;
+/// P3P, and the search for more, allow so many times that.
+constexpr double kLooseBound = 2.0;
 constexpr double kFocal_px = 718.0;
+/// A young landmark's depth may be wrong by this share: it lies on a piece of its ray.
+constexpr double kDepthError = 0.15;
+/// How far from where a landmark is expected a corner like it is looked for: rad.
+constexpr double kSearch_rad = 0.075;
 /// Cauchy scale: corners that were detected twice are off by about that.
 constexpr double kLoss_px = 1.0;
 /// Bits in which a landmark differs from a corner near its projection.
@@ -49,7 +61,7 @@ Eigen::Vector2d uv_of(const PlaceView& view, int index) {
   return corner_of(view, index).uv.cast<double>();
 }
 
-bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
+int num_cells(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
   std::vector<char> cells(static_cast<std::size_t>(kColumns * kRows));
   for (const Eigen::Vector2d& point : uv) {
     const int column =
@@ -58,27 +70,36 @@ bool is_spread(const std::vector<Eigen::Vector2d>& uv, const Camera& camera) {
         std::clamp(static_cast<int>(kRows * point.y() / camera.height_px), 0, kRows - 1);
     cells[static_cast<std::size_t>(row * kColumns + column)] = 1;
   }
-  return std::ranges::count(cells, char{1}) >= kMinCells;
+  return static_cast<int>(std::ranges::count(cells, char{1}));
 }
 
 /// Sightings of one view's landmarks by the other one.
 bool is_seen(
     const Similarity3& by_from_of, const PlaceView& of, int mine, const PlaceView& by, int other) {
-  const Eigen::Vector3d x = by_from_of * landmark_of(of, mine);
-  return x.z() > 0.0 && (by.camera.project(x) - uv_of(by, other)).norm() <= bound_px(by.camera);
+  const Eigen::Vector3d landmark = landmark_of(of, mine);
+  const Eigen::Vector3d near = by_from_of * ((1.0 - kDepthError) * landmark);
+  const Eigen::Vector3d far = by_from_of * ((1.0 + kDepthError) * landmark);
+  if (std::min(near.z(), far.z()) <= 0.0) {
+    return false;
+  }
+  const Eigen::Vector2d from = by.camera.project(near);
+  const Eigen::Vector2d way = by.camera.project(far) - from;
+  const Eigen::Vector2d seen = uv_of(by, other) - from;
+  const double share = std::clamp(seen.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (seen - share * way).norm() <= bound_px(by.camera);
 }
 
 /// Landmarks of `of` where `by` has corners like them near their projections: each other's
 /// nearest.
 std::vector<DescriptorPair> match_near(const Similarity3& by_from_of,
                                        const PlaceView& of,
-                                       const PlaceView& by) {
+                                       const PlaceView& by,
+                                       double radius_px) {
   struct Best {
     int mine = -1;
     int num_bits = kGuidedBits + 1;
   };
   std::vector<Best> best(by.corners.size());
-  const double radius_px = 2.0 * bound_px(by.camera);
   for (std::size_t i = 0; i < of.corners.size(); ++i) {
     const int mine = static_cast<int>(i);
     if (!of.corners[i].has_landmark() || of.descriptors[i] == kNoDescriptor) {
@@ -140,7 +161,8 @@ std::optional<Consensus> find_consensus(const PlaceView& of,
   if (uv.size() < kMinMatches) {
     return std::nullopt;
   }
-  const auto start = estimate_absolute_pose(points, uv, by.camera, bound_px(by.camera), kSeed);
+  const auto start =
+      estimate_absolute_pose(points, uv, by.camera, kLooseBound * bound_px(by.camera), kSeed);
   if (!start.has_value()) {
     return std::nullopt;
   }
@@ -205,12 +227,14 @@ std::vector<DescriptorPair> agreeing(const Similarity3& old_from_recent,
   return inliers;
 }
 
-bool is_enough(const PlaceView& by, const std::vector<DescriptorPair>& inliers) {
+bool is_enough(const PlaceView& by,
+               const std::vector<DescriptorPair>& inliers,
+               const Least& least) {
   std::vector<Eigen::Vector2d> uv;
   for (const auto& [mine, other] : inliers) {
     uv.push_back(uv_of(by, other));
   }
-  return uv.size() >= kMinInliers && is_spread(uv, by.camera);
+  return uv.size() >= least.num_inliers && num_cells(uv, by.camera) >= least.num_cells;
 }
 
 double median_error_px(const Similarity3& recent_from_old,
@@ -233,15 +257,22 @@ std::optional<PlacePose> locate_in_place(const PlaceView& old, const PlaceView& 
   if (!found.has_value()) {
     return std::nullopt;
   }
-  found = find_consensus(old, frame, match_near(Similarity3(found->by_from_of), old, frame));
-  if (!found.has_value() || !is_enough(frame, found->inliers)) {
+  found = find_consensus(
+      old, frame,
+      match_near(Similarity3(found->by_from_of), old, frame, kLooseBound * bound_px(frame.camera)));
+  if (!found.has_value() || !is_enough(frame, found->inliers, {})) {
     return std::nullopt;
   }
   return PlacePose{found->by_from_of.inverse(), std::move(found->inliers)};
 }
 
-std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent) {
-  const auto pairs = match_descriptors(old.descriptors, recent.descriptors);
+std::optional<Loop> check_place(const PlaceView& old,
+                                const PlaceView& recent,
+                                const std::optional<Similarity3>& expected) {
+  const Least least = expected.has_value() ? kLeastExpected : Least();
+  const auto pairs = expected.has_value() ? match_near(*expected, old, recent,
+                                                       kSearch_rad * recent.camera.mean_focal_px())
+                                          : match_descriptors(old.descriptors, recent.descriptors);
   const auto on_old = find_consensus(old, recent, pairs);
   if (!on_old.has_value()) {
     return std::nullopt;
@@ -256,7 +287,9 @@ std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent) {
                                    on_old->inliers, on_recent->inliers)
                                 .a_from_b;
   // More of them, where the first similarity has them.
-  const auto near = agreeing(first, old, recent, match_near(first.inverse(), old, recent));
+  const auto near =
+      agreeing(first, old, recent,
+               match_near(first.inverse(), old, recent, kLooseBound * bound_px(recent.camera)));
   std::vector<DescriptorPair> back;
   for (const auto& [mine, other] : near) {
     if (corner_of(recent, other).has_landmark()) {
@@ -271,7 +304,9 @@ std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent) {
     return static_cast<double>(agreeing(loop.from_to, old, recent, found).size()) >=
            kMinAgreement * static_cast<double>(found.size());
   };
-  if (!is_enough(recent, loop.corners) || back.size() < kMinInliers ||
+  if (!is_enough(recent, loop.corners, least) || back.size() < least.num_inliers ||
+      static_cast<double>(on_old->inliers.size()) <
+          least.share * static_cast<double>(pairs.size()) ||
       !explained(on_old->inliers) || !explained(swapped(on_recent->inliers))) {
     return std::nullopt;
   }

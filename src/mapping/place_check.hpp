@@ -39,6 +39,10 @@ struct PlacePose {
 /// where they are: `old` on the new one's, the new one on the old ones, both agreeing, then one
 /// similarity refined on both images. The result's `from` and `to` are not set. nullopt: the two do
 /// not show one place.
-[[nodiscard]] std::optional<Loop> check_place(const PlaceView& old, const PlaceView& recent);
+/// With `expected`, the new one from the old one, corners are matched near where the landmarks
+/// should be.
+[[nodiscard]] std::optional<Loop> check_place(const PlaceView& old,
+                                              const PlaceView& recent,
+                                              const std::optional<Similarity3>& expected = {});
 
 }  // namespace stemvo

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <iterator>
+#include <limits>
 
 #include "geometry/median.hpp"
+#include "mapping/expected_views.hpp"
 
 namespace stemvo {
 namespace {
@@ -17,7 +20,7 @@ constexpr int kMinFrames = 5;
 /// It becomes a place where it shares less than this with the last view that is kept ..
 constexpr double kMaxSharedPlace = 0.5;
 /// .. and shows less than this of a kept place.
-constexpr double kSamePlace = 0.3;
+constexpr double kSamePlace = 0.2;
 /// A place is looked for among those so many lookups before that share no tracks: the window
 /// remembers the others. It forgets those from which the camera went away, and came back: from
 /// there to here is this much of its way.
@@ -97,6 +100,7 @@ void PlaceRecognizer::load(const KeptMap& map) {
     if (!keyframe_of(map, i).descriptors.empty()) {
       add(i, keyframe_of(map, i));
       places_.back().lookup = -kMinLookupsApart;
+      places_.back().path = -std::numeric_limits<double>::infinity();
     }
   }
 }
@@ -137,27 +141,35 @@ void PlaceRecognizer::begin_lookup(const KeptKeyframe& keyframe) {
 std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
                                                std::span<const int> components,
                                                int number,
-                                               const KeptKeyframe& keyframe) {
+                                               const KeptKeyframe& keyframe,
+                                               const DescribeAt& describe_at) {
   begin_lookup(keyframe);
   const auto joins = [&](int place) {
     return components[static_cast<std::size_t>(place)] !=
                components[static_cast<std::size_t>(number)] &&
            keyframe_of(map, place).frame >= 0;
   };
-  std::vector<int> to_check;
-  for (const PlaceCandidate& candidate :
-       index_.candidates(keyframe.descriptors, end_of_far(), kMaxCandidates)) {
-    to_check.push_back(candidate.keyframe);
-  }
+  // Poses tell the scale of places that they connect.
+  ScaledDescriptors scales(keyframe.descriptors, describe_at);
+  const bool has_others = std::ranges::any_of(places_, [&](const Place& place) {
+    return components[static_cast<std::size_t>(place.keyframe)] !=
+           components[static_cast<std::size_t>(number)];
+  });
+  std::vector<Look> to_check = look_alikes(scales, has_others, end_of_far());
+  std::ranges::copy(expected_looks(map, components, number, keyframe, scales),
+                    std::back_inserter(to_check));
   const std::size_t num_candidates = to_check.size();
-  std::vector<int> checked;
   for (std::size_t i = 0; i < to_check.size(); ++i) {
-    const int place = to_check[i];
-    if (std::ranges::count(checked, place) > 0) {
+    const Look look = to_check[i];
+    const int place = look.place;
+    if (std::any_of(to_check.begin(), to_check.begin() + static_cast<std::ptrdiff_t>(i),
+                    [&](const Look& other) {
+                      return other.place == place &&
+                             other.expected.has_value() == look.expected.has_value();
+                    })) {
       continue;
     }
-    checked.push_back(place);
-    const std::optional<Sighting> sighting = look_at(map, place, number, keyframe);
+    const std::optional<Sighting> sighting = look_at(map, look, number, keyframe);
     if (!sighting.has_value()) {
       continue;
     }
@@ -171,20 +183,73 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
     }
     sightings_.push_back(*sighting);
     if (i < num_candidates) {
-      std::ranges::copy(neighbours_of(place), std::back_inserter(to_check));
+      for (const int neighbour : neighbours_of(place)) {
+        to_check.push_back({neighbour, look.seen, {}});
+      }
     }
   }
   return std::nullopt;
 }
 
+std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(ScaledDescriptors& scales,
+                                                                bool at_all,
+                                                                int before) const {
+  std::vector<std::pair<double, Look>> found;
+  const auto vote = [&](std::span<const Descriptor> seen) {
+    for (const PlaceCandidate& place : index_.candidates(seen, before, kMaxCandidates)) {
+      found.push_back({place.votes, {place.keyframe, seen, {}}});
+    }
+  };
+  vote(scales.at_one());
+  for (std::size_t i = 0; at_all && i < kOtherScales.size(); ++i) {
+    vote(scales.other(i));
+  }
+  std::ranges::stable_sort(found, std::greater<>(), &std::pair<double, Look>::first);
+  std::vector<Look> looks;
+  for (const auto& [votes, look] : found) {
+    if (std::ssize(looks) < kMaxCandidates &&
+        std::ranges::find(looks, look.place, &Look::place) == looks.end()) {
+      looks.push_back(look);
+    }
+  }
+  return looks;
+}
+
+/// Places of the same map that the camera has come back to, by the poses.
+std::vector<PlaceRecognizer::Look> PlaceRecognizer::expected_looks(
+    const KeptMap& map,
+    std::span<const int> components,
+    int number,
+    const KeptKeyframe& keyframe,
+    ScaledDescriptors& scales) const {
+  const auto component_of = [&](int node) { return components[static_cast<std::size_t>(node)]; };
+  std::vector<int> places;
+  for (const Place& place : places_) {
+    if (place.keyframe < end_of_far() && component_of(place.keyframe) == component_of(number) &&
+        has_come_back(map, place, number)) {
+      places.push_back(place.keyframe);
+    }
+  }
+  std::vector<ExpectedView> views = expected_views(map, places, number, keyframe);
+  views.resize(std::min<std::size_t>(views.size(), kMaxCandidates));
+  std::vector<Look> looks;
+  for (const ExpectedView& view : views) {
+    looks.push_back(
+        {view.place, scales.for_magnification(view.magnification), view.keyframe_from_place});
+  }
+  return looks;
+}
+
 std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
-    const KeptMap& map, int place, int number, const KeptKeyframe& keyframe) const {
+    const KeptMap& map, const Look& look, int number, const KeptKeyframe& keyframe) const {
+  const int place = look.place;
   const KeptKeyframe& old = keyframe_of(map, place);
   if (place >= end_of_far() || (num_shared(track_ids_of(old), last_tracks_) > kMaxTracks &&
                                 !has_come_back(map, place_of(place), number))) {
     return std::nullopt;
   }
-  std::optional<Loop> loop = check_place(view_of(old), view_of(keyframe));
+  std::optional<Loop> loop =
+      check_place(view_of(old), {keyframe.camera, keyframe.corners, look.seen}, look.expected);
   if (!loop.has_value()) {
     return std::nullopt;
   }
@@ -192,13 +257,12 @@ std::optional<PlaceRecognizer::Sighting> PlaceRecognizer::look_at(
   loop->to = number;
   const double share =
       static_cast<double>(loop->corners.size()) / static_cast<double>(keyframe.corners.size());
-  return Sighting{num_lookups_, share, std::move(*loop)};
+  return Sighting{num_lookups_, share, look.expected.has_value(), std::move(*loop)};
 }
 
 bool PlaceRecognizer::has_come_back(const KeptMap& map, const Place& place, int number) const {
   const Similarity3 net = pose_of(map, place.keyframe).inverse() * pose_of(map, number);
-  const double depth = median_depth(keyframe_of(map, place.keyframe).corners);
-  return depth > 0.0 && change_of_view(net, depth) < kMaxNetWay * (path_ - place.path);
+  return place.depth > 0.0 && change_of_view(net, place.depth) < kMaxNetWay * (path_ - place.path);
 }
 
 /// By another sighting, of another place; of keyframes that were looked up before, too, where two
@@ -210,7 +274,9 @@ bool PlaceRecognizer::is_confirmed(const KeptMap& map, const Sighting& sighting,
   }
   const Similarity3 map_from_camera = pose_of(map, loop.from) * loop.from_to;
   const auto num = std::ranges::count_if(sightings_, [&](const Sighting& other) {
-    if (other.loop.from == loop.from ||
+    const bool is_same_view =
+        other.loop.from == loop.from && (!sighting.was_expected || other.lookup == sighting.lookup);
+    if (is_same_view ||
         (joins && (other.lookup == sighting.lookup || other.share < kMinJoinShare))) {
       return false;
     }
@@ -245,7 +311,7 @@ std::vector<int> PlaceRecognizer::neighbours_of(int place) const {
 
 void PlaceRecognizer::add(int number, const KeptKeyframe& keyframe) {
   index_.add(number, keyframe.descriptors);
-  places_.push_back({number, num_lookups_, path_});
+  places_.push_back({number, num_lookups_, path_, median_depth(keyframe.corners)});
   kept_tracks_ = track_ids_of(keyframe);
 }
 
@@ -265,22 +331,23 @@ void PlaceRecognizer::renumber(std::span<const int> numbers) {
 std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
                                                     const Camera& camera,
                                                     const std::vector<KeptCorner>& corners,
-                                                    const std::vector<Descriptor>& descriptors) {
+                                                    const std::vector<Descriptor>& descriptors,
+                                                    const DescribeAt& describe_at) {
   const std::vector<Similarity3> before = std::exchange(located_, {});
   may_be_locating_ = false;
-  std::vector<int> to_check;
-  for (const PlaceCandidate& candidate :
-       index_.candidates(descriptors, static_cast<int>(map.keyframes.size()), kMaxCandidates)) {
-    to_check.push_back(candidate.keyframe);
-  }
+  ScaledDescriptors scales(descriptors, describe_at);
+  std::vector<Look> to_check = look_alikes(scales, true, static_cast<int>(map.keyframes.size()));
   const std::size_t num_candidates = to_check.size();
   for (std::size_t i = 0; i < to_check.size(); ++i) {
-    const int place = to_check[i];
+    const Look look = to_check[i];
+    const int place = look.place;
+    const auto end = to_check.begin() + static_cast<std::ptrdiff_t>(i);
+    if (std::ranges::find(to_check.begin(), end, place, &Look::place) != end) {
+      continue;
+    }
     const KeptKeyframe& old = keyframe_of(map, place);
-    const auto found = locate_in_place(view_of(old), {camera, corners, descriptors});
-    if (std::find(to_check.begin(), to_check.begin() + static_cast<std::ptrdiff_t>(i), place) !=
-            to_check.begin() + static_cast<std::ptrdiff_t>(i) ||
-        !found.has_value()) {
+    const auto found = locate_in_place(view_of(old), {camera, corners, look.seen});
+    if (!found.has_value()) {
       continue;
     }
     const Similarity3 map_from_camera = pose_of(map, place) * Similarity3(found->old_from_camera);
@@ -308,7 +375,9 @@ std::optional<LocatedFrame> PlaceRecognizer::locate(const KeptMap& map,
       return located;
     }
     if (i < num_candidates) {
-      std::ranges::copy(neighbours_of(place), std::back_inserter(to_check));
+      for (const int neighbour : neighbours_of(place)) {
+        to_check.push_back({neighbour, look.seen, {}});
+      }
     }
   }
   may_be_locating_ = before.empty() && !located_.empty();

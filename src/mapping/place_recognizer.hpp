@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "mapping/descriptors.hpp"
 #include "mapping/kept_map.hpp"
 #include "mapping/place_check.hpp"
 #include "mapping/place_index.hpp"
@@ -45,7 +46,8 @@ class PlaceRecognizer {
   [[nodiscard]] std::optional<Loop> recognize(const KeptMap& map,
                                               std::span<const int> components,
                                               int number,
-                                              const KeptKeyframe& keyframe);
+                                              const KeptKeyframe& keyframe,
+                                              const DescribeAt& describe_at = {});
   /// The last one that was looked up shows a place that is kept: it needs not become one.
   [[nodiscard]] bool shows_kept_place() const { return shows_kept_place_; }
   /// It becomes a place: its descriptors and corners must stay in the map.
@@ -61,24 +63,41 @@ class PlaceRecognizer {
   [[nodiscard]] std::optional<LocatedFrame> locate(const KeptMap& map,
                                                    const Camera& camera,
                                                    const std::vector<KeptCorner>& corners,
-                                                   const std::vector<Descriptor>& descriptors);
+                                                   const std::vector<Descriptor>& descriptors,
+                                                   const DescribeAt& describe_at = {});
 
  private:
   struct Place {
     int keyframe = 0;  ///< its number
     int lookup = 0;
-    double path = 0.0;  ///< path_ then
+    double path = 0.0;   ///< path_ then
+    double depth = 0.0;  ///< median; 0: it has no landmarks
   };
   /// A check that went well.
   struct Sighting {
     int lookup = 0;      ///< its number
     double share = 0.0;  ///< of the keyframe's corners that agree
+    bool was_expected = false;
     Loop loop;
   };
+  /// A place to look at, and the frame's descriptors at the scale at which it may look alike.
+  struct Look {
+    int place = 0;
+    std::span<const Descriptor> seen;
+    std::optional<Similarity3> expected;  ///< the frame from the place, where that is known
+  };
+  [[nodiscard]] std::vector<Look> look_alikes(ScaledDescriptors& scales,
+                                              bool at_all,
+                                              int before) const;
+  [[nodiscard]] std::vector<Look> expected_looks(const KeptMap& map,
+                                                 std::span<const int> components,
+                                                 int number,
+                                                 const KeptKeyframe& keyframe,
+                                                 ScaledDescriptors& scales) const;
   void begin_lookup(const KeptKeyframe& keyframe);
   [[nodiscard]] const Place& place_of(int keyframe) const;
   [[nodiscard]] std::optional<Sighting> look_at(const KeptMap& map,
-                                                int place,
+                                                const Look& look,
                                                 int number,
                                                 const KeptKeyframe& keyframe) const;
   [[nodiscard]] bool is_confirmed(const KeptMap& map, const Sighting& sighting, bool joins) const;

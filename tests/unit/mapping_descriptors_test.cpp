@@ -61,6 +61,18 @@ TEST(Descriptors, TurnWithTheImage) {
   EXPECT_GT(differing_bits(one[0], describe({turned, {}}, corners_at({turned_uv}), 0.0)[0]), 40);
 }
 
+TEST(Descriptors, ShowFromFartherOffWhatIsSmaller) {
+  const cv::Mat near = texture({0, 0});
+  cv::Mat far;
+  const double scale = kOtherScales[0];
+  cv::resize(near, far, {}, scale, scale, cv::INTER_AREA);
+  const Eigen::Vector2f uv(150.0F, 80.0F);
+  const Eigen::Vector2f far_uv = (scale * (uv.array().cast<double>() + 0.5) - 0.5).cast<float>();
+  const auto as_far = describe({far, {}}, corners_at({far_uv}), 0.0);
+  EXPECT_GT(differing_bits(as_far[0], describe({near, {}}, corners_at({uv}), 0.0)[0]), 50);
+  EXPECT_LE(differing_bits(as_far[0], describe({near, {}}, corners_at({uv}), 0.0, scale)[0]), 10);
+}
+
 TEST(Descriptors, PixelsAreTheInputs) {
   ChannelImage half{texture({0, 0}), {}};
   half.map.scale = {2.0, 2.0};

@@ -94,6 +94,47 @@ TEST(PlaceCheck, APartOfTheImageIsNotEnough) {
   EXPECT_FALSE(check_place(view_of(old), view_of(recent)).has_value());
 }
 
+TEST(PlaceCheck, LandmarksThatAreNewHaveWrongDepths) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  std::mt19937 random(1);
+  std::normal_distribution<float> error(1.0F, 0.08F);
+  for (KeptCorner& corner : recent.corners) {
+    corner.in_camera *= error(random);
+  }
+  const auto loop = check_place(view_of(old), view_of(recent));
+  ASSERT_TRUE(loop.has_value());
+  const auto num_seen = static_cast<double>(recent.corners.size());
+  EXPECT_GT(static_cast<double>(loop->corners.size()), 0.8 * num_seen);
+  EXPECT_LT(turn_rad(loop->from_to, true_similarity()), 0.01);
+}
+
+/// A third of the image, and few of its corners, but where they were expected.
+TEST(PlaceCheck, WhatIsExpectedNeedsFewerCorners) {
+  DescribedPoints points = street();
+  const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);
+  KeptKeyframe recent = points.see(kNewPose, kNewUnits, 100000);
+  int num_left = 0;
+  for (std::size_t i = 0; i < recent.corners.size(); ++i) {
+    const bool stays = recent.corners[i].uv.x() < 500.0F && num_left < 26;
+    num_left += stays ? 1 : 0;
+    recent.descriptors[i] = stays ? points.changed(recent.descriptors[i], 0.15) : points.draw();
+  }
+  const Similarity3 truth = true_similarity();
+  Similarity3 expected = truth;
+  expected.rotation = truth.rotation * so3_exp({0.0, 0.02, 0.01});
+  expected.scale *= 1.1;
+  EXPECT_FALSE(check_place(view_of(old), view_of(recent)).has_value());
+  const auto loop = check_place(view_of(old), view_of(recent), expected.inverse());
+  ASSERT_TRUE(loop.has_value());
+  EXPECT_LT(turn_rad(loop->from_to, truth), 0.005);
+  EXPECT_LT(std::abs(std::log(loop->from_to.scale / truth.scale)), 0.05);
+  DescribedPoints other = street(2);
+  const KeptKeyframe elsewhere = other.see(kNewPose, kNewUnits, 100000);
+  EXPECT_FALSE(check_place(view_of(old), view_of(elsewhere), expected.inverse()).has_value());
+}
+
 TEST(PlaceCheck, LocatesAFrameWithoutLandmarks) {
   DescribedPoints points = street();
   const KeptKeyframe old = points.see(kOldPose, kOldUnits, 0);

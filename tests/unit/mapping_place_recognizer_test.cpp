@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -24,9 +25,16 @@ struct TwoRounds {
         points(testing::points_along(path, 2000, seed), seed),
         elsewhere(testing::points_along(path, 2000, seed + 100), seed + 100) {}
 
-  std::optional<Loop> add(DescribedPoints& seen, const Rigid3& pose, double units) {
+  /// `num_known`: so many corners look as they did.
+  std::optional<Loop> add(DescribedPoints& seen,
+                          const Rigid3& pose,
+                          double units,
+                          std::size_t num_known = 10000) {
     const int number = static_cast<int>(map.keyframes.size());
     KeptKeyframe keyframe = seen.see(pose, units, 10000 * (number / 6));
+    for (std::size_t i = num_known; i < keyframe.corners.size(); ++i) {
+      keyframe.descriptors[i] = seen.draw();
+    }
     keyframe.frame = 5 * number;
     map.map_from_keyframe.emplace_back(keyframe.world_from_camera);
     map.keyframes.push_back(keyframe);
@@ -85,6 +93,39 @@ TEST(PlaceRecognizer, AStreetThatIsDrivenAgainIsRecognized) {
   EXPECT_GT(num_loops, 8);
   // A recognized place is kept once.
   EXPECT_LE(drive.num_places - places_before, 2);
+}
+
+/// Its descriptors at the first scale say nothing.
+TEST(PlaceRecognizer, APlaceIsRecognizedAtAnotherScale) {
+  TwoRounds drive(3);
+  drive.first_round();
+  const KeptMap before = drive.map;
+  KeptKeyframe frame = drive.points.see(drive.aside(20), 1.0, 0);
+  const std::vector<Descriptor> larger =
+      std::exchange(frame.descriptors, std::vector(frame.corners.size(), drive.points.draw()));
+  EXPECT_FALSE(
+      drive.recognizer.locate(before, frame.camera, frame.corners, frame.descriptors).has_value());
+  EXPECT_TRUE(drive.recognizer
+                  .locate(before, frame.camera, frame.corners, frame.descriptors,
+                          [&](double scale) { return scale > 1.0 ? larger : frame.descriptors; })
+                  .has_value());
+}
+
+/// Too few corners for anybody who does not know where to look.
+TEST(PlaceRecognizer, APlaceIsExpectedWhereTheCameraCameBack) {
+  TwoRounds drive(3);
+  drive.first_round();
+  int num_loops = 0;
+  for (int i = 0; i < kLength; ++i) {
+    const auto loop = drive.add(drive.points, drive.aside(i), 1.0, 26);
+    if (loop.has_value()) {
+      ++num_loops;
+      const Rigid3& old = drive.path[static_cast<std::size_t>(loop->from)];
+      EXPECT_LT((loop->from_to.translation - (old.inverse() * drive.aside(i)).translation).norm(),
+                0.3);
+    }
+  }
+  EXPECT_GT(num_loops, 5);
 }
 
 TEST(PlaceRecognizer, OneSightingIsNotBelieved) {
