@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Makes a folder in EuRoC's layout of a camera in a ROS 1 bag, a ROS 2 bag or an MCAP file: `stemvo run FOLDER` takes it. Needs no ROS.
+Of what `stemvo run` wrote it makes an MCAP file, that ROS 2 tools play and draw.
 
 Compressed images stay the bytes they are. The camera is that of the camera_info topic beside the images', or --camera FILE.
 """
@@ -16,6 +17,10 @@ try:
     import PIL.Image
     import rosbags.highlevel
     import rosbags.typesys
+    if __package__:
+        from . import result_bag
+    else:
+        import result_bag  # beside this file
 except ImportError as error:
     if __name__ != "__main__":
         raise
@@ -136,10 +141,19 @@ def convert(options, folder):
     return written, left_out
 
 
+def opener(options):
+    if options.recording is None:
+        return None
+    import stemvo
+
+    return lambda first, count: stemvo.read_recording(options.recording, options.camera, frames=f"{first}:{first + count}")
+
+
 def main(arguments=None):
     parser = argparse.ArgumentParser(prog="python -m stemvo.bag", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bag", type=pathlib.Path, help="a .bag file (ROS 1), a folder with metadata.yaml (ROS 2), or an .mcap or .db3 file")
-    parser.add_argument("out", type=pathlib.Path, help="the folder to make; must not exist")
+    parser.add_argument("bag", type=pathlib.Path, help="a .bag file (ROS 1), a folder with metadata.yaml (ROS 2), an .mcap or .db3 file, or the --out of `stemvo run`")
+    parser.add_argument("out", type=pathlib.Path, help="the folder to make, of a result the .mcap file; must not exist")
+    parser.add_argument("--recording", type=pathlib.Path, help="of a result: its frames are written too")
     parser.add_argument("--topic", help="of the images; default: the only one")
     parser.add_argument("--camera", type=pathlib.Path, help="a camera file in place of the camera_info topic")
     options = parser.parse_args(arguments)
@@ -148,7 +162,11 @@ def main(arguments=None):
         if not options.bag.exists():
             raise BagError("expected a bag, found nothing of that name; check the path")
         if options.out.exists():
-            raise BagError(f"{options.out}: expected a folder that does not exist, found one")
+            raise BagError(f"{options.out}: expected a name that does not exist, found one")
+        if result_bag.is_result(options.bag):
+            written = result_bag.write_result(options.bag, options.out, opener(options))
+            print(f"{options.out}: {written} frames")
+            return 0
         shutil.rmtree(unfinished, ignore_errors=True)
         written, left_out = convert(options, unfinished)
         unfinished.rename(options.out)

@@ -8,6 +8,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -16,6 +17,7 @@ sys.path.insert(0, str(ROOT / "python/stemvo"))  # the file alone: it needs no b
 import bag as bag_module  # noqa: E402
 import numpy as np  # noqa: E402
 import PIL.Image  # noqa: E402
+import rosbags.highlevel  # noqa: E402
 import rosbags.rosbag1  # noqa: E402
 import rosbags.rosbag2  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
@@ -178,6 +180,126 @@ class Bag(unittest.TestCase):
         self.expect_error(["nothing.mcap"], self.folder / "nothing.mcap", self.out)
         self.expect_error(["does not exist, found one"], bag, self.folder)
         self.assertFalse(self.out.exists())
+
+
+class Result(unittest.TestCase):
+    """A result as a bag, read back with rosbags and compared with the numbers it was made of."""
+
+    FRAMES, STEP_S = 4, 0.1
+    CAMERA = types.SimpleNamespace(fx=150.0, fy=151.0, cx=79.5, cy=59.5, width=WIDTH, height=HEIGHT)
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.result = self.folder / "result"
+        self.result.mkdir()
+        half = float(np.sin(np.pi / 4))
+        with (self.result / "frames.csv").open("w", encoding="utf-8") as file:
+            columns = ["frame", "timestamp_s", "map_scale", *(f"map_{c}" for c in ("x", "y", "z", "qx", "qy", "qz", "qw")), "x", "y", "z", "qx", "qy", "qz", "qw",
+                       *(f"step_var_{c}" for c in ("x", "y", "z", "rx", "ry", "rz"))]
+            file.write(",".join(columns) + "\n")
+            for i in range(self.FRAMES):  # 2 m a frame forward (z), then turned to the right by 90 degrees (about y, down); the map is twice as large, 1 m to the right
+                turn = [0, half, 0, half] if i == 3 else [0, 0, 0, 1]
+                values = [7 + i, 1.7e9 + self.STEP_S * i, 2, 1, 0, 0, 0, 0, 0, 1, 0, 0, 2.0 * i, *turn, *([0.01, 0.02, 0.04, 1e-4, 2e-4, 3e-4] if i else [0] * 6)]
+                file.write(",".join(map(repr, values)) + "\n")
+        vertices = np.array([((1, 2, 3), (10, 20, 30)), ((4, 5, 6), (40, 50, 60)), ((0, 0, 0), (1, 1, 1)), ((0, 0, 2), (1, 1, 1))],
+                            np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)]))
+        header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nelement edge 1\nproperty int vertex1\nend_header\n"
+        (self.result / "map.ply").write_bytes(header.encode() + vertices.tobytes() + bytes(8))
+
+    def write(self, **more):
+        out = self.folder / "out.mcap"
+        bag_module.result_bag.write_result(self.result, out, **more)
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        with rosbags.highlevel.AnyReader([out], default_typestore=store) as reader:
+            found = {}
+            for connection, time_ns, raw in reader.messages():
+                found.setdefault(connection.topic, []).append((time_ns, reader.deserialize(raw, connection.msgtype)))
+            self.latched = {c.topic for c in reader.connections if any(q.durability.name == "TRANSIENT_LOCAL" for q in c.ext.offered_qos_profiles)}
+        return found
+
+    @staticmethod
+    def vector(message):
+        return [message.x, message.y, message.z]
+
+    def test_messages_hold_what_the_result_says(self):
+        recording = [(scene(i), 0.0) for i in range(self.FRAMES)]
+        recording[1] = (None, 0.0)  # cannot be read
+        asked = []
+
+        def open_recording(first, count):
+            asked.append((first, count))
+            return type("Recording", (list,), {"camera": self.CAMERA})(recording)
+
+        found = self.write(open_recording=open_recording)
+        self.assertEqual(asked, [(7, self.FRAMES)])
+        self.assertEqual(set(found), {"/tf_static", "/landmarks", "/tf", "/odometry", "/camera/image/compressed", "/camera/camera_info"})
+        self.assertEqual(self.latched, {"/tf_static", "/landmarks"})
+        times = [round((1.7e9 + self.STEP_S * i) * 1e9) for i in range(self.FRAMES)]
+        self.assertEqual([time for time, _ in found["/odometry"]], times)
+        for (time_ns, odometry), (_, tf) in zip(found["/odometry"], found["/tf"]):
+            i = times.index(time_ns)
+            self.assertEqual(bag_module.stamp_ns(odometry), time_ns)
+            self.assertEqual((odometry.header.frame_id, odometry.child_frame_id), ("odom", "base_link"))
+            self.assertEqual([(t.header.frame_id, t.child_frame_id, bag_module.stamp_ns(t)) for t in tf.transforms], [("map", "odom", time_ns), ("odom", "base_link", time_ns)])
+            np.testing.assert_allclose(self.vector(odometry.pose.pose.position), [2.0 * i, 0, 0], atol=1e-12)  # x is forward
+            half = float(np.sin(np.pi / 4))
+            turn = [0, 0, -half, half] if i == 3 else [0, 0, 0, 1]  # right is clockwise from above
+            q = odometry.pose.pose.orientation
+            np.testing.assert_allclose([q.x, q.y, q.z, q.w], turn, atol=1e-12)
+            np.testing.assert_allclose(self.vector(tf.transforms[1].transform.translation), self.vector(odometry.pose.pose.position))
+            # Where the base is in the map: twice as far, and 1 m to the right (-y).
+            np.testing.assert_allclose(self.vector(tf.transforms[0].transform.translation) + np.array([2.0 * i, 0, 0]), [4.0 * i, -1, 0], atol=1e-12)
+            self.assertEqual(tf.transforms[0].transform.rotation.w, 1.0)
+        first, second, last = found["/odometry"][0][1], found["/odometry"][1][1], found["/odometry"][3][1]
+        self.assertFalse(first.pose.covariance.any())
+        self.assertFalse(self.vector(first.twist.twist.linear)[0])
+        np.testing.assert_allclose(second.pose.covariance.reshape(6, 6), np.diag([0.04, 0.01, 0.02, 3e-4, 1e-4, 2e-4]), atol=1e-15)
+        np.testing.assert_allclose(self.vector(second.twist.twist.linear), [20, 0, 0], rtol=1e-6)
+        np.testing.assert_allclose(second.twist.covariance.reshape(6, 6).diagonal(), [4, 1, 2, 0.03, 0.01, 0.02], rtol=1e-5)
+        np.testing.assert_allclose(self.vector(last.twist.twist.linear), [0, 20, 0], rtol=1e-6, atol=1e-6)  # turned to the right it moves to its left
+        np.testing.assert_allclose(self.vector(last.twist.twist.angular), [0, 0, -np.pi / 2 / self.STEP_S], rtol=1e-6)
+        # Steps of 2 m in y: a yaw's variance of 2e-4 each, behind one and two steps.
+        covariance = found["/odometry"][2][1].pose.covariance.reshape(6, 6)
+        np.testing.assert_allclose(covariance[1, 1], 2 * 0.01 + 4 * 2e-4)
+        np.testing.assert_allclose(covariance[1, 5], 2 * 2e-4)
+        np.testing.assert_allclose(covariance, covariance.T)
+        static = found["/tf_static"][0][1].transforms[0]
+        self.assertEqual((static.header.frame_id, static.child_frame_id), ("base_link", "camera_optical"))
+        q = static.transform.rotation
+        np.testing.assert_allclose([q.x, q.y, q.z, q.w], [-0.5, 0.5, -0.5, 0.5], atol=1e-12)
+        self.check_images(found, times)
+
+    def check_images(self, found, times):
+        self.assertEqual([time for time, _ in found["/camera/image/compressed"]], [times[0], *times[2:]])
+        image = found["/camera/image/compressed"][1][1]
+        self.assertEqual((image.header.frame_id, image.format, bag_module.stamp_ns(image)), ("camera_optical", "jpeg", times[2]))
+        pixels = np.asarray(PIL.Image.open(io.BytesIO(image.data.tobytes())))
+        self.assertLess(np.abs(pixels.astype(int) - scene(2)).mean(), 20)
+        info = found["/camera/camera_info"][0][1]
+        self.assertEqual((info.width, info.height, info.header.frame_id, info.distortion_model), (WIDTH, HEIGHT, "camera_optical", "plumb_bob"))
+        self.assertEqual(list(info.k), [150, 0, 79.5, 0, 151, 59.5, 0, 0, 1])
+        self.assertEqual(list(info.p), [150, 0, 79.5, 0, 0, 151, 59.5, 0, 0, 0, 1, 0])
+        self.assertFalse(info.d.any())
+        cloud = found["/landmarks"][0][1]
+        self.assertEqual((cloud.header.frame_id, cloud.width, cloud.height, cloud.point_step, cloud.row_step), ("map", 2, 1, 16, 32))
+        self.assertEqual([(f.name, f.offset, f.datatype) for f in cloud.fields], [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7)])
+        points = cloud.data.view(np.dtype([("xyz", "<f4", 3), ("rgb", "<u4")]))
+        np.testing.assert_array_equal(points["xyz"], [[3, -1, -2], [6, -4, -5]])
+        self.assertEqual(list(points["rgb"]), [0x0A141E, 0x28323C])
+
+    def test_the_command_writes_one_file_or_says_why_not(self):
+        out = self.folder / "made.mcap"
+        with contextlib.redirect_stdout(io.StringIO()) as said:
+            self.assertEqual(bag_module.main([str(self.result), str(out)]), 0)
+        self.assertEqual(said.getvalue(), f"{out}: 4 frames\n")
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["made.mcap", "result"])
+        (self.result / "frames.csv").write_text("frame,timestamp_s\n0,0\n", encoding="utf-8")
+        with contextlib.redirect_stderr(io.StringIO()) as complaint:
+            self.assertEqual(bag_module.main([str(self.result), str(self.folder / "none.mcap")]), 1)
+        self.assertIn("frames.csv: expected rows with poses and variances, found none", complaint.getvalue())
+        self.assertFalse((self.folder / "none.mcap").exists())
 
 
 if __name__ == "__main__":
