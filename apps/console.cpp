@@ -2,8 +2,12 @@
 #include "console.hpp"
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <regex>
+
+#include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "report/metrics_keys.hpp"
@@ -12,6 +16,7 @@ namespace stemvo::apps {
 namespace {
 
 bool is_json = false;
+bool is_rows = false;
 
 /// On one line: the messages of libraries may have many.
 void print_labelled(std::string line, std::string_view message) {
@@ -26,13 +31,23 @@ void print_note(std::string_view text) { std::fwrite(text.data(), 1, text.size()
 
 void print(std::string_view text) {
   if (!is_json) {
-    print_help(text);
+    is_rows ? print_note(text) : print_help(text);
   }
 }
 
 void print_help(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 
 void choose_json() { is_json = true; }
+
+void choose_rows() {
+  is_rows = true;
+  std::signal(SIGPIPE, SIG_IGN);  // the results are written all the same
+}
+
+bool print_row(const nlohmann::ordered_json& row) {
+  print_help(row.dump() + '\n');
+  return std::fflush(stdout) == 0;
+}
 
 void print_json(const nlohmann::ordered_json& document) {
   if (is_json) {
@@ -69,7 +84,8 @@ std::string command_line() {
     }
     command += is_plain ? " " + word : " '" + word + "'";
   }
-  return command;
+  static const std::regex kSecret("://[^/@ ]*@");  // of a camera's address
+  return std::regex_replace(command, kSecret, "://***@");
 }
 
 std::chrono::steady_clock::time_point process_start() {

@@ -15,6 +15,10 @@ void print(std::string_view text);
 void print_help(std::string_view text);
 /// --json: the document of print_json is all of standard output.
 void choose_json();
+/// --stream: standard output is for print_row alone, print goes to standard error.
+void choose_rows();
+/// A row for a program that reads along; at once. False: nobody reads any more.
+bool print_row(const nlohmann::ordered_json& row);
 /// A command's result as one document; nothing without --json. Once, and not after an error.
 void print_json(const nlohmann::ordered_json& document);
 

@@ -138,8 +138,11 @@ int run_program(int argc, char** argv) {
        {add_run, add_evaluate, add_channel, add_synth, add_calibrate, add_check, add_models}) {
     CLI::App* command = add(app, action);
     command->set_version_flag("--version", "stemvo " + std::string(version()));
-    command->add_flag_callback("--json", choose_json,
-                               "The result as one JSON document on standard output");
+    CLI::Option* const json = command->add_flag_callback(
+        "--json", choose_json, "The result as one JSON document on standard output");
+    if (CLI::Option* const rows = command->get_option_no_throw("--stream")) {
+      json->excludes(rows);
+    }
   }
   app.require_subcommand(0, 1);
   try {

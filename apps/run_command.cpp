@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <atomic>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -25,6 +27,7 @@ constexpr const char* kRunFooter =
   TUM                   rgb.txt, groundtruth.txt; the camera by --camera
   RECORDING             images/, camera.yaml, and where they exist times.txt and poses.txt
   drive.mp4             a video, decoded by FFmpeg; the camera by --camera
+  rtsp://HOST/PATH      a camera of the network, http:// and https:// too; --camera
   camera:0              /dev/video0, live, until Ctrl-C or the end of --frames; --camera
 
 With --camera any folder of PNG or JPEG images in the order of their names (frame2 before frame10),
@@ -70,7 +73,29 @@ struct RunArguments {
   RunRequest request;
   ConfigArguments config;
   bool is_quiet = false;
+  bool is_stream = false;
 };
+
+nlohmann::ordered_json row_of(std::size_t frame, const FrameResult& result, const Rigid3& pose) {
+  const auto numbers = [](const auto& vector) {
+    return std::vector<double>(vector.begin(), vector.end());
+  };
+  const Similarity3& map = result.map_from_world;
+  return {{"frame", frame},
+          {"timestamp_s", result.time_s},
+          {"state", to_string(result.state)},
+          {"is_measured", result.is_measured},
+          {"position", numbers(pose.translation)},
+          {"quaternion_xyzw", numbers(pose.rotation.coeffs())},
+          {"step_variances", numbers(result.motion_covariance.diagonal())},
+          {"scale_state", to_string(result.scale_state)},
+          {"map_id", result.map_id},
+          {"is_scale_new", result.is_scale_new},
+          {"map_from_world",
+           {{"scale", map.scale},
+            {"position", numbers(map.translation)},
+            {"quaternion_xyzw", numbers(map.rotation.coeffs())}}}};
+}
 
 void print_summary(const RunArguments& arguments, const RunSummary& summary) {
   if (arguments.is_quiet) {
@@ -94,8 +119,19 @@ Expected<int> run(RunArguments& arguments) {
   if (!arguments.is_quiet) {
     request.note = print_line;
   }
+  std::atomic<bool> is_read = true;
+  if (arguments.is_stream) {
+    choose_rows();
+    request.on_frame = [&is_read](std::size_t frame, const FrameResult& result,
+                                  const Rigid3& pose) {
+      is_read = is_read && print_row(row_of(frame, result, pose));
+    };
+  }
   Progress progress("frames", arguments.is_quiet);
-  STEMVO_TRY_GET(const RunSummary summary, run_sequence(request, std::ref(progress)));
+  const auto go_on = [&](std::size_t done, std::size_t total) {
+    return progress(done, total) && is_read;
+  };
+  STEMVO_TRY_GET(const RunSummary summary, run_sequence(request, go_on));
   for (const std::string& warning : summary.warnings) {
     print_warning(warning);
   }
@@ -167,6 +203,9 @@ void add_options(CLI::App& command, RunArguments& arguments) {
                    "trajectory_map_*, map.ply and --save-map have it; takes longer than the run");
   command.add_flag("--timing", request.measure_times,
                    "Also where the time went: a table, and the key timing in metrics.json");
+  command.add_flag("--stream", arguments.is_stream,
+                   "A line of JSON per frame on standard output while it runs, all else on "
+                   "standard error");
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");
 }
 

@@ -67,9 +67,11 @@ void warn_of_camera(FrameSource& frames);
 /// Images that were listed; what the request names goes before what lies beside them.
 [[nodiscard]] Expected<FrameSource> open_listing(const Listing& listing,
                                                  const FrameSourceRequest& request);
+/// "rtsp://..", "http://.." and the like.
+[[nodiscard]] bool is_address(const std::filesystem::path& path);
 /// N of "camera:N".
 [[nodiscard]] std::optional<int> camera_number(const std::filesystem::path& path);
-/// A video file, or a live camera.
+/// A video file, an address, or a live camera.
 [[nodiscard]] Expected<FrameSource> open_video(const FrameSourceRequest& request);
 /// The same of a stream that is open.
 [[nodiscard]] Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,

@@ -142,12 +142,19 @@ std::optional<int> dataset::camera_number(const fs::path& path) {
   return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
 }
 
+bool dataset::is_address(const fs::path& path) {
+  constexpr std::string_view kKinds[] = {"rtsp://", "rtsps://", "http://", "https://"};
+  return !is_file(path) && std::ranges::any_of(kKinds, [text = path.string()](auto kind) {
+    return text.starts_with(kind);
+  });
+}
+
 Expected<FrameSource> open_source(const FrameSourceRequest& request) {
   const fs::path& path = request.sequence_dir;
   if (is_file(path) && (is_bag(path) || dataset::is_image_file(path))) {
     return refuse(path);
   }
-  const bool is_stream = dataset::camera_number(path) || is_file(path);
+  const bool is_stream = dataset::camera_number(path) || dataset::is_address(path) || is_file(path);
   const auto listing = is_stream ? std::nullopt : find_listing(request);
   if (!is_stream && !listing && !dataset::is_folder(path)) {
     return refuse(path);

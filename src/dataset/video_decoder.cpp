@@ -47,6 +47,11 @@ Expected<std::unique_ptr<VideoDecoder>> decode_file(const fs::path& file, const 
   return open(file.c_str(), 0, size);
 }
 
+Expected<std::unique_ptr<VideoDecoder>> decode_address(const std::string& address,
+                                                       const cv::Size& size) {
+  return open(address.c_str(), 0, size);
+}
+
 Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {
   return open(nullptr, number, size);
 }

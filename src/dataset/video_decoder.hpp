@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include <opencv2/core.hpp>
@@ -46,13 +47,16 @@ class VideoDecoder {
 /// video. Error: the module is not where it was installed.
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::filesystem::path& file,
                                                                   const cv::Size& size);
+/// The same of an address. Null: nothing there that FFmpeg can decode.
+[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_address(const std::string& address,
+                                                                     const cv::Size& size);
 /// Camera N of the machine (V4L2), asked for images of this size. Null: no such camera. Errors: as
 /// above.
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number,
                                                                     const cv::Size& size);
 
-/// The module's only symbol; the caller owns the decoder. Null: it cannot be opened. Without `file`
-/// camera `number`.
+/// The module's only symbol; the caller owns the decoder. Null: it cannot be opened. `file` is a
+/// whole path, or an address; without it camera `number`.
 extern "C" using OpenDecoder =
     VideoDecoder * (const char* file, int number, int width_px, int height_px);
 inline constexpr const char* kOpenDecoder = "stemvo_open_decoder";

@@ -50,9 +50,10 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   stream->set_default_rate(camera.rate_hz.value_or(30.0));
   FrameSource frames;
   frames.kind = stream->is_live() ? "live camera" : "video";
-  frames.name = stream->is_live() ? fmt::format("camera{}", camera_number(owner).value_or(0))
-                                  : request.sequence_dir.stem().string();
-  if (!stream->is_live()) {
+  const auto number = camera_number(owner);
+  const std::string stem = request.sequence_dir.stem().string();
+  frames.name = number ? fmt::format("camera{}", *number) : stem.empty() ? "stream" : stem;
+  if (!number && !is_address(request.sequence_dir)) {
     frames.files = {request.sequence_dir};
   }
   const std::size_t end = range.end.value_or(std::numeric_limits<std::size_t>::max());
@@ -105,7 +106,9 @@ Expected<FrameSource> open_video(const FrameSourceRequest& request) {
   const auto number = camera_number(request.sequence_dir);
   const cv::Size size(camera.camera.width_px, camera.camera.height_px);
   const auto stream = number ? VideoStream::open_camera(*number, size)
-                             : VideoStream::open_file(request.sequence_dir, size);
+                      : is_address(request.sequence_dir)
+                          ? VideoStream::open_address(request.sequence_dir.string(), size)
+                          : VideoStream::open_file(request.sequence_dir, size);
   return stream.and_then([&](const std::shared_ptr<VideoStream>& opened) {
     return open_stream(opened, camera, request);
   });

@@ -28,6 +28,17 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
   return std::make_shared<VideoStream>(std::move(decoder), file.string(), false);
 }
 
+Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::string& address,
+                                                                 const cv::Size& size) {
+  STEMVO_TRY_GET(auto decoder, decode_address(address, size));
+  if (decoder == nullptr) {
+    return fail(fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none",
+                            address));
+  }
+  const bool is_live = !(decoder->frame_count() > 0.0);
+  return std::make_shared<VideoStream>(std::move(decoder), address, is_live);
+}
+
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {
   STEMVO_TRY_GET(auto decoder, decode_camera(number, size));
   if (decoder == nullptr) {

@@ -24,6 +24,9 @@ class VideoStream {
   /// Decoded by FFmpeg, as decode_file says. Error: no file, or not a video.
   [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_file(
       const std::filesystem::path& file, const cv::Size& size);
+  /// Live, unless what is there says how many frames it has. Error: nothing that can be decoded.
+  [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_address(
+      const std::string& address, const cv::Size& size);
   /// Camera N of the machine (V4L2, /dev/videoN), asked for images of this size. Error: no such
   /// camera.
   [[nodiscard]] static Expected<std::shared_ptr<VideoStream>> open_camera(int number,

@@ -105,6 +105,9 @@ class DriveLoop {
     const std::string row = frames_csv_row(number, time_s, pose, written);
     drive_.csv += row;
     rows_.add(row);
+    if (run_.request.on_frame) {
+      run_.request.on_frame(number, pose, written);
+    }
     kitti_.add(kitti_row(written));
     tum_.add(tum_row(time_s, written));
     if (Clock::now() - last_written_ > std::chrono::seconds(1)) {

@@ -13,6 +13,7 @@
 #include "dataset/frame_source.hpp"
 #include "report/metrics_json.hpp"
 #include "stemvo/error.hpp"
+#include "stemvo/frame_result.hpp"
 
 namespace stemvo {
 
@@ -34,6 +35,9 @@ struct RunRequest : FrameSourceRequest {
   /// Called before work starts, and of a stream's ground truth after it: what the input was taken
   /// for, a line each.
   std::function<void(const std::string&)> note;
+  /// Called after each frame, maybe from another thread: its number in the recording, what came of
+  /// it, and its pose as result files hold it.
+  std::function<void(std::size_t, const FrameResult&, const Rigid3&)> on_frame;
   /// Where `fps` counts from; the program sets the start of the process.
   std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
 };

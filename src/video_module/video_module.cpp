@@ -40,8 +40,11 @@ class OpenCvDecoder final : public VideoDecoder {
 
 cv::VideoCapture open_file(const char* file, const cv::Size& wanted) {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // errors are ours to tell
-  // A playlist may name anything.
-  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
+  // A playlist may name anything: one of this machine no address, one of another no file.
+  ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS",
+           file[0] == '/' ? "protocol_whitelist;file"
+                          : "rtsp_transport;tcp|protocol_whitelist;rtsp,rtp,udp,tcp,tls,http,https",
+           1);
   cv::VideoCapture capture(file, cv::CAP_FFMPEG);
   // As players show it, but where the calibration is of the sensor's rows and columns.
   capture.set(cv::CAP_PROP_ORIENTATION_AUTO, 1);
