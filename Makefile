@@ -22,6 +22,8 @@ setup:
 
 build: setup
 	@echo "==> Building build/release/stemvo"
+	@# A checkout that was moved or copied holds another one's configuration.
+	@cache=build/release/CMakeCache.txt; test ! -e $$cache || test "$$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' $$cache)" -ef . || rm -rf $$cache build/release/CMakeFiles
 	@cmake --preset release --log-level=WARNING >build/setup/configure.log || { cat build/setup/configure.log; exit 1; }
 	@cmake --build --preset release --parallel $(JOBS) --target stemvo_app
 

@@ -34,6 +34,30 @@ class Evaluation(unittest.TestCase):
         self.assertRegex(refused.stderr, "^error: .*LICENSE:1: [^\n]+\n$")
 
 
+class Moved(unittest.TestCase):
+    """`make build` drops the configuration of a checkout that lay elsewhere, and no other."""
+
+    def test_a_moved_checkout_is_configured_anew(self):
+        with tempfile.TemporaryDirectory() as folder:
+            base = pathlib.Path(folder).resolve()
+            there, elsewhere, linked = base / "there", base / "elsewhere", base / "linked"
+            for checkout in (there, elsewhere):
+                (checkout / "build/release/CMakeFiles").mkdir(parents=True)
+            linked.symlink_to(there)
+            (there / "tools").mkdir()
+            shutil.copy(ROOT / "Makefile", there)
+            for script, text in (("tools/setup.sh", "mkdir -p build/setup"), ("cmake", "ls build/release >>seen")):
+                (there / script).write_text(f"#!/bin/sh\n{text}\n")
+                (there / script).chmod(0o755)
+            for home, is_kept in ((there, True), (linked, True), (elsewhere, False), (base / "gone", False)):
+                cache = there / "build/release/CMakeCache.txt"
+                cache.write_text(f"A:STRING=1\nCMAKE_HOME_DIRECTORY:INTERNAL={home}\n")
+                (there / "build/release/CMakeFiles").mkdir(exist_ok=True)
+                subprocess.run(["make", "--silent", "build"], cwd=there, check=True, capture_output=True, env={**os.environ, "PATH": f"{there}:{os.environ['PATH']}"})
+                self.assertEqual(cache.exists(), is_kept, home)
+                self.assertEqual((there / "build/release/CMakeFiles").exists(), is_kept, home)
+
+
 class ContinuousIntegration(unittest.TestCase):
     """The job's steps, in order, as its shell runs them; what builds the program has been done."""
 
