@@ -7,10 +7,11 @@ from typing import Any
 from . import _core
 from ._core import (AdjustedKeyframe, AdjustedMap, Camera, CameraSigma, FrameView, Keyframe, MapChanges, Options, Recording, Result,
                     __version__, align, dense_errors, evaluate, pair_by_time, read_recording, read_trajectory, rescale_steps, segment_errors)
+from .results import Kept, plot, to_dataframe
 
 __all__ = [
-    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "dense_errors", "evaluate",
-    "pair_by_time", "read_recording", "read_trajectory", "rescale_steps", "segment_errors",
+    "AdjustedKeyframe", "AdjustedMap", "Camera", "CameraSigma", "FrameView", "Kept", "Keyframe", "MapChanges", "Odometry", "Options", "Recording", "Result", "__version__", "align", "dense_errors", "evaluate",
+    "pair_by_time", "plot", "read_recording", "read_trajectory", "rescale_steps", "segment_errors", "to_dataframe",
 ]
 
 
