@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
 #include "console.hpp"
+#include "options.hpp"
 #include "report/check.hpp"
 #include "report/metrics_keys.hpp"
+#include "text/text_file.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {
@@ -21,11 +25,12 @@ its bounds:
   ate_rmse_m.sim3: {max: 3}
 
 Exit code 1 when a number is outside its bounds, so that it gates a script:
-  stemvo check result/metrics.json --against thresholds.yaml)";
+  stemvo check result/metrics.json --against thresholds.yaml
+  stemvo check result/metrics.json --baseline before/metrics.json --tolerance 5%)";
 
 struct CheckArguments {
-  std::filesystem::path metrics;
-  std::filesystem::path thresholds;
+  CheckRequest request;
+  std::optional<std::filesystem::path> junit;
 };
 
 nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
@@ -35,25 +40,55 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
                       {"value", result.number},
                       {result.is_max ? "max" : "min", result.limit},
                       {"passed", result.passed}});
+    if (!result.problem.empty()) {
+      bounds.back()["problem"] = result.problem;
+    }
   }
   return {{"passed", all_passed(results)}, {"bounds", bounds}};
 }
 
 Expected<int> check(CheckArguments& arguments) {
-  STEMVO_TRY_GET(const std::vector<ThresholdResult> results,
-                 check_metrics(arguments.metrics, arguments.thresholds));
+  STEMVO_TRY_GET(const std::vector<ThresholdResult> results, check_metrics(arguments.request));
   print(format_check_table(results));
   print_json(document(results));
+  if (arguments.junit) {
+    STEMVO_TRY(write_text_file(*arguments.junit,
+                               format_junit(results, arguments.request.metrics.string())));
+  }
+  for (const ThresholdResult& result : results) {
+    if (!result.problem.empty()) {
+      return fail(result.problem);  // the table has the others
+    }
+  }
   return all_passed(results) ? kExitDone : kExitFailed;
 }
 
 void add_options(CLI::App& command, CheckArguments& arguments) {
-  command.add_option("METRICS.json", arguments.metrics, "metrics.json of a run")
+  CheckRequest& request = arguments.request;
+  command.add_option("METRICS.json", request.metrics, "metrics.json of a run")
       ->required()
       ->type_name("");
-  command.add_option("--against", arguments.thresholds, "Thresholds to hold it against")
-      ->required()
-      ->type_name("THRESHOLDS.yaml");
+  add_file_option(command, "--against", request.thresholds, "Thresholds to hold it against");
+  add_file_option(command, "--baseline", request.baseline,
+                  "metrics.json of an earlier run, none of whose errors may grow");
+  command
+      .add_option_function<std::string>(
+          "--tolerance",
+          [&request](const std::string& share) { request.tolerance = std::stod(share) / 100.0; },
+          "With --baseline: by how much they may; default 5%")
+      ->type_name("P%")
+      ->check([](const std::string& text) {
+        const bool is_share =
+            text.ends_with('%') && parse_numbers(text.substr(0, text.size() - 1), 1);
+        return is_share && text.front() != '-' ? std::string()
+                                               : "expected a share as 5%, found " + text;
+      });
+  add_file_option(command, "--junit", arguments.junit, "Write the bounds as JUnit's XML, too");
+  command.parse_complete_callback([&request] {
+    if (!request.thresholds && !request.baseline) {
+      throw CLI::RequiredError("--against or --baseline");
+    }
+  });
 }
 
 }  // namespace

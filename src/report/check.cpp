@@ -2,6 +2,8 @@
 #include "report/check.hpp"
 
 #include <algorithm>
+#include <array>
+#include <functional>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -18,7 +20,39 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// `{max: 1.0}`, `{min: 0.99}` or both under each metric's name.
+/// The bounds of one key: `{max: 1.0}`, `{min: 0.99}` or both. `where`: file and line.
+std::vector<ThresholdResult> read_bounds(const std::string& key,
+                                         const YAML::Node& node,
+                                         const std::function<std::string(const YAML::Node&)>& where,
+                                         const YAML::Node& name) {
+  ThresholdResult result;
+  result.key = key;
+  if (!name.IsScalar() || !node.IsMap() || node.size() == 0) {
+    result.problem =
+        where(name) +
+        one_line(fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
+                             node.IsScalar() ? node.Scalar() : "no bound"));
+    return {result};
+  }
+  std::vector<ThresholdResult> bounds;
+  for (const auto& bound : node) {
+    const std::string side = bound.first.Scalar();
+    const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
+    result.is_max = side == "max";
+    result.limit = limit ? limit->front() : 0.0;
+    result.problem.clear();
+    if (side != "min" && side != "max") {
+      result.problem = fmt::format("{}: expected min or max, found '{}'", key, side);
+    } else if (!limit) {
+      result.problem = fmt::format("{}.{}: {}", key, side, limit.error().message);
+    }
+    result.problem = result.problem.empty() ? "" : where(bound.first) + one_line(result.problem);
+    result.place = where(name);
+    bounds.push_back(result);
+  }
+  return bounds;
+}
+
 Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::path& file) {
   const Expected<YAML::Node> root =
       read_text_file(file, kMaxSettings_MB).and_then([&](const std::string& text) {
@@ -31,29 +65,14 @@ Expected<std::vector<ThresholdResult>> read_thresholds(const std::filesystem::pa
     return fail(fmt::format("{}: expected lines like 't_rel_percent: {{max: 1.0}}', found none",
                             file.string()));
   }
-  const auto fail_at = [&](const YAML::Node& node, const std::string& problem) {
-    return fail(fmt::format("{}:{}: {}", file.string(), node.Mark().line + 1, one_line(problem)));
+  const auto where = [&](const YAML::Node& node) {
+    return fmt::format("{}:{}: ", file.string(), node.Mark().line + 1);
   };
   std::vector<ThresholdResult> bounds;
   for (const auto& entry : *root) {
-    const std::string key = entry.first.Scalar();
-    if (!entry.first.IsScalar() || !entry.second.IsMap() || entry.second.size() == 0) {
-      return fail_at(entry.first,
-                     fmt::format("{}: expected {{max: NUMBER}} or {{min: NUMBER}}, found '{}'", key,
-                                 entry.second.IsScalar() ? entry.second.Scalar() : "no bound"));
-    }
-    for (const auto& bound : entry.second) {
-      const std::string name = bound.first.Scalar();
-      if (name != "min" && name != "max") {
-        return fail_at(bound.first, fmt::format("{}: expected min or max, found '{}'", key, name));
-      }
-      const Expected<std::vector<double>> limit = parse_numbers(bound.second.Scalar(), 1);
-      if (!limit) {
-        return fail_at(bound.first, fmt::format("{}.{}: {}", key, name, limit.error().message));
-      }
-      bounds.push_back(
-          {key, name == "max", limit->front(), entry.first.Mark().line + 1, std::nullopt, false});
-    }
+    const std::vector<ThresholdResult> some =
+        read_bounds(entry.first.Scalar(), entry.second, where, entry.first);
+    bounds.insert(bounds.end(), some.begin(), some.end());
   }
   return bounds;
 }
@@ -77,6 +96,81 @@ const Json* find_metric(const Json& root, std::string_view key) {
   return node;
 }
 
+/// The bounds that a run's numbers put on a later one's.
+Expected<std::vector<ThresholdResult>> read_baseline(const std::filesystem::path& file,
+                                                     double tolerance,
+                                                     const Json& metrics) {
+  constexpr std::array kErrors = {"t_rel_percent",   "r_rel_deg_per_100m", "average_offset_m",
+                                  "ate_rmse_m.none", "ate_rmse_m.scale",   "ate_rmse_m.se3",
+                                  "ate_rmse_m.sim3", "rpe_translation_m",  "rpe_rotation_deg"};
+  STEMVO_TRY_GET(const Json baseline, read_json_object(file));
+  std::vector<ThresholdResult> bounds;
+  const std::string place = file.string() + ": ";
+  const auto add = [&](const std::string& key, bool is_max) {
+    const Json* number = find_metric(baseline, key);
+    if (number != nullptr && number->is_number()) {
+      const double share = is_max ? 1.0 + tolerance : 1.0 - tolerance;
+      bounds.push_back({key, is_max, share * number->get<double>(), place, {}, false, ""});
+    }
+  };
+  for (const char* group : {"", "map."}) {
+    for (const char* error : kErrors) {
+      add(std::string(group) + error, true);
+    }
+  }
+  add("tracked_fraction", false);
+  if (bounds.empty()) {
+    return fail(place + "expected numbers of a run, as metrics.json has them, found none");
+  }
+  for (const char* same : {"frames", "alignment"}) {  // else the numbers are not comparable
+    if (baseline.contains(same) && metrics.contains(same) && baseline[same] != metrics[same]) {
+      bounds.push_back({same,
+                        true,
+                        0.0,
+                        place,
+                        {},
+                        false,
+                        fmt::format("{}{}: expected {} as in the run, found {}", place, same,
+                                    metrics[same].dump(), baseline[same].dump())});
+    }
+  }
+  return bounds;
+}
+
+/// Holds one bound against its metric.
+void judge(ThresholdResult& result, const Json& metrics, const std::filesystem::path& file) {
+  const Json* metric = find_metric(metrics, result.key);
+  if (!result.problem.empty()) {
+    return;
+  }
+  if (metric == nullptr) {
+    result.problem = fmt::format("{}expected a metric of {}, which lists them, found '{}'",
+                                 result.place, file.string(), result.key);
+  } else if (metric->is_number()) {
+    const double value = result.number.emplace(metric->get<double>());
+    result.passed = result.is_max ? value <= result.limit : value >= result.limit;  // not NaN
+  } else if (!metric->is_null()) {
+    result.problem = fmt::format("{}: {}: expected a number, found {}", file.string(), result.key,
+                                 metric->type_name());
+  }
+}
+
+std::string bound_of(const ThresholdResult& result) {
+  return fmt::format("{} {:.9g}", result.is_max ? "<=" : ">=", result.limit);
+}
+
+/// For an attribute of XML; one line.
+std::string xml(const std::string& text) {
+  std::string escaped;
+  for (const char letter : one_line(text)) {
+    constexpr std::string_view kLetters = "&<>\"";
+    constexpr std::array kNames = {"&amp;", "&lt;", "&gt;", "&quot;"};
+    const std::size_t at = kLetters.find(letter);
+    escaped += at == std::string_view::npos ? std::string(1, letter) : kNames.at(at);
+  }
+  return escaped;
+}
+
 /// Six digits, or all of them where six would show a passed bound as kept.
 std::string shown(const ThresholdResult& result) {
   if (!result.number) {
@@ -89,27 +183,18 @@ std::string shown(const ThresholdResult& result) {
 
 }  // namespace
 
-Expected<std::vector<ThresholdResult>> check_metrics(const std::filesystem::path& metrics_file,
-                                                     const std::filesystem::path& thresholds_file) {
-  auto results = read_thresholds(thresholds_file);
-  if (!results) {
-    return results;
+Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request) {
+  std::vector<ThresholdResult> results;
+  if (request.thresholds) {
+    STEMVO_TRY_GET(results, read_thresholds(*request.thresholds));
   }
-  STEMVO_TRY_GET(const Json metrics, read_json_object(metrics_file));
-  for (ThresholdResult& result : *results) {
-    const Json* metric = find_metric(metrics, result.key);
-    if (metric == nullptr) {
-      return fail(fmt::format("{}:{}: expected a metric of {}, which lists them, found '{}'",
-                              thresholds_file.string(), result.line, metrics_file.string(),
-                              result.key));
-    }
-    if (metric->is_number()) {
-      const double value = result.number.emplace(metric->get<double>());
-      result.passed = result.is_max ? value <= result.limit : value >= result.limit;  // not NaN
-    } else if (!metric->is_null()) {
-      return fail(fmt::format("{}: {}: expected a number, found {}", metrics_file.string(),
-                              result.key, metric->type_name()));
-    }
+  STEMVO_TRY_GET(const Json metrics, read_json_object(request.metrics));
+  if (request.baseline) {
+    STEMVO_TRY_GET(const auto bounds, read_baseline(*request.baseline, request.tolerance, metrics));
+    results.insert(results.end(), bounds.begin(), bounds.end());
+  }
+  for (ThresholdResult& result : results) {
+    judge(result, metrics, request.metrics);
   }
   return results;
 }
@@ -124,8 +209,8 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   table.add({"metric", "value", "bound", "result"});
   table.rule();
   for (const ThresholdResult& result : results) {
-    table.add({result.key, shown(result),
-               fmt::format("{} {}", result.is_max ? "<=" : ">=", result.limit),
+    const bool has_problem = !result.problem.empty();
+    table.add({result.key, has_problem ? "-" : shown(result), has_problem ? "-" : bound_of(result),
                result.passed ? "ok" : "FAILED"});
   }
   const auto failed = std::count_if(results.begin(), results.end(),
@@ -133,7 +218,32 @@ std::string format_check_table(const std::vector<ThresholdResult>& results) {
   const std::string summary =
       failed == 0 ? fmt::format("all {} bounds kept\n", results.size())
                   : fmt::format("{} of {} bounds not kept\n", failed, results.size());
-  return table.str() + summary;
+  std::string problems;
+  for (const ThresholdResult& result : results) {
+    problems += result.problem.empty() ? "" : result.problem + "\n";
+  }
+  return table.str() + summary + problems;
+}
+
+std::string format_junit(const std::vector<ThresholdResult>& results, const std::string& name) {
+  std::string cases;
+  std::size_t errors = 0;
+  std::size_t failures = 0;
+  for (const ThresholdResult& result : results) {
+    const bool has_problem = !result.problem.empty();
+    const std::string bound = has_problem ? "" : " " + bound_of(result);
+    cases +=
+        fmt::format("  <testcase classname=\"{}\" name=\"{}\"", xml(name), xml(result.key + bound));
+    (has_problem ? errors : failures) += result.passed ? 0 : 1;
+    cases += result.passed ? "/>\n"
+                           : fmt::format("><{} message=\"{}\"/></testcase>\n",
+                                         has_problem ? "error" : "failure",
+                                         xml(has_problem ? result.problem : shown(result)));
+  }
+  return fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+      "<testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\">\n{}</testsuite>\n",
+      xml(name), results.size(), failures, errors, cases);
 }
 
 }  // namespace stemvo

@@ -10,28 +10,43 @@
 
 namespace stemvo {
 
-/// One bound of a thresholds file, held against a metrics.json.
+/// What a metrics.json is held against; at least one of the two files.
+struct CheckRequest {
+  std::filesystem::path metrics;
+  std::optional<std::filesystem::path> thresholds;
+  std::optional<std::filesystem::path> baseline;  ///< the metrics.json of an earlier run
+  double tolerance = 0.05;                        ///< share of the baseline's number
+};
+
+/// One bound, held against a metrics.json.
 struct ThresholdResult {
   std::string key;     ///< dotted, e.g. "ate_rmse_m.none"
   bool is_max = true;  ///< whether `limit` is a maximum
   double limit = 0.0;
-  int line = 0;                  ///< in the thresholds file
-  std::optional<double> number;  ///< as found; nullopt: null
+  std::string place;                            ///< the bound's: "FILE:LINE: " or "FILE: "
+  std::optional<double> number = std::nullopt;  ///< as found; nullopt: null
   bool passed = false;
+  std::string problem;  ///< the bound or the metric cannot be read: why; it did not pass
 };
 
 /// Thresholds are YAML: `t_rel_percent: {max: 1.0}`, `tracked_fraction: {min: 0.99}`, nested keys
 /// dotted (`ate_rmse_m.none: {max: 3}`); min and max may stand together and are two results, in the
-/// file's order. A metric that is null fails. Errors (file, and line where there is one): file
-/// missing, not JSON, not YAML, no thresholds, a bound other than min and max, a bound that is not
-/// a finite number, a key the metrics do not have, a metric that is not a number.
-[[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(
-    const std::filesystem::path& metrics_file, const std::filesystem::path& thresholds_file);
+/// file's order. A metric that is null fails. A baseline bounds its own errors (t_rel, r_rel,
+/// offset, ATE, RPE, those of the map) from above and tracked_fraction from below, each by the
+/// tolerance. Problems of one bound (file, and line where there is one): other than min and max,
+/// not a finite number, a key the metrics do not have, a metric that is not a number, a baseline of
+/// other frames or another alignment. Errors: file missing, not JSON, not YAML, no thresholds.
+[[nodiscard]] Expected<std::vector<ThresholdResult>> check_metrics(const CheckRequest& request);
 
-/// False when any bound was passed.
+/// False when any bound was passed or has a problem.
 [[nodiscard]] bool all_passed(const std::vector<ThresholdResult>& results);
 
 /// Aligned table, one line per bound and a summary line; ends with a newline.
 [[nodiscard]] std::string format_check_table(const std::vector<ThresholdResult>& results);
+
+/// JUnit's XML: a test case per bound; `name` is the suite's. A problem is an error, a bound that
+/// was passed a failure.
+[[nodiscard]] std::string format_junit(const std::vector<ThresholdResult>& results,
+                                       const std::string& name);
 
 }  // namespace stemvo

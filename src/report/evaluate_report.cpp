@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "dataset/frame_files.hpp"
 #include "dataset/ground_truth.hpp"
 #include "report/metrics_keys.hpp"
 #include "text/text_table.hpp"
@@ -23,6 +24,18 @@ struct Pairs {
   Trajectory truth;
 };
 
+/// The poses of the range, and their times where they have some.
+void cut(PoseFile& file, const FrameRange& range) {
+  const auto part = [&range](auto& all) {
+    all = {all.begin() + static_cast<std::ptrdiff_t>(range.begin),
+           all.begin() + static_cast<std::ptrdiff_t>(range.end)};
+  };
+  part(file.poses);
+  if (!file.timestamps_s.empty()) {
+    part(file.timestamps_s);
+  }
+}
+
 /// Nullopt: all of both, line by line.
 Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
                                           const PoseFile& truth,
@@ -34,7 +47,8 @@ Expected<std::optional<Pairs>> pair_poses(const PoseFile& estimate,
     }
     return fail(fmt::format(
         "{}: expected {} poses as in {}, found {} (poses are compared line by line "
-        "unless both files have times, as TUM's and EuRoC's)",
+        "unless both files have times, as TUM's and EuRoC's; --frames A:B takes some of the "
+        "ground truth's)",
         file.string(), truth.poses.size(), request.ground_truth.string(), estimate.poses.size()));
   }
   const TimePairs pairs =
@@ -63,13 +77,20 @@ nlohmann::ordered_json row_json(const EvaluationRow& row) {
 }  // namespace
 
 Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request) {
-  STEMVO_TRY_GET(const auto truth, dataset::read_truth(request.ground_truth, request.camera_file));
+  STEMVO_TRY_GET(auto truth, dataset::read_truth(request.ground_truth, request.camera_file));
+  const std::size_t num_lines = truth.poses.size();
+  STEMVO_TRY_GET(const FrameRange range,
+                 dataset::resolve_range(request.frames, num_lines, request.ground_truth.string()));
+  cut(truth, range);
   EvaluationReport report;
   report.ground_truth = request.ground_truth.string();
   report.num_poses = truth.poses.size();
   report.alignment = request.alignment;
   for (const std::filesystem::path& file : request.estimates) {
-    STEMVO_TRY_GET(const auto estimate, dataset::read_truth(file, request.camera_file));
+    STEMVO_TRY_GET(auto estimate, dataset::read_truth(file, request.camera_file));
+    if (estimate.timestamps_s.empty() && estimate.poses.size() == num_lines) {
+      cut(estimate, range);
+    }
     STEMVO_TRY_GET(const auto pairs, pair_poses(estimate, truth, file, request));
     const Trajectory& compared = pairs ? pairs->estimate : estimate.poses;
     const Trajectory& with = pairs ? pairs->truth : truth.poses;

@@ -10,6 +10,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "dataset/frame_source.hpp"
 #include "evaluation/metrics.hpp"
 #include "evaluation/pose_file.hpp"
 #include "stemvo/error.hpp"
@@ -23,7 +24,8 @@ struct EvaluationRequest {
   Alignment alignment = Alignment::kNone;
   double tolerance_s = kTimeTolerance_s;  ///< between a pose and its true one
   std::optional<std::filesystem::path> camera_file =
-      std::nullopt;  ///< with EuRoC's: as read_truth says
+      std::nullopt;                                        ///< with EuRoC's: as read_truth says
+  std::optional<FrameRangeRequest> frames = std::nullopt;  ///< of the ground truth's poses
 };
 
 /// One estimate. t_rel, r_rel and the offset are those after the alignment asked for; `ate_rmse`
@@ -43,7 +45,8 @@ struct EvaluationReport {
   EvaluationRow zero_motion;        ///< the baseline that stays at the origin
 };
 
-/// Poses are matched by time (pair_by_time) where both files have times, else line by line. Both
+/// Poses are matched by time (pair_by_time) where both files have times, else line by line; an
+/// estimate without times has a pose for each line of the ground truth, or of its `frames`. Both
 /// then start at the identity. Errors: those of the readers; without times another number of poses
 /// than the ground truth; with times fewer than two pairs.
 [[nodiscard]] Expected<EvaluationReport> evaluate_files(const EvaluationRequest& request);

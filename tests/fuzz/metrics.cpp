@@ -11,7 +11,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const fuzz::InputFile thresholds(reinterpret_cast<const std::uint8_t*>(kThresholds.data()),
                                    kThresholds.size());
   const fuzz::InputFile metrics(data, size);
-  const auto results = check_metrics(metrics.path(), thresholds.path());
+  const auto results = check_metrics({metrics.path(), thresholds.path(), std::nullopt});
   fuzz::expect_said(results);
   if (results) {
     fuzz::expect(results->size() == 2 && !format_check_table(*results).empty(), "a row per bound");

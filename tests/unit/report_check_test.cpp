@@ -21,8 +21,30 @@ constexpr char kMetrics[] = R"({"t_rel_percent": 0.83, "tracked_fraction": 1.0, 
 Expected<std::vector<ThresholdResult>> check(const std::string& thresholds,
                                              const std::string& metrics = kMetrics) {
   const TempFolder folder;
-  return check_metrics(folder.file("metrics.json", metrics),
-                       folder.file("thresholds.yaml", thresholds));
+  return check_metrics({folder.file("metrics.json", metrics),
+                        folder.file("thresholds.yaml", thresholds), std::nullopt});
+}
+
+/// The error, or the first problem of a bound.
+std::string problem_of(const Expected<std::vector<ThresholdResult>>& results) {
+  if (!results) {
+    return results.error().message;
+  }
+  for (const ThresholdResult& result : *results) {
+    if (!result.problem.empty()) {
+      EXPECT_FALSE(result.passed);
+      return result.problem;
+    }
+  }
+  return "no error";
+}
+
+Expected<std::vector<ThresholdResult>> compare(const std::string& metrics,
+                                               const std::string& baseline,
+                                               double tolerance = 0.05) {
+  const TempFolder folder;
+  return check_metrics({folder.file("metrics.json", metrics), std::nullopt,
+                        folder.file("baseline.json", baseline), tolerance});
 }
 
 TEST(Check, PassesWhatIsWithinItsBounds) {
@@ -86,11 +108,10 @@ class BrokenThresholds : public ::testing::TestWithParam<std::tuple<std::string,
 
 TEST_P(BrokenThresholds, AreNamedWithTheirLine) {
   const auto& [thresholds, complaint] = GetParam();
-  const auto results = check(thresholds);
-  ASSERT_FALSE(results);
-  EXPECT_THAT(results.error().message, HasSubstr("thresholds.yaml:"));
-  EXPECT_THAT(results.error().message, HasSubstr(complaint));
-  EXPECT_EQ(results.error().message.find('\n'), std::string::npos);
+  const std::string problem = problem_of(check(thresholds));
+  EXPECT_THAT(problem, HasSubstr("thresholds.yaml:"));
+  EXPECT_THAT(problem, HasSubstr(complaint));
+  EXPECT_EQ(problem.find('\n'), std::string::npos);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -119,8 +140,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Check, NamesMetricsThatCannotBeRead) {
   const std::string thresholds = "t_rel_percent: {max: 1}\n";
   const auto message = [&](const std::string& metrics) {
-    const auto results = check(thresholds, metrics);
-    return results ? std::string("no error") : results.error().message;
+    return problem_of(check(thresholds, metrics));
   };
   EXPECT_THAT(message("{\"t_rel_percent\": NaN}"),
               HasSubstr("metrics.json: not JSON: parse error at line 1"));
@@ -136,12 +156,74 @@ TEST(Check, NamesMetricsThatCannotBeRead) {
 
   const TempFolder folder;
   const auto file = folder.file("t.yaml", thresholds);
-  const auto no_metrics = check_metrics(folder / "none.json", file);
+  const auto no_metrics = check_metrics({folder / "none.json", file, std::nullopt});
   ASSERT_FALSE(no_metrics);
   EXPECT_THAT(no_metrics.error().message, HasSubstr("none.json: cannot read"));
-  const auto no_thresholds = check_metrics(file, folder / "none.yaml");
+  const auto no_thresholds = check_metrics({file, folder / "none.yaml", std::nullopt});
   ASSERT_FALSE(no_thresholds);
   EXPECT_THAT(no_thresholds.error().message, HasSubstr("none.yaml: cannot read"));
+}
+
+TEST(Check, HoldsEveryBoundBesideOneWithAProblem) {
+  const auto results =
+      check("t_rel: {max: 1}\nframes: {min: 500, most: 3}\nt_rel_percent: {max: 1}\n");
+  ASSERT_TRUE(results) << results.error().message;
+  ASSERT_EQ(results->size(), 4U);
+  EXPECT_THAT((*results)[0].problem, HasSubstr(":1: expected a metric of"));
+  EXPECT_EQ((*results)[1].number, 400.0);
+  EXPECT_FALSE((*results)[1].passed);
+  EXPECT_THAT((*results)[2].problem, HasSubstr(":2: frames: expected min or max, found 'most'"));
+  EXPECT_TRUE((*results)[3].passed);
+  EXPECT_THAT(format_check_table(*results), HasSubstr("3 of 4 bounds not kept\n"));
+  EXPECT_THAT(format_check_table(*results), HasSubstr(":2: frames: expected min or max"));
+}
+
+constexpr char kBaseline[] =
+    R"({"frames": 400, "alignment": "none", "t_rel_percent": 0.8, "fps": 100,
+  "r_rel_deg_per_100m": null, "ate_rmse_m": {"sim3": 1.0}, "tracked_fraction": 1.0, "map": {"t_rel_percent": 0.5}})";
+
+TEST(Check, ABaselineBoundsItsErrorsByTheTolerance) {
+  const std::string run = R"({"frames": 400, "alignment": "none", "t_rel_percent": 0.83, "fps": 1,
+    "ate_rmse_m": {"sim3": 1.06}, "tracked_fraction": 0.96, "map": {"t_rel_percent": null}})";
+  const auto results = compare(run, kBaseline);
+  ASSERT_TRUE(results) << results.error().message;
+  ASSERT_EQ(results->size(), 4U);
+  const auto expect = [&](std::size_t i, const std::string& key, double limit, bool passed) {
+    EXPECT_EQ((*results)[i].key, key);
+    EXPECT_NEAR((*results)[i].limit, limit, 1e-12);
+    EXPECT_EQ((*results)[i].passed, passed) << key;
+  };
+  expect(0, "t_rel_percent", 0.84, true);
+  expect(1, "ate_rmse_m.sim3", 1.05, false);
+  expect(2, "map.t_rel_percent", 0.525, false);  // null
+  expect(3, "tracked_fraction", 0.95, true);
+  EXPECT_TRUE(compare(run, kBaseline, 0.07)->at(1).passed);
+  EXPECT_TRUE(all_passed(*compare(kBaseline, kBaseline, 0.0)));
+}
+
+TEST(Check, ABaselineOfOtherFramesOrAnotherAlignmentIsAProblem) {
+  EXPECT_THAT(problem_of(compare(R"({"frames": 399, "alignment": "none", "t_rel_percent": 0.1,
+      "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
+                                 kBaseline)),
+              HasSubstr("baseline.json: frames: expected 399 as in the run, found 400"));
+  EXPECT_THAT(problem_of(compare(R"({"frames": 400, "alignment": "sim3", "t_rel_percent": 0.1,
+      "ate_rmse_m": {"sim3": 1}, "tracked_fraction": 1, "map": {"t_rel_percent": 0}})",
+                                 kBaseline)),
+              HasSubstr(R"(expected "sim3" as in the run, found "none")"));
+  EXPECT_THAT(problem_of(compare(kBaseline, "{}")), HasSubstr("expected numbers of a run"));
+}
+
+TEST(Check, JunitHasACasePerBound) {
+  const auto results = check("frames: {min: 1}\nt_rel_percent: {max: 0.5}\n\"a<b\": {max: 1}\n");
+  ASSERT_TRUE(results);
+  const std::string xml = format_junit(*results, "a&b");
+  EXPECT_THAT(xml,
+              HasSubstr("<testsuite name=\"a&amp;b\" tests=\"3\" failures=\"1\" errors=\"1\">\n"));
+  EXPECT_THAT(xml, HasSubstr("<testcase classname=\"a&amp;b\" name=\"frames &gt;= 1\"/>\n"));
+  EXPECT_THAT(
+      xml, HasSubstr("name=\"t_rel_percent &lt;= 0.5\"><failure message=\"0.83\"/></testcase>\n"));
+  EXPECT_THAT(xml, HasSubstr("name=\"a&lt;b\"><error message=\""));
+  EXPECT_THAT(xml, HasSubstr("found 'a&lt;b'\"/></testcase>\n</testsuite>\n"));
 }
 
 }  // namespace

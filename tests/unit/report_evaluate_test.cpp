@@ -96,6 +96,27 @@ TEST(EvaluateFiles, NamesTheFileThatDoesNotFit) {
               HasSubstr("eleven.txt:1: expected 12 numbers, found 11"));
 }
 
+TEST(EvaluateFiles, FramesTakePartOfTheGroundTruth) {
+  const Files files;
+  const Trajectory estimate = circle(300, 1.02);
+  const auto part = files.folder / "part.txt";  // what a run of frames 100:250 wrote
+  ASSERT_TRUE(write_kitti_trajectory(part, {estimate.begin() + 100, estimate.begin() + 250}));
+  EvaluationRequest request{files.truth, {files.kitti, part}};
+  request.frames = {100, 250};
+  const auto report = evaluate_files(request);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(report->num_poses, 150U);
+  for (const EvaluationRow& row : report->rows) {
+    EXPECT_EQ(row.num_pairs, 150U);
+    EXPECT_NEAR(row.metrics.path_length_m, 149.0, 1e-3);
+    EXPECT_NEAR(row.metrics.average_offset_m, report->rows[0].metrics.average_offset_m, 1e-6);
+  }
+  request.frames = {100, 240};
+  EXPECT_THAT(evaluate_files(request).error().message, HasSubstr("part.txt: expected 140 poses"));
+  request.frames = {100, 301};
+  EXPECT_THAT(evaluate_files(request).error().message, HasSubstr("expected frames inside 0:300"));
+}
+
 TEST(EvaluateFiles, FilesWithTimesAreMatchedByTime) {
   const Files files;
   const Trajectory truth = circle(300, 1.0);
