@@ -198,9 +198,10 @@ void add_options(CLI::App& command, RunArguments& arguments) {
       "A map that --save-map wrote: the camera finds itself in it (map_* in frames.csv)");
   add_file_option(command, "--save-map", request.saved_map,
                   "Write what was remembered, with the places of --map");
-  command.add_flag("--adjust", request.adjust_map,
-                   "In the end adjust all keyframes, landmarks and the camera together: "
-                   "trajectory_map_*, map.ply and --save-map have it; takes longer than the run");
+  command.add_flag(
+      "--adjust", request.adjust_map,
+      "In the end adjust all keyframes, landmarks and the camera together, as is done "
+      "where places were seen again: trajectory_map_*, map.ply and --save-map have it");
   command.add_flag("--timing", request.measure_times,
                    "Also where the time went: a table, and the key timing in metrics.json");
   command.add_flag("--stream", arguments.is_stream,

@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kEdgesPerKeyframe = 128;
 /// For so many times that time the next one waits: a room brings new loops with every keyframe.
 constexpr int kPause = 8;
+constexpr int kKeyframesPerMerge = 16;
 /// Standard deviations of where a lost frame was found, one place alone: rotation, share of the
 /// depth, scale.
 constexpr double kSigmaFound_rad = 0.005;
@@ -167,7 +168,9 @@ void Mapper::add_place(int node, std::vector<Descriptor> descriptors) {
 Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
   Recognition recognition;
   const Loop& loop = *found.loop;
-  if (!is_within_drift(keeper_.graph(view), loop)) {
+  // A graph that says the same already needs no solving, and no drift explains it.
+  const bool is_known = sigmas_off(keeper_.map(), loop) <= kMaxAgreeingSigmas;
+  if (!is_known && !is_within_drift(keeper_.graph(view), loop)) {
     if (!found.is_place) {  // nor does it show that one
       add_place(found.node, found.keyframe.descriptors);
     }
@@ -175,9 +178,7 @@ Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
   }
   recognition.frame = keeper_.keyframe(loop.from).frame;
   recognition.moved = keeper_.add_loop(loop);
-  // A graph that says the same already needs no solving.
-  has_new_loops_ = has_new_loops_ || recognition.moved.has_value() ||
-                   sigmas_off(keeper_.map(), loop) > kMaxAgreeingSigmas;
+  has_new_loops_ = has_new_loops_ || !is_known;
   if (recognition.moved.has_value()) {
     solved_ = {};  // of the graph before
     keyframes_until_next_ = 0;
@@ -217,11 +218,12 @@ void Mapper::solve_graph(const WindowView& view) {
   }
 }
 
-/// While nobody reads the graph.
+/// While nobody reads the graph; now and then: all loops are looked through.
 void Mapper::merge() {
-  if (solved_.valid() || looked_up_.valid()) {
+  if (++keyframes_since_merge_ < kKeyframesPerMerge || solved_.valid() || looked_up_.valid()) {
     return;
   }
+  keyframes_since_merge_ = 0;
   const std::vector<int> numbers = keeper_.merge();
   if (!numbers.empty()) {
     recognizer_.renumber(numbers);

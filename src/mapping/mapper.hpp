@@ -106,6 +106,7 @@ class Mapper {
   bool has_new_loops_ = false;
   int keyframes_until_solved_ = 0;
   int keyframes_until_next_ = 0;  ///< once there are new loops
+  int keyframes_since_merge_ = 0;
   std::shared_future<std::optional<std::vector<Similarity3>>> solved_;
   std::shared_future<LookedUp> looked_up_;  ///< last: it ends before what it works on
 };

@@ -18,6 +18,11 @@ std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 Rigid3 pose_of(const Similarity3& placed) { return {placed.rotation, placed.translation}; }
 
+/// Places that are seen again, from elsewhere, tell a camera that nobody knows: focal length
+/// (share), k1, k2.
+constexpr double kFreeFocal = 0.1;
+constexpr double kFreeDistortion = 0.05;
+
 /// No keyframe was turned against what was measured between it and the next one.
 bool agrees_with_motions(const KeptMap& kept, const std::vector<Similarity3>& map_from_keyframe) {
   constexpr double kMaxTurn_rad = 0.035;
@@ -41,7 +46,11 @@ WholeMap::WholeMap(const PhasedOdometry& odometry)
       camera(kept.keyframes.empty() ? odometry.view().camera() : kept.keyframes.back().camera),
       camera_sigma(prior_sigma(odometry.options().camera.refine)) {
   if (const auto learnt = odometry.frames().estimator().camera_estimate(); learnt && camera_sigma) {
-    camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
+    if (kept.loops.empty()) {
+      camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
+    } else {
+      camera_sigma->tail<3>() << kFreeFocal, kFreeDistortion, kFreeDistortion;
+    }
   }
 }
 

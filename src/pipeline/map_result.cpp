@@ -35,7 +35,7 @@ double stretch_at(std::span<const Similarity3> estimated,
 
 MapResult finish_map(const Run& run) {
   MapResult map{WholeMap(run.odometry), {}};
-  if (run.request.adjust_map) {
+  if (run.request.adjust_map || !map.whole.kept.loops.empty()) {
     const auto start = std::chrono::steady_clock::now();
     (void)map.whole.adjust();  // no covariances: no error
     map.adjustment_s =

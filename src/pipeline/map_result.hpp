@@ -20,8 +20,8 @@ struct MapResult {
   std::optional<double> adjustment_s = std::nullopt;  ///< it took
 };
 
-/// Takes in what the run remembers, adjusted where that is asked for; with
-/// scale.source=ground_truth steps get their true length.
+/// Takes in what the run remembers, adjusted where places were seen again, or where that is asked
+/// for; with scale.source=ground_truth steps get their true length.
 [[nodiscard]] MapResult finish_map(const Run& run);
 
 /// Pairs of frames of this run that show one place.
