@@ -22,6 +22,9 @@ constexpr double kMaxRoads = 4.0;
 constexpr double kRounding_s = 1e-6;  ///< of sums
 /// A first measurement may be the wrong peak of a search over scales: others must confirm it.
 constexpr double kFirstSigma = 0.1;
+/// Drift in a second between ways without a road: the path adds up ways, whose errors average out
+/// where it follows them; what is smoothed into neighbours lasts, an error at the start above all.
+constexpr double kWayDrift = 0.035;
 constexpr double kTrend_s = 10.0;  ///< a trend that nothing confirms is forgotten by 1 / e
 
 }  // namespace
@@ -49,6 +52,11 @@ bool ScaleFilter::update(double log_scale, double sigma, ScaleWitness witness) {
     return true;
   }
   const bool is_road = witness == ScaleWitness::kRoad;
+  const double way_s = record(ScaleWitness::kWay).since_s;
+  if (!is_road && record(ScaleWitness::kRoad).since_s > way_s) {
+    const double drift = std::sqrt(std::min(way_s, kMaxShare_s)) * kWayDrift;
+    sigma_ = std::min(std::hypot(sigma_, drift), kUnknownSigma);
+  }
   const double innovation = log_scale - log_scale_;
   const double distance = judge(innovation, sigma, witness);
   // Huber's weight of a residual d is kHuber / d, so the variance grows by d / kHuber; beyond
