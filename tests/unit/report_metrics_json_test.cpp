@@ -58,39 +58,22 @@ nlohmann::json written(const MetricsReport& report) {
 }
 
 TEST(MetricsJson, HoldsEveryKeyAndTheExactNumbers) {
-  const nlohmann::json json = written(example());
-  EXPECT_EQ(json["stemvo_version"], "0.1.0");
-  EXPECT_EQ(json["sequence"], "00");
-  EXPECT_EQ(json["first_frame"], 20);
-  EXPECT_EQ(json["frames"], 200);
-  EXPECT_EQ(json["model"], "default");
-  EXPECT_EQ(json["filter"], 7);
-  EXPECT_EQ(json["fps"], 31.5);
-  EXPECT_EQ(json["scale_source"], "ground_truth");
-  EXPECT_EQ(json["tracked_fraction"], 0.995);
-  EXPECT_EQ(json["path_length_m"], 145.25);
+  nlohmann::json json = written(example());
   EXPECT_EQ(json["average_offset_m"].get<double>(), 1.0 / 3.0);
-  EXPECT_EQ(json["null_offset_m"], 79.25);
-  EXPECT_EQ(json["t_rel_percent"], 0.97);
-  EXPECT_EQ(json["r_rel_deg_per_100m"], 1.72);
-  EXPECT_EQ(json["segment_lengths_m"], nlohmann::json({100.0, 200.0}));
-  EXPECT_EQ(json["segments"], 5);
-  EXPECT_EQ(json["ate_rmse_m"]["none"], 4.0);
-  EXPECT_EQ(json["ate_rmse_m"]["scale"], 3.0);
-  EXPECT_EQ(json["ate_rmse_m"]["se3"], 2.0);
-  EXPECT_EQ(json["ate_rmse_m"]["sim3"], 1.0);
-  EXPECT_EQ(json["rpe_translation_m"], 0.0123);
-  EXPECT_EQ(json["rpe_rotation_deg"], 0.0456);
-  EXPECT_EQ(json["alignment"], "none");
-  EXPECT_EQ(json["road_measured_fraction"], 0.75);
-  EXPECT_EQ(json["road_believed_fraction"], 0.875);
-  EXPECT_EQ(json["camera"], nlohmann::json::parse(R"({"fx_px": 700.0, "fy_px": 710.0,
-      "cx_px": 600.5, "cy_px": 180.25,
-      "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75})"));
-  EXPECT_TRUE(json["map"].is_null());
-  EXPECT_EQ(json["maps"], 2);
-  EXPECT_EQ(json["scale_new_frames"], nlohmann::json({1, 120}));
-  EXPECT_EQ(json.size(), 27U);
+  json.erase("average_offset_m");
+  EXPECT_EQ(json, nlohmann::json::parse(R"({
+      "stemvo_version": "0.1.0", "sequence": "00", "first_frame": 20, "frames": 200,
+      "model": "default", "filter": 7, "fps": 31.5, "tracked_fraction": 0.995,
+      "scale_source": "ground_truth", "in_place_fraction": 0.0,
+      "road_measured_fraction": 0.75, "road_believed_fraction": 0.875,
+      "maps": 2, "scale_new_frames": [1, 120], "map": null,
+      "camera": {"fx_px": 700.0, "fy_px": 710.0, "cx_px": 600.5, "cy_px": 180.25,
+                 "fx_sigma_px": 3.5, "cx_sigma_px": 0.5, "cy_sigma_px": 0.75},
+      "alignment": "none", "path_length_m": 145.25, "null_offset_m": 79.25,
+      "t_rel_percent": 0.97, "r_rel_deg_per_100m": 1.72,
+      "segments": 5, "segment_lengths_m": [100.0, 200.0],
+      "ate_rmse_m": {"none": 4.0, "scale": 3.0, "se3": 2.0, "sim3": 1.0},
+      "rpe_translation_m": 0.0123, "rpe_rotation_deg": 0.0456})"));
 }
 
 TEST(MetricsJson, HoldsWhatTheMapMadeOfIt) {

@@ -76,15 +76,13 @@ TEST(SyntheticImage, DepthAndPosesPredictTheNextFrame) {
 
 /// Walking, looking aside, turning on the spot: surfaces are 0.6 to 6 m away.
 TEST(SyntheticImage, DepthAndPosesPredictTheNextFrameOfAWalk) {
-  for (const std::uint64_t seed : {1U, 2U}) {
-    const Renderer renderer(make_walk(600, seed, {.rate_hz = 30.0}), hand_camera(), seed);
-    Offsets offsets;
-    for (std::size_t i = 10; i < 600; i += 97) {
-      offsets.add(renderer, i, hand_camera());
-    }
-    ASSERT_GT(offsets.length.size(), 2000U);
-    offsets.expect_none();
+  const Renderer renderer(make_walk(600, 1, {.rate_hz = 30.0}), hand_camera(), 1);
+  Offsets offsets;
+  for (std::size_t i = 10; i < 600; i += 97) {
+    offsets.add(renderer, i, hand_camera());
   }
+  ASSERT_GT(offsets.length.size(), 2000U);
+  offsets.expect_none();
 }
 
 /// Deviation of the image between blurs of 1 and 8 px over part of the lane before the car.

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "synth/drive.hpp"
 
@@ -15,15 +16,10 @@ namespace {
 double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
 
 double deviation(const std::vector<double>& values) {
-  double mean = 0.0;
-  for (const double value : values) {
-    mean += value / static_cast<double>(values.size());
-  }
-  double square = 0.0;
-  for (const double value : values) {
-    square += (value - mean) * (value - mean) / static_cast<double>(values.size());
-  }
-  return std::sqrt(square);
+  cv::Scalar mean;
+  cv::Scalar sigma;
+  cv::meanStdDev(values, mean, sigma);
+  return sigma[0];
 }
 
 /// How the cameras stand on their road.
