@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "config/config.hpp"
@@ -16,17 +18,24 @@ namespace stemvo::testing {
 struct RoadDrive {
   static constexpr double kStep_m = 0.8;
 
-  RoadScene scene;
+  const RoadScene scene{};
   DriveTracks tracks;
 
-  explicit RoadDrive(int num_frames) : tracks(make_tracks(num_frames)) { scene.noise_gray = 1.0; }
+  explicit RoadDrive(int num_frames) : tracks(make_tracks(num_frames)) {}
 
+  /// Rendered once for all drives: they differ in their length alone.
   [[nodiscard]] std::shared_ptr<const RoadImage> road_image(int frame, bool has_road) const {
-    RoadScene shown = scene;
-    shown.has_road = has_road;
-    const cv::Mat pixels =
-        render_road(shown, tracks.pose(frame).inverse(), static_cast<std::uint64_t>(frame));
-    return std::make_shared<RoadImage>(make_road_image({pixels, {}}, scene.camera));
+    static std::map<std::pair<int, bool>, std::shared_ptr<const RoadImage>> rendered;
+    std::shared_ptr<const RoadImage>& image = rendered[{frame, has_road}];
+    if (image == nullptr) {
+      RoadScene shown = scene;
+      shown.noise_gray = 1.0;
+      shown.has_road = has_road;
+      const cv::Mat pixels =
+          render_road(shown, tracks.pose(frame).inverse(), static_cast<std::uint64_t>(frame));
+      image = std::make_shared<RoadImage>(make_road_image({pixels, {}}, scene.camera));
+    }
+    return image;
   }
 
  private:
