@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "report/frame_image.hpp"
 #include "support/temp_folder.hpp"
@@ -34,19 +35,9 @@ bool is_red(const cv::Vec3b& rgb) { return rgb[0] > 150 && rgb[1] < 80 && rgb[2]
 
 /// Smallest box around the pixels that are not gray.
 cv::Rect colored_box(const cv::Mat& rgb) {
-  std::vector<cv::Point> points;
-  for (int y = 0; y < rgb.rows; ++y) {
-    for (int x = 0; x < rgb.cols; ++x) {
-      if (!is_gray(rgb.at<cv::Vec3b>(y, x))) {
-        points.emplace_back(x, y);
-      }
-    }
-  }
-  cv::Rect box;
-  for (const cv::Point& point : points) {
-    box = box.empty() ? cv::Rect(point, cv::Size(1, 1)) : box | cv::Rect(point, cv::Size(1, 1));
-  }
-  return box;
+  std::vector<cv::Mat> channels;
+  cv::split(rgb, channels);
+  return cv::boundingRect((channels[0] != channels[1]) | (channels[1] != channels[2]));
 }
 
 TEST(FrameImage, WritingLeavesTheImageAloneAndKeepsItsColours) {

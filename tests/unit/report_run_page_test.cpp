@@ -108,30 +108,28 @@ TEST_F(RunPageTest, WithoutGroundTruthThereIsNone) {
   EXPECT_TRUE(page["metrics"]["segments"].is_null());
 }
 
+std::vector<std::size_t> rows_of(const SmallFrames& frames) {
+  std::vector<std::size_t> rows;
+  for (const html::CaptionedImage& kept : frames.images()) {
+    rows.push_back(kept.row);
+  }
+  return rows;
+}
+
 TEST(SmallFrames, EveryTenthIsKeptAndFewerWhereTheyWouldTakeTooMuch) {
   const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(30, 60, 90));
   SmallFrames all;
   for (std::size_t row = 0; row < 100; ++row) {
     all.add(row, 1000 + row, row == 50 ? cv::Mat() : image);
   }
-  std::vector<std::size_t> rows;
-  std::size_t bytes = 0;
-  for (const html::CaptionedImage& kept : all.images()) {
-    rows.push_back(kept.row);
-    bytes = kept.jpeg.size();
-  }
-  EXPECT_THAT(rows, ElementsAre(0, 10, 20, 30, 40, 60, 70, 80, 90));
+  EXPECT_THAT(rows_of(all), ElementsAre(0, 10, 20, 30, 40, 60, 70, 80, 90));
   EXPECT_EQ(all.images().back().caption, "frame 1090");
 
-  SmallFrames few(3 * bytes);
+  SmallFrames few(3 * all.images().back().jpeg.size());
   for (std::size_t row = 0; row < 100; ++row) {
     few.add(row, row, image);
   }
-  rows.clear();
-  for (const html::CaptionedImage& kept : few.images()) {
-    rows.push_back(kept.row);
-  }
-  EXPECT_THAT(rows, ElementsAre(0, 40, 80));
+  EXPECT_THAT(rows_of(few), ElementsAre(0, 40, 80));
 }
 
 }  // namespace

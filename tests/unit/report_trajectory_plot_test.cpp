@@ -23,15 +23,19 @@ TrajectoryPlot corner() {
   return plot;
 }
 
-/// The box around the pixels of an RGB colour within the axes.
-cv::Rect box_of(const cv::Mat& image, const cv::Vec3b& rgb) {
+/// The pixels within so many levels of an RGB colour.
+cv::Mat mask_of(const cv::Mat& image, const cv::Scalar& rgb, double levels) {
   cv::Mat mask;
-  const cv::Scalar color(rgb[0], rgb[1], rgb[2]);
+  cv::inRange(image, rgb - cv::Scalar::all(levels), rgb + cv::Scalar::all(levels), mask);
+  return mask;
+}
+
+/// The box around the pixels of an RGB colour within the axes.
+cv::Rect box_of(const cv::Mat& image, const cv::Scalar& rgb) {
   const cv::Point corner(155, 185);
   constexpr int kLabels_px = 120;  // below the axes
-  cv::inRange(image(cv::Rect(corner, cv::Point(image.cols, image.rows - kLabels_px))), color, color,
-              mask);
-  return cv::boundingRect(mask);
+  const cv::Rect axes(corner, cv::Point(image.cols, image.rows - kLabels_px));
+  return cv::boundingRect(mask_of(image(axes), rgb, 0.0));
 }
 
 TEST(TrajectoryImage, HasBothPathsWithEqualAxes) {
@@ -44,15 +48,8 @@ TEST(TrajectoryImage, HasBothPathsWithEqualAxes) {
   EXPECT_LT(std::abs(truth.x - estimate.x), 0.1 * estimate.width) << "both go to the right";
 }
 
-/// Pixels within a few levels of an RGB colour.
-int count_color(const cv::Mat& image, const cv::Vec3b& rgb) {
-  int count = 0;
-  for (auto it = image.begin<cv::Vec3b>(); it != image.end<cv::Vec3b>(); ++it) {
-    const bool is_near = std::abs((*it)[0] - rgb[0]) < 4 && std::abs((*it)[1] - rgb[1]) < 4 &&
-                         std::abs((*it)[2] - rgb[2]) < 4;
-    count += is_near ? 1 : 0;
-  }
-  return count;
+int count_color(const cv::Mat& image, const cv::Scalar& rgb) {
+  return cv::countNonZero(mask_of(image, rgb, 3.0));
 }
 
 TEST(TrajectoryImage, ShowsBothPathsAndTheMarkers) {
