@@ -23,7 +23,7 @@ struct Driven {
   }
 };
 
-TEST(PairEstimator, EveryMeasuredStepIsOneUnit) {
+TEST(PairEstimator, EveryMeasuredStepIsOneUnitAndPosesStayAsTheyCame) {
   Driven d;
   d.run.add_all();
   EXPECT_EQ(d.run.state(0), FrameState::kFirst);
@@ -32,13 +32,8 @@ TEST(PairEstimator, EveryMeasuredStepIsOneUnit) {
   EXPECT_LT(testing::fitted_error_share(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
   EXPECT_LT(testing::rotation_error_rad(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
   EXPECT_NEAR(d.last_motion().translation.norm(), 1.0, 1e-9);
-}
-
-TEST(PairEstimator, PosesStayAsTheyCameAndThereAreNoLandmarks) {
-  Driven d;
-  d.run.add_range(0, 10);
   const std::vector<Rigid3>& poses = d.estimator.trajectory();
-  ASSERT_EQ(poses.size(), 10U);
+  ASSERT_EQ(poses.size(), d.drive.world_from_camera.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     EXPECT_EQ(poses[i].translation, d.run.results[i].world_from_camera.translation);
   }
