@@ -2,12 +2,13 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build lab demo test test-all test-long bench format check-format lint docs clean
+.PHONY: help setup build arm64 lab demo test test-all test-long bench format check-format lint docs clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
 	@echo "make lab           install what is missing, build the studies' program build/lab/bin/stemvo-lab (docs/search.md, robustness.md, benchmark.md)"
+	@echo "make arm64         cross-compile for 64-bit ARM: build/arm64/stemvo and its Debian package"
 	@echo "make test          install what is missing, build, run the tests"
 	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
@@ -27,6 +28,9 @@ build: setup
 	@cmake --preset release --log-level=WARNING >build/setup/configure.log || { cat build/setup/configure.log; exit 1; }
 	@cmake --build --preset release --parallel $(JOBS) --target stemvo_app
 
+arm64: build
+	@tools/arm64.sh
+
 lab: setup
 	@tools/setup.sh lab
 
@@ -44,7 +48,7 @@ test-all: test test-long
 
 # Without one of these groups the tests that need it are skipped.
 test-long:
-	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
+	@for group in arm64 peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
 	@tools/setup.sh tools docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed

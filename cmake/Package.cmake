@@ -3,6 +3,7 @@
 if(TARGET stemvo_app)
   set(man_page ${PROJECT_BINARY_DIR}/install/stemvo.1)
   install(CODE "execute_process(COMMAND ${CMAKE_COMMAND} -D PROGRAM=$<TARGET_FILE:stemvo_app> -D OUT=${man_page}
+                                        -D \"EMULATOR=${CMAKE_CROSSCOMPILING_EMULATOR}\"
                                         -P ${PROJECT_SOURCE_DIR}/cmake/package/man_page.cmake
                                 COMMAND_ERROR_IS_FATAL ANY)")
   install(FILES ${man_page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)

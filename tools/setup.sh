@@ -21,6 +21,7 @@ PACKAGES=(
 
 # Group, its environment, apt packages.
 readonly TABLE="\
+arm64     -                    g++-aarch64-linux-gnu mmdebstrap qemu-user
 browser   build/venv-browser   chromium
 coverage  build/venv-coverage
 docs      build/venv-docs      doxygen

@@ -1,16 +1,16 @@
 # The help of the program and of its commands, as a man page.
-# cmake -D PROGRAM=... -D OUT=... -P man_page.cmake
+# cmake -D PROGRAM=... -D OUT=... [-D EMULATOR=..] -P man_page.cmake; a program for another processor runs in the emulator.
 function(help result)
-  execute_process(COMMAND "${PROGRAM}" ${ARGN} --help OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND ${EMULATOR} "${PROGRAM}" ${ARGN} --help OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)
   string(REPLACE "\\" "\\e" text "${text}")
   string(REPLACE "-" "\\-" text "${text}")
   string(REGEX REPLACE "(^|\n)([.'])" "\\1\\\\&\\2" text "${text}")
   set(${result} "${text}" PARENT_SCOPE)
 endfunction()
 
-execute_process(COMMAND "${PROGRAM}" --version OUTPUT_VARIABLE version OUTPUT_STRIP_TRAILING_WHITESPACE
+execute_process(COMMAND ${EMULATOR} "${PROGRAM}" --version OUTPUT_VARIABLE version OUTPUT_STRIP_TRAILING_WHITESPACE
                 COMMAND_ERROR_IS_FATAL ANY)
-execute_process(COMMAND "${PROGRAM}" --help OUTPUT_VARIABLE plain COMMAND_ERROR_IS_FATAL ANY)
+execute_process(COMMAND ${EMULATOR} "${PROGRAM}" --help OUTPUT_VARIABLE plain COMMAND_ERROR_IS_FATAL ANY)
 help(text)
 set(page ".TH STEMVO 1 \"\" \"${version}\"\n.SH NAME\nstemvo \\- monocular visual odometry on one learned filter\n")
 string(APPEND page ".SH DESCRIPTION\n.nf\n${text}.fi\n")
