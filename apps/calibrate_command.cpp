@@ -154,10 +154,11 @@ void add_options(CLI::App& command, CalibrateArguments& arguments) {
           ->type_name("BOARD");
   board->excludes(
       add_file_option(command, "--camera", request.camera_file, "Camera file to start from"));
-  add_file_option(command, "--times", request.times, "Of images: a time in seconds per image");
-  add_rate_option(command, request.rate_hz);
-  add_file_option(command, "--calib", request.calibration,
-                  "Calibration to start from; default: the folder's calib.txt");
+  board->excludes(
+      add_file_option(command, "--times", request.times, "Of images: a time in seconds per image"));
+  board->excludes(add_rate_option(command, request.rate_hz));
+  board->excludes(add_file_option(command, "--calib", request.calibration,
+                                  "Calibration to start from; default: the folder's calib.txt"));
   board->excludes(add_range_option(command, "--frames", request.frames, "Frames A to B-1 only"));
   add_config_options(command, arguments.config);
   command.add_flag("--quiet", arguments.is_quiet, "Only errors and warnings");

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -49,6 +50,12 @@ nlohmann::ordered_json document(const std::vector<ThresholdResult>& results) {
 
 Expected<int> check(CheckArguments& arguments) {
   STEMVO_TRY_GET(const std::vector<ThresholdResult> results, check_metrics(arguments.request));
+  std::error_code code;
+  if (arguments.junit &&
+      std::filesystem::equivalent(*arguments.junit, arguments.request.metrics, code)) {
+    return fail(fmt::format("--junit {}: expected a file of its own, found the metrics",
+                            arguments.junit->string()));
+  }
   print(format_check_table(results));
   print_json(document(results));
   if (arguments.junit) {
@@ -78,11 +85,12 @@ void add_options(CLI::App& command, CheckArguments& arguments) {
           "With --baseline: by how much they may; default 5%")
       ->type_name("P%")
       ->check([](const std::string& text) {
-        const bool is_share =
-            text.ends_with('%') && parse_numbers(text.substr(0, text.size() - 1), 1);
-        return is_share && text.front() != '-' ? std::string()
-                                               : "expected a share as 5%, found " + text;
-      });
+        const auto share = parse_numbers(text.substr(0, text.find('%')), 1);
+        return text.ends_with('%') && share && share->front() >= 0.0
+                   ? std::string()
+                   : "expected a share as 5%, found " + text;
+      })
+      ->needs("--baseline");
   add_file_option(command, "--junit", arguments.junit, "Write the bounds as JUnit's XML, too");
   command.parse_complete_callback([&request] {
     if (!request.thresholds && !request.baseline) {

@@ -5,11 +5,11 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
-#include <regex>
 
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
+#include "dataset/frame_files.hpp"
 #include "report/metrics_keys.hpp"
 
 namespace stemvo::apps {
@@ -84,8 +84,7 @@ std::string command_line() {
     }
     command += is_plain ? " " + word : " '" + word + "'";
   }
-  static const std::regex kSecret("://[^/@ ]*@");  // of a camera's address
-  return std::regex_replace(command, kSecret, "://***@");
+  return dataset::without_secrets(command);
 }
 
 std::chrono::steady_clock::time_point process_start() {

@@ -17,8 +17,9 @@ constexpr const char* kEvaluateFooter =
 (state_groundtruth_estimate0/data.csv, the body's pose, which T_BS of
 ../cam0/sensor.yaml, or of --camera, makes the camera's). Where both files have
 times, each pose is compared with the true one nearest in time; else line by
-line, the estimate's with all of the ground truth's or with those of --frames. Both trajectories are moved to start at the identity; nothing else is
-fitted unless --align says so.
+line, the estimate's with all of the ground truth's or with those of --frames.
+Both trajectories are moved to start at the identity; nothing else is fitted
+unless --align says so.
 
 Examples:
   stemvo evaluate --gt kitti/poses/03.txt result/trajectory_kitti.txt

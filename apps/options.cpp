@@ -127,8 +127,8 @@ void add_threads_option(CLI::App& command, int& num_threads) {
       ->check(in_range(0, 1024));
 }
 
-void add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {
-  command
+CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {
+  return command
       .add_option("--rate", rate_hz,
                   "Of images without times: frames per second, where the camera file has no "
                   "rate_hz; default 30")

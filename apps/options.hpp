@@ -50,7 +50,7 @@ CLI::Option* add_out_folder(CLI::App& command,
 void add_threads_option(CLI::App& command, int& num_threads);
 
 /// --rate HZ.
-void add_rate_option(CLI::App& command, std::optional<double>& rate_hz);
+CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz);
 
 /// --gt-tolerance S.
 void add_tolerance_option(CLI::App& command, double& tolerance_s);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes a run's result as an MCAP file of ROS 2 (docs/recordings.md says which topics); needs no ROS."""
+"""Writes a run's result as an MCAP file of ROS 2 (docs/results.md says which topics); needs no ROS."""
 
 import csv
 import dataclasses
@@ -20,7 +20,7 @@ LATCHED = (Qos(QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.T
 
 
 class ResultError(Exception):
-    """What is wrong with the result, in one line."""
+    """The result has a fault, which one line names."""
 
 
 @dataclasses.dataclass

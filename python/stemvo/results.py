@@ -12,7 +12,7 @@ NUMBERS = ("timestamp", "state", "is_measured", "num_matches", "num_inliers", "s
 
 
 class Kept(types.SimpleNamespace):
-    """What was pickled: the same attributes and repr, without the library."""
+    """An object that was pickled: the same attributes and repr, without the library."""
 
     def __repr__(self) -> str:
         return self._repr

@@ -182,12 +182,25 @@ BoardPoints find_charuco(const Board& board, const std::vector<Marker>& markers)
   return points;
 }
 
+/// Corners on the image. Others are of markers that are none, and newer OpenCV throws at them.
+BoardPoints on_image(const BoardPoints& points, const cv::Size& size) {
+  const cv::Rect2f image({}, cv::Size2f(size - cv::Size(1, 1)));
+  BoardPoints kept;
+  for (std::size_t i = 0; i < points.in_image.size(); ++i) {
+    if (image.contains(points.in_image[i])) {
+      kept.on_board.push_back(points.on_board[i]);
+      kept.in_image.push_back(points.in_image[i]);
+    }
+  }
+  return kept;
+}
+
 }  // namespace
 
 Expected<Board> parse_board(const std::string& text) {
   std::vector<std::string> parts = split(text, ':');
   Board board;
-  if (parts.front() == "charuco" || parts.front() == "aprilgrid") {
+  if (parts.size() > 1 && (parts.front() == "charuco" || parts.front() == "aprilgrid")) {
     board.kind = parts.front() == "charuco" ? Board::Kind::kCharuco : Board::Kind::kAprilGrid;
     board.dictionary = board.kind == Board::Kind::kAprilGrid ? "DICT_APRILTAG_36h11" : "";
     parts.erase(parts.begin());
@@ -235,7 +248,8 @@ Expected<BoardPoints> find_board(const Board& board, const cv::Mat& gray) {
   if (markers.size() < kMinMarkers) {
     return BoardPoints();
   }
-  const BoardPoints points = is_grid ? find_grid(board, markers) : find_charuco(board, markers);
+  const BoardPoints points =
+      on_image(is_grid ? find_grid(board, markers) : find_charuco(board, markers), gray.size());
   return points.in_image.size() < kMinCorners ? BoardPoints() : refined(gray, markers, points);
 }
 

@@ -30,10 +30,10 @@ Expected<BoardFit> fit_once(std::vector<BoardView*> views, const cv::Size& size,
   std::vector<cv::Mat> translations;
   BoardFit fit;
   try {
-    fit.error_px =
-        cv::calibrateCamera(boards, images, size, k, lens, rotations, translations, sigmas,
-                            cv::noArray(), errors_px, has_k3 ? 0 : cv::CALIB_FIX_K3,
-                            {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-12});
+    fit.error_px = cv::calibrateCamera(
+        boards, images, size, k, lens, rotations, translations, sigmas, cv::noArray(), errors_px,
+        cv::CALIB_USE_LU | (has_k3 ? 0 : cv::CALIB_FIX_K3),
+        {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-12});
   } catch (const cv::Exception&) {
     return fail("expected views that tell a camera, found none; tilt the board");
   }
@@ -65,6 +65,21 @@ BoardView* find_odd(const std::vector<BoardView*>& views) {
   return views.size() > kMinViews && worst->error_px > limit_px ? worst : nullptr;
 }
 
+/// No camera sees a board that was named wrong. Error: this one is.
+Expected<BoardFit> check_fit(const BoardFit& fit, const cv::Size& size) {
+  constexpr double kMaxError = 0.003;  // of the image's width
+  const bool is_finite = std::ranges::all_of(fit.numbers, [](const FittedNumber& number) {
+    return std::isfinite(number.value) && std::isfinite(number.sigma);
+  });
+  if (!is_finite || !(fit.error_px <= kMaxError * size.width)) {
+    return fail(fmt::format(
+        "expected corners within {:.1f} px of where a camera sees the board's, found {:.1f} px: "
+        "another board than --board says (an aprilgrid's gap is in metres), or a fisheye lens",
+        kMaxError * size.width, fit.error_px));
+  }
+  return fit;
+}
+
 }  // namespace
 
 Expected<BoardFit> fit_camera(std::vector<BoardView>& views, const cv::Size& size) {
@@ -87,7 +102,7 @@ Expected<BoardFit> fit_camera(std::vector<BoardView>& views, const cv::Size& siz
                !(std::abs(fit->numbers.back().value) > kMinSigmas * fit->numbers.back().sigma)) {
       has_k3 = false;
     } else {
-      return fit;
+      return fit ? check_fit(*fit, size) : fit;
     }
   }
 }

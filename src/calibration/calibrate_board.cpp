@@ -58,6 +58,27 @@ class ViewCollector {
   BoardReport& report_;
 };
 
+/// Beside the camera file.
+fs::path coverage_file(const BoardRequest& request) {
+  fs::path file = request.out_file;
+  file.replace_extension();
+  file += "_coverage.png";
+  return file;
+}
+
+/// Error: a picture would be overwritten.
+Status check_spares(const BoardRequest& request, const std::vector<fs::path>& pictures) {
+  for (const fs::path& out : {request.out_file, coverage_file(request)}) {
+    for (const fs::path& picture : pictures) {
+      if (std::error_code code; fs::equivalent(out, picture, code)) {
+        return fail(fmt::format("{}: expected a file to write that is no picture of the board",
+                                out.string()));
+      }
+    }
+  }
+  return {};
+}
+
 /// The size that most pictures have.
 Expected<cv::Size> look_at_images(const BoardRequest& request,
                                   const CalibrationProgress& progress,
@@ -67,6 +88,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
                  dataset::list_images(dataset::is_folder(inside) ? inside : request.pictures));
   FrameSource frames;
   frames.files = listing.files;
+  STEMVO_TRY(check_spares(request, frames.files));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   ViewCollector collector(request, report);
   for (std::size_t i = 0; i < frames.files.size() && !report.interrupted; ++i) {
@@ -84,6 +106,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
 Expected<cv::Size> look_at_video(const BoardRequest& request,
                                  const CalibrationProgress& progress,
                                  BoardReport& report) {
+  STEMVO_TRY(check_spares(request, {request.pictures}));
   STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
   constexpr std::size_t kMaxLooks = 300;
   constexpr std::size_t kUsualStep = 5;
@@ -119,9 +142,7 @@ std::string file_text(const BoardRequest& request, const BoardReport& report) {
 }
 
 Status write_files(const BoardRequest& request, const cv::Size& size, BoardReport& report) {
-  report.coverage_file = request.out_file;
-  report.coverage_file.replace_extension();
-  report.coverage_file += "_coverage.png";
+  report.coverage_file = coverage_file(request);
   STEMVO_TRY(write_text_file(request.out_file, file_text(request, report)));
   return write_image(report.coverage_file, draw_coverage(report.views, size));
 }
@@ -147,6 +168,11 @@ Expected<BoardReport> calibrate_board(const BoardRequest& request,
                             fit.error().message, report.num_pictures));
   }
   report.fit = *std::move(fit);
+  constexpr double kMaxSigma = 0.02;
+  if (const FittedNumber& fx = report.fit.numbers.front(); fx.sigma > kMaxSigma * fx.value) {
+    report.warnings.push_back(fmt::format("fx is known to {:.0f} % only: the views hardly tell it",
+                                          100.0 * fx.sigma / fx.value));
+  }
   report.missing = missing_views(report.views, size);
   STEMVO_TRY(write_files(request, size, report));
   return report;

@@ -69,6 +69,8 @@ void warn_of_camera(FrameSource& frames);
                                                  const FrameSourceRequest& request);
 /// "rtsp://..", "http://.." and the like.
 [[nodiscard]] bool is_address(const std::filesystem::path& path);
+/// A text with addresses, whose users and queries are left out: they may hold passwords.
+[[nodiscard]] std::string without_secrets(const std::string& text);
 /// N of "camera:N".
 [[nodiscard]] std::optional<int> camera_number(const std::filesystem::path& path);
 /// A video file, an address, or a live camera.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <regex>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -83,6 +84,10 @@ Status check_unused(const FrameSourceRequest& request, bool is_listing, bool is_
                     "times.txt, a video its own), found {}",
                     request.times->string(), request.sequence_dir.string()));
   }
+  if (request.rate_hz && !(*request.rate_hz >= 1e-6 && *request.rate_hz <= 1e5)) {
+    return fail(
+        fmt::format("--rate: expected a number from 1e-06 to 100000, found {}", *request.rate_hz));
+  }
   if (request.rate_hz && !is_listing) {
     return fail(fmt::format("--rate {}: expected images without times, found {}", *request.rate_hz,
                             request.sequence_dir.string()));
@@ -140,6 +145,12 @@ std::optional<int> dataset::camera_number(const fs::path& path) {
   }
   const auto number = parse_index(std::string_view(text).substr(kPrefix.size()));
   return number && *number < kMaxNumber ? std::optional(static_cast<int>(*number)) : std::nullopt;
+}
+
+std::string dataset::without_secrets(const std::string& text) {
+  static const std::regex kUser("://[^/ ]*@");  // a password may have an @ in it
+  static const std::regex kQuery("(://[^ '?]*)\\?[^ ']*");
+  return std::regex_replace(std::regex_replace(text, kUser, "://***@"), kQuery, "$1?***");
 }
 
 bool dataset::is_address(const fs::path& path) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <limits>
 
 #include <fmt/format.h>
@@ -37,12 +38,23 @@ Status check_length(const PoseFile& truth,
       request.ground_truth->string(), num_expected, truth.poses.size()));
 }
 
+/// The last part of an address behind the host, without a query.
+std::string stem_of(const fs::path& path) {
+  const std::string address = path.string();
+  if (!is_address(path)) {
+    return path.stem().string();
+  }
+  const std::size_t end = std::min(address.find_first_of("?#"), address.size());
+  const std::size_t way = address.find('/', address.find("://") + 3);
+  return way < end ? fs::path(address.substr(way, end - way)).stem().string() : "";
+}
+
 }  // namespace
 
 Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
                                   const CameraFile& camera,
                                   const FrameSourceRequest& request) {
-  const std::string owner = request.sequence_dir.string();
+  const std::string owner = without_secrets(request.sequence_dir.string());
   const FrameRangeRequest range = request.frames.value_or(FrameRangeRequest{});
   STEMVO_TRY(check_stream_size(stream->size(), camera.camera, owner));
   STEMVO_TRY_GET(const FrameView view, view_of(camera.camera, *request.camera_file));
@@ -51,7 +63,7 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   FrameSource frames;
   frames.kind = stream->is_live() ? "live camera" : "video";
   const auto number = camera_number(owner);
-  const std::string stem = request.sequence_dir.stem().string();
+  const std::string stem = stem_of(request.sequence_dir);
   frames.name = number ? fmt::format("camera{}", *number) : stem.empty() ? "stream" : stem;
   if (!number && !is_address(request.sequence_dir)) {
     frames.files = {request.sequence_dir};

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "dataset/frame_files.hpp"
 #include "try.hpp"
 
 namespace stemvo::dataset {
@@ -31,12 +32,13 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::string& address,
                                                                  const cv::Size& size) {
   STEMVO_TRY_GET(auto decoder, decode_address(address, size));
-  if (decoder == nullptr) {
-    return fail(fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none",
-                            address));
+  const std::string name = without_secrets(address);
+  if (decoder == nullptr || decoder->size().empty()) {
+    return fail(
+        fmt::format("{}: expected a stream of pictures that FFmpeg can decode, found none", name));
   }
   const bool is_live = !(decoder->frame_count() > 0.0);
-  return std::make_shared<VideoStream>(std::move(decoder), address, is_live);
+  return std::make_shared<VideoStream>(std::move(decoder), name, is_live);
 }
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_camera(int number, const cv::Size& size) {

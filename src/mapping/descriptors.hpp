@@ -48,12 +48,12 @@ class ScaledDescriptors {
   [[nodiscard]] std::span<const Descriptor> at_one() const { return at_one_; }
   /// At kOtherScales[i].
   [[nodiscard]] std::span<const Descriptor> other(std::size_t i);
-  /// Those nearest to a view that this one magnifies.
+  /// The scale's descriptors that are nearest to a view which this one magnifies.
   [[nodiscard]] std::span<const Descriptor> for_magnification(double magnification);
 
  private:
   std::span<const Descriptor> at_one_;
-  const DescribeAt& describe_at_;
+  DescribeAt describe_at_;
   std::array<std::vector<Descriptor>, kOtherScales.size()> others_;
 };
 

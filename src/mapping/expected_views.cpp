@@ -25,7 +25,7 @@ struct SharedView {
   double magnification = 1.0;
 };
 
-/// What `by` sees of the landmarks of `of`.
+/// How much `by` sees of the landmarks of `of`, and how large.
 SharedView shared_view(const KeptKeyframe& of,
                        const KeptKeyframe& by,
                        const Similarity3& by_from_of) {

@@ -17,7 +17,7 @@ struct ExpectedView {
   double magnification = 1.0;  ///< of the keyframe's view to the place's
 };
 
-/// Those of `places` that share enough of the view with the map's keyframe `number`, whose corners
+/// Picks the `places` that share enough of the view with the map's keyframe `number`, whose corners
 /// `keyframe` has. The most first.
 [[nodiscard]] std::vector<ExpectedView> expected_views(const KeptMap& map,
                                                        std::span<const int> places,

@@ -19,6 +19,7 @@ namespace {
 constexpr std::size_t kEdgesPerKeyframe = 128;
 /// For so many times that time the next one waits: a room brings new loops with every keyframe.
 constexpr int kPause = 8;
+/// Places are looked through for merging so often.
 constexpr int kKeyframesPerMerge = 16;
 /// Standard deviations of where a lost frame was found, one place alone: rotation, share of the
 /// depth, scale.
@@ -178,7 +179,7 @@ Recognition Mapper::take_in(const WindowView& view, const LookedUp& found) {
   }
   recognition.frame = keeper_.keyframe(loop.from).frame;
   recognition.moved = keeper_.add_loop(loop);
-  has_new_loops_ = has_new_loops_ || !is_known;
+  has_new_loops_ = has_new_loops_ || !is_known || recognition.moved.has_value();
   if (recognition.moved.has_value()) {
     solved_ = {};  // of the graph before
     keyframes_until_next_ = 0;

@@ -139,7 +139,9 @@ double align_level(const Level& prev, const Level& cur, Eigen::Quaterniond& turn
                       Vector5d row;
                       row << -fy - along * at.y(), fx + along * at.x(), fy * at.x() - fx * at.y(),
                           -static_cast<double>(value), -1.0;
-                      const double weight = 1.0 / (1.0 + off * off / (scale * scale));
+                      // Of two equal images the scale is 0 too.
+                      const double weight =
+                          off == 0.0 ? 1.0 : 1.0 / (1.0 + off * off / (scale * scale));
                       normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
                       right -= weight * off * row;
                       sum += std::abs(off);

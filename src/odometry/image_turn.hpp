@@ -23,7 +23,7 @@ class ImageTurn {
   /// image before, of another size, plain, or of another scene.
   [[nodiscard]] std::optional<Eigen::Quaterniond> align(
       const ImagePyramid& image, double interval_s, const std::optional<Eigen::Quaterniond>& hint);
-  /// What align() expected of its last image: the turn before went on as fast.
+  /// The turn that align() expected of its last image: the one before went on as fast.
   [[nodiscard]] const Eigen::Quaterniond& expected() const { return expected_; }
 
   /// A gray image and the pinhole camera that it was taken by.

@@ -44,12 +44,15 @@ WholeMap::WholeMap(const PhasedOdometry& odometry)
       times_s(odometry.frames().times_s()),
       map_from_frame(place_trajectory(trajectory, times_s, kept)),
       camera(kept.keyframes.empty() ? odometry.view().camera() : kept.keyframes.back().camera),
-      camera_sigma(prior_sigma(odometry.options().camera.refine)) {
+      camera_sigma(prior_sigma(odometry.options().camera.refine)),
+      prior(camera_sigma) {
   if (const auto learnt = odometry.frames().estimator().camera_estimate(); learnt && camera_sigma) {
+    if (!kept.loops.empty()) {
+      prior->tail<3>() << kFreeFocal, kFreeDistortion, kFreeDistortion;
+    }
+    camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
     if (kept.loops.empty()) {
-      camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
-    } else {
-      camera_sigma->tail<3>() << kFreeFocal, kFreeDistortion, kFreeDistortion;
+      prior = camera_sigma;
     }
   }
 }
@@ -73,8 +76,8 @@ Status WholeMap::adjust(const std::vector<int>& frames) {
   const auto is_of_other = [](const KeptKeyframe& keyframe) { return keyframe.frame < 0; };
   const auto num_of_other = std::ranges::count_if(kept.keyframes, is_of_other);
   constexpr std::size_t kMaxViews = 12;
-  const auto adjusted = adjust_map(
-      kept, {camera, camera_sigma, static_cast<int>(num_of_other), covariance_of, kMaxViews});
+  const auto adjusted =
+      adjust_map(kept, {camera, prior, static_cast<int>(num_of_other), covariance_of, kMaxViews});
   if (adjusted && agrees_with_motions(kept, adjusted->map_from_keyframe)) {
     take_in(*adjusted);
   } else {

@@ -36,6 +36,7 @@ struct WholeMap {
   std::vector<Similarity3> map_from_frame;      ///< by keyframes as they are, or as adjusted
   Camera camera;                                ///< as it was used last, or as adjusted
   std::optional<IntrinsicsDelta> camera_sigma;  ///< before, or after; nullopt: it is not refined
+  std::optional<IntrinsicsDelta> prior;         ///< sigmas that adjust() holds the camera with
   std::vector<int> covariance_of;               ///< keyframes
   std::vector<Eigen::Matrix<double, 6, 6>> covariances;
 

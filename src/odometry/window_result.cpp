@@ -73,7 +73,8 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
                                ? road_landmarks(window_, world_from_camera_, view_.points, camera())
                                : std::vector<RoadLandmark>();
     // A position that a motion model has a share in tells no length.
-    const bool is_shared = fused_.has_value() || state == FrameState::kStationary;
+    const bool is_shared =
+        (fused_.has_value() && !is_adjusted_) || state == FrameState::kStationary;
     const double position_units = is_shared
                                       ? std::numeric_limits<double>::infinity()
                                       : pixel_units(find_seen_landmarks(window_, view_.points));

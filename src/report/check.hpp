@@ -10,7 +10,7 @@
 
 namespace stemvo {
 
-/// What a metrics.json is held against; at least one of the two files.
+/// A metrics.json and what it is held against; at least one of the two files.
 struct CheckRequest {
   std::filesystem::path metrics;
   std::optional<std::filesystem::path> thresholds;

@@ -39,7 +39,7 @@ using FilterBank =
 /// runtime refused it.
 class Stem {
  public:
-  /// Loads and checks a model, for `apply` alone: of the default one the best filter's own file.
+  /// Loads and checks a model, for `apply` alone: of the default one the default filter's own file.
   /// Errors: no such model, not ONNX, no metadata that say kernel, stride and padding, or others
   /// than the graph's, inputs or outputs other than 1x3xHxW or 1x1xHxW -> 1xCxhxw float, filter
   /// outside [0, C), sampling_px not a divisor of the stride (lists the allowed values).

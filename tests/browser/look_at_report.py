@@ -142,7 +142,7 @@ def point_at_each(page, touch):
 
 
 def sizes_of_map(page):
-    """Of both axes of the path from above, how long they are and how long the paths."""
+    """How long both axes of the path from above are, and how long the paths."""
     return page.evaluate("""["x", "y"].map((axis) => {
         const { section, div } = figures[0], [low, high] = div._fullLayout[axis + "axis"].range;
         const values = section.traces.flatMap((trace) => trace[axis]).filter(Number.isFinite);

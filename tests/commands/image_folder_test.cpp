@@ -53,6 +53,24 @@ class ImageFolderRun : public ::testing::Test {
   const std::string good_camera_ = camera_file_of(sequence_) + "rate_hz: 10\n";
 };
 
+TEST_F(ImageFolderRun, GivesTheBytesOfTheSameKittiFolder) {
+  fs::create_directories(folder_.path() / "other/00");
+  for (const char* name : {"calib.txt", "times.txt"}) {
+    fs::copy_file(sequence_ / name, folder_.path() / "other/00" / name);
+  }
+  fs::copy(images_, folder_.path() / "other/00/image_2");
+  const std::string kitti = folder_ / "kitti";
+  ASSERT_EQ(run_stemvo({"run", folder_ / "other/00", "--out", kitti}).exit_code, 0);
+  write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
+  const ProgramResult result =
+      run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* name : {"kitti", "tum"}) {
+    const std::string file = std::string("/trajectory_") + name + ".txt";
+    EXPECT_EQ(read_file(out_ + file), read_file(kitti + file)) << file;
+  }
+}
+
 TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
   const ProgramResult result =
       run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 images

@@ -32,11 +32,11 @@ Camera true_camera() {
 class BoardCalibration : public ::testing::Test {
  protected:
   /// Pictures of the print, the last `num_smeared` of which the camera moved in.
-  BoardReport calibrate(const std::string& board,
-                        const test::Print& print,
-                        int num_pictures,
-                        double max_tilt_rad = 0.6,
-                        int num_smeared = 0) {
+  Expected<BoardReport> try_to_calibrate(const std::string& board,
+                                         const test::Print& print,
+                                         int num_pictures,
+                                         double max_tilt_rad = 0.6,
+                                         int num_smeared = 0) {
     static test::BoardCamera camera(true_camera());
     const fs::path photos = temp_ / "photos";
     fs::create_directories(photos);
@@ -50,8 +50,11 @@ class BoardCalibration : public ::testing::Test {
       }
       cv::imwrite((photos / fmt::format("{:02}.png", i)).string(), image);
     }
-    const BoardRequest request{photos, temp_ / "camera.yaml", parse_board(board).value(), board};
-    auto report = calibrate_board(request);
+    return calibrate_board({photos, temp_ / "camera.yaml", parse_board(board).value(), board});
+  }
+  template <typename... Rest>
+  BoardReport calibrate(const Rest&... rest) {
+    const auto report = try_to_calibrate(rest...);
     EXPECT_TRUE(report) << report.error().message;
     return report.value_or(BoardReport());
   }
@@ -118,6 +121,26 @@ TEST_F(BoardCalibration, BoardsOfMarkersInEveryLayout) {
   }
 }
 
+TEST_F(BoardCalibration, ABoardThatIsNamedWrongIsRefused) {
+  for (const auto& [board, print] :
+       {std::pair("aprilgrid:4x3:0.03:0.3", test::print_tags(true)),  // a share of the side
+        std::pair("aprilgrid:3x4:0.03:0.009", test::print_tags(true)),
+        std::pair("charuco:4x6:0.03:0.0225:DICT_4X4_50", test::print_charuco({6, 4}, false))}) {
+    const auto report = try_to_calibrate(board, print, 9);
+    ASSERT_FALSE(report) << board;
+    EXPECT_THAT(report.error().message, HasSubstr("another board than --board says")) << board;
+    EXPECT_FALSE(fs::exists(temp_ / "camera.yaml"));
+  }
+}
+
+TEST_F(BoardCalibration, APictureIsNotOverwritten) {
+  ASSERT_TRUE(try_to_calibrate("9x6:0.025", test::print_chessboard({9, 6}, 0.025), 4, 0.6));
+  const auto report = calibrate_board(
+      {temp_ / "photos", temp_ / "photos/00.png", parse_board("9x6:0.025").value(), "9x6:0.025"});
+  ASSERT_FALSE(report);
+  EXPECT_THAT(report.error().message, HasSubstr("no picture of the board"));
+}
+
 TEST_F(BoardCalibration, ViewsThatErrAreLeftOutAndSaid) {
   const BoardReport report =
       calibrate("9x6:0.025", test::print_chessboard({9, 6}, 0.025), 14, 0.6, 2);
@@ -150,7 +173,7 @@ TEST(Board, FormsAreCheckedBeforeWork) {
   for (const char* text :
        {"", "9x6", "9x6:", "9x6:0", "9x6:-1", "9x6:nan", "9:0.025", "9x6x3:0.025", "2x6:0.025",
         "999x6:0.025", "9x6:0.025:3", "charuco:7x5:0.04:0.03", "charuco:7x5:0.03:0.04:DICT_5X5_100",
-        "aprilgrid:6x6:0.088", "circles:4x4:1"}) {
+        "aprilgrid:6x6:0.088", "circles:4x4:1", "charuco", "aprilgrid", "charuco:"}) {
     const auto board = parse_board(text);
     ASSERT_FALSE(board) << text;
     EXPECT_THAT(board.error().message, HasSubstr("--board: expected COLUMNSxROWS:SQUARE_M"))

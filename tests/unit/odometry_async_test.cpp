@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <atomic>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -244,6 +245,22 @@ TEST_F(Async, OneThatWasMovedFromIsAnError) {
   EXPECT_FALSE(odometry.next());
   EXPECT_TRUE(odometry.landmarks_since(0).landmarks.empty() && odometry.keyframes().empty() &&
               odometry.tracked_points().empty() && odometry.channel_image().empty());
+}
+
+TEST_F(Async, IsDestroyedInTheMiddle) {
+  for (const int threads : {1, 2}) {
+    for (const std::size_t num_frames : {0U, 1U, 2U, 7U, 12U}) {
+      std::atomic<std::size_t> num_called = 0;
+      AsyncOdometry odometry = create(threads, [&](const FrameResult&) { ++num_called; });
+      for (std::size_t i = 0; i < num_frames; ++i) {
+        ASSERT_TRUE(push(odometry, i));
+      }
+      {
+        const AsyncOdometry dropped = std::move(odometry);
+      }
+      EXPECT_LE(num_called, num_frames);
+    }
+  }
 }
 
 }  // namespace

@@ -76,6 +76,27 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
   EXPECT_GT((wrong.world_from_camera().translation - truth.translation).norm(), 0.1);
 }
 
+TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
+  ScaleOptions scale;
+  scale.source = ScaleSource::kNone;
+  scale.step_m = 0.7;
+  Chain chain({}, scale);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
+}
+
+TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
+  Chain chain = make_chain();
+  MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);
+  doubtful.is_decisive = false;
+  EXPECT_EQ(chain.add(doubtful), FrameState::kInitializing);
+  EXPECT_TRUE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_FALSE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+}
+
 TEST(MotionChain, TheGateKeepsTheRotationAndGoesOnAndThePapersDropsBoth) {
   for (const bool is_papers : {false, true}) {
     Chain chain = make_chain({.gate = is_papers ? ForwardGate::kPaper : ForwardGate::kTranslation});

@@ -104,7 +104,6 @@ TEST(ScaleFilter, WithoutMeasurementsTheDoubtGrows) {
   EXPECT_EQ(filter.log_scale(), 0.0);
 }
 
-// Both in turn, each sure of itself: the road's plane may be a table, a way is one.
 TEST(ScaleFilter, WaysAreFollowedSoThatThePathLosesLittleWhereTheMapStretches) {
   ScaleFilter filter(kDriftSigma);
   constexpr double kSpeedSigma = 0.02;
@@ -117,6 +116,7 @@ TEST(ScaleFilter, WaysAreFollowedSoThatThePathLosesLittleWhereTheMapStretches) {
   EXPECT_LT(std::abs(path_error), 2e-4);
 }
 
+// Both in turn, each sure of itself: the road's plane may be a table, a way is one.
 TEST(ScaleFilter, AWayThatContradictsTheRoadWinsAndKeepsWinning) {
   ScaleFilter filter(kDriftSigma);
   measure(filter, 50, 0.0);

@@ -180,7 +180,8 @@ TEST(Check, HoldsEveryBoundBesideOneWithAProblem) {
 
 constexpr char kBaseline[] =
     R"({"frames": 400, "alignment": "none", "t_rel_percent": 0.8, "fps": 100,
-  "r_rel_deg_per_100m": null, "ate_rmse_m": {"sim3": 1.0}, "tracked_fraction": 1.0, "map": {"t_rel_percent": 0.5}})";
+  "r_rel_deg_per_100m": null, "ate_rmse_m": {"sim3": 1.0},
+  "tracked_fraction": 1.0, "map": {"t_rel_percent": 0.5}})";
 
 TEST(Check, ABaselineBoundsItsErrorsByTheTolerance) {
   const std::string run = R"({"frames": 400, "alignment": "none", "t_rel_percent": 0.83, "fps": 1,

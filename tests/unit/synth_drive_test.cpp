@@ -48,6 +48,14 @@ class SyntheticDriveTest : public ::testing::Test {
   const fs::path root_ = folder_.path();
 };
 
+TEST_F(SyntheticDriveTest, ShorterDriveReplacesALongerOne) {
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(4)));
+  ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(2)));
+  const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");
+  ASSERT_TRUE(sequence) << sequence.error().message;
+  EXPECT_EQ(sequence->size(), 2U);
+}
+
 TEST_F(SyntheticDriveTest, IsASequenceWithExactTruth) {
   ASSERT_TRUE(render_synthetic_drive(root_ / "out", small(3)));
   const auto sequence = open_kitti(root_ / "out" / "sequences" / "00");

@@ -45,12 +45,12 @@ class Ratio(typing.NamedTuple):
 
 
 def difference(drives, seed=1):
-    """Of the mean errors a and b, in the mean over drives."""
+    """Difference of the mean errors a and b, in the mean over drives."""
     return Difference(*_interval(drives, lambda a, b, count: (a - b) / count, seed) or (np.nan, -np.inf, np.inf))
 
 
 def paired_ratio(drives, seed=1):
-    """Of the mean errors a and b, which are above 0; geometric mean over drives."""
+    """Ratio of the mean errors a and b, which are above 0; geometric mean over drives."""
     found = _interval(drives, lambda a, b, _: np.log(np.maximum(a, LEAST_ERROR) / np.maximum(b, LEAST_ERROR)), seed) or (0.0, -np.inf, np.inf)
     return Ratio(*(float(np.exp(value)) for value in found))
 
