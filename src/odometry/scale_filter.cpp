@@ -24,7 +24,7 @@ constexpr double kRounding_s = 1e-6;  ///< of sums
 constexpr double kFirstSigma = 0.1;
 /// Drift in a second between ways without a road: the path adds up ways, whose errors average out
 /// where it follows them; what is smoothed into neighbours lasts, an error at the start above all.
-constexpr double kWayDrift = 0.035;
+constexpr double kWayDrift = 0.02;
 constexpr double kTrend_s = 10.0;  ///< a trend that nothing confirms is forgotten by 1 / e
 
 }  // namespace

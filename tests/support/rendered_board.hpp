@@ -130,8 +130,9 @@ class BoardCamera {
       r_ = {random.uniform(-max_tilt_rad, max_tilt_rad),
             random.uniform(-max_tilt_rad, max_tilt_rad), random.uniform(-0.4, 0.4)};
       const double z = box.width * camera_.fx_px / camera_.width_px / random.uniform(0.3, 0.8);
-      const cv::Vec3d center(z * random.uniform(-0.5, 0.5) * camera_.width_px / camera_.fx_px,
-                             z * random.uniform(-0.5, 0.5) * camera_.height_px / camera_.fy_px, z);
+      // Braces: in this order, whatever the compiler.
+      const cv::Vec3d center{z * random.uniform(-0.5, 0.5) * camera_.width_px / camera_.fx_px,
+                             z * random.uniform(-0.5, 0.5) * camera_.height_px / camera_.fy_px, z};
       cv::Matx33d rotation;
       cv::Rodrigues(r_, rotation);
       t_ = center - rotation * middle;

@@ -49,7 +49,8 @@ struct PlantedDrive {
       scale.add(ways.take(now_s));
       const double step_m = interval_s * speed(now_s - 0.5 * interval_s);
       units_per_m *= std::exp(-drift);
-      const Eigen::Vector3d next_error(noise(engine), noise(engine), noise(engine));
+      Eigen::Vector3d next_error;
+      std::ranges::generate(next_error, [&] { return noise(engine); });
       const Eigen::Vector3d step =
           Eigen::Vector3d(0.0, 0.0, -step_m * units_per_m) + next_error - error;
       error = next_error;
