@@ -25,7 +25,7 @@ class CalibrateBoard : public ::testing::Test {
     cv::RNG random(3);
     fs::create_directories(folder_ / "photos");
     for (int i = 0; i < kNumPhotos; ++i) {
-      photographer.choose_pose(print, 0.6, random);
+      photographer.choose_pose(print, 0.4, random);
       files_.emplace_back(folder_ / "photos" / fmt::format("{}.png", i));
       cv::imwrite(files_.back(), photographer.photograph(print, 0.5, random));
     }
