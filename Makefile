@@ -48,7 +48,7 @@ test-all: test test-long
 
 # Without one of these groups the tests that need it are skipped.
 test-long:
-	@for group in arm64 peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
+	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
 	@tools/setup.sh tools docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed

@@ -238,7 +238,7 @@ cases = [
     (lambda: stemvo.read_recording("camera:0"), "stemvo.FrameView"),
     (lambda: stemvo.read_recording(images), "expected camera_file, or camera.yaml in their folder"),
     (lambda: stemvo.read_recording(images, camera_file, rate=10, times="times.txt"), "rate 10: expected images without times, found"),
-    (lambda: stemvo.Options({"stem.model": pathlib.Path(os.fsdecode(b"\xff"))}), "options: expected text in UTF-8, found"),
+    (lambda: stemvo.Options({"stem.model": pathlib.Path(os.fsdecode(b"\\xff"))}), "options: expected text in UTF-8, found"),
     (lambda: stemvo.FrameView(camera_file, masks=["1,2"]), "masks: expected"),
     (lambda: stemvo.FrameView("/nowhere.yaml"), "/nowhere.yaml"),
     (lambda: stemvo.Odometry("camera"), "expected Camera, Recording or FrameView"),
