@@ -92,7 +92,7 @@ TEST_F(Times, DroppedFramesAndJitterCostLittleAndFramesTakenForEvenlySpacedMore)
     }
   }
   EXPECT_LT(with_times.t_rel_percent, 1.1 * all.t_rel_percent);
-  // Errors without times are no larger any more: the image itself says where to look. Tracks are lost.
+  // Images say where to look: errors without times are no larger, but tracks are lost.
   EXPECT_GT(with_times.inliers, 1.01 * without.inliers);
 }
 
