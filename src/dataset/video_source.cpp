@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 
 #include <fmt/format.h>
@@ -39,14 +40,14 @@ Status check_length(const PoseFile& truth,
 }
 
 /// The last part of an address behind the host, without a query.
-std::string stem_of(const fs::path& path) {
+std::string stem_of(const std::filesystem::path& path) {
   const std::string address = path.string();
   if (!is_address(path)) {
     return path.stem().string();
   }
   const std::size_t end = std::min(address.find_first_of("?#"), address.size());
   const std::size_t way = address.find('/', address.find("://") + 3);
-  return way < end ? fs::path(address.substr(way, end - way)).stem().string() : "";
+  return way < end ? std::filesystem::path(address.substr(way, end - way)).stem().string() : "";
 }
 
 }  // namespace
