@@ -194,22 +194,23 @@ std::optional<Loop> PlaceRecognizer::recognize(const KeptMap& map,
 std::vector<PlaceRecognizer::Look> PlaceRecognizer::look_alikes(ScaledDescriptors& scales,
                                                                 bool at_all,
                                                                 int before) const {
-  std::vector<std::pair<double, Look>> found;
+  std::vector<std::pair<PlaceCandidate, std::span<const Descriptor>>> found;
   const auto vote = [&](std::span<const Descriptor> seen) {
     for (const PlaceCandidate& place : index_.candidates(seen, before, kMaxCandidates)) {
-      found.push_back({place.votes, {place.keyframe, seen, {}}});
+      found.emplace_back(place, seen);
     }
   };
   vote(scales.at_one());
   for (std::size_t i = 0; at_all && i < kOtherScales.size(); ++i) {
     vote(scales.other(i));
   }
-  std::ranges::stable_sort(found, std::greater<>(), &std::pair<double, Look>::first);
+  std::ranges::stable_sort(found, std::greater<>(),
+                           [](const auto& one) { return one.first.votes; });
   std::vector<Look> looks;
-  for (const auto& [votes, look] : found) {
+  for (const auto& [place, seen] : found) {
     if (std::ssize(looks) < kMaxCandidates &&
-        std::ranges::find(looks, look.place, &Look::place) == looks.end()) {
-      looks.push_back(look);
+        std::ranges::find(looks, place.keyframe, &Look::place) == looks.end()) {
+      looks.push_back({place.keyframe, seen, {}});
     }
   }
   return looks;
