@@ -15,8 +15,6 @@ import pathlib
 import sys
 
 import numpy as np
-import onnx
-from google.protobuf.message import DecodeError
 
 from stems import discriminant, drive, metadata, onnx_writer
 from stems import stem as stem_module
@@ -33,8 +31,7 @@ def parse_arguments(arguments):
     parser.add_argument("drives", metavar="DRIVE", type=pathlib.Path, nargs="+")
     parser.add_argument("--out", metavar="DIR", type=pathlib.Path, required=True, help="created where missing")
     parser.add_argument("--name", default="default")
-    parser.add_argument("--default-filter", type=int, metavar="K", help="used where none is asked for (default: 0, without a file of its own)")
-    parser.add_argument("--first", metavar="MODEL", type=pathlib.Path, help="its filter 0 takes the place of the first (made by stemvo-lab learn)")
+    parser.add_argument("--default-filter", type=int, metavar="K", help="used where none is asked for (default: 0, which gets no file of its own)")
     parser.add_argument("--objective", choices=("matching", "tracking"), default="matching",
                         help="tell points apart, or the smallest covariance of a tracked translation (default: %(default)s)")
     parser.add_argument("--sampling", type=int, default=2, metavar="PX",
@@ -97,18 +94,7 @@ def learn(scatter, nuisance, options):
     # Samples in the middle of stride x stride pixels, as those of the image made smaller by the stride.
     padding = (max(0, options.kernel - options.stride) // 2,) * 4
     layer_norm = stem_module.LayerNorm(np.ones(FILTERS), np.zeros(FILTERS), options.floor**2) if has_norm else None
-    return stem_module.Stem(weights, bias, stride=options.stride, mean=np.zeros(1), padding=padding, repeats_border=True, layer_norm=layer_norm), ratios
-
-
-def put_first(stem, file):
-    """The filter 0 of another model, which may hold it several times, moved down."""
-    kernel = stem.weights.shape[-1]
-    try:
-        (weights,) = (onnx.numpy_helper.to_array(item) for item in onnx.load(file).graph.initializer if item.name == "weights")
-        stem.weights[0] = weights[0, :, :kernel, :kernel]
-    except (OSError, ValueError, DecodeError) as error:
-        raise drive.DriveError(f"{file}: expected a model with `weights` of {kernel}x{kernel}, found: {error}") from error
-    stem.bias[0] = 0.0
+    return stem_module.Stem(weights, bias, stride=options.stride, mean=np.zeros(1), padding=padding, layer_norm=layer_norm), ratios
 
 
 def alone(stem, options):
@@ -124,7 +110,6 @@ def alone(stem, options):
 def command_line(options):
     return (f"tools/learn_stem.py {' '.join(file.name for file in options.drives)} --out models --name {options.name} "
             f"{'' if options.objective == 'matching' else f'--objective {options.objective} '}"
-            f"{'' if options.first is None else f'--first {options.first.name} '}"
             f"{'' if options.default_filter is None else f'--default-filter {options.default_filter} '}--kernel {options.kernel} --stride {options.stride} "
             f"--sampling {options.sampling} --zoom {options.zoom:g} --rotation {options.rotation:g} --gain {options.gain:g} "
             f"--offset {options.offset:g} --noise {options.noise:g} --floor {options.floor:g} --pairs {options.pairs} "
@@ -141,8 +126,6 @@ def run(options):
     scatter = collect([drive.Drive(folder) for folder in options.drives], options)
     nuisance = discriminant.Nuisance(options.gain, options.offset, options.noise)
     stem, ratios = learn(scatter, nuisance, options)
-    if options.first is not None:
-        put_first(stem, options.first)
     options.out.mkdir(parents=True, exist_ok=True)
     said = {"network": "stemvo, learned on rendered drives", "layer": "stem", "licence": "MIT",
             "default_filter": options.default_filter or 0, "command": command_line(options), "filters": FILTERS}

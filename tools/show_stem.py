@@ -41,8 +41,7 @@ def read_weights(path):
     if len(weights) != 1 or len(convolutions) != 1:
         raise ShowError(f"{path}: expected one convolution with `weights`, found {len(convolutions)}")
     attributes = {item.name: list(item.ints) for item in convolutions[0].attribute}
-    around = [onnx.numpy_helper.to_array(item) for item in graph.initializer if item.name == "around"]  # onnx_writer's repeated border
-    return weights[0], attributes["strides"][0], around[0][[2, 3, 6, 7]].tolist() if around else attributes["pads"]
+    return weights[0], attributes["strides"][0], attributes["pads"]
 
 
 def draw(weights, title, path):

@@ -102,10 +102,7 @@ ChannelImage ContrastNormalization::apply(const Channel& channel) {
     values = &resized_;
   } else if (wanted > sampling) {  // an odd last row or column is left out
     const cv::Size size = channel.values.size() / 2;
-    constexpr float kKernel[] = {0.25F, 0.5F, 0.25F};
-    const cv::Mat1f kernel(1, 3, const_cast<float*>(kKernel));
-    cv::sepFilter2D(channel.values, smooth_, CV_32F, kernel, kernel);
-    cv::resize(smooth_({0, 0, 2 * size.width, 2 * size.height}), resized_, size, 0.0, 0.0,
+    cv::resize(channel.values({0, 0, 2 * size.width, 2 * size.height}), resized_, size, 0.0, 0.0,
                cv::INTER_AREA);
     values = &resized_;
   }

@@ -34,7 +34,7 @@ TEST(Model, SaysWhatItIs) {
 }
 
 TEST(Model, TheBuiltInOnesAreThoseOfTheFolder) {
-  EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_0", "paper"));
+  EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_2", "paper"));
   for (const std::string& model : built_in_models()) {
     EXPECT_EQ(read_model(model).value(),
               testing::read_all(STEMVO_SOURCE_DIR "/models/" + model + ".onnx"));

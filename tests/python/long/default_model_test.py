@@ -28,7 +28,6 @@ class DefaultModel(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             for line in lines:
                 line = line.replace("build/release/stemvo", os.environ["STEMVO_PROGRAM"])
-                line = line.replace("learned.onnx", str(ROOT / "models/default_filter_0.onnx"))  # tests/lab learn filters
                 line = line.replace("build/teacher", f"{folder}/teacher").replace("--out models", f"--out {folder}/models")
                 words = line.split()
                 program = [sys.executable, str(ROOT / words[0])] if words[0].startswith("tools/") else words[:1]
