@@ -27,9 +27,6 @@ constexpr double kMinExplained = 0.5;
 constexpr double kHysteresis = 1.5;
 /// So many times the flow of a stationary frame is what errors of landmarks do to one that turns.
 constexpr double kTurnFlow = 3.0;
-/// A position that is off by more pixels of the median landmark (1 sigma) is told badly: from twice
-/// as many on the motion model counts fully.
-constexpr double kDoubtful_px = 0.2;
 
 }  // namespace
 
@@ -80,7 +77,6 @@ void WindowEstimator::advance_to(double time_s) {
 
 FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& localized) {
   fused_.reset();
-  is_adjusted_ = false;
   if (!frame.has_image()) {
     go_on(frame);
     return FrameState::kNoImage;
@@ -98,12 +94,10 @@ FrameState WindowEstimator::find_pose(const Frame& frame, LocalizedFrame& locali
     is_still = is_stationary(moving_points_, now, min_flow_px(), options_.min_inliers);
   }
   const SeenLandmarks seen = find_seen_landmarks(window_, now);
-  Rigid3 start = predict();
-  // An image that is missing before this one: its turn is of more than one frame.
-  const auto image_turn = last_.frame == frame.number - 1 ? frame.image_turn : std::nullopt;
-  for (const auto& turn : {frame.hints.prev_from_cur, image_turn}) {
-    start = turn ? nearer_pose(start, predict(turn), seen, camera()) : start;
-  }
+  const Rigid3 start =
+      frame.hints.prev_from_cur
+          ? nearer_pose(predict(), predict(frame.hints.prev_from_cur), seen, camera())
+          : predict();
   const std::optional<Localization> found = stemvo::localize(seen, start, camera(), localization_);
   if (found.has_value()) {
     return accept_localization(frame, found->world_from_camera, is_still, localized);
@@ -135,9 +129,8 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
   const bool has_moved = parallax_px >= bound_px;
   if (has_moved) {
     moved_to_ = found.translation;
-  }
-  if (is_last_localized_ && last_.frame == frame.number - 1) {
-    fuse_with_prediction(before, seen, std::min(1.0, parallax_px / bound_px));
+  } else if (last_.frame == frame.number - 1) {
+    fuse_with_prediction(before, seen, parallax_px / bound_px);
   }
   const double turn_px =
       camera().mean_focal_px() * view_.world_from_camera.rotation.angularDistance(found.rotation);
@@ -151,21 +144,16 @@ FrameState WindowEstimator::accept_localization(const Frame& frame,
                               : FrameState::kRotating;
 }
 
-/// The less parallax, the more the motion model counts: at `parallax` 1 it does where the landmarks
-/// tell a direction badly: few of them, or in a corner of the image.
+/// The less parallax, the more the motion model counts: at `parallax` 1 it does not.
 void WindowEstimator::fuse_with_prediction(const Rigid3& before,
                                            const SeenLandmarks& seen,
                                            double parallax) {
   const Matrix6d noise = pose_influences(world_from_camera_.inverse(), seen.points, seen.uv,
                                          camera(), localization_.loss_px)
                              .squared_sum();
-  const double sigma_px = std::sqrt(noise.topLeftCorner<3, 3>().trace()) / pixel_units(seen);
-  const double doubt = std::clamp(sigma_px / kDoubtful_px - 1.0, 0.0, 1.0);
-  const double weight = std::max(std::pow(1.0 - parallax * parallax, 2), doubt);
-  if (weight > 0.0) {
-    fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_);
-    world_from_camera_ = before * fused_->prev_from_cur;
-  }
+  const double weight = std::pow(1.0 - parallax * parallax, 2);
+  fused_ = motion_.fuse(before.inverse() * world_from_camera_, noise, weight, interval_s_);
+  world_from_camera_ = before * fused_->prev_from_cur;
 }
 
 /// Nothing is measured: the last motion goes on.
@@ -331,7 +319,7 @@ void WindowEstimator::add_keyframe(const Frame& frame) {
     keyframes_since_refinement_ = 0;
     refinement_.num_fixed_poses =
         window_.keyframes.size() < length ? 1 : window_options_.num_keyframes / 2;
-    is_adjusted_ = refine_window(window_, camera(), refinement_);
+    refine_window(window_, camera(), refinement_);
     world_from_camera_ = window_.keyframes.back().world_from_camera;
     view_.world_from_camera = world_from_camera_;
   }

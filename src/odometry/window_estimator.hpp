@@ -102,7 +102,7 @@ class WindowEstimator final : public Estimator {
   void move_world(const Similarity3& moved);
   void add_move(const Rigid3& move, Matrix6d& covariance) const;
   /// Units of motion that move the median landmark in view by a pixel.
-  [[nodiscard]] double pixel_units(const SeenLandmarks& seen) const;
+  [[nodiscard]] double pixel_units() const;
   void measure_scale(const Frame& frame, FrameState state);
   void describe(const Frame& frame, FrameResult& result);
   void measure_covariance(const Frame& frame, LocalizedFrame& localized);
@@ -127,8 +127,7 @@ class WindowEstimator final : public Estimator {
   MotionCovariance uncertainty_;
   Rigid3 world_from_camera_;                 ///< of the frame in work
   MotionModel motion_;                       ///< between localized frames
-  std::optional<MotionModel::Fused> fused_;  ///< the frame in work
-  bool is_adjusted_ = false;                 ///< it is a keyframe, placed by its window
+  std::optional<MotionModel::Fused> fused_;  ///< the frame in work, where parallax is low
   double assumed_step_;  ///< in the first interval, where nothing measures a length
   HintTrust trust_;
   double speed_ = 0.0;          ///< of the last step measured or assumed, units per second

@@ -38,7 +38,7 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
       .dt_s = interval_s_,
       .usual_step = speed_ * interval_s_,
       .hidden_px = result.state == FrameState::kStationary ? min_flow_px() : min_way_px(),
-      .fused = is_adjusted_ ? std::nullopt : fused_,
+      .fused = fused_,
       .faded = motion_.faded(interval_s_),
       .two_view = localized.two_view,
       .camera = result.camera,
@@ -48,10 +48,10 @@ void WindowEstimator::measure_covariance(const Frame& frame, LocalizedFrame& loc
   add_move(last.inverse() * world_from_prev, result.motion_covariance);
 }
 
-double WindowEstimator::pixel_units(const SeenLandmarks& seen) const {
+double WindowEstimator::pixel_units() const {
   const Rigid3 camera_from_world = world_from_camera_.inverse();
   std::vector<double> depths;
-  for (const Eigen::Vector3d& point : seen.points) {
+  for (const Eigen::Vector3d& point : find_seen_landmarks(window_, view_.points).points) {
     depths.push_back((camera_from_world * point).z());
   }
   return depths.empty() ? 0.0 : median(std::move(depths)) / camera().mean_focal_px();
@@ -73,11 +73,10 @@ void WindowEstimator::measure_scale(const Frame& frame, FrameState state) {
                                ? road_landmarks(window_, world_from_camera_, view_.points, camera())
                                : std::vector<RoadLandmark>();
     // A position that a motion model has a share in tells no length.
-    const bool is_shared =
-        (fused_.has_value() && !is_adjusted_) || state == FrameState::kStationary;
-    const double position_units = is_shared
-                                      ? std::numeric_limits<double>::infinity()
-                                      : pixel_units(find_seen_landmarks(window_, view_.points));
+    const bool is_shared = state == FrameState::kLowParallax || state == FrameState::kRotating ||
+                           state == FrameState::kStationary;
+    const double position_units =
+        is_shared ? std::numeric_limits<double>::infinity() : pixel_units();
     const double factor =
         scale_.measure(frame.road ? &road : nullptr, world_from_camera_.inverse() * road_pose_,
                        frame.time_s, position_units, landmarks);

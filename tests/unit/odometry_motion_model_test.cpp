@@ -44,34 +44,6 @@ TEST(MotionModel, AtWeightZeroTheMeasurementIsTaken) {
   EXPECT_LT((model.predict(kDt_s).translation - motion.translation).norm(), 1e-9);
 }
 
-/// One direction of the turn is not told from a translation: the other ones are measured on.
-TEST(MotionModel, ADirectionThatIsNotToldFollowsTheModel) {
-  testing::SceneRandom random(5);
-  MotionModel model;
-  Rigid3 pose;
-  Rigid3 truth;
-  const Rigid3 motion(so3_exp({0.0, 0.05, 0.0}), {0.01, 0.0, 0.02});
-  for (int i = 0; i < 90; ++i) {
-    truth = truth * motion;
-    const bool is_told = i < 30;
-    const double off = random.noise(is_told ? 1e-4 : 0.03).x();
-    Vector6d along = Vector6d::Zero();
-    along << 3.0, 0.0, 0.0, 0.0, -1.0, 0.0;  // of a wall 3 units away
-    along /= along.norm();
-    const Matrix6d noise =
-        noise_of(1e-4, 1e-4) + (is_told ? 0.0 : 0.03 * 0.03) * along * along.transpose();
-    const Vector6d error = off * along;
-    const Rigid3 seen = truth * Rigid3(so3_exp(error.tail<3>()), error.head<3>());
-    const auto fused = model.fuse(pose.inverse() * seen, noise, 1.0, kDt_s);
-    model.measured(fused.prev_from_cur, kDt_s, true);
-    pose = pose * fused.prev_from_cur;
-    if (!is_told) {
-      EXPECT_LT(so3_log(fused.prev_from_cur.rotation.conjugate() * motion.rotation).norm(), 0.01)
-          << i;
-    }
-  }
-}
-
 TEST(MotionModel, ACameraThatStandsHasLessNoiseThanItsMeasurements) {
   Followed still;
   double sum = 0.0;
