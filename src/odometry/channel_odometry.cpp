@@ -26,7 +26,6 @@ ChannelOdometry::ChannelOdometry(const Options& options, const Camera& camera, c
     : given_camera_(camera),
       asks_road_(options.scale.source == ScaleSource::kCameraHeight),
       contrast_(contrast_options(options, camera)),
-      road_contrast_({.tracking_resolution = TrackingResolution::kNative}),
       front_end_(create_front_end(options.features)) {
   front_end_->set_mask(mask);
   if (options.odometry.mode == OdometryMode::kTwoFrame) {
