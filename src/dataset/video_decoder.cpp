@@ -20,8 +20,9 @@ Expected<void*> load_symbol(const fs::path& built, const char* symbol, std::stri
   std::string why;
   for (const fs::path& place : places) {
     // Never unloaded: decoders live as long as their videos.
-    if (void* module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL)) {
-      return ::dlsym(module, symbol);
+    void* const module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (void* const found = module != nullptr ? ::dlsym(module, symbol) : nullptr) {
+      return found;
     }
     why += fmt::format("; {}", ::dlerror());
   }

@@ -47,12 +47,11 @@ WholeMap::WholeMap(const PhasedOdometry& odometry)
       camera_sigma(prior_sigma(odometry.options().camera.refine)),
       prior(camera_sigma) {
   if (const auto learnt = odometry.frames().estimator().camera_estimate(); learnt && camera_sigma) {
-    if (!kept.loops.empty()) {
-      prior->tail<3>() << kFreeFocal, kFreeDistortion, kFreeDistortion;
-    }
     camera_sigma->head<3>() = camera_sigma->head<3>().cwiseMin(learnt->sigma.head<3>());
     if (kept.loops.empty()) {
       prior = camera_sigma;
+    } else {
+      prior->tail<3>() << kFreeFocal, kFreeDistortion, kFreeDistortion;
     }
   }
 }

@@ -2,6 +2,7 @@
 // The camera by pictures of printed boards, rendered with a camera that is known.
 #include <cmath>
 #include <filesystem>
+#include <iostream>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -92,6 +93,7 @@ class BoardCalibration : public ::testing::Test {
 
 TEST_F(BoardCalibration, AChessboardTellsTheCameraThatTheFileHolds) {
   const BoardReport report = calibrate("9x6:0.025", test::print_chessboard({9, 6}, 0.025), 25);
+  std::cout << format_board_table(report);
   EXPECT_EQ(report.num_pictures, 25U);
   EXPECT_GE(report.views.size(), 24U);
   expect_true(report.fit, 0.001, 0.5);
