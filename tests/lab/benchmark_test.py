@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 from small_kitti import write_sequence
 from stemvo.lab import benchmark, runs
+from stemvo.lab.cli import main
 
 GRAY = ("--set", "stem.model=gray", "--config", "default")
 
@@ -23,7 +24,7 @@ def kitti(tmp_path):
 
 
 def call(kitti, out, *arguments, code=0):
-    answer = CliRunner().invoke(benchmark.command, [str(kitti), "--out", str(out), *arguments])
+    answer = CliRunner().invoke(main, ["benchmark", str(kitti), "--out", str(out), *arguments])
     assert answer.exit_code == code, answer.output
     return pd.read_csv(out / "benchmark.csv") if (out / "benchmark.csv").exists() else answer.output
 

@@ -12,10 +12,11 @@ from click.testing import CliRunner
 from evo.core import metrics, trajectory
 from evo.tools import file_interface
 from stemvo.lab import bootstrap, compare, tables
+from stemvo.lab.cli import main
 
 
 def call(out, *arguments, code=0):
-    answer = CliRunner().invoke(compare.command, [*map(str, arguments), "--out", str(out)])
+    answer = CliRunner().invoke(main, ["compare", *map(str, arguments), "--out", str(out)])
     assert answer.exit_code == code, answer.output
     return answer.output
 

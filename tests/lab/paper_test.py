@@ -14,6 +14,7 @@ import pytest
 from click.testing import CliRunner
 from small_kitti import write_sequence
 from stemvo.lab import paper
+from stemvo.lab.cli import main
 
 MODEL = pathlib.Path(__file__).parents[2] / "models/default.onnx"
 
@@ -25,7 +26,7 @@ def made(tmp_path_factory):
     write_sequence(folder / "kitti", "06", camera="image_2")
     (folder / "theirs").mkdir()
     (folder / "theirs/06.txt").write_text("".join(f"1 0 0 {0.1 * i} 0 1 0 0 0 0 1 {0.5 * i}\n" for i in range(8)))
-    answer = CliRunner().invoke(paper.command, [str(MODEL), str(folder / "kitti"), "--out", str(folder / "out"), "--filters", "0:2", "--tartanvo", str(folder / "theirs")])
+    answer = CliRunner().invoke(main, ["paper", str(MODEL), str(folder / "kitti"), "--out", str(folder / "out"), "--filters", "0:2", "--tartanvo", str(folder / "theirs")])
     assert answer.exit_code == 0, answer.output
     return folder / "out"
 

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 from stemvo.lab import scene
+from stemvo.lab.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def project(camera_from_world, points, fx, fy, cx, cy):
 
 def call(result, kind):
     out = result / kind
-    answer = CliRunner().invoke(scene.command, [str(result / "result"), str(result / "drive/sequences/00"), "--out", str(out), "--to", kind])
+    answer = CliRunner().invoke(main, ["scene", str(result / "result"), str(result / "drive/sequences/00"), "--out", str(out), "--to", kind])
     assert answer.exit_code == 0, answer.output
     return out
 

@@ -28,15 +28,15 @@ def measured():
 def test_points_land_where_they_are_in_another_brightness_too(measured):
     for name in ("gray", "default"):
         row = warps.row(measured[name]["as it is"])
-        assert row.median[0] < 0.15 and row.found[0] > 0.95 and row.wrong[0] < 0.01
-        assert row.median[1] <= row.median[0] <= row.median[2] < row.percentile_90[0]
-        assert warps.row(measured[name]["gain"]).found[0] > 0.9
+        assert row["median"][0] < 0.15 and row["found"][0] > 0.95 and row["wrong"][0] < 0.01
+        assert row["median"][1] <= row["median"][0] <= row["median"][2] < row["percentile_90"][0]
+        assert warps.row(measured[name]["gain"])["found"][0] > 0.9
 
 
 def test_noise_costs_precision(measured):
     for name in ("gray", "default"):
-        assert warps.row(measured[name]["noise"]).median[0] > 1.5 * warps.row(measured[name]["as it is"]).median[0]
-        assert warps.geometric_mean(measured[name])[0] > warps.row(measured[name]["as it is"]).median[0]
+        assert warps.row(measured[name]["noise"])["median"][0] > 1.5 * warps.row(measured[name]["as it is"])["median"][0]
+        assert warps.geometric_mean(measured[name])[0] > warps.row(measured[name]["as it is"])["median"][0]
 
 
 def test_a_wrong_truth_is_seen():

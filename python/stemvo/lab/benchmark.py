@@ -30,13 +30,13 @@ def methods_of(configs, overrides, model, trajectories, scales):
     for text in trajectories:
         name, found, folder = text.partition("=")
         if not found or not pathlib.Path(folder).is_dir():
-            raise runs.LabError(f"--trajectories: expected NAME=FOLDER of files NN.txt, found '{text}'")
+            raise ValueError(f"--trajectories: expected NAME=FOLDER of files NN.txt, found '{text}'")
         made += [runs.Method(name, scale, folder=pathlib.Path(folder))
                  for scale in (runs.AS_IT_COMES, runs.TRUE_STEPS) if runs.TRUE_STEPS in scales or scale == runs.AS_IT_COMES]
     for method in made:
         method.settings()  # a wrong key is an error now
     if repeated := {method.title for method in made if sum(other.title == method.title for other in made) > 1}:
-        raise runs.LabError(f"expected methods of different names, found two of '{min(repeated)}'")
+        raise ValueError(f"expected methods of different names, found two of '{min(repeated)}'")
     return made
 
 
@@ -160,14 +160,11 @@ def write_report(out, rows, notes, methods, sequences, poses):
 def command(kitti, out, sequences, configs, overrides, model, trajectories, scale, frames):
     """Methods on the sequences of KITTI (sequences/NN, poses/NN.txt). The same command again repeats only what changed."""
     scales = {"both": (runs.ROAD, runs.TRUE_STEPS), "road": (runs.ROAD,), "steps": (runs.TRUE_STEPS,)}[scale]
-    try:
-        methods = methods_of(configs or (() if trajectories and not (overrides or model) else ("default", "paper")),
-                             overrides, model, trajectories, scales)
-        found = runs.sequences_of(kitti, [name for name in sequences.split(",") if name], frames)
-        runs.open_folder(out, "benchmark", [kitti / "sequences", model, *(line.partition("=")[2] for line in trajectories)])
-        rows, poses = measure_all(methods, found, out)
-    except (runs.LabError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+    methods = methods_of(configs or (() if trajectories and not (overrides or model) else ("default", "paper")),
+                         overrides, model, trajectories, scales)
+    found = runs.sequences_of(kitti, [name for name in sequences.split(",") if name], frames)
+    runs.open_folder(out, "benchmark", [kitti / "sequences", model, *(line.partition("=")[2] for line in trajectories)])
+    rows, poses = measure_all(methods, found, out)
     click.echo(write_report(out, rows, [*NOTES, *told_best(methods, found, poses)], methods, found, poses))
     failed = rows[rows["state"] == "failed"]
     for _, row in failed.iterrows():

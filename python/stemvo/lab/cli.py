@@ -26,6 +26,12 @@ class Lazy(click.Group):
     def get_command(self, ctx, name):
         return importlib.import_module(f"stemvo.lab.{name}").command if name in COMMANDS else None
 
+    def invoke(self, ctx):
+        try:
+            return super().invoke(ctx)
+        except (ValueError, OSError, KeyError) as error:
+            raise click.ClickException(str(error)) from None
+
     def format_commands(self, ctx, formatter):
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))

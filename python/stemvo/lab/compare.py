@@ -36,7 +36,7 @@ def trajectory_in(given):
     """The file itself, or that of a result's folder: the adjusted one is a file of its own."""
     file = given / "trajectory_tum.txt" if given.is_dir() else given
     if not file.exists():
-        raise runs.LabError(f"{given}: expected a trajectory file or a result of `stemvo run`, found none")
+        raise ValueError(f"{given}: expected a trajectory file or a result of `stemvo run`, found none")
     return file
 
 
@@ -49,10 +49,10 @@ def load(given, name, truth_file, align, camera_file, tolerance_s, first):
     elif first <= len(true_poses) - len(poses) or len(poses) == len(true_poses):
         which, frames = np.arange(len(poses)), np.arange(len(poses)) + first
     else:
-        raise runs.LabError(f"{file}: expected {len(true_poses) - first} poses, one per line of {truth_file}, found {len(poses)}; "
+        raise ValueError(f"{file}: expected {len(true_poses) - first} poses, one per line of {truth_file}, found {len(poses)}; "
                             "where times are missing --first says which true pose goes with the first")
     if len(frames) < 2:
-        raise runs.LabError(f"{file}: expected times of {truth_file}, found {len(frames)} within {tolerance_s} s")
+        raise ValueError(f"{file}: expected times of {truth_file}, found {len(frames)} within {tolerance_s} s")
     poses, truth = poses[which], true_poses[frames]
     metrics = stemvo.evaluate(poses, truth, align) | {"poses": len(poses)}
     return Path(name, file, stemvo.align(poses, truth, align=align), frames, metrics)
@@ -62,7 +62,7 @@ def common(paths, true_poses, align):
     """The paths at the poses that all of them have, aligned there anew, and the truth of these."""
     frames = set(paths[0].frames.tolist()).intersection(*(path.frames.tolist() for path in paths[1:]))
     if len(frames) < 2:
-        raise runs.LabError(f"expected paths that share poses, found {len(frames)} in common")
+        raise ValueError(f"expected paths that share poses, found {len(frames)} in common")
     frames = np.array(sorted(frames))
     found = {path.name: stemvo.align(path.poses[np.isin(path.frames, frames)], true_poses[frames], align=align) for path in paths}
     truth = stemvo.align(true_poses[frames], true_poses[frames], align="none")
@@ -137,7 +137,7 @@ def names_of(given):
         names = ["/".join(part[-depth:]) for part in parts]
         if len(set(names)) == len(names):
             return names
-    raise runs.LabError("expected different files, found one twice")
+    raise ValueError("expected different files, found one twice")
 
 
 CAPTIONS = {"numbers": "Errors of each path", "segments": "Errors by length of the segments",
@@ -178,13 +178,10 @@ def write_report(out, title, found, lines, positions, note, width):
 @click.option("--width", type=click.Choice(list(figures.WIDTHS_IN)), default="column", show_default=True, help="Of the figures: of a paper's")
 def command(given, gt, out, align, names, camera, tolerance, first, width):
     """Results of `stemvo run`, or trajectory files of any program (KITTI, TUM, EuRoC), compared."""
-    try:
-        titles = names.split(",") if names else names_of(given)
-        if len(titles) != len(given) or len(set(titles)) != len(titles):
-            raise runs.LabError(f"--names: expected {len(given)} different names, found {len(titles)}")
-        paths = [load(file, name, gt, align, camera, tolerance, first) for file, name in zip(given, titles)]
-        found, lines, positions = compare(paths, gt, camera, align)
-        runs.open_folder(out, "compare", [gt, camera, *(path.file for path in paths)])
-        click.echo(write_report(out, f"{' and '.join(titles)} against {gt.name}", found, lines, positions, ALIGNMENTS[align], width))
-    except (runs.LabError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+    titles = names.split(",") if names else names_of(given)
+    if len(titles) != len(given) or len(set(titles)) != len(titles):
+        raise ValueError(f"--names: expected {len(given)} different names, found {len(titles)}")
+    paths = [load(file, name, gt, align, camera, tolerance, first) for file, name in zip(given, titles)]
+    found, lines, positions = compare(paths, gt, camera, align)
+    runs.open_folder(out, "compare", [gt, camera, *(path.file for path in paths)])
+    click.echo(write_report(out, f"{' and '.join(titles)} against {gt.name}", found, lines, positions, ALIGNMENTS[align], width))

@@ -87,6 +87,10 @@ def _map_levels(image, function):
     return cv2.LUT(image, _levels(function(np.arange(256.0))))
 
 
+def _gained(image, gain):
+    return _map_levels(image, lambda level: gain * level)
+
+
 def _blend(image, weight, gray):
     """weight * image + (1 - weight) * gray."""
     weight = np.asarray(weight, np.float32)
@@ -105,20 +109,6 @@ def _texture(width, height, like, seed):
     return image if like.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
 
 
-def _exposure_steps(image, strength, at):
-    gain = strength ** at._replace(frame=at.frame // 12).random.uniform(-1.0, 1.0)
-    return _map_levels(image, lambda level: gain * level)
-
-
-def _exposure_drift(image, strength, at):
-    gain = strength ** -math.sin(2.0 * math.pi * at.frame / 80.0)
-    return _map_levels(image, lambda level: gain * level)
-
-
-def _gamma(image, strength, at):
-    return _map_levels(image, lambda level: 255.0 * (level / 255.0) ** strength)
-
-
 def _vignette(image, strength, at):
     height, width = image.shape[:2]
     v, u = _grid(image)
@@ -130,18 +120,6 @@ def _dusk(image, strength, at):
     light = strength ** min(1.0, at.frame / 50.0)
     electrons = image * (light * 4000.0 / 255.0)
     return _levels((electrons + np.sqrt(electrons + 9.0) * at.random.standard_normal(image.shape)) * 255.0 / (4000.0 * math.sqrt(light)))
-
-
-def _low_contrast(image, strength, at):
-    return _map_levels(image, lambda level: 128.0 + strength * (level - 128.0))
-
-
-def _sensor_noise(image, strength, at):
-    return _levels(image + strength * at.random.standard_normal(image.shape))
-
-
-def _gaussian_blur(image, strength, at):
-    return cv2.GaussianBlur(image, (0, 0), _pixels(image, strength))
 
 
 def _motion_blur(image, strength, at):
@@ -191,11 +169,6 @@ def _dirt(image, strength, at):
     return _blend(image, cv2.GaussianBlur(weight, (0, 0), _pixels(image, 5.0)), 60.0)
 
 
-def _occluder_passes(frame, strength):
-    """From one side to the other in 30 of every 60 frames, the first 20 without."""
-    return 20 <= frame % 60 < 50
-
-
 def _occluder(image, strength, at):
     height, width = image.shape[:2]
     size = int(strength * width)
@@ -215,16 +188,11 @@ def _moving_third(image, strength, at):
     return image
 
 
-def _is_black(frame, strength):
-    return 30 <= frame % 100 < 30 + int(strength)
-
-
 def _falls_out(i, share, seed):
     return i > 0 and At(i, seed, None).random.uniform() < share
 
 
-def _dropped(recording, share, seed):
-    kept = [i for i in range(len(recording)) if not _falls_out(i, share, seed)]
+def _kept(recording, kept):
     return Frames(kept, kept, recording.camera)
 
 
@@ -235,14 +203,11 @@ def _repeated(recording, share, seed):
     return Frames(shown, list(range(len(recording))), recording.camera)
 
 
-def _every_nth(recording, step, seed):
-    kept = list(range(0, len(recording), int(step)))
-    return Frames(kept, kept, recording.camera)
-
-
-def _of_camera(recording, left, top, width, height, factor):
-    """Another camera's frames: a part of the image, resized."""
-    camera, size = recording.camera, (round(factor * width), round(factor * height))
+def _viewed(recording, share=1.0, factor=1.0):
+    """Another camera's frames: the middle of the image, this share of its sides, resized."""
+    camera = recording.camera
+    width, height = int(share * camera.width), int(share * camera.height)
+    left, top, size = (camera.width - width) // 2, (camera.height - height) // 2, (round(factor * width), round(factor * height))
     x, y = size[0] / width, size[1] / height
     made = stemvo.Camera(camera.fx * x, camera.fy * y, (camera.cx - left + 0.5) * x - 0.5, (camera.cy - top + 0.5) * y - 0.5, *size)
 
@@ -254,39 +219,40 @@ def _of_camera(recording, left, top, width, height, factor):
     return Frames(everything, everything, made, view)
 
 
-def _cropped(recording, share, seed):
-    camera = recording.camera
-    width, height = int(share * camera.width), int(share * camera.height)
-    return _of_camera(recording, (camera.width - width) // 2, (camera.height - height) // 2, width, height, 1.0)
-
-
-def _scaled(recording, factor, seed):
-    return _of_camera(recording, 0, 0, recording.camera.width, recording.camera.height, factor)
-
-
 ALL = (
-    Disturbance("exposure_steps", "light", "gain jumps every 12 frames, up to this factor", (1.2, 1.5, 2.0), _exposure_steps),
-    Disturbance("exposure_drift", "light", "gain swings slowly up to this factor", (1.5, 2.0, 3.0), _exposure_drift),
-    Disturbance("gamma", "light", "gray levels to this power", (1.5, 2.2, 3.0), _gamma),
+    Disturbance("exposure_steps", "light", "gain jumps every 12 frames, up to this factor", (1.2, 1.5, 2.0),
+                lambda image, factor, at: _gained(image, factor ** at._replace(frame=at.frame // 12).random.uniform(-1.0, 1.0))),
+    Disturbance("exposure_drift", "light", "gain swings slowly up to this factor", (1.5, 2.0, 3.0),
+                lambda image, factor, at: _gained(image, factor ** -math.sin(2.0 * math.pi * at.frame / 80.0))),
+    Disturbance("gamma", "light", "gray levels to this power", (1.5, 2.2, 3.0), lambda image, power, at: _map_levels(image, lambda level: 255.0 * (level / 255.0) ** power)),
     Disturbance("vignette", "light", "this share of the light is lost in the corners", (0.3, 0.6, 0.9), _vignette),
     Disturbance("dusk", "noise", "the light falls to this share in 50 frames, photon and read noise; gain makes up for half of the stops", (0.1, 0.03, 0.01), _dusk),
-    Disturbance("low_contrast", "light", "this share of the contrast is left", (0.5, 0.25, 0.1), _low_contrast),
-    Disturbance("sensor_noise", "noise", "normal noise of this many gray levels", (6.0, 12.0, 24.0), _sensor_noise),
-    Disturbance("gaussian_blur", "blur", "of this sigma, pixels of a frame 1242 wide", (1.0, 2.0, 3.0), _gaussian_blur),
+    Disturbance("low_contrast", "light", "this share of the contrast is left", (0.5, 0.25, 0.1),
+                lambda image, share, at: _map_levels(image, lambda level: 128.0 + share * (level - 128.0))),
+    Disturbance("sensor_noise", "noise", "normal noise of this many gray levels", (6.0, 12.0, 24.0),
+                lambda image, sigma, at: _levels(image + sigma * at.random.standard_normal(image.shape))),
+    Disturbance("gaussian_blur", "blur", "of this sigma, pixels of a frame 1242 wide", (1.0, 2.0, 3.0),
+                lambda image, sigma, at: cv2.GaussianBlur(image, (0, 0), _pixels(image, sigma))),
     Disturbance("motion_blur", "blur", "along a line so long, of another direction in each frame", (5.0, 11.0, 21.0), _motion_blur),
     Disturbance("jpeg", "noise", "compressed at this quality", (30.0, 15.0, 7.0), _jpeg),
     Disturbance("fog", "weather", "visible so far, metres, on a flat road between walls 40 m away", (100.0, 50.0, 25.0), _fog),
     Disturbance("rain", "weather", "so many streaks per frame of 1242x375", (200.0, 600.0, 1500.0), _rain),
     Disturbance("shadows", "light", "bands that move over the image take this share of the light", (0.3, 0.5, 0.7), _shadows),
     Disturbance("dirt", "in the way", "blots on the lens over this share of the image", (0.05, 0.1, 0.2), _dirt),
-    Disturbance("occluder", "in the way", "something passes before the camera, of this share of the image", (0.1, 0.2, 0.4), _occluder, None, _occluder_passes),
+    Disturbance("occluder", "in the way", "something passes before the camera, of this share of the image", (0.1, 0.2, 0.4), _occluder, None,
+                lambda frame, share: 20 <= frame % 60 < 50),  # the first 20 of every 60 frames without
     Disturbance("moving_third", "in the way", "a third of the image moves on its own, pixels per frame", (2.0, 5.0, 10.0), _moving_third),
-    Disturbance("blackout", "in the way", "no light in so many of 100 frames", (3.0, 10.0, 20.0), lambda image, strength, at: np.zeros_like(image), None, _is_black),
-    Disturbance("dropped", "other frames", "this share of the frames is missing", (0.05, 0.1, 0.2), None, _dropped),
+    Disturbance("blackout", "in the way", "no light in so many of 100 frames", (3.0, 10.0, 20.0),
+                lambda image, count, at: np.zeros_like(image), None, lambda frame, count: 30 <= frame % 100 < 30 + int(count)),
+    Disturbance("dropped", "other frames", "this share of the frames is missing", (0.05, 0.1, 0.2), None,
+                lambda recording, share, seed: _kept(recording, [i for i in range(len(recording)) if not _falls_out(i, share, seed)])),
     Disturbance("repeated", "other frames", "this share of the frames shows the one before", (0.05, 0.1, 0.2), None, _repeated),
-    Disturbance("every_nth", "other frames", "only every so many frames", (2.0, 3.0, 5.0), None, _every_nth),
-    Disturbance("cropped", "other views", "only the middle of the image, this share of its sides", (0.8, 0.6, 0.4), None, _cropped),
-    Disturbance("scaled", "other views", "the image made smaller by this factor", (0.75, 0.5, 0.35), None, _scaled),
+    Disturbance("every_nth", "other frames", "only every so many frames", (2.0, 3.0, 5.0), None,
+                lambda recording, step, seed: _kept(recording, list(range(0, len(recording), int(step))))),
+    Disturbance("cropped", "other views", "only the middle of the image, this share of its sides", (0.8, 0.6, 0.4), None,
+                lambda recording, share, seed: _viewed(recording, share=share)),
+    Disturbance("scaled", "other views", "the image made smaller by this factor", (0.75, 0.5, 0.35), None,
+                lambda recording, factor, seed: _viewed(recording, factor=factor)),
 )
 
 

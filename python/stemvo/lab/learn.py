@@ -109,16 +109,13 @@ def command(drives, out, steps, seed):
 
     Corners of frames that are warped and disturbed (as `stemvo-lab warps`), 8x8 weights, symmetric along x, y and the diagonals: what
     lands them nearest to where they are. The same drives, steps and seed give the same filter."""
-    try:
-        crops = teaching.collect(frames_of(drives, seed), seed)
-        click.echo(f"{len(crops.before)} corners")
-        costs = []
-        for number, (weights, value) in enumerate(learn(crops, steps, seed), 1):
-            costs.append(value)
-            if number % 50 == 0 or number == steps:
-                click.echo(f"step {number}: {np.mean(costs[-50:]):.3f}")
-        names = " ".join("/".join(pathlib.Path(drive).parts[-3:]) for drive in drives)
-        write(rounded(weights), out, f"stemvo-lab learn {names} --out {out.name} --steps {steps} --seed {seed}")
-        click.echo(out)
-    except (OSError, ValueError, cv2.error) as error:
-        raise click.ClickException(str(error)) from error
+    crops = teaching.collect(frames_of(drives, seed), seed)
+    click.echo(f"{len(crops.before)} corners")
+    costs = []
+    for number, (weights, value) in enumerate(learn(crops, steps, seed), 1):
+        costs.append(value)
+        if number % 50 == 0 or number == steps:
+            click.echo(f"step {number}: {np.mean(costs[-50:]):.3f}")
+    names = " ".join("/".join(pathlib.Path(drive).parts[-3:]) for drive in drives)
+    write(rounded(weights), out, f"stemvo-lab learn {names} --out {out.name} --steps {steps} --seed {seed}")
+    click.echo(out)

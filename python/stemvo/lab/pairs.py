@@ -17,14 +17,6 @@ class Pair(NamedTuple):
     motion: np.ndarray  # 2x3: pixels of `after` from pixels of `before`
 
 
-def gain(before, after, rng):
-    return before, after * np.exp(rng.uniform(-0.6, 0.6)) + rng.uniform(-15, 15)
-
-
-def gamma(before, after, rng):
-    return before, 255 * (np.clip(after, 0, 255) / 255) ** np.exp(rng.uniform(-0.7, 0.7))
-
-
 def noise(before, after, rng):
     level = rng.uniform(6, 20)
     return tuple(image + rng.normal(0, level, image.shape) for image in (before, after))
@@ -35,10 +27,6 @@ def dusk(before, after, rng):
     light = np.exp(rng.uniform(np.log(0.02), np.log(0.15)))
     return tuple((rng.poisson(np.clip(2 * light * image, 0, None)) / 2 + rng.normal(0, 1, image.shape)) / np.sqrt(light)
                  for image in (before, after))
-
-
-def blur(before, after, rng):
-    return before, cv2.GaussianBlur(after, (0, 0), rng.uniform(0.5, 1.8))
 
 
 def low_contrast(before, after, rng):
@@ -82,12 +70,13 @@ def jpeg(before, after, rng):
                  for image in (before, after))
 
 
-def as_it_is(before, after, rng):
-    return before, after
-
-
-DISTURBANCES: dict[str, Disturbance] = {"as it is": as_it_is, "gain": gain, "gamma": gamma, "noise": noise, "dusk": dusk, "blur": blur,
-                                        "low contrast": low_contrast, "fog": fog, "shadow": shadow, "rain": rain, "jpeg": jpeg}
+DISTURBANCES: dict[str, Disturbance] = {
+    "as it is": lambda before, after, rng: (before, after),
+    "gain": lambda before, after, rng: (before, after * np.exp(rng.uniform(-0.6, 0.6)) + rng.uniform(-15, 15)),
+    "gamma": lambda before, after, rng: (before, 255 * (np.clip(after, 0, 255) / 255) ** np.exp(rng.uniform(-0.7, 0.7))),
+    "noise": noise, "dusk": dusk,
+    "blur": lambda before, after, rng: (before, cv2.GaussianBlur(after, (0, 0), rng.uniform(0.5, 1.8))),
+    "low contrast": low_contrast, "fog": fog, "shadow": shadow, "rain": rain, "jpeg": jpeg}
 
 
 def _bytes(image: np.ndarray) -> np.ndarray:

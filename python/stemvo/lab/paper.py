@@ -53,7 +53,7 @@ def export(weights, layers, out, preprocessing=None):
         return [_layer(weights)], None
     tool = pathlib.Path(__file__).resolve().parents[3] / "tools/export_stem.py"
     if not tool.exists():
-        raise runs.LabError(f"{weights}: expected an .onnx file that tools/export_stem.py of a checkout wrote")
+        raise ValueError(f"{weights}: expected an .onnx file that tools/export_stem.py of a checkout wrote")
     listed = _output(tool, weights, "--list")
     totals = re.search(r"^layers (\d+), filters (\d+), used (\d+) .*not used (\d+)", listed, re.MULTILINE)
     if layers == "all" and weights.suffix != ".npz":  # which holds one
@@ -67,7 +67,7 @@ def export(weights, layers, out, preprocessing=None):
 def _output(tool, *arguments):
     done = subprocess.run([sys.executable, tool, *arguments], capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise runs.LabError((done.stderr or done.stdout).strip().removeprefix("error: "))
+        raise ValueError((done.stderr or done.stdout).strip().removeprefix("error: "))
     return done.stdout
 
 
@@ -85,7 +85,7 @@ def weights_in(given):
     """The file, or all of a folder."""
     files = [given] if given.is_file() else sorted(file for file in given.iterdir() if file.suffix in SUFFIXES)
     if not files:
-        raise runs.LabError(f"{given}: expected weights ({', '.join(SUFFIXES)}), found none")
+        raise ValueError(f"{given}: expected weights ({', '.join(SUFFIXES)}), found none")
     return files
 
 
@@ -117,7 +117,7 @@ def table_2(layers, sequence, chosen, config, out):
         method = runs.Method(label, runs.TRUE_STEPS, config | options)
         row, poses = runs.run(method, sequence, out / "runs" / sequence.name / re.sub(r"[^A-Za-z0-9.]+", "_", label))
         if poses is None:
-            raise runs.LabError(f"{label}: {row['problem']}")
+            raise ValueError(f"{label}: {row['problem']}")
         is_detected = row["tracked_fraction"] * len(poses) >= LEAST_MEASURED * (len(poses) - 1) + 1
         motion = score.mean_motion(poses) if is_detected else (NOT_DETECTED, NOT_DETECTED)
         rows.append({"Layer-filter": label, "E_t, m": motion[0], "E_r, deg": motion[1], "t_rel, %": row["t_rel_percent"] if is_detected else None,
@@ -207,7 +207,7 @@ def reproduce(weights, kitti, out, layers, preprocessing, chosen, frames, winner
     sequences = runs.sequences_of(kitti, SEQUENCES)
     ran = [sequence for sequence in sequences if not sequence.problem and sequence.truth is not None]
     if not ran:
-        raise runs.LabError(f"{kitti}: expected sequences {', '.join(SEQUENCES)} with true poses, found none")
+        raise ValueError(f"{kitti}: expected sequences {', '.join(SEQUENCES)} with true poses, found none")
     for_filters = runs.Sequence(kitti, ran[0].name, ran[0].official, min(frames, len(ran[0])))
     tables.write(table_1(counted), out / "table1", "Table 1: layers and filters", [
         "Used: plain convolutions, the rule that gives the paper's numbers on its networks. A stem's file holds one layer."])
@@ -248,11 +248,8 @@ def reproduce(weights, kitti, out, layers, preprocessing, chosen, frames, winner
 def command(weights, kitti, out, layers, preprocessing, filters, frames, winner, config, deepvo, tartanvo):
     """The paper's tables 1, 2 and 4 and figures 1, 3, 4 and 5 from WEIGHTS (a file or a folder of them) and KITTI."""
     chosen = re.fullmatch(r"(\d+):(\d+)", filters or "0:1")
-    try:
-        if not chosen:
-            raise runs.LabError(f"--filters: expected A:B, found '{filters}'")
-        runs.open_folder(out, "paper", [*weights_in(weights), kitti / "sequences"])
-        click.echo(reproduce(weights, kitti, out, layers, preprocessing, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
-                             config, {"DeepVO": deepvo, "TartanVO": tartanvo}))
-    except (runs.LabError, ValueError) as error:
-        raise click.ClickException(str(error)) from None
+    if not chosen:
+        raise ValueError(f"--filters: expected A:B, found '{filters}'")
+    runs.open_folder(out, "paper", [*weights_in(weights), kitti / "sequences"])
+    click.echo(reproduce(weights, kitti, out, layers, preprocessing, tuple(map(int, chosen.groups())) if filters else None, frames, winner,
+                         config, {"DeepVO": deepvo, "TartanVO": tartanvo}))

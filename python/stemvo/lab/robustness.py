@@ -16,7 +16,7 @@ from stemvo.lab import bootstrap, score, work
 from stemvo.lab.disturbances import ALL, Disturbed, find
 from stemvo.lab.ranking import number
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import LabError, open_folder, options_of
+from stemvo.lab.runs import open_folder, options_of
 from stemvo.lab.search import program_hash
 
 CONTROLS = ("gray", "red", "green", "blue", "log", "census", "orb", "sift")
@@ -217,39 +217,36 @@ def command(drives, out, frames, kinds, controls, config, overrides, jobs, addre
     100 m, in brackets the share of frames with a measured motion, and how many times as large the channel's rotation error is as a control's,
     with the 95 % interval; * where it leaves out 1. Rows in OUT/rows.csv are not computed again.
     """
-    try:
-        values = {"scale.source": "ground_truth"} | options_of(config, overrides)
-        has_true_steps = values["scale.source"] == "ground_truth"
-        values |= {"scale.source": "none"} if has_true_steps else {}
-        opened = [score.Drive(str(pathlib.Path(drive).resolve()), frames) for drive in dict.fromkeys(drives)]
-        has_color = any((drive.open()[0][0].ndim == 3) for drive in opened)
-        channels = contenders(values, list(dict.fromkeys(filter(None, controls.split(",")))) or [one for one in CONTROLS if has_color or one not in COLORS])
-        for options in channels.values():
-            stemvo.Odometry(opened[0].open().camera, options | {"threads": 1})  # what is refused is refused now
-        asked = list(filter(None, kinds.split(",")))
-        planned = [("none", "none", 0.0)] if not asked or "none" in asked else []
-        for one in [find(name) for name in asked if name != "none"] if asked else ALL:
-            planned += [(one.name, one.group, strength) for strength in one.strengths]
-        open_folder(out, "robustness", [*(f"{drive}/times.txt" for drive in drives), config])
-        rows, hashes, program = Rows(out / "rows.csv", COLUMNS, len(KEY)), {drive: drive.hash() for drive in opened}, program_hash()
-        tasks = {}
-        for kind, _, strength in planned:
-            for drive in opened:
-                for name, options in channels.items():
-                    of = hashlib.sha256(f"{program} {sorted(options.items())} {has_true_steps}".encode()).hexdigest()[:16]
-                    tasks[kind, strength, drive, name] = Task(name, tuple(options.items()), has_true_steps, drive, kind, strength), (of, drive.name, hashes[drive], kind, strength)
-        from tqdm import tqdm
+    values = {"scale.source": "ground_truth"} | options_of(config, overrides)
+    has_true_steps = values["scale.source"] == "ground_truth"
+    values |= {"scale.source": "none"} if has_true_steps else {}
+    opened = [score.Drive(str(pathlib.Path(drive).resolve()), frames) for drive in dict.fromkeys(drives)]
+    has_color = any((drive.open()[0][0].ndim == 3) for drive in opened)
+    channels = contenders(values, list(dict.fromkeys(filter(None, controls.split(",")))) or [one for one in CONTROLS if has_color or one not in COLORS])
+    for options in channels.values():
+        stemvo.Odometry(opened[0].open().camera, options | {"threads": 1})  # what is refused is refused now
+    asked = list(filter(None, kinds.split(",")))
+    planned = [("none", "none", 0.0)] if not asked or "none" in asked else []
+    for one in [find(name) for name in asked if name != "none"] if asked else ALL:
+        planned += [(one.name, one.group, strength) for strength in one.strengths]
+    open_folder(out, "robustness", [*(f"{drive}/times.txt" for drive in drives), config])
+    rows, hashes, program = Rows(out / "rows.csv", COLUMNS, len(KEY)), {drive: drive.hash() for drive in opened}, program_hash()
+    tasks = {}
+    for kind, _, strength in planned:
+        for drive in opened:
+            for name, options in channels.items():
+                of = hashlib.sha256(f"{program} {sorted(options.items())} {has_true_steps}".encode()).hexdigest()[:16]
+                tasks[kind, strength, drive, name] = Task(name, tuple(options.items()), has_true_steps, drive, kind, strength), (of, drive.name, hashes[drive], kind, strength)
+    from tqdm import tqdm
 
-        missing = {task: key for task, key in tasks.values() if rows.get(key) is None}
-        if missing:
-            with work.workers(jobs, address, ray) as workers:
-                for task, row in tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
-                    rows.append([dict(zip(KEY, missing[task])) | row | {"channel": task.channel}])
-                    if row["refused"]:
-                        click.echo(f"{task.drive.name}, {task.disturbance} {task.strength}, {task.channel}: {row['refused']}", err=True)
-        lines = [Line(kind, group, strength, {name: [rows.get(tasks[kind, strength, drive, name][1]) for drive in opened] for name in channels}) for kind, group, strength in planned]
-        for line in lines:
-            line.judge()
-        click.echo(write_results(out, lines, opened))
-    except (ValueError, LabError) as error:
-        raise click.ClickException(str(error)) from None
+    missing = {task: key for task, key in tasks.values() if rows.get(key) is None}
+    if missing:
+        with work.workers(jobs, address, ray) as workers:
+            for task, row in tqdm(work.run(workers, outcome, missing), total=len(missing), unit=" runs", disable=None):
+                rows.append([dict(zip(KEY, missing[task])) | row | {"channel": task.channel}])
+                if row["refused"]:
+                    click.echo(f"{task.drive.name}, {task.disturbance} {task.strength}, {task.channel}: {row['refused']}", err=True)
+    lines = [Line(kind, group, strength, {name: [rows.get(tasks[kind, strength, drive, name][1]) for drive in opened] for name in channels}) for kind, group, strength in planned]
+    for line in lines:
+        line.judge()
+    click.echo(write_results(out, lines, opened))

@@ -21,24 +21,20 @@ GROUND = (0, 2)  # axes of KITTI's camera along the road
 LENGTH_TOLERANCE_M = 1.5  # between a sequence's path and the official one
 
 
-class LabError(Exception):
-    """One line for the user."""
-
-
 def open_folder(out, command, inputs):
     """Creates OUT by the rule of `stemvo run`: a new folder, an empty one or results of the same command, which holds no input."""
     root, mark = out.resolve(), f"Results of 'stemvo-lab {command}': its next run may replace them.\n"
     for given in map(pathlib.Path, filter(None, inputs)):
         # A link to a file may lie in the folder, or lead into it.
         if given.exists() and any(root in (place, *place.parents) for place in (given.absolute().parent.resolve(), given.resolve().parent)):
-            raise LabError(f"{out}: expected a folder that holds no input, found {given}")
+            raise ValueError(f"{out}: expected a folder that holds no input, found {given}")
     if out.is_dir() and any(out.iterdir()) and not ((out / ".stemvo").is_file() and (out / ".stemvo").read_text() == mark):
-        raise LabError(f"{out}: expected a new folder, an empty one or results of 'stemvo-lab {command}', found other files")
+        raise ValueError(f"{out}: expected a new folder, an empty one or results of 'stemvo-lab {command}', found other files")
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / ".stemvo").write_text(mark)
     except OSError as error:
-        raise LabError(f"{out}: expected an output folder that can be written, found: {error.strerror}") from None
+        raise ValueError(f"{out}: expected an output folder that can be written, found: {error.strerror}") from None
 
 
 def config_file(name):
@@ -65,7 +61,7 @@ def options_of(config=None, overrides=(), model=None):
     for line in overrides:
         key, found, value = line.partition("=")
         if not found:
-            raise LabError(f"--set: expected KEY=VALUE, found '{line}'")
+            raise ValueError(f"--set: expected KEY=VALUE, found '{line}'")
         values[key] = value
     return values | ({"stem.model": str(model)} if model else {})
 
@@ -138,10 +134,10 @@ def sequences_of(kitti, names=(), frames=None):
     """Those asked for, where one that is not there has a problem, or all."""
     folder, official = pathlib.Path(kitti) / "sequences", published()["sequences"]
     if wrong := [name for name in names if not name or name in (".", "..") or "/" in name]:
-        raise LabError(f"{folder}: expected the names of folders in it, found '{wrong[0]}'")
+        raise ValueError(f"{folder}: expected the names of folders in it, found '{wrong[0]}'")
     found = list(dict.fromkeys(names)) or (sorted(entry.name for entry in folder.iterdir() if entry.is_dir()) if folder.is_dir() else [])
     if not found:
-        raise LabError(f"{folder}: expected a folder per sequence, found none; give the folder above it")
+        raise ValueError(f"{folder}: expected a folder per sequence, found none; give the folder above it")
     return [Sequence(kitti, name, official.get(name), frames) for name in found]
 
 
@@ -166,7 +162,7 @@ def _identity(method, sequence):
 def trajectory_file(method, sequence):
     file = method.folder / f"{sequence.name}.txt"
     if not file.exists():
-        raise LabError(f"{file}: expected a trajectory, found none")
+        raise ValueError(f"{file}: expected a trajectory, found none")
     return file
 
 
@@ -178,7 +174,7 @@ def track(recording, options, progress=None):
         if progress:
             progress(len(results), len(recording))
     if len(results) < len(recording):
-        raise LabError(f"expected {len(recording)} images, found {len(recording) - len(results)} that cannot be read")
+        raise ValueError(f"expected {len(recording)} images, found {len(recording) - len(results)} that cannot be read")
     in_units = odometry.scale_source == "none" or not any(result.scale_state in ("measured", "held") for result in results)
     return np.stack([result.world_from_camera for result in results]), np.mean([result.is_measured for result in results]), in_units
 
@@ -190,10 +186,10 @@ def others_poses(method, sequence):
     if times is not None:
         which, frames = stemvo.pair_by_time(times, sequence.recording.timestamps)
         if len(frames) < len(sequence):
-            raise LabError(f"{file}: expected a pose of each of {len(sequence)} frames, found {len(frames)}")
+            raise ValueError(f"{file}: expected a pose of each of {len(sequence)} frames, found {len(frames)}")
         poses = poses[which]
     if len(poses) < len(sequence):
-        raise LabError(f"{file}: expected {len(sequence)} poses, found {len(poses)}")
+        raise ValueError(f"{file}: expected {len(sequence)} poses, found {len(poses)}")
     return poses[:len(sequence)]
 
 
@@ -216,7 +212,7 @@ def run(method, sequence, folder, progress=None):
         if before.get("inputs") == identity and before.get("poses") == hashlib.sha256(poses_file.read_bytes()).hexdigest():
             return before["row"], stemvo.read_trajectory(poses_file)[0]
         row, poses = _compute(method, sequence, row, progress)
-    except (LabError, ValueError, OSError) as error:
+    except (ValueError, OSError) as error:
         return row | {"problem": str(error)}, None
     folder.mkdir(parents=True, exist_ok=True)
     text = "".join(" ".join(f"{number + 0.0:.12e}" for number in pose[:3].ravel()) + "\n" for pose in poses)

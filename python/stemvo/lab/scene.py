@@ -22,7 +22,7 @@ def read_landmarks(file, num_cameras):
     head, found, body = file.read_bytes().partition(b"end_header\n")
     counts = [int(line.split()[2]) for line in head.decode("ascii", "replace").splitlines() if line.startswith("element vertex ")]
     if not found or not counts or len(body) < counts[0] * _VERTEX.itemsize or counts[0] < num_cameras:
-        raise runs.LabError(f"{file}: expected a map of `stemvo run`, found another file")
+        raise ValueError(f"{file}: expected a map of `stemvo run`, found another file")
     vertices = np.frombuffer(body, _VERTEX, counts[0] - num_cameras)
     return vertices["position"].astype(float), vertices["rgb"]
 
@@ -86,16 +86,13 @@ def write_nerfstudio(out, camera, names, poses, points):
 @click.option("--camera", type=click.Path(exists=True, path_type=pathlib.Path), help="Camera file, as `stemvo run` had it")
 def command(result, recording, out, kind, camera):
     """RESULT of `stemvo run` on RECORDING: its images without distortion, camera, poses and landmarks for another program."""
-    try:
-        poses, points, said = read_result(result)
-        first = said["first_frame"]
-        read = stemvo.read_recording(recording, camera, frames=f"{first}:{first + len(poses)}")
-        pinhole = said["camera"]
-        intrinsics = {"w": read.camera.width, "h": read.camera.height, "fl_x": pinhole["fx_px"], "fl_y": pinhole["fy_px"],
-                      "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX}
-        runs.open_folder(out, "scene", [result / "metrics.json", recording, camera])
-        names = write_images(read, first, out / "images")
-        {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](out, intrinsics, names, poses, points)
-    except (runs.LabError, ValueError, KeyError, OSError) as error:
-        raise click.ClickException(str(error)) from None
+    poses, points, said = read_result(result)
+    first = said["first_frame"]
+    read = stemvo.read_recording(recording, camera, frames=f"{first}:{first + len(poses)}")
+    pinhole = said["camera"]
+    intrinsics = {"w": read.camera.width, "h": read.camera.height, "fl_x": pinhole["fx_px"], "fl_y": pinhole["fy_px"],
+                  "cx": pinhole["cx_px"] + HALF_PX, "cy": pinhole["cy_px"] + HALF_PX}
+    runs.open_folder(out, "scene", [result / "metrics.json", recording, camera])
+    names = write_images(read, first, out / "images")
+    {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](out, intrinsics, names, poses, points)
     click.echo(f"{out}: {sum(name is not None for name in names)} images, {len(points[0])} points")

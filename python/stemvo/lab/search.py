@@ -15,7 +15,7 @@ import stemvo
 from stemvo import _core
 from stemvo.lab import ranking, score, work
 from stemvo.lab.rows import Rows
-from stemvo.lab.runs import LabError, open_folder, options_of
+from stemvo.lab.runs import open_folder, options_of
 
 # A run's odometry made cheap: pairs of frames, fewer points, steps of the true length.
 DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400, "features.klt_window": 23,
@@ -227,31 +227,28 @@ def command(drives, models, out, frames, held_out, held_out_frames, kinds, filte
     and adds drives, models or filters. After a quarter, half and three quarters of the frames, filters that are worse than the best at 95 %
     by a paired moving-block bootstrap are stopped.
     """
-    try:
-        values = options_of(config, overrides) if config else DEFAULTS | options_of(None, overrides)
-        layers = layers_of(models, values | {"scale.source": "ground_truth"}, baselines)
-        seen = [score.Drive(str(pathlib.Path(drive).resolve()), frames, kind or None) for kind in ["", *filter(None, kinds.split(","))] for drive in drives]
-        seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
-        if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
-            raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
-        jobs = jobs or (None if address else len(os.sched_getaffinity(0)))
-        if planned:
-            return click.echo(plan(planned, layers, seen, jobs or 1))
-        first, _, last = (filters or ":").partition(":")
-        candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in range(layer.num_filters)[int(first or 0) : int(last) if last else None]]
-        candidates = part_of(candidates, shard) if shard else candidates
-        candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
-        open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
-        rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)
-        shares = SHARES[-1:] if exhaustive else SHARES
-        from tqdm import tqdm
+    values = options_of(config, overrides) if config else DEFAULTS | options_of(None, overrides)
+    layers = layers_of(models, values | {"scale.source": "ground_truth"}, baselines)
+    seen = [score.Drive(str(pathlib.Path(drive).resolve()), frames, kind or None) for kind in ["", *filter(None, kinds.split(","))] for drive in drives]
+    seen += [score.Drive(str(pathlib.Path(drive).resolve()), held_out_frames, held_out=True) for drive in held_out]
+    if twice := [name for name, count in collections.Counter((drive.name, drive.held_out) for drive in seen).items() if count > 1]:
+        raise ValueError(f"DRIVE: expected each name once, found {twice[0][0]} twice")
+    jobs = jobs or (None if address else len(os.sched_getaffinity(0)))
+    if planned:
+        return click.echo(plan(planned, layers, seen, jobs or 1))
+    first, _, last = (filters or ":").partition(":")
+    candidates = [(layer, k) for layer in layers if not layer.is_baseline for k in range(layer.num_filters)[int(first or 0) : int(last) if last else None]]
+    candidates = part_of(candidates, shard) if shard else candidates
+    candidates += [(layer, k) for layer in layers if layer.is_baseline for k in range(layer.num_filters)]
+    open_folder(out, "search", [*(f"{drive}/times.txt" for drive in (*drives, *held_out)), *models, *others, config])
+    rows = Rows(out / "rows.csv", COLUMNS, len(KEY), others)
+    shares = SHARES[-1:] if exhaustive else SHARES
+    from tqdm import tqdm
 
-        with work.workers(jobs, address, ray) as workers, tqdm(unit=" filter-frames", disable=None) as bar:
-            search = Search(seen, rows, candidates, workers, bar.update)
-            search.race(shares)
-        table = search.table(shares)
-        click.echo(write_results(out, table))
-        for line in judged(table, seen):
-            click.echo(line)
-    except (ValueError, LabError) as error:
-        raise click.ClickException(str(error)) from None
+    with work.workers(jobs, address, ray) as workers, tqdm(unit=" filter-frames", disable=None) as bar:
+        search = Search(seen, rows, candidates, workers, bar.update)
+        search.race(shares)
+    table = search.table(shares)
+    click.echo(write_results(out, table))
+    for line in judged(table, seen):
+        click.echo(line)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """How far the program's own tracker lands from where a planted warp puts a point, channel by channel."""
 
-import dataclasses
 import json
+import pathlib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 import cv2
@@ -20,23 +20,12 @@ MARGIN = 24.0  # input px from the border
 RESAMPLES = 200
 
 
-@dataclasses.dataclass
-class Landed:
+class Landed(NamedTuple):
     """What became of the points of one image pair."""
 
     errors: np.ndarray  # input px, of the points found
     num_points: int
     num_wrong: int
-
-
-@dataclasses.dataclass(frozen=True)
-class Row:
-    """Of one channel under one disturbance; each value with its interval (5 to 95 %, bootstrap over the frames)."""
-
-    median: tuple[float, float, float]  # input px
-    percentile_90: tuple[float, float, float]
-    found: tuple[float, float, float]  # share of the points
-    wrong: tuple[float, float, float]
 
 
 def _inside(points: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -68,9 +57,11 @@ def resampled(landed: Sequence[Landed], seed: int = 0) -> np.ndarray:
     return np.array([_values([landed[i] for i in rng.integers(len(landed), size=len(landed))]) for _ in range(RESAMPLES)])
 
 
-def row(landed: Sequence[Landed]) -> Row:
-    values, (low, high) = _values(landed), np.nanpercentile(resampled(landed), [5, 95], axis=0)
-    return Row(*((float(v), float(a), float(b)) for v, a, b in zip(values, low, high, strict=True)))
+def row(landed: Sequence[Landed]) -> dict[str, tuple[float, float, float]]:
+    """Of one channel under one disturbance: median and 90th percentile in input px, shares of the points found and wrong; each with its
+    interval (5 to 95 %, bootstrap over the frames)."""
+    values = np.array([_values(landed), *np.nanpercentile(resampled(landed), [5, 95], axis=0)])
+    return dict(zip(("median", "percentile_90", "found", "wrong"), map(tuple, values.T.tolist()), strict=True))
 
 
 def geometric_mean(by_disturbance: Mapping[str, Sequence[Landed]]) -> tuple[float, float, float]:
@@ -109,13 +100,12 @@ def channel_of(text: str) -> dict[str, Any]:
 
 def table(result: Mapping[str, Mapping[str, Sequence[Landed]]]) -> str:
     """As docs/evidence.md holds it: a line a disturbance, a column a channel."""
-    kinds = list(next(iter(result.values())))
-    rows = {name: {kind: row(landed) for kind, landed in found.items()} for name, found in result.items()}
     lines = ["| | " + " | ".join(result) + " |", "|---" * (1 + len(result)) + "|"]
-    for kind in kinds:
-        cells = [f"{r.median[0]:.3f} ({r.median[1]:.3f}-{r.median[2]:.3f}), {r.percentile_90[0]:.2f}; {100 * r.found[0]:.0f} %, {100 * r.wrong[0]:.1f} %"
-                 for r in (rows[name][kind] for name in result)]
-        lines.append(f"| {kind} | " + " | ".join(cells) + " |")
+    for kind in next(iter(result.values())):
+        rows = [row(found[kind]) for found in result.values()]
+        lines.append(f"| {kind} | " + " | ".join(
+            "{:.3f} ({:.3f}-{:.3f}), {:.2f}; {:.0f} %, {:.1f} %".format(*r["median"], r["percentile_90"][0], 100 * r["found"][0], 100 * r["wrong"][0])
+            for r in rows) + " |")
     means = ["{:.3f} ({:.3f}-{:.3f})".format(*geometric_mean(found)) for found in result.values()]
     return "\n".join([*lines, "| geometric mean | " + " | ".join(means) + " |"])
 
@@ -132,13 +122,9 @@ def command(recordings, channels, frames, far, seed, out):
 
     For each disturbance: median error in input px (5 to 95 %, bootstrap over the frames), 90th percentile; share of the points that
     is found, and found in a wrong place (2 px off and more)."""
-    try:
-        images = [image for recording in recordings for image in frames_of(recording, frames)]
-        result = measure({text: channel_of(text) for text in channels}, images, reach=FAR if far else NEAR, seed=seed)
-    except ValueError as error:
-        raise click.ClickException(str(error)) from error
+    images = [image for recording in recordings for image in frames_of(recording, frames)]
+    result = measure({text: channel_of(text) for text in channels}, images, reach=FAR if far else NEAR, seed=seed)
     click.echo(table(result))
     if out:
-        rows = {name: {kind: dataclasses.asdict(row(landed)) for kind, landed in found.items()} for name, found in result.items()}
-        with open(out, "w", encoding="utf-8") as file:
-            json.dump(rows, file, indent=1)
+        rows = {name: {kind: row(landed) for kind, landed in found.items()} for name, found in result.items()}
+        pathlib.Path(out).write_text(json.dumps(rows, indent=1))
