@@ -12,7 +12,7 @@
 #include "console.hpp"
 #include "options.hpp"
 #include "report/check.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "commands.hpp"
 #include "dataset/frame_files.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 
 namespace stemvo::apps {
 namespace {

@@ -14,6 +14,17 @@ namespace {
 
 constexpr const char* kShippedConfigs = "default, fast, paper";
 
+/// Of the configurations that come with the program: <prefix>/share/stemvo/config of the prefix
+/// that it is installed under, else that of the source tree it was built from.
+std::filesystem::path config_folder() {
+  std::error_code code;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
+  const auto installed = program.parent_path().parent_path() / "share/stemvo/config";
+  return !code && std::filesystem::is_directory(installed, code)
+             ? installed
+             : std::filesystem::path(STEMVO_SOURCE_DIR) / "config";
+}
+
 Expected<std::filesystem::path> find_config(const std::string& given) {
   std::error_code code;
   const std::filesystem::path file(given);
@@ -21,7 +32,7 @@ Expected<std::filesystem::path> find_config(const std::string& given) {
     return file;
   }
   for (const std::string& name : {given, given + ".yaml"}) {
-    const std::filesystem::path shipped = data_folder("config") / name;
+    const std::filesystem::path shipped = config_folder() / name;
     if (std::filesystem::exists(shipped, code)) {
       return shipped;
     }
@@ -32,17 +43,6 @@ Expected<std::filesystem::path> find_config(const std::string& given) {
 }
 
 }  // namespace
-
-std::filesystem::path data_folder(const char* name) {
-  std::error_code code;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
-  const std::filesystem::path installed =
-      program.parent_path().parent_path() / "share" / "stemvo" / name;
-  if (!code && std::filesystem::is_directory(installed, code)) {
-    return installed;
-  }
-  return std::filesystem::path(STEMVO_SOURCE_DIR) / name;
-}
 
 template <typename Number>
 CLI::Validator in_range(Number min, Number max) {
@@ -119,12 +119,6 @@ CLI::Option* add_out_folder(CLI::App& command,
                             std::filesystem::path& folder,
                             const std::string& help) {
   return command.add_option("--out", folder, help)->required()->type_name("DIR");
-}
-
-void add_threads_option(CLI::App& command, int& num_threads) {
-  command.add_option("--threads", num_threads, "Threads; 0 (default): all cores")
-      ->type_name("N")
-      ->check(in_range(0, 1024));
 }
 
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz) {

@@ -14,10 +14,6 @@
 
 namespace stemvo::apps {
 
-/// "models" or "config": <prefix>/share/stemvo/NAME of the prefix that the program is installed
-/// under, else NAME in the source tree it was built from.
-[[nodiscard]] std::filesystem::path data_folder(const char* name);
-
 /// --config and --set, which several commands share.
 struct ConfigArguments {
   std::string file;
@@ -45,9 +41,6 @@ template <typename Number>
 CLI::Option* add_out_folder(CLI::App& command,
                             std::filesystem::path& folder,
                             const std::string& help = "Folder for the results; created");
-
-/// --threads N.
-void add_threads_option(CLI::App& command, int& num_threads);
 
 /// --rate HZ.
 CLI::Option* add_rate_option(CLI::App& command, std::optional<double>& rate_hz);

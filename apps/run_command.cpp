@@ -11,7 +11,7 @@
 #include "options.hpp"
 #include "pipeline/run.hpp"
 #include "progress.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 #include "try.hpp"
 
 namespace stemvo::apps {
@@ -189,7 +189,9 @@ void add_options(CLI::App& command, RunArguments& arguments) {
       ->type_name("X,Y,WIDTH,HEIGHT|FILE")
       ->expected(1)
       ->take_all();
-  add_threads_option(command, request.num_threads);
+  command.add_option("--threads", request.num_threads, "Threads; 0 (default): all cores")
+      ->type_name("N")
+      ->check(in_range(0, 1024));
   command.add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));

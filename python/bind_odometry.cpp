@@ -18,7 +18,6 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
-#include "dataset/camera_height.hpp"
 #include "frames.hpp"
 #include "options.hpp"
 #include "options/visit.hpp"

@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "dataset/camera_height.hpp"
 #include "odometry/road/image.hpp"
 #include "synth/synth.hpp"
 

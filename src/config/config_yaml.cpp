@@ -19,6 +19,7 @@ namespace {
 
 /// Keys, and values, that had another name once.
 constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
+    {"features.klt_levels", "features.pyramid_levels"},
     {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
     {"refine.every", "ba.every_n_keyframes"},
     {"refine.loss_px", "ba.loss_px"},
@@ -101,7 +102,7 @@ std::string parse_number(std::string_view kind, const YAML::Node& node, Number& 
   const auto [stop, error] = std::from_chars(text.data() + (has_plus ? 1 : 0), end, value);
   return error == std::errc() && stop == end
              ? std::string()
-             : fmt::format("expected {}, found {}", kind, options::quote(text));
+             : fmt::format("expected {}, found '{}'", kind, one_line(text));
 }
 
 /// Finds where documents begin: YAML::Load reads the first and leaves out others without a word.
@@ -129,49 +130,41 @@ class DocumentLines final : public YAML::EventHandler {
   void OnMapEnd() override {}
 };
 
-/// Walks one YAML map, top level (section empty) or section.
-class MapReader {
- public:
-  MapReader(std::string_view source, std::vector<Key>& keys) : source_(source), keys_(keys) {}
-
-  Status read(const YAML::Node& map, std::string_view section) {
-    if (map.IsNull()) {
-      return {};  // an empty file, or a section whose keys are all commented out
-    }
-    if (!map.IsMap()) {
-      const std::string where = section.empty() ? "" : fmt::format("{}: ", section);
-      return error(map, fmt::format("{}expected keys with values, found {}", where, kind_of(map)));
-    }
-    std::map<std::string, int> first_line;
-    for (const auto& entry : map) {
-      const YAML::Node& key_node = entry.first;
-      const YAML::Node& value = entry.second;
-      const std::string& key = key_node.Scalar();
-      const std::string name = one_line(options::full_name(section, key));
-      // yaml-cpp keeps both entries of a duplicated key without a word.
-      const auto [first, is_new] = first_line.emplace(key, line_of(key_node));
-      if (!is_new) {
-        return error(key_node, fmt::format("{}: duplicated key; it stands on line {} already", name,
-                                           first->second));
-      }
-      if (section.empty() && is_section(key, keys_)) {
-        STEMVO_TRY(read(value, key));
-      } else if (const std::string problem = read_key(section, key, value, keys_);
-                 !problem.empty()) {
-        return error(key_node, fmt::format("{}: {}", name, problem));
-      }
-    }
-    return {};
+/// Reads one map, that of the top level (section empty) or of a section.
+Status read_map(const YAML::Node& map,
+                std::string_view section,
+                std::string_view source,
+                std::vector<Key>& keys) {
+  const auto error = [&](const YAML::Node& node, const std::string& message) {
+    return fail(fmt::format("{}:{}: {}", source, line_of(node), message));
+  };
+  if (map.IsNull()) {
+    return {};  // an empty file, or a section whose keys are all commented out
   }
-
- private:
-  Error error(const YAML::Node& node, const std::string& message) const {
-    return fail(fmt::format("{}:{}: {}", source_, line_of(node), message));
+  if (!map.IsMap()) {
+    const std::string where = section.empty() ? "" : fmt::format("{}: ", section);
+    return error(map, fmt::format("{}expected keys with values, found {}", where, kind_of(map)));
   }
-
-  std::string_view source_;
-  std::vector<Key>& keys_;
-};
+  std::map<std::string, int> first_line;
+  for (const auto& entry : map) {
+    const YAML::Node& key_node = entry.first;
+    const std::string& key = key_node.Scalar();
+    const std::string name = one_line(options::full_name(section, key));
+    // yaml-cpp keeps both entries of a duplicated key without a word.
+    const auto [first, is_new] = first_line.emplace(key, line_of(key_node));
+    if (!is_new) {
+      return error(key_node, fmt::format("{}: duplicated key; it stands on line {} already", name,
+                                         first->second));
+    }
+    if (section.empty() && is_section(key, keys)) {
+      STEMVO_TRY(read_map(entry.second, key, source, keys));
+    } else if (const std::string problem = read_key(section, key, entry.second, keys);
+               !problem.empty()) {
+      return error(key_node, fmt::format("{}: {}", name, problem));
+    }
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -204,7 +197,7 @@ std::string parse(const YAML::Node& node, bool& value) {
   value = text == "true" || text == "on";
   return !problem.empty() || value || text == "false" || text == "off"
              ? problem
-             : fmt::format("expected true or false, found {}", options::quote(text));
+             : fmt::format("expected true or false, found '{}'", one_line(text));
 }
 
 std::string parse(const YAML::Node& node, int& value) {
@@ -223,8 +216,8 @@ std::string parse(const YAML::Node& node, std::vector<double>& value) {
   if (node.IsScalar()) {
     const Expected<YAML::Node> list = parse_document(node.Scalar(), "value");
     if (list && !list->IsSequence()) {
-      return fmt::format("expected a list of numbers like [100, 200], found {}",
-                         options::quote(node.Scalar()));
+      return fmt::format("expected a list of numbers like [100, 200], found '{}'",
+                         one_line(node.Scalar()));
     }
     return list ? parse(*list, value) : list.error().message;
   }
@@ -288,7 +281,7 @@ std::string read_key(std::string_view section,
 }
 
 Status read_document(const YAML::Node& root, std::string_view source, std::vector<Key>& keys) {
-  return MapReader(source, keys).read(root, "");
+  return read_map(root, "", source, keys);
 }
 
 }  // namespace stemvo::config

@@ -10,6 +10,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "config/config.hpp"
 #include "evaluation/pose_file.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/camera.hpp"
@@ -128,5 +129,12 @@ struct FrameSourceRequest : SequenceOptions {
 /// --calib file whose principal point is outside the image (one of another image size).
 [[nodiscard]] Expected<FrameSource> open_kitti(const std::filesystem::path& directory,
                                                const SequenceOptions& options = {});
+
+namespace dataset {
+/// The configuration for these frames. A camera file's camera_height sets scale.camera_height_m
+/// where --set did not. Where nobody named scale.source it becomes camera_height on a KITTI folder,
+/// with a camera file's height, and with one that was given without a source; else none.
+[[nodiscard]] Config with_camera_height(Config config, const FrameSource& frames);
+}  // namespace dataset
 
 }  // namespace stemvo

@@ -44,13 +44,8 @@ Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const
 
 }  // namespace
 
-Expected<std::unique_ptr<VideoDecoder>> decode_file(const fs::path& file, const cv::Size& size) {
+Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::string& file, const cv::Size& size) {
   return open(file.c_str(), 0, size);
-}
-
-Expected<std::unique_ptr<VideoDecoder>> decode_address(const std::string& address,
-                                                       const cv::Size& size) {
-  return open(address.c_str(), 0, size);
 }
 
 Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {

@@ -43,13 +43,11 @@ class VideoDecoder {
                                           const char* symbol,
                                           std::string_view what);
 
-/// By FFmpeg, turned as the container asks unless frames that are not have this size. Null: not a
-/// video. Error: the module is not where it was installed.
-[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::filesystem::path& file,
+/// A file or an address by FFmpeg, turned as the container asks unless frames that are not have
+/// this size. Null: nothing there that can be decoded. Error: the module is not where it was
+/// installed.
+[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::string& file,
                                                                   const cv::Size& size);
-/// The same of an address. Null: nothing there that FFmpeg can decode.
-[[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_address(const std::string& address,
-                                                                     const cv::Size& size);
 /// Camera N of the machine (V4L2), asked for images of this size. Null: no such camera. Errors: as
 /// above.
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number,

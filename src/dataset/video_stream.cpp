@@ -31,7 +31,7 @@ Expected<std::shared_ptr<VideoStream>> VideoStream::open_file(const fs::path& fi
 
 Expected<std::shared_ptr<VideoStream>> VideoStream::open_address(const std::string& address,
                                                                  const cv::Size& size) {
-  STEMVO_TRY_GET(auto decoder, decode_address(address, size));
+  STEMVO_TRY_GET(auto decoder, decode_file(address, size));
   const std::string name = without_secrets(address);
   if (decoder == nullptr || decoder->size().empty()) {
     return fail(

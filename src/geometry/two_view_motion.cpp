@@ -10,7 +10,7 @@
 
 #include "degrees.hpp"
 #include "geometry/decomposition.hpp"
-#include "optimal_triangulator.hpp"
+#include "geometry/triangulation.hpp"
 
 namespace stemvo {
 namespace {

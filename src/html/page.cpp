@@ -8,8 +8,27 @@
 #include <nlohmann/json.hpp>
 #include <openssl/evp.h>
 
-#include "html/assets.hpp"
 #include "text/text_file.hpp"
+
+// The assembler puts the files into the program as they are: as arrays of C++ they would take
+// longer to compile than everything else.
+#define STEMVO_ASSET(name, file)                                   \
+  __asm__(                                                         \
+      ".section .rodata\n"                                         \
+      ".globl " #name                                              \
+      "_begin\n"                                                   \
+      ".hidden " #name "_begin\n" #name "_begin:\n.incbin \"" file \
+      "\"\n"                                                       \
+      ".globl " #name                                              \
+      "_end\n"                                                     \
+      ".hidden " #name "_end\n" #name                              \
+      "_end:\n"                                                    \
+      ".previous\n");                                              \
+  extern "C" const char name##_begin[];                            \
+  extern "C" const char name##_end[]
+
+STEMVO_ASSET(stemvo_page_html, STEMVO_PAGE_HTML);
+STEMVO_ASSET(stemvo_plotly_gz, STEMVO_PLOTLY_GZ);
 
 namespace stemvo::html {
 namespace {
@@ -61,8 +80,8 @@ Json path_json(std::span<const Rigid3> poses) {
 }
 
 Status write_page(const std::filesystem::path& file, const Json& content) {
-  std::string page(page_template());
-  fill_in(page, "{{plotly}}", base64(plotly_gz()));
+  std::string page(stemvo_page_html_begin, stemvo_page_html_end);
+  fill_in(page, "{{plotly}}", base64({stemvo_plotly_gz_begin, stemvo_plotly_gz_end}));
   fill_in(page, "{{content}}", script_json(content));  // last: it may hold any text
   return write_text_file(file, page);
 }

@@ -5,36 +5,27 @@
 
 #include <fmt/ranges.h>
 
+#include "text/text_file.hpp"
+
 namespace stemvo::options {
 namespace {
 
 /// Written so that NaN fails.
 bool is_inside(const Rule& rule, double value) {
-  const bool is_odd = !rule.odd || std::fmod(std::abs(value), 2.0) == 1.0;
-  return std::isfinite(value) && value >= rule.min && value <= rule.max && is_odd;
+  return std::isfinite(value) && value >= rule.min && value <= rule.max;
 }
 
 std::string number_violation(std::string_view kind, double value, const Rule& rule) {
   if (is_inside(rule, value)) {
     return {};
   }
-  const std::string range =
-      std::isfinite(rule.min) && std::isfinite(rule.max)
-          ? fmt::format(" {}from {} to {}", rule.odd ? "odd, " : "", rule.min, rule.max)
-          : "";
+  const std::string range = std::isfinite(rule.min) && std::isfinite(rule.max)
+                                ? fmt::format(" from {} to {}", rule.min, rule.max)
+                                : "";
   return fmt::format("expected {}{}, found {}", kind, range, value);
 }
 
 }  // namespace
-
-std::string quote(std::string_view text) {
-  constexpr std::size_t kMaxLength = 60;
-  std::string shown(text.substr(0, kMaxLength));
-  for (char& c : shown) {
-    c = static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return "'" + shown + (text.size() > kMaxLength ? "...'" : "'");
-}
 
 std::string full_name(std::string_view section, std::string_view key) {
   return section.empty() ? std::string(key) : fmt::format("{}.{}", section, key);
@@ -59,8 +50,8 @@ std::string violation_of(const std::string& value, const Rule& rule) {
   }
   const bool is_known = std::ranges::find(rule.choices, value) != rule.choices.end();
   return is_known ? std::string()
-                  : fmt::format("expected one of {}, found {}", fmt::join(rule.choices, ", "),
-                                quote(value));
+                  : fmt::format("expected one of {}, found '{}'", fmt::join(rule.choices, ", "),
+                                one_line(value));
 }
 
 }  // namespace stemvo::options

@@ -62,8 +62,7 @@ Status check_holds_none(const fs::path& folder, const std::vector<fs::path>& inp
                                        folder.string(), found->string())));
 }
 
-}  // namespace
-
+/// Error: another process has it. On a file system without locks it is taken without one.
 Expected<FolderLock> lock_folder(const fs::path& folder) {
   const int file = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const FolderLock lock(nullptr, [file](void*) {
@@ -79,6 +78,8 @@ Expected<FolderLock> lock_folder(const fs::path& folder) {
   }
   return lock;
 }
+
+}  // namespace
 
 Status create_out_folder(const fs::path& folder) {
   std::error_code code;
@@ -113,21 +114,13 @@ Expected<FolderLock> open_out_folder(const fs::path& folder,
   return marked ? Expected<FolderLock>(lock) : refuse(folder, marked.error().message);
 }
 
-std::vector<fs::path> input_files(const FrameSource& source, const Config& config) {
-  std::vector<fs::path> files = source.files;
-  files.emplace_back(config.stem.model);
-  for (const auto& file : {source.ground_truth_file, source.given_calibration}) {
-    files.push_back(file.value_or(""));
-  }
-  return files;
-}
-
 std::vector<fs::path> input_files(const FrameSourceRequest& request,
                                   const FrameSource& source,
                                   const Config& config) {
-  std::vector<fs::path> files = input_files(source, config);
-  files.insert(files.end(), {request.sequence_dir, request.times.value_or(""),
-                             request.camera_file.value_or("")});
+  std::vector<fs::path> files = source.files;
+  files.insert(files.end(), {config.stem.model, source.ground_truth_file.value_or(""),
+                             source.given_calibration.value_or(""), request.sequence_dir,
+                             request.times.value_or(""), request.camera_file.value_or("")});
   files.insert(files.end(), request.masks.begin(), request.masks.end());
   return files;
 }

@@ -15,8 +15,6 @@ namespace stemvo::pipeline {
 /// While one lives no other process writes into the folder, as far as it asks for a lock too. An
 /// advisory lock of the folder itself: the kernel lets go of it however the process ends.
 using FolderLock = std::shared_ptr<void>;
-/// Error: another process has it. On a file system without locks it is taken without one.
-[[nodiscard]] Expected<FolderLock> lock_folder(const std::filesystem::path& folder);
 
 /// Creates the folder and those above it.
 [[nodiscard]] Status create_out_folder(const std::filesystem::path& folder);
@@ -35,10 +33,8 @@ using FolderLock = std::shared_ptr<void>;
     const std::string& command,
     const std::vector<std::filesystem::path>& inputs);
 
-/// Files that are read for a source's frames and its model; some need not be there.
-[[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSource& source,
-                                                             const Config& config);
-/// The same with what was asked for: a mask may also be a rectangle, which is no file.
+/// Files that are read for a source's frames, its model and what was asked for; some need not be
+/// there, and a mask may also be a rectangle, which is no file.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSourceRequest& request,
                                                              const FrameSource& source,
                                                              const Config& config);

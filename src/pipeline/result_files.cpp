@@ -25,12 +25,6 @@
 namespace stemvo::pipeline {
 namespace {
 
-/// Names come from outside: a line break in one must not end the comment it stands in.
-std::string one_line(std::string text) {
-  std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
-  return text;
-}
-
 std::string describe_numbers(const MetricsReport& report) {
   std::string text = fmt::format("scale: {}", report.scale_source);
   if (report.metrics) {
@@ -50,6 +44,7 @@ std::string describe_numbers(const MetricsReport& report) {
 std::string describe_frames(const FrameSource& sequence, std::size_t num_frames) {
   const std::size_t begin = sequence.range.begin;
   const std::string end = num_frames > 0 ? std::to_string(begin + num_frames) : "";
+  // A line break in a name must not end the comment it stands in.
   return one_line(fmt::format("frames {}:{} of {}", begin, end, sequence.name));
 }
 

@@ -7,9 +7,10 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "config/config_yaml.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"

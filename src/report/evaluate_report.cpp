@@ -5,10 +5,11 @@
 #include <array>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "dataset/frame_files.hpp"
 #include "dataset/ground_truth.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 #include "text/text_table.hpp"
 #include "try.hpp"
 

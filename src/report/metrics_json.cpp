@@ -2,9 +2,9 @@
 #include "report/metrics_json.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "report/evaluate_report.hpp"
-#include "report/metrics_keys.hpp"
 #include "text/text_file.hpp"
 #include "try.hpp"
 
@@ -74,10 +74,10 @@ std::string to_text(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
 }
 
-Expected<Json> read_json_object(const std::filesystem::path& file, bool has_comments) {
+Expected<Json> read_json_object(const std::filesystem::path& file) {
   STEMVO_TRY_GET(const std::string text, read_text_file(file, kMaxSettings_MB));
   try {
-    Json json = Json::parse(text, nullptr, true, has_comments);
+    Json json = Json::parse(text);
     if (json.is_object()) {
       return json;
     }

@@ -7,11 +7,22 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "evaluation/metrics.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/error.hpp"
 #include "stemvo/frame_result.hpp"
 #include "timing/stage_timer.hpp"
+
+/// An optional without a value is null in JSON.
+template <typename T>
+struct nlohmann::adl_serializer<std::optional<T>> {
+  template <typename Json>
+  static void to_json(Json& json, const std::optional<T>& value) {
+    json = value ? Json(*value) : Json();
+  }
+};
 
 namespace stemvo {
 
@@ -63,20 +74,23 @@ inline constexpr double kFewBelieved = 0.5;
 /// The warning about a road that was believed never or on few frames; empty where all is well.
 [[nodiscard]] std::string warn_of_road(const MetricsReport& report);
 
-/// Keys: stemvo_version sequence first_frame frames model filter fps scale_source tracked_fraction
-/// maps scale_new_frames in_place_fraction
-/// camera{fx_px,fy_px,cx_px,cy_px,fx_sigma_px,cx_sigma_px,cy_sigma_px} (as it was known in the end;
-/// sigmas are null where it is not refined) road_measured_fraction road_believed_fraction (of all
-/// frames; null where the road is not asked) alignment (of average_offset_m, t_rel_percent,
-/// r_rel_deg_per_100m and rpe_rotation_deg; sim3 where the trajectory is up to scale, else none)
-/// path_length_m average_offset_m null_offset_m t_rel_percent r_rel_deg_per_100m segment_lengths_m
-/// segments ate_rmse_m{none,scale,se3,sim3} rpe_rotation_deg map{keyframes loops relocalizations
-/// adjustment_s, alignment and those behind it} (of trajectory_map_kitti.txt; null where nothing is
-/// remembered) and, only where it was asked for, timing{threads fps peak_memory_mib cpu_s
-/// other_cpu_s stages{NAME{calls,median_ms,p95_ms,cpu_s}}}. Numbers round-trip; a number that is
-/// not finite becomes null. Error: the file cannot be written.
+/// Keys: those of metrics_document(); `alignment` is that of the offset, t_rel, r_rel and the RPE.
+/// Numbers round-trip; one that is not finite becomes null. Error: the file cannot be written.
 [[nodiscard]] Status write_metrics_json(const std::filesystem::path& file,
                                         const MetricsReport& report);
+
+/// The document that metrics.json holds.
+[[nodiscard]] nlohmann::ordered_json metrics_document(const MetricsReport& report);
+
+/// Adds the keys of metrics.json that need ground truth; all null without metrics.
+void add_metrics(nlohmann::ordered_json& json, const std::optional<Metrics>& metrics);
+
+/// Indented, ends with a newline. A number that is not finite becomes null, bytes that are not
+/// UTF-8 the replacement character.
+[[nodiscard]] std::string to_text(const nlohmann::ordered_json& json);
+
+/// Errors: the file cannot be read, is no JSON or holds no object.
+[[nodiscard]] Expected<nlohmann::ordered_json> read_json_object(const std::filesystem::path& file);
 
 /// The same numbers as an aligned table; each row names its alignment, the zero-motion baseline
 /// stands beside the offset. Ends with a newline.

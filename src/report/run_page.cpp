@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evaluation/pose_file.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 
 namespace stemvo {
 namespace {

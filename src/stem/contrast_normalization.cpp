@@ -119,7 +119,7 @@ TrackingResolution choose_tracking_resolution(TrackingResolution asked,
   if (asked != TrackingResolution::kAuto) {
     return asked;
   }
-  if (method != FeatureMethod::kPatch && method != FeatureMethod::kKlt) {
+  if (method != FeatureMethod::kPatch) {
     return TrackingResolution::kInput;
   }
   return camera.mean_focal_px() >= kLongFocal_px ? TrackingResolution::kHalf

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "stem/hand_made.hpp"
 
-#include <algorithm>
+#include <map>
 
 #include <opencv2/imgproc.hpp>
 
@@ -66,24 +66,16 @@ FilterBank of_gray(cv::Mat (*channel)(const cv::Mat& gray)) {
 
 }  // namespace
 
-bool is_hand_made(const std::string& model) {
-  return std::ranges::find(kHandMadeModels, model) != std::end(kHandMadeModels);
-}
+bool is_hand_made(const std::string& model) { return internal::hand_made_bank(model).has_value(); }
 
 std::optional<HandMadeBank> internal::hand_made_bank(const std::string& model) {
-  if (model == "gray") {
-    return HandMadeBank{1, of_gray([](const cv::Mat& gray) { return gray; })};
-  }
-  if (model == "input_layer") {
-    return HandMadeBank{3, input_channels};
-  }
-  if (model == "log") {
-    return HandMadeBank{1, of_gray(laplacian_of_gaussian)};
-  }
-  if (model == "census") {
-    return HandMadeBank{1, of_gray(local_contrast)};
-  }
-  return std::nullopt;
+  static const std::map<std::string, HandMadeBank> kBanks = {
+      {"gray", {1, of_gray([](const cv::Mat& gray) { return gray; })}},
+      {"input_layer", {3, input_channels}},
+      {"log", {1, of_gray(laplacian_of_gaussian)}},
+      {"census", {1, of_gray(local_contrast)}}};
+  const auto found = kBanks.find(model);
+  return found != kBanks.end() ? std::optional(found->second) : std::nullopt;
 }
 
 }  // namespace stemvo

@@ -8,8 +8,7 @@
 
 namespace stemvo {
 
-/// Channels without a network, to compare a learned one with.
-inline constexpr const char* kHandMadeModels[] = {"gray", "input_layer", "log", "census"};
+/// Whether it names channels without a network, to compare a learned one with.
 [[nodiscard]] bool is_hand_made(const std::string& model);
 
 namespace internal {

@@ -91,23 +91,22 @@ RoadCurve lay_road(const std::vector<double>& curvature, std::uint64_t seed) {
   const auto hills = wave(170.0);
   const auto bumps = wave(61.0);
   const auto banks = wave(93.0);
-  std::vector<Vec3> points;
-  std::vector<Vec3> ups;
+  Path path;
   double heading_rad = 0.0;
   double x = 0.0;
   double z = 0.0;
   for (const double bend : curvature) {
-    const double s = static_cast<double>(points.size());
-    points.emplace_back(x, -(0.7 * hills(s) + 0.12 * bumps(s)), z);
+    const double s = static_cast<double>(path.points.size());
     const double bank_rad = radians(0.8 * banks(s)) + 0.5 * bend;
     const Vec3 right(std::cos(heading_rad), 0.0, -std::sin(heading_rad));
-    ups.push_back(std::cos(bank_rad) * -Vec3::UnitY() - std::sin(bank_rad) * right);
+    path.add({x, -(0.7 * hills(s) + 0.12 * bumps(s)), z},
+             std::cos(bank_rad) * -Vec3::UnitY() - std::sin(bank_rad) * right);
     const double middle_rad = heading_rad + 0.5 * bend;
     x += std::sin(middle_rad);
     z += std::cos(middle_rad);
     heading_rad += bend;
   }
-  return {points, ups};
+  return RoadCurve(path);
 }
 
 /// Metres per second at each knot: slower in turns, changing gently.
@@ -197,17 +196,15 @@ struct CarBody {
 
 }  // namespace
 
-RoadCurve::RoadCurve(const std::vector<Vec3>& points,
-                     const std::vector<Vec3>& ups,
-                     std::vector<RoadPart> parts)
-    : parts_(std::move(parts)) {
+RoadCurve::RoadCurve(const Path& path, std::vector<RoadPart> parts) : parts_(std::move(parts)) {
+  const std::vector<Vec3>& points = path.points;
   const std::size_t last = points.size() - 1;
   knots_.resize(points.size());
   for (std::size_t i = 0; i <= last; ++i) {
     RoadFrame& frame = knots_[i];
     frame.position = points[i];
     frame.forward = (points[std::min(i + 1, last)] - points[i > 0 ? i - 1 : 0]).normalized();
-    frame.right = frame.forward.cross(ups[i]).normalized();
+    frame.right = frame.forward.cross(path.ups[i]).normalized();
     frame.up = frame.right.cross(frame.forward);
   }
   squeeze_in_turns(knots_);

@@ -44,14 +44,23 @@ struct RoadPart {
   int shift;
 };
 
+/// A polyline with an up direction at each point.
+struct Path {
+  std::vector<Vec3> points;
+  std::vector<Vec3> ups;
+
+  void add(const Vec3& point, const Vec3& up) {
+    points.push_back(point);
+    ups.push_back(up);
+  }
+};
+
 /// A road as frames 1 m apart: the arc length of knot i is i.
 class RoadCurve {
  public:
-  /// Points 1 m apart on the road's surface under the camera's path, and an up direction for each;
-  /// at least 3. `parts` cover all knots in order; none: all of it is new.
-  RoadCurve(const std::vector<Vec3>& points,
-            const std::vector<Vec3>& ups,
-            std::vector<RoadPart> parts = {});
+  /// `path`: points 1 m apart on the road's surface under the camera's, at least 3. `parts` cover
+  /// all knots in order; none: all of it is new.
+  explicit RoadCurve(const Path& path, std::vector<RoadPart> parts = {});
 
   [[nodiscard]] int num_knots() const { return static_cast<int>(knots_.size()); }
   [[nodiscard]] const RoadFrame& knot(int index) const {

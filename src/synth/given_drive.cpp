@@ -48,17 +48,6 @@ std::vector<Vec3> smooth(const std::vector<Vec3>& points, double sigma_m) {
   return result;
 }
 
-/// A polyline with an up direction at each point.
-struct Path {
-  std::vector<Vec3> points;
-  std::vector<Vec3> ups;
-
-  void add(const Vec3& point, const Vec3& up) {
-    points.push_back(point);
-    ups.push_back(up);
-  }
-};
-
 Path resample(const Path& from, double spacing_m) {
   Path to;
   double left_m = 0.0;  // from the last sample to the start of this edge, as a debt
@@ -109,8 +98,7 @@ RoadCurve fit_road(const Trajectory& keys) {
     const double height_m = up.dot(loose[i] - close[i]) - kCameraHeight_m;
     ground.add(close[i] + height_m * up, up);
   }
-  const Path knots = resample(ground, 1.0);
-  return {knots.points, knots.ups};
+  return RoadCurve(resample(ground, 1.0));
 }
 
 /// Arc length of the knot nearest to `point` among those near `guess_m`.

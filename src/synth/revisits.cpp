@@ -49,8 +49,8 @@ class Joiner {
     const int end = road_.num_knots();
     for (int i = 0; i < end;) {
       if (homes_[static_cast<std::size_t>(i)] == kNewPlace) {
-        joined_[static_cast<std::size_t>(i)] = static_cast<int>(points_.size());
-        add(road_.knot(i).position, road_.knot(i).up);
+        joined_[static_cast<std::size_t>(i)] = static_cast<int>(path_.points.size());
+        path_.add(road_.knot(i).position, road_.knot(i).up);
         ++i;
         continue;
       }
@@ -62,19 +62,14 @@ class Joiner {
       i = run_end;
     }
     close_part(0);
-    return {points_, ups_, parts_};
+    return RoadCurve(path_, parts_);
   }
 
  private:
-  void add(const Vec3& point, const Vec3& up) {
-    points_.push_back(point);
-    ups_.push_back(up);
-  }
-
   /// The knots since the last part are a part that is `shift` knots behind its first visit.
   void close_part(int shift) {
     const int begin = parts_.empty() ? 0 : parts_.back().end;
-    const int end = static_cast<int>(points_.size());
+    const int end = static_cast<int>(path_.points.size());
     if (end > begin) {
       parts_.push_back({begin, end, shift});
     }
@@ -86,9 +81,10 @@ class Joiner {
     const int last = homes_[static_cast<std::size_t>(end - 1 - kBlend)];
     add_blend(begin, begin + kBlend, true);
     close_part(0);
-    const int shift = static_cast<int>(points_.size()) - joined_[static_cast<std::size_t>(first)];
+    const int shift =
+        static_cast<int>(path_.points.size()) - joined_[static_cast<std::size_t>(first)];
     for (int home = first; home <= last; ++home) {
-      add(road_.knot(home).position, road_.knot(home).up);
+      path_.add(road_.knot(home).position, road_.knot(home).up);
     }
     close_part(shift);
     add_blend(end - kBlend, end, false);
@@ -101,25 +97,24 @@ class Joiner {
       return road_.knot(is_home ? homes_[static_cast<std::size_t>(own)] : own);
     };
     const RoadFrame& from = knot_at(begin - 1, !is_joining);
-    std::vector<Vec3> line = {from.position};
-    std::vector<Vec3> ups = {from.up};
+    Path line{{from.position}, {from.up}};
     for (int own = begin; own < end; ++own) {
       const double t = (own - begin + 1.0) / (end - begin + 1.0);
       const double share = is_joining ? t : 1.0 - t;
       const double weight = share * share * (3.0 - 2.0 * share);
       const RoadFrame& home = knot_at(own, true);
       const RoadFrame& here = road_.knot(own);
-      line.emplace_back(here.position + weight * (on_line(home, here.position) - here.position));
-      ups.emplace_back(((1.0 - weight) * here.up + weight * home.up).normalized());
+      line.add(here.position + weight * (on_line(home, here.position) - here.position),
+               ((1.0 - weight) * here.up + weight * home.up).normalized());
     }
     const RoadFrame& to = knot_at(end, is_joining);
-    line.push_back(to.position);
-    ups.push_back(to.up);
-    add_evenly(line, ups);
+    line.add(to.position, to.up);
+    add_evenly(line);
   }
 
   /// Points between both ends of a line.
-  void add_evenly(const std::vector<Vec3>& line, const std::vector<Vec3>& ups) {
+  void add_evenly(const Path& blend) {
+    const auto& [line, ups] = blend;
     double length_m = 0.0;
     for (std::size_t i = 1; i < line.size(); ++i) {
       length_m += (line[i] - line[i - 1]).norm();
@@ -136,16 +131,15 @@ class Joiner {
         edge_m = (line[edge] - line[edge - 1]).norm();
       }
       const double t = std::clamp((at_m - passed_m) / std::max(edge_m, 1e-9), 0.0, 1.0);
-      add(line[edge - 1] + t * (line[edge] - line[edge - 1]),
-          ((1.0 - t) * ups[edge - 1] + t * ups[edge]).normalized());
+      path_.add(line[edge - 1] + t * (line[edge] - line[edge - 1]),
+                ((1.0 - t) * ups[edge - 1] + t * ups[edge]).normalized());
     }
   }
 
   const RoadCurve& road_;
   const std::vector<int>& homes_;
   std::vector<int> joined_;  ///< per own knot on a new place: its number on the joined road
-  std::vector<Vec3> points_;
-  std::vector<Vec3> ups_;
+  Path path_;
   std::vector<RoadPart> parts_;
 };
 

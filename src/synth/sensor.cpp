@@ -23,29 +23,29 @@ float gaussian(std::uint64_t bits) {
   return (part(0) + part(16) + part(32) + part(48) - kMean) / kDeviation;
 }
 
-/// Share of the light that reaches a pixel through the lens.
-class Vignette {
- public:
-  explicit Vignette(const cv::Size& size)
-      : cx_(0.5F * static_cast<float>(size.width - 1)),
-        cy_(0.5F * static_cast<float>(size.height - 1)),
-        corner2_(std::max(cx_ * cx_ + cy_ * cy_, 1.0F)) {}
-
-  [[nodiscard]] float at(int x, int y) const {
-    const float dx = static_cast<float>(x) - cx_;
-    const float dy = static_cast<float>(y) - cy_;
-    return 1.0F - kCornerLoss * (dx * dx + dy * dy) / corner2_;
+/// An image of `level(light, gain, noise)`: `gain` is the share of the light that reaches the pixel
+/// through the lens, `noise` is normal.
+template <typename Level>
+cv::Mat read_out(const cv::Mat& light, std::uint64_t seed, const Level& level) {
+  const cv::Point2f centre(0.5F * static_cast<float>(light.cols - 1),
+                           0.5F * static_cast<float>(light.rows - 1));
+  const float corner2 = std::max(centre.dot(centre), 1.0F);
+  cv::Mat rgb(light.size(), CV_8UC3);
+  for (int y = 0; y < light.rows; ++y) {
+    const auto* from = light.ptr<cv::Vec3f>(y);
+    auto* to = rgb.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < light.cols; ++x) {
+      const cv::Point2f off = cv::Point2f(cv::Point(x, y)) - centre;
+      const float gain = 1.0F - kCornerLoss * off.dot(off) / corner2;
+      const std::uint64_t pixel =
+          seed ^ (static_cast<std::uint64_t>(y) << 32) ^ (static_cast<std::uint64_t>(x) << 2);
+      for (int c = 0; c < 3; ++c) {
+        const float noise = gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
+        to[x][c] = cv::saturate_cast<uchar>(level(from[x][c], gain, noise));
+      }
+    }
   }
-
- private:
-  float cx_;
-  float cy_;
-  float corner2_;
-};
-
-/// Draws of noise for the channels of a pixel begin with this.
-std::uint64_t pixel_key(std::uint64_t seed, int x, int y) {
-  return seed ^ (static_cast<std::uint64_t>(y) << 32) ^ (static_cast<std::uint64_t>(x) << 2);
+  return rgb;
 }
 
 }  // namespace
@@ -54,48 +54,22 @@ cv::Mat expose(const cv::Mat& light, float exposure, std::uint64_t seed) {
   cv::Mat blurred;
   const cv::Matx13f spread(0.08F, 0.84F, 0.08F);  // variance 0.16 px^2
   cv::sepFilter2D(light, blurred, CV_32F, spread, spread, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
-  cv::Mat rgb(light.size(), CV_8UC3);
-  const Vignette vignette(light.size());
-  for (int y = 0; y < light.rows; ++y) {
-    const auto* from = blurred.ptr<cv::Vec3f>(y);
-    auto* to = rgb.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < light.cols; ++x) {
-      const float gain = exposure * 255.0F * vignette.at(x, y);
-      const std::uint64_t pixel = pixel_key(seed, x, y);
-      for (int c = 0; c < 3; ++c) {
-        const float level = std::max(0.0F, gain * from[x][c]);
-        const float noise = (kReadNoise + kPhotonNoise * std::sqrt(level)) *
-                            gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
-        to[x][c] = cv::saturate_cast<uchar>(level + noise);
-      }
-    }
-  }
-  return rgb;
+  return read_out(blurred, seed, [exposure](float value, float gain, float noise) {
+    const float level = std::max(0.0F, exposure * 255.0F * gain * value);
+    return level + (kReadNoise + kPhotonNoise * std::sqrt(level)) * noise;
+  });
 }
 
 cv::Mat expose_chip(const cv::Mat& light, float exposure, std::uint64_t seed) {
   constexpr float kDarker = 0.65F;  // as bright a mean as without the response curve
   cv::Mat spread;
   cv::GaussianBlur(light, spread, {}, chip::kSpread_px, 0.0, cv::BORDER_REPLICATE);
-  cv::Mat rgb(light.size(), CV_8UC3);
-  const Vignette vignette(light.size());
   const float electrons_of_white = chip::kFullWell / exposure;
-  for (int y = 0; y < light.rows; ++y) {
-    const auto* from = spread.ptr<cv::Vec3f>(y);
-    auto* to = rgb.ptr<cv::Vec3b>(y);
-    for (int x = 0; x < light.cols; ++x) {
-      const float gain = kDarker * exposure * vignette.at(x, y);
-      const std::uint64_t pixel = pixel_key(seed, x, y);
-      for (int c = 0; c < 3; ++c) {
-        const float electrons = electrons_of_white * std::max(0.0F, gain * from[x][c]);
-        const float noise = std::sqrt(electrons + chip::kRead * chip::kRead) *
-                            gaussian(mix(pixel + static_cast<std::uint64_t>(c)));
-        const float read = std::max(0.0F, (electrons + noise) / electrons_of_white);
-        to[x][c] = cv::saturate_cast<uchar>(255.0F * chip::response(read));
-      }
-    }
-  }
-  return rgb;
+  return read_out(spread, seed, [=](float value, float gain, float noise) {
+    const float electrons = electrons_of_white * std::max(0.0F, kDarker * exposure * gain * value);
+    const float read = electrons + std::sqrt(electrons + chip::kRead * chip::kRead) * noise;
+    return 255.0F * chip::response(std::max(0.0F, read / electrons_of_white));
+  });
 }
 
 }  // namespace stemvo::synth

@@ -2,9 +2,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "synth/crossing.hpp"
+#include "synth/buildings.hpp"
 #include "synth/drive.hpp"
-#include "synth/house.hpp"
 #include "synth/materials.hpp"
 #include "synth/vehicles.hpp"
 
@@ -117,23 +116,8 @@ void add_segment(const Street& street,
   street.scene.add_patch(points, texture, style);
 }
 
-constexpr Rgb kAsphaltGray = {0.345F, 0.345F, 0.35F};
-constexpr Style kKerbStone{.albedo = {0.46F, 0.445F, 0.42F}};
-
-/// A strip of the road that crosses, at the road's height.
-void add_crossed(const Street& street, int knot, double left_m, double right_m) {
-  const Style style{.material = materials::asphalt,
-                    .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
-                    .albedo = kAsphaltGray};
-  if (right_m > left_m) {
-    add_segment(street, knot,
-                {{{0, left_m, 0.0}, {0, right_m, 0.0}, {1, right_m, 0.0}, {1, left_m, 0.0}}},
-                style);
-  }
-}
-
 /// Strips between lines along the road; lateral distances to the right of the camera's path, which
-/// runs in the right lane.
+/// runs in the right lane. A road that crosses is level.
 void add_ground(const Street& street) {
   struct Line {
     double lateral_m;
@@ -149,7 +133,7 @@ void add_ground(const Street& street) {
                                             {-7.2, kKerb_m, materials::sidewalk, kPaving},
                                             {-5.35, kKerb_m, materials::kerb, kStone},
                                             {-5.2, kKerb_m, materials::kerb, kStone},
-                                            {-5.2, 0.0, materials::asphalt, kAsphaltGray},
+                                            {-5.2, 0.0, materials::asphalt, kAsphalt},
                                             {2.2, 0.0, materials::parking, {0.38F, 0.365F, 0.355F}},
                                             {4.4, 0.0, materials::kerb, kStone},
                                             {4.4, kKerb_m, materials::sidewalk, kPaving},
@@ -160,25 +144,30 @@ void add_ground(const Street& street) {
     const Style style{.material = left->material,
                       .seed = static_cast<std::uint32_t>(hash_of(street.seed, 'G')),
                       .albedo = left->albedo};
+    Style crossed = style;
+    crossed.material = materials::asphalt;
+    crossed.albedo = kAsphalt;
     for (int i = street.window.start; i + 1 < street.window.end; ++i) {
-      if (street.is_crossed(i)) {
-        add_crossed(street, i, left->lateral_m, right->lateral_m);
+      const bool is_crossed = street.is_crossed(i);
+      if (is_crossed && left->lateral_m == right->lateral_m) {
         continue;
       }
+      const double low_m = is_crossed ? 0.0 : left->height_m;
+      const double high_m = is_crossed ? 0.0 : right->height_m;
       add_segment(street, i,
-                  {{{0, left->lateral_m, left->height_m},
-                    {0, right->lateral_m, right->height_m},
-                    {1, right->lateral_m, right->height_m},
-                    {1, left->lateral_m, left->height_m}}},
-                  style);
+                  {{{0, left->lateral_m, low_m},
+                    {0, right->lateral_m, high_m},
+                    {1, right->lateral_m, high_m},
+                    {1, left->lateral_m, low_m}}},
+                  is_crossed ? crossed : style);
       for (const int end : {0, 1}) {  // the strip's end at a crossing road
-        if (left->height_m > 0.0 && street.is_crossed(end == 0 ? i - 1 : i + 1)) {
+        if (low_m > 0.0 && street.is_crossed(end == 0 ? i - 1 : i + 1)) {
           add_segment(street, i,
                       {{{end, left->lateral_m, 0.0},
                         {end, right->lateral_m, 0.0},
                         {end, right->lateral_m, right->height_m},
                         {end, left->lateral_m, left->height_m}}},
-                      kKerbStone);
+                      {.albedo = kStone});
         }
       }
     }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "synth/crossing.hpp"
+#include "synth/buildings.hpp"
 #include "synth/vehicles.hpp"
 
 namespace stemvo::synth {

@@ -75,7 +75,6 @@ TEST_P(MaskedFrontEnd, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
 INSTANTIATE_TEST_SUITE_P(Methods,
                          MaskedFrontEnd,
                          ::testing::Values(FeatureMethod::kPatch,
-                                           FeatureMethod::kKlt,
                                            FeatureMethod::kOrb,
                                            FeatureMethod::kSift));
 

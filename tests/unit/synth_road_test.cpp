@@ -123,7 +123,7 @@ TEST(RoadCurveTest, TightTurnsDoNotFoldTheStreet) {
     points.emplace_back(kRadius_m * (1.0 - std::cos(angle)) + after, 0.0,
                         before + kRadius_m * std::sin(angle));
   }
-  const RoadCurve road(points, std::vector<Eigen::Vector3d>(60, -Eigen::Vector3d::UnitY()));
+  const RoadCurve road({points, std::vector<Eigen::Vector3d>(60, -Eigen::Vector3d::UnitY())});
   for (int i = 0; i + 1 < road.num_knots(); ++i) {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d edge = road.knot(i + 1).point(side * kStreetHalfWidth_m, 0.0) -

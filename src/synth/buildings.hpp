@@ -2,13 +2,26 @@
 #pragma once
 
 #include "synth/drive.hpp"
+#include "synth/scene.hpp"
 
 namespace stemvo::synth {
 
+inline constexpr Rgb kAsphalt = {0.345F, 0.345F, 0.35F};
 /// Half the width of the road that crosses.
 inline constexpr int kCrossingHalf_m = 4;
 /// It ends so far from the street's middle, at a house.
 inline constexpr double kCrossingEnd_m = 32.0;
+
+struct House {
+  std::array<Vec3, 4> plan;  ///< front left, front right, back right, back left, as seen on foot
+  Vec3 up;
+  Style style;
+  Scene& scene;
+
+  void add_walls(double height_m);
+  /// A gable roof with its ridge along the street, over the eaves by 12 cm.
+  void add_roof(double eaves_m, double rise_m, std::uint32_t seed);
+};
 
 /// The scene beyond the street's edges: the crossing road, hedges along it, houses at its ends, and
 /// lights.
