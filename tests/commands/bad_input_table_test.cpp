@@ -3,11 +3,7 @@
 // of file only is with the tests of its reader.
 #include "support/bad_input_table.hpp"
 
-#include <string>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
-
+#include "support/test.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -90,7 +86,7 @@ TEST_F(BadInputTable, ConfigurationFile) {
 
 TEST_F(BadInputTable, Model) {
   const std::string model = folder_ / "plain_k4s4.onnx";
-  write_file(model, read_file(testing::tiny_model("plain_k4s4")));
+  write_file(model, read_file(tiny_model("plain_k4s4")));
   expect_refused_with_faults(model, "weights", {"models", model}, {}, {text("empty", "")});
 }
 

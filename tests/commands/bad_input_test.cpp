@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -13,13 +8,12 @@ namespace {
 /// A copy of ten rendered frames that each test breaks in its own way.
 class BadInput : public ::testing::Test {
  protected:
-  ProgramResult run(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"run", sequence_.string(), "--out", out_});
-    return run_stemvo(more);
+  ProgramResult run(const Words& more = {}) const {
+    return run_stemvo({"run", sequence_.string(), "--out", out_}, more);
   }
 
-  test::TempFolder folder_;
-  fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  TempFolder folder_;
+  fs::path sequence_ = copy_drive(folder_.path(), 10);
   std::string out_ = folder_ / "out";
 };
 
@@ -71,14 +65,12 @@ TEST_F(BadInput, Configuration) {
 }
 
 TEST_F(BadInput, Channel) {
-  const auto channel = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"channel", sequence_.string(), "--out", out_});
-    return run_stemvo(more);
+  const auto channel = [&](const Words& more) {
+    return run_stemvo({"channel", sequence_.string(), "--out", out_}, more);
   };
   expect_error(channel({"--filters", "0:500"}), 1, {"default", "--filters 0:500"});
   expect_error(channel({"--frames", "3:99"}), 1, {"0:10"});
-  const ProgramResult good = channel({"--frames", "2:4", "--filters", "1:3"});
-  EXPECT_EQ(good.exit_code, 0) << good.err;
+  succeeded(channel({"--frames", "2:4", "--filters", "1:3"}));
   for (const char* name :
        {"000002_input", "000003_filter_001", "000003_filter_002", "000002_sheet"}) {
     EXPECT_TRUE(fs::exists(out_ + "/" + name + ".png")) << name;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Photos of a chessboard become a camera file that a run takes.
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "support/program_test.hpp"
 #include "support/rendered_board.hpp"
+#include "support/test.hpp"
 #include "support/write_video.hpp"
 
 namespace stemvo {
@@ -20,8 +19,8 @@ class CalibrateBoard : public ::testing::Test {
   void SetUp() override {
     Camera camera{260.0, 260.7, 162.5, 124.8, 320, 240, Distortion::kRadialTangential};
     camera.distortion_coefficients = {-0.28, 0.09, 0.0008, -0.0005};
-    test::BoardCamera photographer(camera);
-    const test::Print print = test::print_chessboard({7, 5}, 0.03);
+    BoardCamera photographer(camera);
+    const Print print = print_chessboard({7, 5}, 0.03);
     cv::RNG random(3);
     fs::create_directories(folder_ / "photos");
     for (int i = 0; i < kNumPhotos; ++i) {
@@ -52,11 +51,10 @@ TEST_F(CalibrateBoard, PhotosAndVideosMakeACameraThatARunTakes) {
   expect_camera(
       run_stemvo({"calibrate", "--board", "7x5:0.03", photos_, "--out", camera_, "--json"}));
   const ProgramResult ran =
-      run_stemvo({"run", photos_, "--camera", camera_, "--out", folder_ / "out"});
-  EXPECT_EQ(ran.exit_code, 0) << ran.err;
+      succeeded(run_stemvo({"run", photos_, "--camera", camera_, "--out", folder_ / "out"}));
   EXPECT_THAT(ran.err, HasSubstr("30 frames per second are taken for granted"));
   const std::string video = folder_ / "photos.avi";
-  test::write_video(video, 10.0, files_);
+  write_video(video, 10.0, files_);
   expect_camera(
       run_stemvo({"calibrate", "--board", "7x5:0.03", video, "--out", camera_, "--json"}));
   const ProgramResult said =

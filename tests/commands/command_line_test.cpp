@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "stemvo/version.hpp"
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-const std::vector<std::string> kCommands = {"run",       "evaluate", "channel", "synth",
-                                            "calibrate", "check",    "models"};
+const Words kCommands = {"run", "evaluate", "channel", "synth", "calibrate", "check", "models"};
 
 /// For a terminal of 80 columns; commands to copy stay whole.
-std::vector<std::string> lines_too_long(const std::string& help) {
+Words lines_too_long(const std::string& help) {
   std::istringstream text(help);
-  std::vector<std::string> found;
+  Words found;
   for (std::string line; std::getline(text, line);) {
     if (line.size() > 80 && !line.starts_with("  stemvo ")) {
       found.push_back(line);
@@ -57,7 +51,7 @@ TEST(CommandLine, VersionIsOneLine) {
 }
 
 struct Misuse {
-  std::vector<std::string> arguments;
+  Words arguments;
   std::string says;
 };
 
@@ -101,8 +95,8 @@ TEST(CommandLine, WrongUsageIsOneLineAndExitCodeTwo) {
 }
 
 TEST(CommandLine, OutputThatCannotBeWrittenIsAnError) {
-  const ProgramResult full = test::run_program(
-      "/bin/sh", {"-c", std::string(STEMVO_PROGRAM) + " --dump-config > /dev/full"});
+  const ProgramResult full =
+      run_program("/bin/sh", {"-c", std::string(STEMVO_PROGRAM) + " --dump-config > /dev/full"});
   EXPECT_EQ(full.exit_code, 1);
   EXPECT_THAT(full.err, StartsWith("error: standard output: "));
 }

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -31,13 +26,11 @@ class ImageFolderRun : public ::testing::Test {
     write_file(camera_, good_camera_);
   }
 
-  ProgramResult run_path(const std::string& path, std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"run", path, "--out", out_});
-    return run_stemvo(more);
+  ProgramResult run_path(const std::string& path, const Words& more = {}) const {
+    return run_stemvo({"run", path, "--out", out_}, more);
   }
-  ProgramResult run(std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"--camera", camera_});
-    return run_path(images_.string(), more);
+  ProgramResult run(const Words& more = {}) const {
+    return run_path(images_.string(), joined({"--camera", camera_}, more));
   }
   std::string config_key(const std::string& key) const {
     const std::string text = read_file(out_ + "/config.yaml");
@@ -45,8 +38,8 @@ class ImageFolderRun : public ::testing::Test {
     return text.substr(begin, text.find('\n', begin) - begin);
   }
 
-  test::TempFolder folder_;
-  const fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  TempFolder folder_;
+  const fs::path sequence_ = copy_drive(folder_.path(), 10);
   const fs::path images_ = folder_.path() / "my images";
   const std::string camera_ = folder_ / "camera.yaml";
   const std::string out_ = folder_ / "out";
@@ -60,11 +53,9 @@ TEST_F(ImageFolderRun, GivesTheBytesOfTheSameKittiFolder) {
   }
   fs::copy(images_, folder_.path() / "other/00/image_2");
   const std::string kitti = folder_ / "kitti";
-  ASSERT_EQ(run_stemvo({"run", folder_ / "other/00", "--out", kitti}).exit_code, 0);
+  succeeded(run_stemvo({"run", folder_ / "other/00", "--out", kitti}));
   write_file(folder_ / "times.txt", first_ten_lines(sequence_ / "times.txt"));
-  const ProgramResult result =
-      run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  succeeded(run({"--set", "scale.source=camera_height", "--times", folder_ / "times.txt"}));
   for (const char* name : {"kitti", "tum"}) {
     const std::string file = std::string("/trajectory_") + name + ".txt";
     EXPECT_EQ(read_file(out_ + file), read_file(kitti + file)) << file;
@@ -76,8 +67,7 @@ TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
       run({"--gt", folder_ / "poses/00.txt", "--frames", "2:9"});  // 60 poses, 10 images
   expect_error(result, 1, {"00.txt", "10 images", "60 poses"});
   write_file(folder_ / "ten.txt", first_ten_lines(folder_ / "poses/00.txt"));
-  const ProgramResult good = run({"--gt", folder_ / "ten.txt", "--frames", "2:9"});
-  ASSERT_EQ(good.exit_code, 0) << good.err;
+  succeeded(run({"--gt", folder_ / "ten.txt", "--frames", "2:9"}));
   const auto metrics = nlohmann::json::parse(read_file(out_ + "/metrics.json"));
   EXPECT_EQ(metrics.at("sequence"), "my images");
   EXPECT_EQ(metrics.at("frames"), 7);
@@ -90,12 +80,9 @@ TEST_F(ImageFolderRun, NamesTheFolderAndTheCameraFile) {
 
 TEST_F(ImageFolderRun, ScaleComesFromTheCameraFileUnlessItWasChosen) {
   const std::string height = good_camera_ + "camera_height: 1.25\n";
-  const auto expect_scale = [&](const std::vector<std::string>& more, const std::string& source,
+  const auto expect_scale = [&](const Words& more, const std::string& source,
                                 const std::string& height_m) {
-    std::vector<std::string> arguments = {"--frames", "0:2"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const ProgramResult result = run(arguments);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    succeeded(run(joined({"--frames", "0:2"}, more)));
     EXPECT_EQ(config_key("source"), source);
     EXPECT_EQ(config_key("camera_height_m"), height_m);
   };
@@ -126,7 +113,7 @@ TEST_F(ImageFolderRun, ACameraThatStandsStillIsSaidToDoSo) {
 }
 
 TEST_F(ImageFolderRun, APatternThatTheShellReplaced) {
-  std::vector<std::string> names = {"--camera", camera_};
+  Words names = {"--camera", camera_};
   for (int i = 1; i < 1000; ++i) {
     names.push_back((images_ / fmt::format("{:06}.png", i)).string());
   }

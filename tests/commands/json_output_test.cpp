@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <map>
 #include <regex>
-#include <set>
-#include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
@@ -32,7 +28,7 @@ std::set<std::string> commands() {
 class JsonOutput : public ::testing::Test {
  protected:
   /// The document, which is all of standard output.
-  static Json document(std::vector<std::string> arguments, int exit_code = 0) {
+  static Json document(Words arguments, int exit_code = 0) {
     const ProgramResult result = run_stemvo(arguments);
     EXPECT_EQ(result.exit_code, exit_code) << arguments.front() << ": " << result.err;
     Json json = Json::parse(result.out, nullptr, /*allow_exceptions=*/false);
@@ -44,7 +40,7 @@ class JsonOutput : public ::testing::Test {
   }
 
   TempFolder folder_;
-  fs::path drive_ = test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
+  fs::path drive_ = rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
   std::string sequence_ = drive_ / "sequences/00";
 };
 
@@ -57,7 +53,7 @@ TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
   const std::string truth = drive_ / "poses/00.txt";
   struct Call {
     std::string command;
-    std::vector<std::string> arguments;
+    Words arguments;
     std::string key;
     int exit_code = 0;
   };
@@ -75,8 +71,7 @@ TEST_F(JsonOutput, IsOneDocumentOfEveryCommand) {
   };
   std::set<std::string> called;
   for (const Call& call : calls) {
-    std::vector<std::string> arguments = {call.command};
-    arguments.insert(arguments.end(), call.arguments.begin(), call.arguments.end());
+    const Words arguments = joined({call.command}, call.arguments);
     EXPECT_TRUE(document(arguments, call.exit_code).contains(call.key)) << call.command;
     called.insert(call.command);
   }
@@ -107,8 +102,8 @@ TEST_F(JsonOutput, BoundThatIsPassedIsInTheDocument) {
 }
 
 TEST_F(JsonOutput, SaysWhyAModelCannotBeUsed) {
-  const std::string good = read_file(testing::tiny_model("plain_k4s4"));
-  write_file(folder_ / "default.onnx", testing::with_metadata(good, "stride", "2"));
+  const std::string good = read_file(tiny_model("plain_k4s4"));
+  write_file(folder_ / "default.onnx", with_metadata(good, "stride", "2"));
   const Json json = document({"models", folder_ / "default.onnx", "--json"}, 1);
   EXPECT_EQ(json["models"][0]["sound"], false);
   EXPECT_THAT(json["models"][0]["problem"].get<std::string>(), HasSubstr("default.onnx"));

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -13,7 +9,7 @@ namespace {
 class Overwrite : public ::testing::Test {
  protected:
   TempFolder folder_;
-  fs::path sequence_ = test::copy_drive(folder_.path(), 10);
+  fs::path sequence_ = copy_drive(folder_.path(), 10);
   std::string out_ = folder_ / "out";
 };
 
@@ -45,9 +41,8 @@ TEST_F(Overwrite, NoCommandTakesAFolderThatIsNotItsOwn) {
 }
 
 TEST_F(Overwrite, ResultsOfAnotherCommandStay) {
-  ASSERT_EQ(run_stemvo({"channel", sequence_, "--frames", "0:1", "--filters", "0:1", "--out", out_})
-                .exit_code,
-            0);
+  succeeded(
+      run_stemvo({"channel", sequence_, "--frames", "0:1", "--filters", "0:1", "--out", out_}));
   write_file(fs::path(out_) / "config.yaml", "mine");
   expect_error(run_stemvo({"run", sequence_, "--quiet", "--out", out_}), 1,
                {out_, "results of 'stemvo run', found other files"});
@@ -55,7 +50,7 @@ TEST_F(Overwrite, ResultsOfAnotherCommandStay) {
 }
 
 TEST_F(Overwrite, AnInputBehindALinkStays) {
-  ASSERT_EQ(run_stemvo({"run", sequence_, "--quiet", "--out", out_}).exit_code, 0);
+  succeeded(run_stemvo({"run", sequence_, "--quiet", "--out", out_}));
   const fs::path truth = fs::path(out_) / "trajectory_kitti.txt";
   fs::copy_file(folder_ / "poses/00.txt", truth, fs::copy_options::overwrite_existing);
   fs::create_symlink(truth, folder_ / "gt.txt");
@@ -66,31 +61,28 @@ TEST_F(Overwrite, AnInputBehindALinkStays) {
 
 TEST_F(Overwrite, PosesThatADriveIsRenderedAlongStay) {
   const std::string drive = folder_ / "drive";
-  const std::vector<std::string> synth = {"synth", drive, "--frames", "2"};
-  ASSERT_EQ(run_stemvo(synth).exit_code, 0);
+  const Words synth = {"synth", drive, "--frames", "2"};
+  succeeded(run_stemvo(synth));
   const fs::path poses = fs::path(drive) / "poses/00.txt";
   const std::string before = read_file(poses);
-  std::vector<std::string> along = synth;
-  along.insert(along.end(), {"--trajectory", poses});
-  expect_error(run_stemvo(along), 1, {poses, "found the given trajectory"});
+  expect_error(run_stemvo(synth, {"--trajectory", poses}), 1,
+               {poses, "found the given trajectory"});
   EXPECT_EQ(read_file(poses), before);
 }
 
 TEST_F(Overwrite, NothingIsLeftInTheUsersHome) {
   const fs::path home = folder_ / "home";
   fs::create_directory(home);
-  const ProgramResult result = test::run_program(
-      "/usr/bin/env", {"HOME=" + home.string(), "XDG_CACHE_HOME=" + (home / "cache").string(),
-                       STEMVO_PROGRAM, "run", sequence_, "--quiet", "--out", out_});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  succeeded(run_program("/usr/bin/env",
+                        {"HOME=" + home.string(), "XDG_CACHE_HOME=" + (home / "cache").string(),
+                         STEMVO_PROGRAM, "run", sequence_, "--quiet", "--out", out_}));
   EXPECT_TRUE(fs::is_empty(home)) << "ONNX Runtime's telemetry keeps a file there";
 }
 
 TEST_F(Overwrite, ARunIsRepeatedWithItsOwnConfiguration) {
-  ASSERT_EQ(run_stemvo({"run", sequence_, "--quiet", "--out", out_}).exit_code, 0);
-  const ProgramResult again =
-      run_stemvo({"run", sequence_, "--quiet", "--out", out_, "--config", out_ + "/config.yaml"});
-  EXPECT_EQ(again.exit_code, 0) << again.err;
+  succeeded(run_stemvo({"run", sequence_, "--quiet", "--out", out_}));
+  succeeded(
+      run_stemvo({"run", sequence_, "--quiet", "--out", out_, "--config", out_ + "/config.yaml"}));
 }
 
 }  // namespace

@@ -1,18 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <cstdlib>
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
+#include "support/test.hpp"
 #include "support/write_video.hpp"
 
 namespace stemvo {
@@ -26,16 +18,13 @@ class RecordingsRun : public ::testing::Test {
   void SetUp() override { write_file(camera_, camera_file_of(sequence_)); }
 
   fs::path image(int index) const { return sequence_ / fmt::format("image_2/{:06}.png", index); }
-  ProgramResult run(const std::string& input, std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"run", input, "--out", out_});
-    return run_stemvo(more);
+  ProgramResult run(const std::string& input, const Words& more = {}) const {
+    return run_stemvo({"run", input, "--out", out_}, more);
   }
   /// The poses of the same images in KITTI's layout.
   std::string expected_poses() const {
     const std::string out = folder_ / "kitti";
-    const ProgramResult result =
-        run_stemvo({"run", sequence_.string(), "--out", out, "--set", "scale.source=none"});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
+    succeeded(run_stemvo({"run", sequence_.string(), "--out", out, "--set", "scale.source=none"}));
     return read_file(out + "/trajectory_kitti.txt");
   }
   std::string poses() const { return read_file(out_ + "/trajectory_kitti.txt"); }
@@ -53,7 +42,7 @@ class RecordingsRun : public ::testing::Test {
   }
 
   TempFolder folder_;
-  const fs::path sequence_ = test::copy_drive(folder_.path(), kNumFrames);
+  const fs::path sequence_ = copy_drive(folder_.path(), kNumFrames);
   const std::string camera_ = folder_ / "camera.yaml";
   const std::string out_ = folder_ / "out";
 };
@@ -83,8 +72,7 @@ TEST_F(RecordingsRun, Euroc) {
              camera_file_of(sequence_) +
                  "rate_hz: 10\nT_BS:\n  data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\n");
   write_file(mav / "state_groundtruth_estimate0/data.csv", truth);
-  const ProgramResult result = run(folder_ / "V1");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult result = succeeded(run(folder_ / "V1"));
   EXPECT_THAT(result.err, StartsWith("input: EuRoC recording V1, 12 frames of 620x188 pixels, "
                                      "ground truth for 11 of 12 frames"));
   EXPECT_EQ(poses(), expected_poses());
@@ -101,8 +89,7 @@ TEST_F(RecordingsRun, Tum) {
   }
   write_file(desk / "rgb.txt", list);
   write_file(desk / "camera.yaml", camera_file_of(sequence_));
-  const ProgramResult result = run(desk.string(), {"--pictures", "6"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult result = succeeded(run(desk.string(), {"--pictures", "6"}));
   EXPECT_THAT(result.err, HasSubstr("input: TUM RGB-D recording desk"));
   EXPECT_EQ(poses(), expected_poses());
   EXPECT_THAT(read_file(out_ + "/trajectory_tum.txt"), StartsWith("1305031452.789999962 "));
@@ -119,18 +106,18 @@ TEST_F(RecordingsRun, AVideoWithTruthByTime) {
   }
   write_file(folder_ / "truth.txt", truth);
   const std::string video = write_video();
-  const ProgramResult result = run(video, {"--camera", camera_, "--gt", folder_ / "truth.txt",
-                                           "--pictures", "5", "--threads", "2"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult result =
+      succeeded(run(video, {"--camera", camera_, "--gt", folder_ / "truth.txt", "--pictures", "5",
+                            "--threads", "2"}));
   EXPECT_THAT(result.err, HasSubstr("input: video drive, frames of 620x188 pixels"));
   EXPECT_THAT(result.err, HasSubstr("ground truth for 12 of 12 frames"));
   EXPECT_EQ(metrics().at("frames"), kNumFrames);
   EXPECT_LT(metrics().at("ate_rmse_m").at("sim3").get<double>(), 0.5);
   EXPECT_TRUE(fs::exists(out_ + "/pictures/000010.png"));
   const std::string first = poses();
-  ASSERT_EQ(run(video, {"--camera", camera_, "--threads", "1"}).exit_code, 0);
+  succeeded(run(video, {"--camera", camera_, "--threads", "1"}));
   EXPECT_EQ(poses(), first) << "threads change nothing";
-  ASSERT_EQ(run(video, {"--camera", camera_, "--frames", "2:7"}).exit_code, 0);
+  succeeded(run(video, {"--camera", camera_, "--frames", "2:7"}));
   EXPECT_EQ(metrics().at("frames"), 5);
 }
 
@@ -145,8 +132,7 @@ TEST_F(RecordingsRun, AVideoWithTooFewTruePosesIsRefusedBeforeTheRun) {
   const ProgramResult result = run(video, {"--camera", camera_, "--gt", file});
   expect_error(result, 1, {"truth.txt: expected a pose for each of 12 frames", "found 11 poses"});
   EXPECT_FALSE(fs::exists(out_));
-  const ProgramResult fewer = run(video, {"--camera", camera_, "--gt", file, "--frames", "0:11"});
-  EXPECT_EQ(fewer.exit_code, 0) << fewer.err;
+  succeeded(run(video, {"--camera", camera_, "--gt", file, "--frames", "0:11"}));
 }
 
 TEST_F(RecordingsRun, AVideoThatIsCutOff) {
@@ -178,16 +164,13 @@ TEST_F(RecordingsRun, LargeFramesAreWorkedOnSmaller) {
   write_file(camera_,
              "resolution: [2480, 752]\nintrinsics: [1400, 1400, 1240, 376]\n"
              "distortion_model: none\nrate_hz: 10\n");
-  const ProgramResult result = run(folder_ / "large", {"--camera", camera_});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const ProgramResult result = succeeded(run(folder_ / "large", {"--camera", camera_}));
   EXPECT_THAT(result.err, HasSubstr("3 frames of 2480x752 pixels worked on at 1653x501"));
 }
 
 TEST_F(RecordingsRun, AMaskKeepsPointsAway) {
   const std::string before = expected_poses();
-  ASSERT_EQ(
-      run(sequence_.string(), {"--mask", "0,150,620,38", "--set", "scale.source=none"}).exit_code,
-      0);
+  succeeded(run(sequence_.string(), {"--mask", "0,150,620,38", "--set", "scale.source=none"}));
   EXPECT_NE(poses(), before);
   cv::imwrite(folder_ / "mask.png", [] {
     cv::Mat mask(188, 620, CV_8UC1, cv::Scalar(255));
@@ -195,9 +178,8 @@ TEST_F(RecordingsRun, AMaskKeepsPointsAway) {
     return mask;
   }());
   const std::string by_rectangle = poses();
-  ASSERT_EQ(run(sequence_.string(), {"--mask", folder_ / "mask.png", "--set", "scale.source=none"})
-                .exit_code,
-            0);
+  succeeded(
+      run(sequence_.string(), {"--mask", folder_ / "mask.png", "--set", "scale.source=none"}));
   EXPECT_EQ(poses(), by_rectangle);
   expect_error(run(sequence_.string(), {"--mask", "0,0,620,188"}), 1, {"--mask"});
   expect_error(run(sequence_.string(), {"--mask", "0,0,10,10", "--mask", "nowhere.png"}), 1,

@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
-
 #include "options/visit.hpp"
 #include "support/bad_input_table.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 /// "KEY=VALUE" at both ends of every number.
-std::vector<std::string> ends_of_all_numbers() {
+Words ends_of_all_numbers() {
   Options options;
-  std::vector<std::string> ends;
+  Words ends;
   options::visit(options, [&](std::string_view section, std::string_view name, auto& value,
                               const options::Rule& rule, std::string_view) {
     using Value = std::remove_cvref_t<decltype(value)>;
@@ -29,7 +23,7 @@ std::vector<std::string> ends_of_all_numbers() {
 }
 
 ProgramResult run_with(const std::string& assignment, const TempFolder& folder) {
-  const fs::path drive = test::rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
+  const fs::path drive = rendered_drive({.frames = 30, .width_px = 310, .height_px = 94});
   return run_stemvo({"run", drive / "sequences/00", "--frames", "0:6", "--quiet", "--out",
                      folder / "out", "--set", assignment});
 }

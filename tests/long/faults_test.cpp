@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <chrono>
 #include <csignal>
-#include <string>
-#include <thread>
-
-#include <gmock/gmock.h>
 
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -24,7 +19,7 @@ double length_m(const Trajectory& path) {
 /// Slow frames, so that a run lasts for seconds.
 class LongRun : public ::testing::Test {
  protected:
-  [[nodiscard]] std::vector<std::string> arguments() const {
+  [[nodiscard]] Words arguments() const {
     return {"run",
             drive_.string(),
             "--out",
@@ -53,11 +48,11 @@ class LongRun : public ::testing::Test {
   TempFolder folder_;
   fs::path out_ = folder_ / "out";
   fs::path drive_ =
-      test::rendered_drive({.frames = 400, .width_px = 620, .height_px = 188}) / "sequences/00";
+      rendered_drive({.frames = 400, .width_px = 620, .height_px = 188}) / "sequences/00";
 };
 
 TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
-  test::RunningProgram program(STEMVO_PROGRAM, arguments());
+  RunningProgram program(STEMVO_PROGRAM, arguments());
   wait_for_poses();
   std::ptrdiff_t rows = 0;
   auto last_growth = std::chrono::steady_clock::now();
@@ -82,9 +77,9 @@ TEST_F(LongRun, KeepsItsFramesOnDiskEveryTwoSeconds) {
 }
 
 TEST_F(LongRun, ASecondProcessIsRefusedUntilTheFirstIsGone) {
-  test::RunningProgram first(STEMVO_PROGRAM, arguments());
+  RunningProgram first(STEMVO_PROGRAM, arguments());
   wait_for_poses();
-  const std::vector<std::string> channel = {"channel", drive_.string(), "--out", out_.string()};
+  const Words channel = {"channel", drive_.string(), "--out", out_.string()};
   expect_error(run_stemvo(arguments()), 1, {out_.string(), "no other stemvo writes to"});
   expect_error(run_stemvo(channel), 1, {out_.string(), "no other stemvo writes to"});
   first.send(SIGKILL);

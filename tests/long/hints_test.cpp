@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: MIT
 // A walk seen ten times a second, turning by 200 degrees a second: what a gyro's hints are worth.
-#include <algorithm>
-#include <iostream>
-#include <numbers>
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "dataset/frame_source.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/run_program.hpp"
+#include "support/test.hpp"
 #include "synth/synth.hpp"
 
 namespace stemvo {
 namespace {
-
-constexpr double kDeg = std::numbers::pi / 180.0;
 
 /// Behind the first ten frames.
 struct Outcome {
@@ -73,7 +64,7 @@ class Hints : public ::testing::Test {
     return outcome;
   }
 
-  test::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(Hints, KeepTrackOfFastTurnsAndWrongOnesCostNothing) {

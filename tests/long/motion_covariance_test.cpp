@@ -1,32 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <numbers>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-
 #include "dataset/kitti_text.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/drives.hpp"
 #include "support/motion_errors.hpp"
 #include "support/state_drives.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// 90 degrees to either side at 7 m/s, radius 15 m and more.
-test::StateDrive bends() {
-  test::StateDrive drive;
+StateDrive bends() {
+  StateDrive drive;
   Rigid3 pose;
   for (int i = 0; i < 220; ++i) {
     drive.world_from_camera.push_back(pose);
@@ -38,15 +24,15 @@ test::StateDrive bends() {
 
 fs::path drive_of(const std::string& kind) {
   if (kind == "street") {
-    return test::render_once("covariance_street",
-                             {"--frames", "200", "--width", "640", "--height", "194"});
+    return render_once("covariance_street",
+                       {"--frames", "200", "--width", "640", "--height", "194"});
   }
   if (kind == "turn") {
-    return test::rendered_along("covariance_turn", bends()).parent_path().parent_path();
+    return rendered_along("covariance_turn", bends()).parent_path().parent_path();
   }
-  return test::render_once("covariance_" + kind,
-                           {"--walk", "--frames", "240", "--width", "480", "--height", "360",
-                            "--seed", kind == "walk" ? "1" : "9"});
+  return render_once("covariance_" + kind,
+                     {"--walk", "--frames", "240", "--width", "480", "--height", "360", "--seed",
+                      kind == "walk" ? "1" : "9"});
 }
 
 /// The drive's frames, with noise of so many gray levels on them.
@@ -57,8 +43,7 @@ std::vector<FrameResult> results_of(const fs::path& drive, double noise) {
   std::vector<FrameResult> results;
   cv::RNG random(7);
   for (int i = 0;; ++i) {
-    char name[32];
-    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    const std::string name = image_name(i);
     if (!fs::exists(sequence / name)) {
       return results;
     }
@@ -83,7 +68,7 @@ TEST(MotionCovariance, IsHonestOnRenderedDrivesWithNoiseInTheImages) {
     const fs::path drive = drive_of(kind);
     const Trajectory truth = *read_kitti_trajectory(drive / "poses" / "00.txt");
     for (const double noise : {0.0, 4.0, 8.0, 12.0}) {
-      const testing::MotionErrors errors = testing::errors_of(results_of(drive, noise), truth);
+      const MotionErrors errors = errors_of(results_of(drive, noise), truth);
       std::printf("%-9s noise %2.0f: %3d motions, mean %.2f, inside %.2f\n", kind, noise,
                   errors.count, errors.mean, errors.inside);
       EXPECT_GT(errors.count, 150) << kind << noise;

@@ -1,38 +1,23 @@
 // SPDX-License-Identifier: MIT
 // Images that show something else than a street that stands still: none, darkness, others.
-#include <filesystem>
-#include <functional>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-
 #include "support/drives.hpp"
 #include "support/state_drives.hpp"
 #include "support/state_runs.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using test::kDeg;
-using test::StateDrive;
-using test::StateRun;
 
 class Disturbed : public ::testing::Test {
  protected:
   /// A copy of the drive that may be changed.
   void copy(const std::string& name, const StateDrive& drive) {
-    const fs::path from = test::rendered_along(name, drive);
+    const fs::path from = rendered_along(name, drive);
     sequence_ = folder_.path() / "sequences" / "00";
     fs::create_directories(sequence_.parent_path());
     fs::copy(from, sequence_, fs::copy_options::recursive);
   }
-  [[nodiscard]] fs::path image_file(int frame) const {
-    char name[32];
-    std::snprintf(name, sizeof(name), "image_2/%06d.png", frame);
-    return sequence_ / name;
-  }
+  [[nodiscard]] fs::path image_file(int frame) const { return sequence_ / image_name(frame); }
   void change(int from, int to, const std::function<void(int, cv::Mat&)>& edit) const {
     for (int i = from; i < to; ++i) {
       cv::Mat image = cv::imread(image_file(i).string(), cv::IMREAD_COLOR);
@@ -41,9 +26,9 @@ class Disturbed : public ::testing::Test {
       ASSERT_TRUE(cv::imwrite(image_file(i).string(), image));
     }
   }
-  [[nodiscard]] StateRun run() const { return test::run_states(sequence_, "camera_height"); }
+  [[nodiscard]] StateRun run() const { return run_states(sequence_, "camera_height"); }
 
-  test::TempFolder folder_;
+  TempFolder folder_;
   fs::path sequence_;
 };
 
@@ -71,7 +56,7 @@ struct Passing {
   }
 };
 
-constexpr double kStep_m = test::kDriveStep_m;
+constexpr double kStep_m = kDriveStep_m;
 const cv::Size kImage(620, 188);
 
 /// A share of the light left, and the sensor's noise of one gray level.
@@ -87,7 +72,7 @@ std::function<void(int, cv::Mat&)> darkened(double light) {
 }
 
 TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
-  const StateDrive drive = test::steady_drive();
+  const StateDrive drive = steady_drive();
   copy("steady", drive);
   const int begin = 30;
   const int end = 34;
@@ -101,25 +86,25 @@ TEST_F(Disturbed, AFewFramesInTheDarkAreLostAndTheDriveGoesOn) {
   for (int i = begin; i < end; ++i) {
     EXPECT_NE(result.roads[static_cast<std::size_t>(i)], "measured") << i;
   }
-  test::expect_accurate(result.poses, drive, 10, begin, 0.05, 0.3 * kDeg);
-  test::expect_accurate(result.poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, 10, begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, end + 5, 60, 0.05, 0.3 * kDeg);
   // Over the dark too, by what was known before and after.
-  test::expect_accurate(result.poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
+  expect_accurate(result.poses, drive, begin - 5, begin + 16, 0.1, 2.0 * kDeg, 20);
 }
 
 // Five gray levels of contrast under noise of one: contrast normalization makes an image of them.
 TEST_F(Disturbed, AFewDimFramesAreFollowed) {
-  const StateDrive drive = test::steady_drive();
+  const StateDrive drive = steady_drive();
   copy("steady", drive);
   change(30, 34, darkened(0.02));
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(30, 60, {"tracking"});
-  test::expect_accurate(result.poses, drive, 10, 60, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, 10, 60, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
-  const StateDrive drive = test::standing_drive();
+  const StateDrive drive = standing_drive();
   copy("standing", drive);
   const Passing passing(drive.event_begin + 2, 35, kImage);
   change(drive.event_begin + 2, drive.event_end,
@@ -132,12 +117,12 @@ TEST_F(Disturbed, WhoStandsStaysWhereHeIsWhateverPassesBy) {
   const Rigid3 moved = result.poses[begin].inverse() * result.poses[end - 1];
   EXPECT_LE(moved.translation.norm(), 0.02);  // measured, not held: 0.2 % of a depth of 10 m
   const int num_frames = static_cast<int>(result.poses.size());
-  test::expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
-  test::expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
+  expect_accurate(result.poses, drive, drive.event_end + 3, num_frames, 0.05, 0.3 * kDeg);
 }
 
 TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
-  const StateDrive drive = test::steady_drive();
+  const StateDrive drive = steady_drive();
   copy("steady", drive);
   const int begin = 15;
   const int end = 45;
@@ -146,7 +131,7 @@ TEST_F(Disturbed, WhoDrivesGoesOnWhateverPassesBy) {
   const StateRun result = run();
   ASSERT_EQ(result.states.size(), drive.world_from_camera.size());
   result.expect_states(begin, 60, {"tracking"});
-  test::expect_accurate(result.poses, drive, 10, 60, 0.1, 0.6 * kDeg);
+  expect_accurate(result.poses, drive, 10, 60, 0.1, 0.6 * kDeg);
   EXPECT_NEAR((result.poses[40].translation - result.poses[20].translation).norm(), 20 * kStep_m,
               0.05 * 20 * kStep_m);
 }

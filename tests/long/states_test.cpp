@@ -1,24 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-#include <span>
-#include <string>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-
 #include "evaluation/metrics.hpp"
 #include "support/drives.hpp"
 #include "support/state_drives.hpp"
 #include "support/state_runs.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using test::expect_accurate;
-using test::kDeg;
-using test::StateDrive;
-using test::StateRun;
 
 /// Slower steps may have little parallax: far scenery hardly moves.
 constexpr double kSlow_m = 0.15;
@@ -48,7 +36,7 @@ StateRun run_event(const std::string& name,
                    const StateDrive& drive,
                    const std::string& event,
                    int after) {
-  StateRun result = test::run_states(test::rendered_along(name, drive), "camera_height");
+  StateRun result = run_states(rendered_along(name, drive), "camera_height");
   expect_states(result, drive, event);
   const int num_frames = static_cast<int>(result.poses.size());
   expect_accurate(result.poses, drive, 10, drive.event_begin, 0.05, 0.3 * kDeg);
@@ -62,7 +50,7 @@ Rigid3 motion_between(const StateRun& result, int from, int to) {
 }
 
 TEST(States, StandingInTheMiddle) {
-  const StateDrive drive = test::standing_drive();
+  const StateDrive drive = standing_drive();
   const StateRun result = run_event("standing", drive, "stationary", drive.event_end - 1);
   const Rigid3 moved = motion_between(result, drive.event_begin, drive.event_end - 1);
   // A window's pose is measured, not held: 0.2 % of a depth of 10 m at most.
@@ -71,15 +59,15 @@ TEST(States, StandingInTheMiddle) {
 }
 
 TEST(States, TurningOnTheSpot) {
-  const StateDrive drive = test::turning_drive();
+  const StateDrive drive = turning_drive();
   const StateRun result = run_event("turning", drive, "rotating", drive.event_end - 1);
   const Rigid3 turned = motion_between(result, drive.event_begin - 1, drive.event_end - 1);
-  EXPECT_NEAR(turned.angle_rad(), 16 * test::kTurnPerFrame_rad, 0.4 * kDeg);
+  EXPECT_NEAR(turned.angle_rad(), 16 * kTurnPerFrame_rad, 0.4 * kDeg);
   EXPECT_LE(turned.translation.norm(), 0.03);  // 0.2 % of a depth of 15 m
 }
 
 TEST(States, CutToAnotherPlace) {
-  const StateDrive drive = test::cut_drive();
+  const StateDrive drive = cut_drive();
   const StateRun result = run_event("cut", drive, "lost", drive.event_begin + 3);
   const auto cut = static_cast<std::size_t>(drive.event_begin);
   // Nothing is measured of the road on a motion that was not; the new map has no scale yet.
@@ -88,25 +76,24 @@ TEST(States, CutToAnotherPlace) {
   EXPECT_EQ(result.roads[cut - 1], "measured");
   EXPECT_EQ(result.roads[cut + 3], "measured");
   // The motion went on as it was: the pose is wrong by no more than the jump itself.
-  EXPECT_NEAR(step_m(result.poses, cut), test::kDriveStep_m, 0.1 * test::kDriveStep_m);
+  EXPECT_NEAR(step_m(result.poses, cut), kDriveStep_m, 0.1 * kDriveStep_m);
 }
 
 TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
-  const test::TempFolder folder;
-  const StateDrive drive = test::standing_drive();
-  const fs::path from = test::rendered_along("standing", drive);
+  const TempFolder folder;
+  const StateDrive drive = standing_drive();
+  const fs::path from = rendered_along("standing", drive);
   const fs::path sequence = folder.path() / "sequences" / "00";
   fs::create_directories(sequence.parent_path());
   fs::copy(from, sequence, fs::copy_options::recursive);
   for (int i = 20; i < 35; ++i) {  // something covers the lower part of the image
-    char name[32];
-    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
+    const std::string name = image_name(i);
     cv::Mat image = cv::imread((sequence / name).string(), cv::IMREAD_COLOR);
     ASSERT_FALSE(image.empty());
     image.rowRange(image.rows * 52 / 100, image.rows).setTo(cv::Scalar(90, 90, 90));
     cv::imwrite((sequence / name).string(), image);
   }
-  const StateRun result = test::run_states(sequence, "camera_height");
+  const StateRun result = run_states(sequence, "camera_height");
   ASSERT_EQ(result.poses.size(), drive.world_from_camera.size());
   for (std::size_t i = 15; i < 45; ++i) {
     // Frame 35 still has only covered images behind it.
@@ -118,16 +105,15 @@ TEST(RoadStates, WithoutARoadTheScaleIsHeldAndItsDoubtGrows) {
       EXPECT_GT(std::stod(result.sigmas[i]), std::stod(result.sigmas[i - 1])) << i;
     }
     if (i < 40) {
-      EXPECT_NEAR(step_m(result.poses, i), test::kDriveStep_m, 0.06 * test::kDriveStep_m) << i;
+      EXPECT_NEAR(step_m(result.poses, i), kDriveStep_m, 0.06 * kDriveStep_m) << i;
     }
   }
 }
 
 TEST(Walk, ACameraInTheHandIsFollowed) {
-  const fs::path folder = test::render_walk_once(300);
-  const StateRun result = test::run_states(folder / "sequences/00", "none");
+  const fs::path folder = render_walk_once(300);
+  const StateRun result = run_states(folder / "sequences/00", "none");
   const auto truth = read_kitti_trajectory(folder / "poses/00.txt");
-  ASSERT_TRUE(truth) << truth.error().message;
   ASSERT_EQ(result.poses.size(), truth->size());
   result.expect_states(1, 300,
                        {"tracking", "initializing", "low_parallax", "stationary", "rotating"});

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Clip 03 with frames dropped, and with times that jitter.
-#include <iostream>
-#include <random>
-#include <vector>
-
 #include "dataset/frame_source.hpp"
 #include "evaluation/metrics.hpp"
 #include "evaluation/trajectory.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/kitti_clips.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -23,12 +20,12 @@ struct Outcome {
   double inliers = 0.0;        ///< mean
 };
 
-class Times : public test::NeedsClips {
+class Times : public NeedsClips {
  protected:
   void SetUp() override {
-    test::NeedsClips::SetUp();
+    NeedsClips::SetUp();
     if (!IsSkipped()) {
-      clip_.emplace(open_kitti(testing::shared_data() / "kitti/sequences/03", {}).value());
+      clip_.emplace(open_kitti(shared_data() / "kitti/sequences/03", {}).value());
     }
   }
 

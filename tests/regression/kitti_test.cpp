@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include <string>
-
 #include "support/kitti_clips.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-class Kitti : public test::NeedsClips, public ::testing::WithParamInterface<std::string> {};
+class Kitti : public NeedsClips, public ::testing::WithParamInterface<std::string> {};
 
 TEST_P(Kitti, StaysInsideTheThresholdsWithTrueSteps) {
-  test::hold(test::run_stemvo, GetParam(), "ground_truth", "_true_steps.yaml", folder_ / "result");
+  hold(GetParam(), "ground_truth", "_true_steps.yaml", folder_ / "result");
 }
 
 TEST_P(Kitti, StaysInsideTheThresholdsFromTheCameraHeight) {
-  test::hold(test::run_stemvo, GetParam(), "camera_height", "_camera_height.yaml",
-             folder_ / "result");
+  hold(GetParam(), "camera_height", "_camera_height.yaml", folder_ / "result");
 }
 
 INSTANTIATE_TEST_SUITE_P(Clips,

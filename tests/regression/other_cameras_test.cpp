@@ -1,39 +1,28 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <filesystem>
-#include <iterator>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
 #include "support/state_runs.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 /// Images of other people's cameras.
-class OtherCameras : public test::NeedsClips {
+class OtherCameras : public NeedsClips {
  protected:
-  void expect_poses(std::vector<std::string> arguments, std::size_t count) const {
+  void expect_poses(const Words& arguments, std::size_t count) const {
     const std::string out = folder_ / "out";
-    arguments.insert(arguments.begin(), "run");
-    arguments.insert(arguments.end(), {"--out", out});
-    const ProgramResult result = run_stemvo(arguments);
-    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const ProgramResult result = succeeded(run_stemvo({"run", "--out", out}, arguments));
     EXPECT_THAT(result.err, Not(HasSubstr("warning")));
     const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");
     ASSERT_TRUE(poses) << poses.error().message;  // it refuses what is not finite
     EXPECT_EQ(poses->size(), count);
   }
-  [[nodiscard]] std::vector<std::string> states() const {
-    return test::column(read_file(folder_ / "out/frames.csv"), "state");
+  [[nodiscard]] Words states() const {
+    return column(read_file(folder_ / "out/frames.csv"), "state");
   }
   static std::size_t num_images(const fs::path& folder) {
     return static_cast<std::size_t>(
@@ -46,11 +35,11 @@ class Handheld : public OtherCameras {
  protected:
   /// Frames first, first + step, ..; the bounds are today's figures and half as much again.
   void expect_followed(int first, int step, std::size_t count, double max_ate_m) const {
-    const fs::path data = testing::shared_data() / "handheld";
+    const fs::path data = shared_data() / "handheld";
     std::vector<fs::path> images(fs::directory_iterator(data / "images"), {});
     std::sort(images.begin(), images.end());
     std::istringstream lines(read_file(data / "poses.txt"));
-    std::vector<std::string> poses(images.size());
+    Words poses(images.size());
     for (std::string& pose : poses) {
       std::getline(lines, pose);
     }
@@ -74,7 +63,7 @@ class Handheld : public OtherCameras {
       EXPECT_TRUE(map.at("adjustment_s").is_number());
       EXPECT_LE(map.at("ate_rmse_m").at("sim3").get<double>(), 0.04);  // COLMAP's: 0.033
     }
-    const std::vector<std::string> seen = states();
+    const Words seen = states();
     EXPECT_LE(std::find(seen.begin(), seen.end(), "tracking") - seen.begin(), 40);
     EXPECT_EQ(std::count(seen.begin(), seen.end(), "lost"), 0);
   }
@@ -86,7 +75,7 @@ TEST_F(Handheld, EverySecondFrame) { expect_followed(0, 2, 200, 0.065); }
 TEST_F(Handheld, EveryThirdFrame) { expect_followed(0, 3, 134, 0.055); }
 
 TEST_F(OtherCameras, DroneOfEuroc) {
-  const fs::path data = testing::shared_data() / "euroc/mav0/cam0";
+  const fs::path data = shared_data() / "euroc/mav0/cam0";
   expect_poses({(data / "data").string(), "--camera", (data / "sensor.yaml").string()},
                num_images(data / "data"));
   // It hovers: nothing to make a map of, and nothing is lost.
@@ -96,13 +85,13 @@ TEST_F(OtherCameras, DroneOfEuroc) {
 }
 
 TEST_F(OtherCameras, KinectOfTum) {
-  const fs::path images = testing::shared_data() / "tum/rgb";
+  const fs::path images = shared_data() / "tum/rgb";
   write_file(folder_ / "camera.yaml",
              "image_width: 640\nimage_height: 480\ncamera_model: pinhole\n"
              "intrinsics: [520.9, 521.0, 325.1, 249.7]\ndistortion_model: radial-tangential\n"
              "distortion_coefficients: [0.2312, -0.7849, -0.0033, -0.0001, 0.9172]\nrate_hz: 10\n");
   expect_poses({images.string(), "--camera", folder_ / "camera.yaml"}, num_images(images));
-  const std::vector<std::string> seen = states();
+  const Words seen = states();
   EXPECT_GE(std::count(seen.begin(), seen.end(), "tracking"), 15);
 }
 

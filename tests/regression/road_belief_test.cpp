@@ -1,38 +1,24 @@
 // SPDX-License-Identifier: MIT
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "support/kitti_clips.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-using ::testing::HasSubstr;
-using ::testing::Not;
-
-class RoadOfClip : public test::NeedsClips {
+class RoadOfClip : public NeedsClips {
  protected:
   static constexpr int kFrames = 80;
 
   /// The first frames of clip 03, seen by a camera that is mounted otherwise.
-  test::ProgramResult run(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
-    const fs::path clip = testing::shared_data() / "kitti/sequences/03";
+  ProgramResult run(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
+    const fs::path clip = shared_data() / "kitti/sequences/03";
     const fs::path images = folder_ / "images";
     fs::create_directories(images);
     cv::Size size;
     for (int i = 0; i < kFrames; ++i) {
-      char name[16];
-      std::snprintf(name, sizeof(name), "%06d.png", i);
+      const std::string name = fmt::format("{:06}.png", i);
       cv::Mat image = cv::imread((clip / "image_0" / name).string(), cv::IMREAD_GRAYSCALE);
       turn(image);
       size = image.size();
@@ -43,11 +29,11 @@ class RoadOfClip : public test::NeedsClips {
         << "\ncamera_model: pinhole\nintrinsics: [721.54, 721.54, " << cx_px << ", " << cy_px
         << "]\ndistortion_model: none\ndistortion_coefficients: []\nrate_hz: 10\n"
            "camera_height: 1.65\n";
-    return test::run_stemvo(
+    return run_stemvo(
         {"run", images.parent_path().string(), "--out", folder_ / "result", "--quiet"});
   }
   [[nodiscard]] double believed() const {
-    return nlohmann::json::parse(test::read_file(folder_ / "result/metrics.json"))
+    return nlohmann::json::parse(read_file(folder_ / "result/metrics.json"))
         .at("road_believed_fraction");
   }
 };
@@ -58,15 +44,14 @@ constexpr int kWidth = 1242;
 constexpr int kHeight = 375;
 
 TEST_F(RoadOfClip, IsBelievedByTheCameraAsItIs) {
-  const test::ProgramResult done = run([](cv::Mat&) {}, kCx_px, kCy_px);
-  EXPECT_EQ(done.exit_code, 0) << done.err;
+  const ProgramResult done = succeeded(run([](cv::Mat&) {}, kCx_px, kCy_px));
   EXPECT_THAT(done.err, Not(HasSubstr("warning: scale")));
   EXPECT_GT(believed(), 0.85);
 }
 
 TEST_F(RoadOfClip, IsNotBelievedUpsideDown) {
   const auto turn = [](cv::Mat& image) { cv::rotate(image, image, cv::ROTATE_180); };
-  const test::ProgramResult done = run(turn, kWidth - 1 - kCx_px, kHeight - 1 - kCy_px);
+  const ProgramResult done = run(turn, kWidth - 1 - kCx_px, kHeight - 1 - kCy_px);
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
   EXPECT_EQ(believed(), 0.0);
 }
@@ -75,19 +60,18 @@ TEST_F(RoadOfClip, IsNotBelievedByACameraOnItsSide) {
   const auto turn = [](cv::Mat& image) {
     cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
   };
-  const test::ProgramResult done = run(turn, kCy_px, kWidth - 1 - kCx_px);
+  const ProgramResult done = run(turn, kCy_px, kWidth - 1 - kCx_px);
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
   EXPECT_EQ(believed(), 0.0);
 }
 
-class HandHeld : public test::NeedsClips {};
+class HandHeld : public NeedsClips {};
 
 TEST_F(HandHeld, ARoomHasNoRoad) {
-  const test::ProgramResult done =
-      test::run_stemvo({"run", (testing::shared_data() / "handheld").string(), "--out",
-                        folder_ / "result", "--quiet", "--frames", "0:150", "--set",
-                        "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"});
-  EXPECT_EQ(done.exit_code, 0) << done.err;
+  const ProgramResult done =
+      succeeded(run_stemvo({"run", (shared_data() / "handheld").string(), "--out",
+                            folder_ / "result", "--quiet", "--frames", "0:150", "--set",
+                            "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"}));
   EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
 }
 

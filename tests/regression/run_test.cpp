@@ -1,31 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <chrono>
-#include <filesystem>
-#include <fstream>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "report/evaluate_report.hpp"
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-using test::rendered_drive;
-
 constexpr const char* kTrueScale = "scale.source=ground_truth";
 
-ProgramResult run_drive(const fs::path& sequence,
-                        const std::string& out,
-                        const std::vector<std::string>& more = {}) {
-  std::vector<std::string> arguments = {"run", sequence.string(), "--out", out};
-  arguments.insert(arguments.end(), more.begin(), more.end());
-  return run_stemvo(arguments);
+ProgramResult run_drive(const fs::path& sequence, const std::string& out, const Words& more = {}) {
+  return run_stemvo({"run", sequence.string(), "--out", out}, more);
 }
 
 nlohmann::json metrics_of(const std::string& out) {
@@ -45,8 +31,7 @@ class Run : public ::testing::Test {
 
 TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
   const ProgramResult result =
-      run_drive(sequence_, out_, {"--set", kTrueScale, "--pictures", "20"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+      succeeded(run_drive(sequence_, out_, {"--set", kTrueScale, "--pictures", "20"}));
   EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_kitti.txt")), 60);
   EXPECT_EQ(count_lines(read_file(out_ + "/trajectory_tum.txt")), 60);
   EXPECT_EQ(count_lines(read_file(out_ + "/frames.csv")), 61);
@@ -64,8 +49,8 @@ TEST_F(Run, WritesEveryFileAndPrintsTheTable) {
 }
 
 TEST_F(Run, NothingLooksAhead) {
-  ASSERT_EQ(run_drive(sequence_, out_ + "long", {"--frames", "0:40"}).exit_code, 0);
-  ASSERT_EQ(run_drive(sequence_, out_ + "short", {"--frames", "0:25"}).exit_code, 0);
+  succeeded(run_drive(sequence_, out_ + "long", {"--frames", "0:40"}));
+  succeeded(run_drive(sequence_, out_ + "short", {"--frames", "0:25"}));
   const std::string longer = read_file(out_ + "long/trajectory_kitti.txt");
   const std::string shorter = read_file(out_ + "short/trajectory_kitti.txt");
   EXPECT_EQ(count_lines(shorter), 25);
@@ -76,12 +61,10 @@ TEST_F(Run, NothingLooksAhead) {
 /// near the other one.
 TEST_F(Run, PortableCodeHasItsOwnBytesAndTheSamePath) {
   const std::string path = "/trajectory_kitti.txt";
-  ASSERT_EQ(run_drive(sequence_, out_).exit_code, 0);
+  succeeded(run_drive(sequence_, out_));
   for (const std::string threads : {"1", "2"}) {
-    ASSERT_EQ(test::run_stemvo_portable(
-                  {"run", sequence_.string(), "--out", out_ + threads, "--threads", threads})
-                  .exit_code,
-              0);
+    succeeded(run_stemvo_portable(
+        {"run", sequence_.string(), "--out", out_ + threads, "--threads", threads}));
   }
   EXPECT_TRUE(read_file(out_ + "1" + path) == read_file(out_ + "2" + path));
 #if defined(__x86_64__)
@@ -95,13 +78,12 @@ TEST_F(Run, PortableCodeHasItsOwnBytesAndTheSamePath) {
 }
 
 TEST_F(Run, WithoutGroundTruthNoByteOfTheTrajectoryChanges) {
-  const fs::path copy = test::copy_drive(folder_.path(), 12);
-  ASSERT_EQ(run_drive(copy, out_ + "1").exit_code, 0);
+  const fs::path copy = copy_drive(folder_.path(), 12);
+  succeeded(run_drive(copy, out_ + "1"));
   EXPECT_FALSE(metrics_of(out_ + "1")["t_rel_percent"].is_null() &&
                metrics_of(out_ + "1")["path_length_m"].is_null());
   fs::remove(folder_.path() / "poses/00.txt");
-  const ProgramResult result = run_drive(copy, out_ + "2");
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  succeeded(run_drive(copy, out_ + "2"));
   EXPECT_TRUE(read_file(out_ + "1/trajectory_kitti.txt") ==
               read_file(out_ + "2/trajectory_kitti.txt"));
   const nlohmann::json metrics = metrics_of(out_ + "2");
@@ -114,13 +96,10 @@ TEST_F(Run, WithoutGroundTruthNoByteOfTheTrajectoryChanges) {
 }
 
 TEST_F(Run, ItsConfigRunsAgain) {
-  ASSERT_EQ(run_drive(sequence_, out_ + "1",
-                      {"--frames", "0:10", "--set", "stem.model=gray", "--set", "seed=5"})
-                .exit_code,
-            0);
-  const ProgramResult result =
-      run_drive(sequence_, out_ + "2", {"--frames", "0:10", "--config", out_ + "1/config.yaml"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  succeeded(run_drive(sequence_, out_ + "1",
+                      {"--frames", "0:10", "--set", "stem.model=gray", "--set", "seed=5"}));
+  succeeded(
+      run_drive(sequence_, out_ + "2", {"--frames", "0:10", "--config", out_ + "1/config.yaml"}));
   EXPECT_TRUE(read_file(out_ + "1/trajectory_kitti.txt") ==
               read_file(out_ + "2/trajectory_kitti.txt"));
   EXPECT_TRUE(read_file(out_ + "1/config.yaml") == read_file(out_ + "2/config.yaml"));
@@ -139,18 +118,15 @@ TEST_F(Run, AnyChannelAndFrontEndRuns) {
       EXPECT_EQ(count_lines(read_file(out + "/trajectory_kitti.txt")), 6);
     }
   }
-  EXPECT_EQ(run_drive(sequence_, out_, {"--frames", "0:6", "--config", "paper"}).exit_code, 0);
+  succeeded(run_drive(sequence_, out_, {"--frames", "0:6", "--config", "paper"}));
 }
 
 TEST_F(Run, InterruptWritesWhatWasComputed) {
   for (const int signal : {SIGINT, SIGTERM}) {
     // The same few frames many times over last long enough to be interrupted.
-    const fs::path copy = test::copy_drive(folder_.path() / std::to_string(signal), 2);
+    const fs::path copy = copy_drive(folder_.path() / std::to_string(signal), 2);
     for (int i = 2; i < 4000; ++i) {
-      char name[32];
-      std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
-      fs::create_symlink(copy / (i % 2 == 0 ? "image_2/000000.png" : "image_2/000001.png"),
-                         copy / name);
+      fs::create_symlink(copy / image_name(i % 2), copy / image_name(i));
     }
     fs::remove(copy / "../../poses/00.txt");
     std::ofstream times(copy / "times.txt");
@@ -159,7 +135,7 @@ TEST_F(Run, InterruptWritesWhatWasComputed) {
     }
     times.close();
     const std::string out = out_ + std::to_string(signal);
-    test::RunningProgram program(STEMVO_PROGRAM, {"run", copy.string(), "--out", out});
+    RunningProgram program(STEMVO_PROGRAM, {"run", copy.string(), "--out", out});
     for (int i = 0; i < 600 && !fs::exists(out + "/frames.csv"); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }

@@ -1,18 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <random>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "support/kitti_clips.hpp"
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -21,7 +13,7 @@ namespace {
 class Speeds : public ::testing::Test {
  protected:
   /// t_rel in percent without alignment; `sequence` has poses in ../../poses.
-  double t_rel_with(const fs::path& sequence, double bias, std::vector<std::string> more = {}) {
+  double t_rel_with(const fs::path& sequence, double bias, const Words& more = {}) {
     const auto poses =
         read_kitti_trajectory(sequence / "../../poses" / (sequence.filename().string() + ".txt"));
     std::ifstream times(sequence / "times.txt");
@@ -39,22 +31,22 @@ class Speeds : public ::testing::Test {
       }
     }
     write_file(folder_ / "speeds.csv", rows);
-    more.insert(more.begin(), {"run", sequence.string(), "--out", folder_ / "out", "--set",
-                               "scale.source=none", "--speed", folder_ / "speeds.csv"});
-    const ProgramResult run = run_stemvo(more);
-    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const ProgramResult run =
+        succeeded(run_stemvo({"run", sequence.string(), "--out", folder_ / "out", "--set",
+                              "scale.source=none", "--speed", folder_ / "speeds.csv"},
+                             more));
     EXPECT_THAT(run.err, HasSubstr(fmt::format(", {} speeds", poses->size() - 1)));
     const auto metrics = nlohmann::json::parse(read_file(folder_ / "out/metrics.json"));
     EXPECT_EQ(metrics.at("scale_source"), "speed");
     EXPECT_EQ(metrics.at("alignment"), "none");
     return metrics.at("t_rel_percent").get<double>();
   }
-  test::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(Speeds, MakeMetresOfAClipWithoutItsRoad) {
   STEMVO_NEEDS_SHARED_DATA();
-  const fs::path sequence = testing::shared_data() / "kitti/sequences/03";
+  const fs::path sequence = shared_data() / "kitti/sequences/03";
   EXPECT_LE(t_rel_with(sequence, 0.0), 0.6);
   const double biased = t_rel_with(sequence, 0.05);
   EXPECT_GE(biased, 4.4);
@@ -62,9 +54,9 @@ TEST_F(Speeds, MakeMetresOfAClipWithoutItsRoad) {
 }
 
 TEST_F(Speeds, MakeMetresOfAWalk) {
-  const fs::path walk = test::render_once(
-      "small_walk", {"--walk", "--frames", "150", "--width", "320", "--height", "240"});
-  const std::vector<std::string> lengths = {"--set", "evaluation.segment_lengths_m=[1, 2]"};
+  const fs::path walk =
+      render_once("small_walk", {"--walk", "--frames", "150", "--width", "320", "--height", "240"});
+  const Words lengths = {"--set", "evaluation.segment_lengths_m=[1, 2]"};
   EXPECT_LE(t_rel_with(walk / "sequences/00", 0.0, lengths), 1.0);
   const double biased = t_rel_with(walk / "sequences/00", 0.05, lengths);
   EXPECT_GE(biased, 4.0);

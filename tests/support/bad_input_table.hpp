@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <chrono>
-#include <functional>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include "support/program_test.hpp"
+#include "support/test.hpp"
 
 /// Faults of files, and that the program refuses them.
 namespace stemvo {
-
-using Words = std::vector<std::string>;
 
 /// A call of the program, and the word its one line must hold.
 struct Case {
@@ -127,15 +117,12 @@ class BadInputTable : public ::testing::Test {
   static Fault large() {
     return {"70 MB", [](const fs::path& file) { fs::resize_file(file, 70000000); }};
   }
-  [[nodiscard]] Words run(const Words& more = {}) const {
-    Words words = {"run",     sequence_.string(), "--out", folder_ / "out",
-                   "--quiet", "--frames",         "0:1"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+  [[nodiscard]] Words run() const {
+    return {"run", sequence_.string(), "--out", folder_ / "out", "--quiet", "--frames", "0:1"};
   }
 
   TempFolder folder_;
-  fs::path sequence_ = test::copy_drive(folder_.path(), 3);
+  fs::path sequence_ = copy_drive(folder_.path(), 3);
 };
 
 }  // namespace stemvo

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <set>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/window_estimator.hpp"
 #include "support/estimator_run.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

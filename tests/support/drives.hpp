@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
-#include <fstream>
-#include <optional>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
 #include <fcntl.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 #include "support/run_program.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
 
@@ -24,10 +18,12 @@ struct DriveSize {
   int height_px = 188;
 };
 
+inline std::string image_name(int frame) { return fmt::format("image_2/{:06}.png", frame); }
+
 /// Holds a lock file while it lives.
 class FileLock {
  public:
-  explicit FileLock(const std::filesystem::path& file)
+  explicit FileLock(const fs::path& file)
       : descriptor_(::open(file.c_str(), O_CREAT | O_RDWR, 0600)) {
     ::flock(descriptor_, LOCK_EX);
   }
@@ -40,8 +36,7 @@ class FileLock {
 };
 
 /// The folder for rendered drives, empty when the program is a new one. Hold its lock file.
-inline std::filesystem::path drives_folder() {
-  namespace fs = std::filesystem;
+inline fs::path drives_folder() {
   const fs::path base = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
   const std::string built =
       std::to_string(fs::last_write_time(STEMVO_PROGRAM).time_since_epoch().count());
@@ -58,9 +53,7 @@ inline std::filesystem::path drives_folder() {
 
 /// Renders a drive by these options of `stemvo synth`, or takes the one that is there. Returns the
 /// folder with sequences/00 and poses/00.txt. Read it only; copy what is to be broken.
-inline std::filesystem::path render_once(const std::string& name,
-                                         const std::vector<std::string>& options) {
-  namespace fs = std::filesystem;
+inline fs::path render_once(const std::string& name, const Words& options) {
   const fs::path parent = fs::path(STEMVO_PROGRAM).parent_path() / "test_drives";
   fs::create_directories(parent);
   const FileLock lock(parent / "lock");
@@ -68,44 +61,36 @@ inline std::filesystem::path render_once(const std::string& name,
   if (!fs::exists(drive)) {
     const fs::path unfinished = parent / (name + ".unfinished");
     fs::remove_all(unfinished);
-    std::vector<std::string> arguments = {"synth", unfinished.string()};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    const ProgramResult result = run_stemvo(arguments);
-    if (result.exit_code != 0) {
-      throw std::runtime_error("stemvo synth failed: " + result.err);
-    }
+    succeeded(run_stemvo({"synth", unfinished.string()}, options));
     fs::rename(unfinished, drive);
   }
   return drive;
 }
 
-inline std::filesystem::path render_once(const std::string& name,
-                                         const DriveSize& size,
-                                         const std::optional<std::filesystem::path>& poses) {
-  std::vector<std::string> options = {"--frames", std::to_string(size.frames),
-                                      "--width",  std::to_string(size.width_px),
-                                      "--height", std::to_string(size.height_px)};
-  if (poses) {
-    options.insert(options.end(), {"--trajectory", poses->string()});
-  }
-  return render_once(name, options);
+inline fs::path render_once(const std::string& name,
+                            const DriveSize& size,
+                            const std::optional<fs::path>& poses) {
+  const Words along = poses ? Words{"--trajectory", poses->string()} : Words();
+  return render_once(
+      name, joined({"--frames", std::to_string(size.frames), "--width",
+                    std::to_string(size.width_px), "--height", std::to_string(size.height_px)},
+                   along));
 }
 
 /// A walk with the camera in the hand, 640 x 480, 30 frames a second.
-inline std::filesystem::path render_walk_once(int num_frames) {
+inline fs::path render_walk_once(int num_frames) {
   return render_once("walk_" + std::to_string(num_frames),
                      {"--walk", "--frames", std::to_string(num_frames)});
 }
 
-inline std::filesystem::path rendered_drive(const DriveSize& size = {}) {
+inline fs::path rendered_drive(const DriveSize& size = {}) {
   return render_once(std::to_string(size.frames) + "x" + std::to_string(size.width_px) + "x" +
                          std::to_string(size.height_px),
                      size, std::nullopt);
 }
 
 /// The first frames of the rendered drive, copied, to be broken.
-inline std::filesystem::path copy_drive(const std::filesystem::path& to, int num_frames) {
-  namespace fs = std::filesystem;
+inline fs::path copy_drive(const fs::path& to, int num_frames) {
   const fs::path from = rendered_drive();
   const fs::path sequence = to / "sequences" / "00";
   fs::create_directories(sequence / "image_2");
@@ -115,9 +100,7 @@ inline std::filesystem::path copy_drive(const std::filesystem::path& to, int num
     fs::copy_file(from / "sequences/00" / name, sequence / name);
   }
   for (int i = 0; i < num_frames; ++i) {
-    char name[32];
-    std::snprintf(name, sizeof(name), "image_2/%06d.png", i);
-    fs::copy_file(from / "sequences/00" / name, sequence / name);
+    fs::copy_file(from / "sequences/00" / image_name(i), sequence / image_name(i));
   }
   return sequence;
 }

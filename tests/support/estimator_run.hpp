@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <functional>
-#include <map>
-#include <memory>
-#include <span>
-#include <utility>
-#include <vector>
-
-#include <opencv2/core.hpp>
-
 #include "geometry/alignment.hpp"
 #include "odometry/estimator.hpp"
 #include "odometry/road/image.hpp"
 #include "stemvo/options.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

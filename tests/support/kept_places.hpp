@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <random>
-#include <vector>
-
-#include <Eigen/Core>
-
 #include "mapping/kept_map.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

@@ -1,30 +1,21 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <iostream>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
 #include "support/shared_data.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
 
-using Runner = ProgramResult (*)(const std::vector<std::string>& arguments);
-
 /// A real clip, held against tests/regression/thresholds/kitti_NN_PROTOCOL.yaml.
-inline void hold(Runner run_by,
-                 const std::string& clip,
+inline void hold(const std::string& clip,
                  const std::string& scale_source,
                  const std::string& thresholds,
                  const std::string& out) {
   const ProgramResult run =
-      run_by({"run", (testing::shared_data() / "kitti/sequences" / clip).string(), "--out", out,
-              "--set", "scale.source=" + scale_source});
-  ASSERT_EQ(run.exit_code, 0) << run.err;
+      succeeded(run_stemvo({"run", (shared_data() / "kitti/sequences" / clip).string(), "--out",
+                            out, "--set", "scale.source=" + scale_source}));
   const ProgramResult check =
       run_stemvo({"check", out + "/metrics.json", "--against",
                   STEMVO_SOURCE_DIR "/tests/regression/thresholds/kitti_" + clip + thresholds});

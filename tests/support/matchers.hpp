@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <gmock/gmock.h>
-
+#include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 
@@ -23,6 +17,11 @@ inline double direction_error_rad(const Eigen::Vector3d& a, const Eigen::Vector3
   const Eigen::Vector3d u = a / a.norm();
   const Eigen::Vector3d v = b / b.norm();
   return 2.0 * std::atan2((u - v).norm(), (u + v).norm());
+}
+
+/// fx, fy, cx, cy, width, height.
+inline std::vector<double> numbers_of(const Camera& c) {
+  return {c.fx_px, c.fy_px, c.cx_px, c.cy_px, 1.0 * c.width_px, 1.0 * c.height_px};
 }
 
 /// Largest difference of an entry; NaN fails. For vectors and matrices of the same size.

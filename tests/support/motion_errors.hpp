@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <optional>
-#include <span>
-#include <vector>
-
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
-
 #include "stemvo/frame_result.hpp"
 #include "stemvo/rigid3.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <complex>
 
-#include <Eigen/Core>
-
 #include "features/patch_kernels.hpp"
+#include "support/test.hpp"
 
 /// How an image is sampled, to be read, not to be fast. Complex numbers are points and
 /// similarities.

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <vector>
-
-#include <opencv2/imgproc.hpp>
-
 #include "features/patch_alignment.hpp"
+#include "support/test.hpp"
 
 /// Images of a texture that is known everywhere, seen through known warps.
 namespace stemvo::test {

@@ -1,17 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <filesystem>
-#include <sstream>
-#include <stdexcept>
-#include <string>
-#include <vector>
-
-#include <Eigen/Core>
-
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

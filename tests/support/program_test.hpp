@@ -1,34 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "support/drives.hpp"
 #include "support/run_program.hpp"
+#include "support/test.hpp"
 
-/// Short names for tests of whole programs.
+/// For tests of whole programs.
 namespace stemvo {
-
-namespace fs = std::filesystem;
-using test::ProgramResult;
-using test::read_file;
-using test::run_stemvo;
-using test::TempFolder;
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 inline void write_file(const fs::path& file, const std::string& text) {
   std::ofstream(file, std::ios::binary) << text;
@@ -38,17 +16,15 @@ inline void write_file(const fs::path& file, const std::string& text) {
 inline std::string camera_file_of(const fs::path& sequence) {
   const std::string text = read_file(sequence / "calib.txt");
   std::istringstream row(text.substr(text.find("P2:")));
-  const std::vector<std::string> words{std::istream_iterator<std::string>(row), {}};
-  const test::DriveSize size;
+  const Words words{std::istream_iterator<std::string>(row), {}};
+  const DriveSize size;
   return fmt::format("resolution: [{}, {}]\nintrinsics: [{}, {}, {}, {}]\ndistortion_model: none\n",
                      size.width_px, size.height_px, words.at(1), words.at(6), words.at(3),
                      words.at(7));
 }
 
 /// One line, with the words given, and the exit code; nothing on standard output.
-inline void expect_error(const ProgramResult& result,
-                         int exit_code,
-                         const std::vector<std::string>& words) {
+inline void expect_error(const ProgramResult& result, int exit_code, const Words& words) {
   EXPECT_EQ(result.exit_code, exit_code) << result.err;
   EXPECT_THAT(result.out, IsEmpty());
   EXPECT_THAT(result.err, StartsWith("error: "));

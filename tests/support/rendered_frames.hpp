@@ -1,25 +1,19 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-
-#include <Eigen/Core>
-#include <opencv2/imgproc.hpp>
-
 #include "stemvo/camera.hpp"
+#include "support/test.hpp"
 #include "synth/renderer.hpp"
 
 namespace stemvo::testing {
 
 inline Camera kitti_camera(double scale) {
-  Camera camera;
-  camera.fx_px = camera.fy_px = 718.856 * scale;
-  camera.cx_px = 607.1928 * scale;
-  camera.cy_px = 185.2157 * scale;
-  camera.width_px = static_cast<int>(1241 * scale);
-  camera.height_px = static_cast<int>(376 * scale);
-  return camera;
+  return {718.856 * scale,
+          718.856 * scale,
+          607.1928 * scale,
+          185.2157 * scale,
+          static_cast<int>(1241 * scale),
+          static_cast<int>(376 * scale)};
 }
 
 inline cv::Mat gray_of(const synth::RenderedFrame& frame) {
@@ -53,14 +47,6 @@ inline cv::Mat predict(const synth::RenderedFrame& a,
   return map;
 }
 
-inline Camera hand_camera() {
-  Camera camera;
-  camera.fx_px = camera.fy_px = 585.0;
-  camera.cx_px = 320.0;
-  camera.cy_px = 240.0;
-  camera.width_px = 640;
-  camera.height_px = 480;
-  return camera;
-}
+inline Camera hand_camera() { return {585.0, 585.0, 320.0, 240.0, 640, 480}; }
 
 }  // namespace stemvo::testing

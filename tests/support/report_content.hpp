@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <string>
-
 #include <nlohmann/json.hpp>
+
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

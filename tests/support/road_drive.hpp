@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <map>
-#include <memory>
-#include <utility>
-#include <vector>
-
 #include "config/config.hpp"
 #include "odometry/road/image.hpp"
 #include "support/estimator_run.hpp"
 #include "support/road_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <random>
-
-#include <Eigen/Core>
-#include <opencv2/core.hpp>
-
 #include "odometry/road/image.hpp"
 #include "odometry/road/model.hpp"
 #include "stem/channel.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 
@@ -137,9 +129,7 @@ inline Rigid3 in_units(Rigid3 motion, double metres_per_unit) {
 
 /// Belief that the unit is that long, to 3 %; nothing about the road.
 inline RoadPrior near(double metres_per_unit) {
-  RoadPrior prior;
-  prior.log_scale = std::log(metres_per_unit);
-  prior.log_scale_sigma = 0.03;
+  RoadPrior prior{.log_scale = std::log(metres_per_unit), .log_scale_sigma = 0.03};
   return prior;
 }
 

@@ -1,27 +1,26 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <string>
-#include <vector>
-
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
-
-using stemvo::testing::TempFolder;
 
 /// The whole file; empty where there is none.
 inline std::string read_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+using Words = std::vector<std::string>;
+
+inline Words joined(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
 }
 
 struct ProgramResult {
@@ -35,7 +34,7 @@ struct ProgramResult {
 /// A program as a child process, its output caught in files.
 class RunningProgram {
  public:
-  RunningProgram(const std::string& program, const std::vector<std::string>& arguments)
+  RunningProgram(const std::string& program, const Words& arguments)
       : out_(capture_file("out")), err_(capture_file("err")) {
     std::vector<char*> argv = {const_cast<char*>(program.c_str())};
     for (const std::string& argument : arguments) {
@@ -89,21 +88,26 @@ class RunningProgram {
   pid_t pid_ = -1;
 };
 
-inline ProgramResult run_program(const std::string& program,
-                                 const std::vector<std::string>& arguments) {
+inline ProgramResult run_program(const std::string& program, const Words& arguments) {
   return RunningProgram(program, arguments).wait();
 }
 
 /// The stemvo program that this build made.
-inline ProgramResult run_stemvo(const std::vector<std::string>& arguments) {
-  return run_program(STEMVO_PROGRAM, arguments);
+inline ProgramResult run_stemvo(const Words& arguments, const Words& more = {}) {
+  return run_program(STEMVO_PROGRAM, joined(arguments, more));
 }
 
-/// The same, as a processor without AVX2 runs it.
-inline ProgramResult run_stemvo_portable(const std::vector<std::string>& arguments) {
-  std::vector<std::string> words = {"STEMVO_PORTABLE=1", STEMVO_PROGRAM};
-  words.insert(words.end(), arguments.begin(), arguments.end());
-  return run_program("/usr/bin/env", words);
+/// The result of a program that had to end with 0; throws what it said where it did not.
+inline ProgramResult succeeded(ProgramResult result) {
+  if (result.exit_code != 0) {
+    throw std::runtime_error(fmt::format("exit code {}: {}", result.exit_code, result.err));
+  }
+  return result;
+}
+
+/// The stemvo program as a processor without AVX2 runs it.
+inline ProgramResult run_stemvo_portable(const Words& arguments) {
+  return run_program("/usr/bin/env", joined({"STEMVO_PORTABLE=1", STEMVO_PROGRAM}, arguments));
 }
 
 }  // namespace stemvo::test

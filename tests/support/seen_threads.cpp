@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: MIT
 // OpenCV's loops on threads that the thread sanitizer sees: those of Debian's OpenCV wait for one
 // another in a library that is not built for it, and every loop would be reported.
-#include <algorithm>
 #include <atomic>
-#include <memory>
-#include <thread>
-#include <utility>
-#include <vector>
 
-#include <gtest/gtest.h>
 #include <opencv2/core/parallel/parallel_backend.hpp>
+
+#include "support/test.hpp"
 
 namespace stemvo::test {
 namespace {

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdlib>
-#include <filesystem>
-#include <string>
-
-#include <gtest/gtest.h>
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 
@@ -19,7 +15,7 @@ inline std::filesystem::path shared_data() {
 
 /// First line of a test that needs real data.
 #define STEMVO_NEEDS_SHARED_DATA()                   \
-  if (::stemvo::testing::shared_data().empty()) {    \
+  if (shared_data().empty()) {                       \
     GTEST_SKIP() << "STEMVO_SHARED_DATA is not set"; \
   }                                                  \
   static_assert(true, "")

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
-#include <filesystem>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/core.hpp>
-
 #include "dataset/frame_source.hpp"
 #include "stemvo/odometry.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "synth/synth.hpp"
 
 namespace stemvo::testing {

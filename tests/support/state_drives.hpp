@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cmath>
-#include <filesystem>
-#include <numbers>
-#include <string>
-
 #include "evaluation/trajectory.hpp"
 #include "support/drives.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
 

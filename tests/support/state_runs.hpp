@@ -1,39 +1,29 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <filesystem>
-#include <numbers>
-#include <sstream>
-#include <string>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "evaluation/trajectory.hpp"
 #include "support/run_program.hpp"
 #include "support/state_drives.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
 
-inline constexpr double kDeg = std::numbers::pi / 180.0;
-
 /// One column of frames.csv.
-inline std::vector<std::string> column(const std::string& csv, const std::string& name) {
+inline Words column(const std::string& csv, const std::string& name) {
   std::istringstream lines(csv);
   std::string line;
   std::getline(lines, line);
   const auto cells = [](const std::string& text) {
-    std::vector<std::string> result(1);
+    Words result(1);
     for (const char c : text) {
       c == ',' ? void(result.emplace_back()) : result.back().push_back(c);
     }
     return result;
   };
-  const std::vector<std::string> names = cells(line);
+  const Words names = cells(line);
   const auto index =
       static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
-  std::vector<std::string> values;
+  Words values;
   while (std::getline(lines, line)) {
     values.push_back(cells(line).at(index));
   }
@@ -42,12 +32,12 @@ inline std::vector<std::string> column(const std::string& csv, const std::string
 
 /// The results of a run.
 struct StateRun {
-  std::vector<std::string> states;
-  std::vector<std::string> roads;
-  std::vector<std::string> sigmas;
+  Words states;
+  Words roads;
+  Words sigmas;
   Trajectory poses;
 
-  void expect_states(int from, int to, const std::vector<std::string>& allowed) const {
+  void expect_states(int from, int to, const Words& allowed) const {
     for (int i = from; i < to; ++i) {
       const std::string& state = states.at(static_cast<std::size_t>(i));
       EXPECT_TRUE(std::find(allowed.begin(), allowed.end(), state) != allowed.end())
@@ -60,15 +50,11 @@ struct StateRun {
 inline StateRun run_states(const std::filesystem::path& sequence, const std::string& scale) {
   const TempFolder folder;
   const std::string out = folder / "result";
-  const ProgramResult done = run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",
-                                         "odometry.mode=map", "--set", "scale.source=" + scale});
-  EXPECT_EQ(done.exit_code, 0) << done.err;
+  succeeded(run_stemvo({"run", sequence.string(), "--out", out, "--quiet", "--set",
+                        "odometry.mode=map", "--set", "scale.source=" + scale}));
   const std::string csv = read_file(out + "/frames.csv");
-  StateRun result{column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"), {}};
-  const auto poses = read_kitti_trajectory(out + "/trajectory_kitti.txt");  // refuses NaN
-  EXPECT_TRUE(poses) << (poses ? "" : poses.error().message);
-  result.poses = poses.value_or(Trajectory());
-  return result;
+  return {column(csv, "state"), column(csv, "scale_state"), column(csv, "scale_sigma"),
+          read_kitti_trajectory(out + "/trajectory_kitti.txt").value()};  // refuses NaN
 }
 
 /// Motions over `length` frames within [begin, end): metres and radians off.

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <map>
-#include <utility>
-#include <vector>
-
-#include <Eigen/Core>
-
 #include "features/front_end.hpp"
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 
@@ -48,8 +41,13 @@ class DriveTracks {
 
   /// A path of equal motions (prev_from_cur).
   [[nodiscard]] static std::vector<Rigid3> repeat(const Rigid3& motion, int num_frames) {
-    std::vector<Rigid3> path(1);
-    while (static_cast<int>(path.size()) < num_frames) {
+    return go_on(std::vector<Rigid3>(1), motion, num_frames - 1);
+  }
+  /// The path, and so many motions more.
+  [[nodiscard]] static std::vector<Rigid3> go_on(std::vector<Rigid3> path,
+                                                 const Rigid3& motion,
+                                                 int count) {
+    for (int i = 0; i < count; ++i) {
       path.push_back(path.back() * motion);
     }
     return path;
@@ -84,6 +82,14 @@ class DriveTracks {
 
   /// Matches of frame i - 1 to frame i under the points' numbers.
   [[nodiscard]] Matches matches(int i) const { return matches(i - 1, i); }
+  /// The same under numbers that nobody has seen.
+  [[nodiscard]] Matches other_matches(int i) const {
+    Matches result = matches(i);
+    for (int& id : result.track_ids) {
+      id += 100000;
+    }
+    return result;
+  }
   [[nodiscard]] Matches matches(int prev, int cur) const {
     Matches result;
     result.prev_frame = prev;

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <random>
-#include <vector>
-
-#include <Eigen/Core>
-
 #include "stemvo/camera.hpp"
 #include "stemvo/rigid3.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

@@ -1,16 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <opencv2/core.hpp>
-
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::testing {
 

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-
 #include "support/run_program.hpp"
+#include "support/test.hpp"
 
 namespace stemvo::test {
 
@@ -16,10 +10,8 @@ namespace stemvo::test {
 inline void write_video(const std::string& file,
                         double rate_hz,
                         const std::vector<std::filesystem::path>& images) {
-  std::vector<std::string> arguments = {file, fmt::format("{}", rate_hz)};
-  arguments.insert(arguments.end(), images.begin(), images.end());
-  const ProgramResult result = run_program(STEMVO_WRITE_VIDEO, arguments);
-  ASSERT_EQ(result.exit_code, 0) << result.err;
+  succeeded(run_program(STEMVO_WRITE_VIDEO, joined({file, fmt::format("{}", rate_hz)},
+                                                   Words(images.begin(), images.end()))));
 }
 
 }  // namespace stemvo::test

@@ -1,37 +1,28 @@
 // SPDX-License-Identifier: MIT
-#include <iostream>
-#include <string>
-#include <vector>
-
 #include <nlohmann/json.hpp>
 
 #include "support/kitti_clips.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 // Frames a second are measured by hand on an idle machine (docs/performance.md); held here, where
 // machines are shared and their clocks vary, is the processor time of the whole program.
-void expect_processor_ms_per_frame(const std::vector<std::string>& settings,
-                                   const std::string& out,
-                                   double bound_ms) {
-  std::vector<std::string> arguments = {
-      "run",      (testing::shared_data() / "kitti/sequences/03").string(),
-      "--out",    out,
-      "--frames", "0:200",
-      "--quiet"};
-  arguments.insert(arguments.end(), settings.begin(), settings.end());
-  const test::ProgramResult run = test::run_stemvo(arguments);
-  ASSERT_EQ(run.exit_code, 0) << run.err;
+void expect_processor_ms_per_frame(const Words& settings, const std::string& out, double bound_ms) {
+  const ProgramResult run =
+      succeeded(run_stemvo({"run", (shared_data() / "kitti/sequences/03").string(), "--out", out,
+                            "--frames", "0:200", "--quiet"},
+                           settings));
   const double found_ms = 1000.0 * run.cpu_s / 200;
   std::cout << found_ms << " ms of processor time per frame\n";
   EXPECT_LE(found_ms, bound_ms);
 }
 
-class KittiSpeed : public test::NeedsClips {
+class KittiSpeed : public NeedsClips {
  protected:
   static double t_rel_percent(const std::string& out) {
-    return nlohmann::json::parse(test::read_file(out + "/metrics.json")).at("t_rel_percent");
+    return nlohmann::json::parse(read_file(out + "/metrics.json")).at("t_rel_percent");
   }
 };
 

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "dataset/listing.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
 using dataset::comes_before;
 using dataset::list_images;
 using dataset::matches_pattern;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 TEST(NaturalOrder, NumbersByTheirValue) {
   const std::vector<std::string> sorted = {"0.png",      "1.png",    "2.png",     "10.png",
@@ -66,11 +56,8 @@ class ImageList : public ::testing::Test {
     }
     return result;
   }
-  static std::string error_of(const fs::path& path) {
-    const auto list = list_images(path);
-    return list ? "(listed)" : list.error().message;
-  }
-  testing::TempFolder folder_;
+  static std::string error_of(const fs::path& path) { return message_of(list_images(path)); }
+  TempFolder folder_;
 };
 
 TEST_F(ImageList, ImagesOfAFolderInTheirOrder) {

@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <cstdio>
-#include <filesystem>
-#include <iterator>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "dataset/kitti_text.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
-
-using ::testing::HasSubstr;
-using testing::read_all;
-using testing::TempFolder;
 
 const std::string kText =
     "P0: 700 0 600 0 0 700 180 0 0 0 1 0\n"

@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <iostream>
-#include <vector>
-
-#include <gmock/gmock.h>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "geometry/distortion.hpp"
 #include "odometry/frame_view.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -208,10 +200,9 @@ TEST(Undistortion, NoDistortionChangesNothing) {
 TEST(Undistortion, CoefficientsThatTurnTheImageInsideOutAreRefused) {
   const Camera camera{500.0, 500.0, 320.0, 240.0, 640, 480};
   for (const double k1 : {-8.0, -1e6, 50.0, 1e300}) {
-    const auto undistortion =
-        FrameView::create(with_lens(camera, Distortion::kRadialTangential, {k1}));
-    ASSERT_FALSE(undistortion) << k1;
-    EXPECT_THAT(undistortion.error().message, ::testing::HasSubstr("distortion coefficients"));
+    EXPECT_THAT(
+        message_of(FrameView::create(with_lens(camera, Distortion::kRadialTangential, {k1}))),
+        ::testing::HasSubstr("distortion coefficients"));
   }
 }
 

@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <numbers>
-#include <string>
-#include <utility>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "evaluation/metrics.hpp"
 #include "evaluation/pose_file.hpp"
 #include "support/shared_data.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 /// `num_poses` poses along z, `step_m` apart.
 Trajectory straight(int num_poses, double step_m) {
@@ -84,7 +75,7 @@ TEST(Evaluate, OnePercentOfScaleIsOnePercentOfTranslation) {
 // Straight ahead in truth, 0.01 deg of yaw per metre in the estimate: 1 deg per 100 m, and again
 // the segment is one metre longer than its name.
 TEST(Evaluate, ConstantYawErrorIsItsRotationPerHundredMetres) {
-  const Metrics metrics = evaluate(circle(151, 0.01 * kRadPerDeg), circle(151, 0.0));
+  const Metrics metrics = evaluate(circle(151, 0.01 * kDeg), circle(151, 0.0));
   EXPECT_EQ(metrics.num_segments, 5);  // 100 m, starting at 0, 10, .. 40
   EXPECT_NEAR(metrics.r_rel_deg_per_100m.value(), 1.01, 1e-9);
   EXPECT_NEAR(metrics.rpe_rotation_deg, 0.01, 1e-9);
@@ -96,7 +87,7 @@ TEST(Evaluate, ConstantYawErrorIsItsRotationPerHundredMetres) {
 TEST(Evaluate, LookingElsewhereAtTheRightPlaceCostsNoTranslation) {
   Trajectory estimate = straight(106, 1.0);
   for (std::size_t i = 1; i < estimate.size(); ++i) {
-    estimate[i].rotation = so3_exp({0.0, 10.0 * kRadPerDeg, 0.0});
+    estimate[i].rotation = so3_exp({0.0, 10.0 * kDeg, 0.0});
   }
   const Metrics metrics = evaluate(estimate, straight(106, 1.0));
   EXPECT_EQ(metrics.num_segments, 1);
@@ -112,8 +103,7 @@ TEST(Evaluate, PathsUnderHundredMetresTakeShortSegments) {
 }
 
 TEST(Evaluate, SegmentLengthsAskedForAreTaken) {
-  EvaluationOptions options;
-  options.segment_lengths_m = {25.0};
+  EvaluationOptions options{.segment_lengths_m = {25.0}};
   const Metrics metrics = evaluate(straight(41, 1.0), straight(41, 1.0), options);
   EXPECT_THAT(metrics.segment_lengths_m, ::testing::ElementsAre(25));
   EXPECT_EQ(metrics.num_segments, 2);  // 0 -> 26, 10 -> 36
@@ -184,7 +174,7 @@ TEST(AlignTrajectory, UndoesAPlantedSimilarity) {
 }
 
 Trajectory read(const std::string& name) {
-  const Expected<Trajectory> poses = read_kitti_trajectory(testing::shared_data() / name);
+  const Expected<Trajectory> poses = read_kitti_trajectory(shared_data() / name);
   EXPECT_TRUE(poses) << poses.error().message;
   return poses.value_or(Trajectory(1));
 }

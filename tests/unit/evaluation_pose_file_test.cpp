@@ -1,30 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "evaluation/pose_file.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-
 TEST(PoseFile, FormatsAreToldByTheirRows) {
-  const testing::TempFolder folder;
+  const TempFolder folder;
   const auto kitti = read_pose_file(folder.file("a", "1 0 0 5 0 1 0 6 0 0 1 7\n"));
-  ASSERT_TRUE(kitti) << kitti.error().message;
   EXPECT_THAT(kitti->timestamps_s, IsEmpty());
   const auto tum = read_pose_file(folder.file("b", "# t x y z\n3.5 5 6 7 0 0 0 1\n"));
-  ASSERT_TRUE(tum) << tum.error().message;
   EXPECT_THAT(tum->timestamps_s, ElementsAre(3.5));
   EXPECT_FALSE(tum->is_of_body);
   const auto euroc = read_pose_file(folder.file("c", "#t [ns],x\n3500000000,5,6,7, 0,1,0,0, 9\n"));
-  ASSERT_TRUE(euroc) << euroc.error().message;
   EXPECT_THAT(euroc->timestamps_s, ElementsAre(3.5));
   EXPECT_TRUE(euroc->is_of_body);
   EXPECT_EQ(euroc->poses[0].rotation.x(), 1.0) << "w comes first";
@@ -34,10 +22,9 @@ TEST(PoseFile, FormatsAreToldByTheirRows) {
 }
 
 TEST(PoseFile, ErrorsNameFileAndLine) {
-  const testing::TempFolder folder;
+  const TempFolder folder;
   const auto error_of = [&](const std::string& text) {
-    const auto file = read_pose_file(folder.file("poses", text));
-    return file ? "(read)" : file.error().message;
+    return message_of(read_pose_file(folder.file("poses", text)));
   };
   EXPECT_THAT(error_of("# [ns]\n1,2,3,4,1,0,0,0\n1,2,3\n"),
               HasSubstr("poses:3: expected time, x, y, z, qw, qx, qy, qz, .., found 3 numbers"));
@@ -50,7 +37,7 @@ TEST(PoseFile, ErrorsNameFileAndLine) {
 }
 
 TEST(PoseFile, PosesAreInTheOrderOfTheirTimes) {
-  const testing::TempFolder folder;
+  const TempFolder folder;
   const auto file =
       read_pose_file(folder.file("t", "2 2 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n3 3 0 0 0 0 0 1\n"));
   ASSERT_TRUE(file);

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <opencv2/imgproc.hpp>
-
 #include "features/front_end.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -27,8 +22,7 @@ ChannelImage textured(int shift_px) {
 class MaskedFrontEnd : public ::testing::TestWithParam<FeatureMethod> {};
 
 TEST_P(MaskedFrontEnd, FindsNoPointsThere) {
-  FeatureOptions options;
-  options.method = GetParam();
+  FeatureOptions options{.method = GetParam()};
   const auto num_below = [&](const cv::Mat& mask) {
     const auto front_end = create_front_end(options);
     front_end->set_mask(mask);
@@ -45,8 +39,7 @@ TEST_P(MaskedFrontEnd, FindsNoPointsThere) {
 }
 
 TEST_P(MaskedFrontEnd, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
-  FeatureOptions options;
-  options.method = GetParam();
+  FeatureOptions options{.method = GetParam()};
   const auto front_end = create_front_end(options);
   cv::Mat all_but_left(300, 480, CV_8UC1, cv::Scalar(1));
   all_but_left.colRange(0, 100) = 0;

@@ -1,26 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <iostream>
-#include <limits>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
 #include <opencv2/video/tracking.hpp>
 
 #include "features/patch_alignment.hpp"
 #include "stemvo/options.hpp"
 #include "support/planted_warps.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using test::kViewHeight;
-using test::kViewWidth;
-using test::TestPyramid;
-using test::View;
 
 /// Errors of the points that were found.
 class Distances {

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <cstdlib>
-#include <numeric>
-#include <string_view>
-
-#include <gtest/gtest.h>
-
 #include "features/patch_kernels.hpp"
 #include "instruction_set.hpp"
 #include "support/plain_samples.hpp"
 #include "support/planted_warps.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -27,7 +22,7 @@ TEST(InstructionSet, IsThePortableOneWhereThatIsAskedFor) {
 
 class PatchKernelsTest : public ::testing::Test {
  protected:
-  const test::TestPyramid pyramid_{test::View().render()};
+  const TestPyramid pyramid_{View().render()};
   const BorderedImage& image_ = pyramid_.levels.front();
   const PatchKernels& kernels_ = patch_kernels();
 };
@@ -39,15 +34,15 @@ TEST_F(PatchKernelsTest, SamplesAreThoseOfTheFormula) {
                                  {319.0F, 239.0F, 0.8F, -0.3F}}) {
     FineValues values;
     kernels_.sample_fine(image_, warp, values);
-    const Eigen::VectorXd expected = test::samples(
-        image_, test::Complex(warp.x, warp.y), test::Complex(warp.a, warp.b), test::cubic_weight);
+    const Eigen::VectorXd expected =
+        samples(image_, Complex(warp.x, warp.y), Complex(warp.a, warp.b), cubic_weight);
     for (Eigen::Index k = 0; k < expected.size(); ++k) {
       EXPECT_NEAR(values[static_cast<std::size_t>(k)], expected[k], 0.02);
     }
   }
   CoarseValues coarse;
   kernels_.sample_coarse(image_, 20.25F, 30.75F, coarse);
-  const Eigen::VectorXd expected = test::samples(image_, {23.75, 34.25}, 1.0, test::linear_weight);
+  const Eigen::VectorXd expected = samples(image_, {23.75, 34.25}, 1.0, linear_weight);
   for (Eigen::Index k = 0; k < expected.size(); ++k) {
     EXPECT_NEAR(coarse[static_cast<std::size_t>(k)], expected[k], 1e-3);
   }

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <map>
-#include <optional>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "features/front_end.hpp"
 #include "features/grid_quota.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -39,11 +33,10 @@ double median_error_px(const Matches& matches, const Eigen::Vector2d& expected_f
   return errors.empty() ? 1e9 : errors[errors.size() / 2];
 }
 
-class FrontEndTest : public testing::TestWithParam<FeatureMethod> {
+class FrontEndTest : public ::testing::TestWithParam<FeatureMethod> {
  protected:
   void SetUp() override {
-    FeatureOptions options;
-    options.method = GetParam();
+    FeatureOptions options{.method = GetParam()};
     front_end_ = create_front_end(options);
   }
   std::unique_ptr<FrontEnd> front_end_;
@@ -69,9 +62,9 @@ TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {
 
 INSTANTIATE_TEST_SUITE_P(Methods,
                          FrontEndTest,
-                         testing::Values(FeatureMethod::kPatch,
-                                         FeatureMethod::kOrb,
-                                         FeatureMethod::kSift));
+                         ::testing::Values(FeatureMethod::kPatch,
+                                           FeatureMethod::kOrb,
+                                           FeatureMethod::kSift));
 
 TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const auto front_end = create_front_end({});
@@ -188,8 +181,7 @@ cv::Mat wide_texture(int shift_px) {
 }
 
 TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
-  FeatureOptions options;
-  options.pyramid_levels = 3;
+  FeatureOptions options{.pyramid_levels = 3};
   const auto front_end = create_front_end(options);
   static_cast<void>(front_end->process(image_of(wide_texture(0))));
   const Matches far = front_end->process(image_of(wide_texture(60)));
@@ -199,8 +191,7 @@ TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
 
 TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
   const auto found_after_s = [](double interval_s) {
-    FeatureOptions options;
-    options.pyramid_levels = 3;
+    FeatureOptions options{.pyramid_levels = 3};
     const auto front_end = create_front_end(options);
     for (int i = 0; i < 3; ++i) {
       static_cast<void>(front_end->process(image_of(wide_texture(30 * i)), {i, 0.1 * i}));
@@ -215,8 +206,7 @@ TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
 
 TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
   const auto found_by = [](const std::optional<double>& last_shift_px) {
-    FeatureOptions options;
-    options.pyramid_levels = 3;
+    FeatureOptions options{.pyramid_levels = 3};
     const auto front_end = create_front_end(options);
     const auto show = [&](int shift_px, const std::optional<double>& turn_px) {
       ImageClue clue;
@@ -240,10 +230,7 @@ TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
 }
 
 TEST(GridQuota, GivesEveryCellItsShare) {
-  FeatureOptions options;
-  options.max_features = 24;
-  options.grid_columns = 4;
-  options.grid_rows = 3;
+  FeatureOptions options{.max_features = 24, .grid_columns = 4, .grid_rows = 3};
   GridQuota quota(options, {400, 300});
   EXPECT_TRUE(quota.take({10.0F, 10.0F}));
   EXPECT_TRUE(quota.take({20.0F, 20.0F}));

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "geometry/pose_refinement.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 struct Correspondences {
   std::vector<Eigen::Vector3d> points;

@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "geometry/alignment.hpp"
 #include "stemvo/rigid3.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::IsNear;
-using testing::SceneRandom;
 
 using Points = std::vector<Eigen::Vector3d>;
 
@@ -152,7 +143,7 @@ TEST(AlignPositions, AStraightLineTakesTheSmallestTurn) {
     const Similarity3 found = align_positions(source, target, Alignment::kSim3);
     EXPECT_NEAR(squared_error(found, source, target), 0.0, 1e-18);
     const double turn_rad = Rigid3(found.rotation, found.translation).angle_rad();
-    EXPECT_NEAR(turn_rad, testing::direction_error_rad(from, to), 1e-7);
+    EXPECT_NEAR(turn_rad, direction_error_rad(from, to), 1e-7);
     // Two points are a line, driving the other way is one as well.
     expect_sound(align_positions(source, Points(source.rbegin(), source.rend()), Alignment::kSim3));
     expect_sound(align_positions(Points(source.begin(), source.begin() + 2),

@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 #include <ceres/rotation.h>
-#include <gtest/gtest.h>
 
 #include "geometry/bundle.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 /// A drive as it is measured, poses and points pushed away from the truth.
 Bundle bundle_of(const DriveTracks& drive, double push) {
@@ -114,10 +107,7 @@ CameraPrior weak_prior(double noise_px) {
 TEST(Bundle, EndsWhereCeresDoes) {
   for (const auto& prior : {std::optional<CameraPrior>(), std::optional(weak_prior(0.3))}) {
     const DriveTracks drive(8, 0.3, 5);
-    BundleOptions options;
-    options.max_iterations = 200;
-    options.min_relative_decrease = 1e-14;
-    options.camera = prior;
+    BundleOptions options{.max_iterations = 200, .min_relative_decrease = 1e-14, .camera = prior};
     Bundle ours = bundle_of(drive, 1.0);
     Bundle judge = ours;
     const BundleResult result = solve_bundle_adjustment(ours, options);
@@ -184,12 +174,11 @@ TEST(Bundle, FindsAPlantedCamera) {
   bundle.camera.cx_px += 3.0;
   bundle.camera.cy_px -= 2.0;
   const Camera given = bundle.camera;
-  BundleOptions options;
-  options.num_fixed_poses = 1;
-  options.max_iterations = 50;
-  options.min_relative_decrease = 1e-8;
+  BundleOptions options{.num_fixed_poses = 1,
+                        .max_iterations = 50,
+                        .min_relative_decrease = 1e-8,
+                        .camera = weak_prior(0.1)};
   constexpr double kNoiseSq = 0.01;
-  options.camera = weak_prior(0.1);
   Bundle soon = bundle;
   const BundleResult result = solve_bundle_adjustment(bundle, options);
   ASSERT_TRUE(result.is_usable);

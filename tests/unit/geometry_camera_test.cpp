@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "stemvo/camera.hpp"
 #include "support/matchers.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::IsNear;
 
 constexpr Camera kCamera{700.0, 710.0, 600.0, 180.0, 1241, 376};
 

@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <cstdint>
-#include <vector>
-
-#include <Eigen/Cholesky>
-#include <gtest/gtest.h>
-
 #include "geometry/median.hpp"
 #include "geometry/pose_influence.hpp"
 #include "geometry/pose_refinement.hpp"
 #include "support/motion_errors.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::make_scene;
-using testing::Scene;
-using testing::SceneRandom;
 
 constexpr double kLoss_px = 0.3;
 constexpr int kTrials = 200;
@@ -46,8 +37,8 @@ TEST(PoseInfluence, TheirSquaresAreTheCovarianceWhateverTheNoise) {
       const PoseInfluences influences =
           pose_influences(pose, scene.points_in_prev, scene.cur_uv, scene.camera, kLoss_px);
       // True = (error) pose: an error in the camera's axes, before the pose.
-      return testing::squared_error(pose.inverse(), scene.cur_from_prev.inverse(),
-                                    influences.squared_sum()) /
+      return squared_error(pose.inverse(), scene.cur_from_prev.inverse(),
+                           influences.squared_sum()) /
              5.35;  // chi squared's median
     });
     EXPECT_GT(found, 0.8) << noise_px;
@@ -75,7 +66,7 @@ TEST(PoseInfluence, OfAPointIsWhatThePoseIsWithoutIt) {
 }
 
 TEST(PoseInfluence, NothingSeenGivesAFiniteCovariance) {
-  const PoseInfluences none = pose_influences({}, {}, {}, testing::kitti_camera(), kLoss_px);
+  const PoseInfluences none = pose_influences({}, {}, {}, kitti_camera(), kLoss_px);
   EXPECT_TRUE(none.covariance.allFinite());
   EXPECT_EQ(none.covariance.llt().info(), Eigen::Success);
   EXPECT_EQ(none.squared_sum(), Matrix6d::Zero());
@@ -90,8 +81,7 @@ TEST(PoseInfluence, TwoViewsSayHowSureTheirMotionIs) {
                                 .cur_from_prev;
       Matrix6d covariance = relative_pose_covariance(motion, pairs, scene.camera, kLoss_px);
       covariance.diagonal() += Vector6d::Constant(1e-12);  // of the length, which is known
-      return testing::squared_error(motion.inverse(), scene.cur_from_prev.inverse(), covariance) /
-             4.35;
+      return squared_error(motion.inverse(), scene.cur_from_prev.inverse(), covariance) / 4.35;
     });
     EXPECT_GT(found, 0.75) << noise_px;
     EXPECT_LT(found, 1.35) << noise_px;

@@ -1,27 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "geometry/decomposition.hpp"
 #include "geometry/median.hpp"
 #include "geometry/pose_refinement.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::direction_error_rad;
-using testing::IsNearMotion;
-using testing::make_scene;
-using testing::rotation_error_rad;
-using testing::Scene;
-using testing::SceneOptions;
-using testing::SceneRandom;
 
 using Points = std::vector<Eigen::Vector2d>;
 
@@ -161,7 +147,7 @@ TEST(RefineRelativePose, DegenerateMatchesStayFinite) {
   for (const Rigid3& start : {scene.cur_from_prev, ahead}) {
     for (const Points* points : std::initializer_list<const Points*>{&same, &line, &still}) {
       const RefinedMotion result = refine_relative_pose(start, {*points, *points}, scene.camera);
-      EXPECT_THAT(result.cur_from_prev, testing::IsFiniteMotion());
+      EXPECT_THAT(result.cur_from_prev, IsFiniteMotion());
       EXPECT_TRUE(std::isfinite(result.cost));
     }
   }

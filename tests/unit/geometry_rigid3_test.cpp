@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <limits>
-#include <numbers>
-
-#include <Eigen/LU>
-#include <gtest/gtest.h>
-
 #include "stemvo/rigid3.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::IsNear;
-using testing::IsNearMotion;
-using testing::SceneRandom;
 
 TEST(Rigid3, TransformsPointsAsItsMatrixDoes) {
   SceneRandom random(1);

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
 #include "geometry/triangulation.hpp"
 #include "stemvo/camera.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::IsNear;
-using testing::make_scene;
-using testing::Scene;
 
 Eigen::Vector2d image(const Eigen::Vector3d& point) { return point.hnormalized(); }
 

@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <limits>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "geometry/decomposition.hpp"
 #include "geometry/two_view_scores.hpp"
 #include "support/matchers.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::make_scene;
-using testing::Scene;
 
 using Points = std::vector<Eigen::Vector2d>;
 
@@ -58,7 +50,7 @@ TEST(ScoreHomography, SigmaScalesTheBound) {
 
 TEST(ScoreHomography, ScaleOfTheMatrixDoesNotMatter) {
   const Scene scene = make_scene({.noise_px = 0.5, .planar = true, .seed = 3});
-  const Eigen::Matrix3d h = testing::true_homography(scene);
+  const Eigen::Matrix3d h = true_homography(scene);
   const double expected = score_homography(h, {scene.prev_uv, scene.cur_uv}, 1.0).score;
   EXPECT_GT(expected, 0.0);
   for (const double scale : {-1.0, 1e-9, 1e7}) {
@@ -70,7 +62,7 @@ TEST(ScoreHomography, ScaleOfTheMatrixDoesNotMatter) {
 
 TEST(ScoreHomography, SingularOrBrokenScoresZero) {
   const Scene scene = make_scene({.planar = true, .seed = 3});
-  const Eigen::Matrix3d h = testing::true_homography(scene);
+  const Eigen::Matrix3d h = true_homography(scene);
   Eigen::Matrix3d rank_two = h;
   rank_two.col(2) = 2.0 * h.col(0) - 3.0 * h.col(1);
   Eigen::Matrix3d with_nan = h;

@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "html/page.hpp"
 #include "support/report_content.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo::html {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 class HtmlPage : public ::testing::Test {
  protected:
@@ -26,7 +18,7 @@ class HtmlPage : public ::testing::Test {
     return read_text_file(folder_ / "page.html").value_or("");
   }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
 };
 
 TEST_F(HtmlPage, TextFromOutsideStaysText) {
@@ -35,7 +27,7 @@ TEST_F(HtmlPage, TextFromOutsideStaysText) {
   EXPECT_THAT(text, Not(HasSubstr("alert(1)</script>")));
   EXPECT_THAT(text, Not(HasSubstr("<!--\""))) << "a comment would swallow the rest";
   EXPECT_THAT(text, HasSubstr("{{plotly}}")) << "a place of the template is filled in once";
-  EXPECT_EQ(testing::report_content(text)["title"],
+  EXPECT_EQ(report_content(text)["title"],
             "</script><script>alert(1)</script> {{plotly}} \"' \xef\xbf\xbd <!--");
 }
 
@@ -49,7 +41,7 @@ TEST_F(HtmlPage, PathsAreRoundedAndWhatIsNotFiniteIsNull) {
   poses[0].translation = {1.234567, -2.0, 3.0};
   poses[1].translation.x() = std::nan("");
   const std::string text = written({{"page", "run"}, {"path", path_json(poses)}});
-  const nlohmann::json path = testing::report_content(text)["path"];
+  const nlohmann::json path = report_content(text)["path"];
   EXPECT_EQ(path["x"], nlohmann::json({1.23457, nullptr}));
   EXPECT_EQ(path["y"], nlohmann::json({-2.0, 0.0}));
   EXPECT_EQ(path["z"], nlohmann::json({3.0, 0.0}));

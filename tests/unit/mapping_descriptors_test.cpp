@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <random>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "mapping/descriptors.hpp"
 #include "mapping/place_index.hpp"
 #include "support/kept_places.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DescribedPoints;
 
 /// Blobs that are the same where the image is drawn with another offset.
 cv::Mat texture(cv::Point offset) {

@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <cstddef>
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "mapping/drift_bound.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <cstddef>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mapping/map_adjustment.hpp"
 #include "mapping/pose_graph.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 const IntrinsicsDelta kWeak = (IntrinsicsDelta() << 30.0, 30.0, 0.1, 0.1, 0.1).finished();
 
@@ -25,7 +18,7 @@ DriveTracks walk(int num_frames, double noise_px, std::uint64_t seed) {
         so3_exp({0.15 * std::sin(1.3 * t), 0.5 * std::sin(0.4 * t), 0.2 * std::sin(t)}),
         Eigen::Vector3d(1.5 * std::sin(0.35 * t), 0.3 * std::sin(t), 0.1 * t));
   }
-  testing::SceneRandom random(seed);
+  SceneRandom random(seed);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 800; ++i) {
     const double x = random.uniform(-12.0, 12.0);
@@ -47,7 +40,7 @@ Eigen::Vector2d bend(const Camera& camera,
 /// off by `push`.
 KeptMap map_of(const DriveTracks& drive, const Eigen::Vector2d& radial, double push) {
   KeptMap map;
-  testing::SceneRandom random(5);
+  SceneRandom random(5);
   for (int i = 0; i < drive.num_frames(); ++i) {
     KeptKeyframe& keyframe = map.keyframes.emplace_back();
     keyframe.frame = i;

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/core.hpp>
-
 #include "mapping/map_keeper.hpp"
 #include "support/small_map.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -13,7 +9,7 @@ namespace {
 TEST(MapKeeper, PutsAnotherRecordingsFramesTimesAndTracksBeforeItsOwn) {
   MapKeeper keeper;
   for (int i = 0; i < 2; ++i) {
-    keeper.load(i == 0 ? testing::small_map().map : keeper.map());
+    keeper.load(i == 0 ? small_map().map : keeper.map());
     const KeptMap& map = keeper.map();
     EXPECT_EQ(map.keyframes[0].frame, -7);
     EXPECT_EQ(map.keyframes[1].frame, -2) << "-1 is none";
@@ -107,7 +103,7 @@ TEST_F(MapKeeperWindows, ThatBeginBehindAreMapsOfTheirOwn) {
 }
 
 TEST(MapKeeper, PiecesOfAMapThatNothingConnectsStayPieces) {
-  KeptMap map = testing::small_map().map;
+  KeptMap map = small_map().map;
   map.loops.clear();
   MapKeeper whole;
   whole.load(map);

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mapping/map_merge.hpp"
 #include "mapping/map_trajectory.hpp"
 #include "mapping/pose_graph.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <vector>
-
-#include <gmock/gmock.h>
-
 #include "mapping/map_trajectory.hpp"
 #include "support/matchers.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::IsNear;
-using testing::IsNearMotion;
 
 /// A camera that goes forward one unit and turns a little with each frame, a tenth of a second.
 struct Path {

@@ -1,23 +1,11 @@
 // SPDX-License-Identifier: MIT
 // The estimator with its map: places that are seen again, with tracks that are new there.
-#include <cmath>
-#include <map>
-#include <memory>
-#include <numbers>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "odometry/window_estimator.hpp"
 #include "support/estimator_run.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
-using testing::EstimatorRun;
 
 const Camera kCamera{500.0, 500.0, 500.0, 400.0, 1000, 800};
 
@@ -64,7 +52,7 @@ struct Journey {
     }
   }
   static Options options(bool loops, int threads) {
-    Options options = testing::config_without_scale();
+    Options options = config_without_scale();
     options.odometry.loops = loops;
     options.threads = threads;
     return options;
@@ -75,7 +63,7 @@ struct Journey {
   /// Where the map has frame i, in metres of the drive.
   [[nodiscard]] Eigen::Vector3d position_m(int i) const {
     const double unit_m =
-        1.0 / testing::length_ratio(estimator.trajectory(), drive.world_from_camera, 0, 20);
+        1.0 / length_ratio(estimator.trajectory(), drive.world_from_camera, 0, 20);
     return unit_m * (result(i).map_from_world * result(i).world_from_camera).translation;
   }
   [[nodiscard]] int num_recognized() const {
@@ -93,7 +81,7 @@ struct Journey {
 
 /// Sideways past a wall, 0.4 m a frame; then, at once, slowly from the third frame's place on.
 DriveTracks jump_back(int cut) {
-  testing::SceneRandom random(3);
+  SceneRandom random(3);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 500; ++i) {
     const double x = random.uniform(-10.0, 26.0);
@@ -136,7 +124,7 @@ DriveTracks two_turns(int frames_per_turn) {
     const Eigen::Quaterniond turn = so3_exp({0.0, angle, 0.0});
     path.emplace_back(turn, turn * Eigen::Vector3d(0.0, 0.0, 2.0));
   }
-  testing::SceneRandom random(8);
+  SceneRandom random(8);
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 700; ++i) {
     const double bearing = random.uniform(-std::numbers::pi, std::numbers::pi);

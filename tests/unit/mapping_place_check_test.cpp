@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <random>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "geometry/similarity_refinement.hpp"
 #include "mapping/place_check.hpp"
 #include "support/kept_places.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DescribedPoints;
 
 const Rigid3 kOldPose;
 /// A car that comes back 0.7 m aside, 2 m further, turned by 3 degrees.
@@ -22,8 +14,8 @@ constexpr double kOldUnits = 1.3;
 constexpr double kNewUnits = 0.8;
 
 DescribedPoints street(unsigned seed = 1) {
-  const auto path = testing::DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 1}}, 20);
-  return DescribedPoints(testing::points_along(path, 1200, seed), seed);
+  const auto path = DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 1}}, 20);
+  return DescribedPoints(points_along(path, 1200, seed), seed);
 }
 
 PlaceView view_of(const KeptKeyframe& keyframe) {
@@ -161,7 +153,7 @@ TEST(SimilarityRefinement, CovarianceIsThatOfTheErrors) {
     std::mt19937 random(static_cast<unsigned>(run));
     std::normal_distribution<double> noise(0.0, kNoise_px);
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
-    CrossObservations seen{testing::kitti_camera(), testing::kitti_camera(), {}, {}};
+    CrossObservations seen{kitti_camera(), kitti_camera(), {}, {}};
     for (int i = 0; i < 80; ++i) {
       const double depth = 15.0 + 10.0 * uniform(random);
       const double x = 0.6 * depth * uniform(random);
@@ -195,7 +187,7 @@ TEST(SimilarityRefinement, CovarianceIsThatOfTheErrors) {
 }
 
 TEST(SimilarityRefinement, TooFewPointsTellNothing) {
-  const CrossObservations none{testing::kitti_camera(), testing::kitti_camera(), {}, {}};
+  const CrossObservations none{kitti_camera(), kitti_camera(), {}, {}};
   const auto found = refine_similarity(true_similarity(), none);
   EXPECT_EQ(found.a_from_b.scale, true_similarity().scale);
   EXPECT_TRUE(std::isinf(found.covariance(6, 6)));

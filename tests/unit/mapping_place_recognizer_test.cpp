@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mapping/place_recognizer.hpp"
 #include "support/kept_places.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DescribedPoints;
 
 constexpr int kLength = 60;
 /// The second round has other units.
@@ -21,9 +14,9 @@ constexpr double kUnits = 1.4;
 /// Every keyframe is looked up; tracks are new every 6 keyframes.
 struct TwoRounds {
   explicit TwoRounds(unsigned seed)
-      : path(testing::DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 2}}, kLength)),
-        points(testing::points_along(path, 2000, seed), seed),
-        elsewhere(testing::points_along(path, 2000, seed + 100), seed + 100) {}
+      : path(DriveTracks::repeat({Eigen::Quaterniond::Identity(), {0, 0, 2}}, kLength)),
+        points(points_along(path, 2000, seed), seed),
+        elsewhere(points_along(path, 2000, seed + 100), seed + 100) {}
 
   /// `num_known`: so many corners look as they did.
   std::optional<Loop> add(DescribedPoints& seen,
@@ -160,7 +153,7 @@ TEST(PlaceRecognizer, ALostFrameIsLocatedInTheOldMap) {
     }
   }
   EXPECT_EQ(num_located, 7);
-  DescribedPoints nowhere(testing::points_along(drive.path, 2000, 77), 77);
+  DescribedPoints nowhere(points_along(drive.path, 2000, 77), 77);
   const KeptKeyframe frame = nowhere.see(drive.path[20], 1.0, 0);
   EXPECT_FALSE(drive.recognizer.locate(drive.map, frame.camera, frame.corners, frame.descriptors)
                    .has_value());

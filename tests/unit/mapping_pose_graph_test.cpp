@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <chrono>
-#include <cmath>
-#include <cstddef>
-#include <random>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "mapping/pose_graph.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

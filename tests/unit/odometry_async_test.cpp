@@ -1,23 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <atomic>
-#include <optional>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <opencv2/core.hpp>
 
 #include "stemvo/async_odometry.hpp"
 #include "support/small_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 
 /// Everything a frame left, as far as it can be asked for.
 struct Left {
@@ -60,8 +49,8 @@ class Async : public ::testing::Test {
           odometry.process(frames().images[i], frames().order, time_s(i)).value(), odometry));
     }
   }
-  static const testing::SmallFrames& frames() { return testing::small_frames(); }
-  static double time_s(std::size_t i) { return testing::SmallFrames::time_s(i); }
+  static const SmallFrames& frames() { return small_frames(); }
+  static double time_s(std::size_t i) { return SmallFrames::time_s(i); }
   static Options with_threads(int threads) {
     Options options;
     options.threads = threads;
@@ -73,9 +62,6 @@ class Async : public ::testing::Test {
   }
   static Status push(AsyncOdometry& odometry, std::size_t i) {
     return odometry.push(frames().images[i], frames().order, time_s(i));
-  }
-  static std::string error_of(const Status& status) {
-    return status ? "no error" : status.error().message;
   }
 
   static inline std::vector<Left> plain_;  ///< by Odometry
@@ -140,7 +126,7 @@ TEST_F(Async, ResultsWaitUntilTheyAreTaken) {
   }
   EXPECT_EQ(num_taken, frames().images.size());
   EXPECT_FALSE(odometry.next()->has_value());
-  EXPECT_THAT(error_of(odometry.push(frames().images[0], frames().order, 1e6)),
+  EXPECT_THAT(message_of(odometry.push(frames().images[0], frames().order, 1e6)),
               HasSubstr("after finish()"));
 }
 
@@ -156,7 +142,7 @@ TEST_F(Async, AThousandResultsThatNobodyTakesAreEnough) {
   for (int i = 0; i < 1000; ++i) {
     ASSERT_TRUE(push_next()) << i;
   }
-  EXPECT_THAT(error_of(push_next()), AllOf(HasSubstr("next()"), HasSubstr("1000 that wait")));
+  EXPECT_THAT(message_of(push_next()), AllOf(HasSubstr("next()"), HasSubstr("1000 that wait")));
   ASSERT_TRUE(odometry.next());
   EXPECT_TRUE(push_next());
   EXPECT_FALSE(push_next());
@@ -173,10 +159,10 @@ TEST_F(Async, AWrongFrameIsAnErrorOfPushAndChangesNothing) {
   odometry =
       create(2, [&](const FrameResult& result) { found.push_back(left_by(result, *odometry)); });
   for (std::size_t i = 0; i < frames().images.size(); ++i) {
-    EXPECT_THAT(error_of(odometry->push(cv::Mat(7, 7, CV_8UC1), PixelOrder::kGray, 1e6)),
+    EXPECT_THAT(message_of(odometry->push(cv::Mat(7, 7, CV_8UC1), PixelOrder::kGray, 1e6)),
                 AllOf(HasSubstr("image: expected"), HasSubstr("found 7x7")));
     ASSERT_TRUE(push(*odometry, i));
-    EXPECT_THAT(error_of(push(*odometry, i)), HasSubstr("time: expected"));
+    EXPECT_THAT(message_of(push(*odometry, i)), HasSubstr("time: expected"));
   }
   EXPECT_TRUE(odometry->finish());
   expect_same(found, plain_);
@@ -194,7 +180,7 @@ TEST_F(Async, FinishThrowsWhatTheCallbackThrew) {
     for (std::size_t i = 0; i < frames().images.size() && pushed; ++i) {
       pushed = push(odometry, i);
     }
-    EXPECT_THAT(error_of(pushed), HasSubstr("finish() throws why"));
+    EXPECT_THAT(message_of(pushed), HasSubstr("finish() throws why"));
     EXPECT_THROW((void)odometry.finish(), std::runtime_error);
     EXPECT_EQ(num_called, 3);
   }
@@ -205,8 +191,8 @@ TEST_F(Async, WhatWouldWaitForItselfInTheCallbackIsAnError) {
     std::optional<AsyncOdometry> odometry;
     std::vector<std::string> errors;
     odometry = create(threads, [&](const FrameResult&) {
-      errors = {error_of(push(*odometry, 5)), error_of(odometry->finish()),
-                error_of(odometry->reset()), odometry->next().error().message};
+      errors = {message_of(push(*odometry, 5)), message_of(odometry->finish()),
+                message_of(odometry->reset()), message_of(odometry->next())};
     });
     ASSERT_TRUE(push(*odometry, 0));
     EXPECT_TRUE(odometry->finish());
@@ -232,16 +218,16 @@ TEST_F(Async, AfterAResetTheWorldIsNew) {
     }
     EXPECT_TRUE(odometry->finish());
     expect_same(found, plain_);
-    EXPECT_THAT(error_of(odometry->reset()), HasSubstr("after finish()"));
+    EXPECT_THAT(message_of(odometry->reset()), HasSubstr("after finish()"));
   }
 }
 
 TEST_F(Async, OneThatWasMovedFromIsAnError) {
   AsyncOdometry odometry = create(2);
   const AsyncOdometry other = std::move(odometry);
-  EXPECT_THAT(error_of(push(odometry, 0)), HasSubstr("moved"));
-  EXPECT_THAT(error_of(odometry.finish()), HasSubstr("moved"));
-  EXPECT_THAT(error_of(odometry.reset()), HasSubstr("moved"));
+  EXPECT_THAT(message_of(push(odometry, 0)), HasSubstr("moved"));
+  EXPECT_THAT(message_of(odometry.finish()), HasSubstr("moved"));
+  EXPECT_THAT(message_of(odometry.reset()), HasSubstr("moved"));
   EXPECT_FALSE(odometry.next());
   EXPECT_TRUE(odometry.landmarks_since(0).landmarks.empty() && odometry.keyframes().empty() &&
               odometry.tracked_points().empty() && odometry.channel_image().empty());

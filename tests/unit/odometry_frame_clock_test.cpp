@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/frame_clock.hpp"
 #include "stemvo/odometry.hpp"
 #include "support/small_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -36,7 +33,7 @@ TEST(FrameClock, TimesRiseWhateverTheirSize) {
 
 /// The poses where times begin at `first_s`, with a speed between frames.
 std::vector<FrameResult> run_from(double first_s) {
-  const testing::SmallFrames& frames = testing::small_frames();
+  const SmallFrames& frames = small_frames();
   Odometry odometry = Odometry::create(frames.camera).value();
   std::vector<FrameResult> results;
   for (std::size_t i = 0; i < frames.images.size(); ++i) {

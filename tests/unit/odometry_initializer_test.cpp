@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <tuple>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/initializer.hpp"
 #include "support/estimator_run.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 /// Goes on from frame 0, as the estimator does, until a frame decides.
 struct Decided {
@@ -55,7 +49,7 @@ void expect_true_motion(const Decided& decided, const DriveTracks& drive, double
 /// than a pixel a frame.
 DriveTracks sideways_walk(double noise_px, std::uint64_t seed) {
   const Rigid3 step(so3_exp({0.0, 0.0005, 0.0}), {0.1 / 30.0, 0.0, 0.0});
-  return {DriveTracks::repeat(step, 60), testing::points_of_room(1500, 4.0, seed), noise_px, seed};
+  return {DriveTracks::repeat(step, 60), points_of_room(1500, 4.0, seed), noise_px, seed};
 }
 
 TEST(Initializer, OpensAWindowOfTheReferenceAndNowWhereNeighboursHaveNoParallax) {
@@ -77,7 +71,7 @@ TEST(Initializer, OpensAWindowOfTheReferenceAndNowWhereNeighboursHaveNoParallax)
 TEST(Initializer, APlanarSceneDecidesByTheHomography) {
   int num_right = 0;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    testing::SceneRandom random(seed);
+    SceneRandom random(seed);
     std::vector<Eigen::Vector3d> wall;
     for (int i = 0; i < 1200; ++i) {
       const double x = random.uniform(-6.0, 6.0);
@@ -102,7 +96,7 @@ TEST(Initializer, WaitsWhileTheCameraOnlyTurnsOrStands) {
        {std::tuple(DriveTracks::repeat(turn, 40), 0.15, FrameState::kRotating),
         std::tuple(std::vector<Rigid3>(15), 0.03, FrameState::kStationary)}) {
     const Decided decided =
-        initialize(DriveTracks(path, testing::points_of_room(1500, 4.0, 7), noise_px, 7));
+        initialize(DriveTracks(path, points_of_room(1500, 4.0, 7), noise_px, 7));
     EXPECT_EQ(decided.frame, -1);
     EXPECT_EQ(decided.states, std::vector<FrameState>(path.size() - 1, expected));
   }
@@ -113,7 +107,7 @@ TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   Matches matches = walk.matches(1);
   Initializer initializer(Options{});
   initializer.start({0, Rigid3(), {}});
-  testing::SceneRandom random(9);
+  SceneRandom random(9);
   for (Eigen::Vector2d& uv : matches.cur_uv) {
     uv = random.pixel(walk.camera);
   }

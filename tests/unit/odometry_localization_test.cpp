@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: MIT
-#include <gtest/gtest.h>
-
 #include "odometry/localization.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 /// Landmarks of a street, seen from a known place.
 struct Seen {
-  Camera camera = testing::kitti_camera();
+  Camera camera = kitti_camera();
   Rigid3 world_from_camera{so3_exp({0.02, 0.4, -0.01}), {3.0, -0.2, 8.0}};
   SeenLandmarks landmarks;
 
   Seen(int count, double noise_px, double wrong_share) {
-    testing::SceneRandom random(3);
+    SceneRandom random(3);
     while (landmarks.size() < count) {
       const Eigen::Vector2d uv = random.pixel(camera);
       const Eigen::Vector3d x = random.uniform(4.0, 50.0) * camera.normalize(uv).homogeneous();

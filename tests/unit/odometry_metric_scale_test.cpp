@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <memory>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/metric_scale.hpp"
 #include "odometry/pair_estimator.hpp"
 #include "odometry/way.hpp"
 #include "odometry/window_estimator.hpp"
 #include "support/road_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::EstimatorRun;
-using testing::metric_config;
-using testing::RoadDrive;
 
 constexpr double kStep_m = RoadDrive::kStep_m;
 
@@ -165,7 +157,7 @@ TEST(MetricScale, LandmarksAreInTheUnitsOfTheirPoseWhenTheFirstRoadComes) {
   for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
     const bool is_metric = landmark.frame >= first_road;
     const double unit_m = is_metric ? 1.0 : kStep_m;
-    const double depth_m = testing::true_place(landmark, drive.tracks).z();
+    const double depth_m = true_place(landmark, drive.tracks).z();
     EXPECT_NEAR(unit_m * landmark.in_camera.z(), depth_m, 0.05 * depth_m) << landmark.frame;
     ++(is_metric ? num_after : num_before);
   }

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "odometry/pair_estimator.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-constexpr double kDeg = std::numbers::pi / 180.0;
 
 /// A measured motion from prev_from_cur (what the car did), as the estimator reports it.
 MeasuredMotion driven(const Eigen::Vector3d& direction,
@@ -43,9 +38,7 @@ class Chain : public MotionChain {
 };
 
 Chain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
-  ScaleOptions scale;
-  scale.source = ScaleSource::kConstantSpeed;
-  scale.step_m = step_m;
+  ScaleOptions scale{.source = ScaleSource::kConstantSpeed, .step_m = step_m};
   return {options, scale};
 }
 
@@ -57,8 +50,7 @@ TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
 }
 
 TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
-  OdometryOptions paper;
-  paper.composition = Composition::kPaper;
+  OdometryOptions paper{.composition = Composition::kPaper};
   Chain right = make_chain();
   Chain wrong = make_chain(paper);
   Rigid3 truth;
@@ -77,9 +69,7 @@ TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
 }
 
 TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
-  ScaleOptions scale;
-  scale.source = ScaleSource::kNone;
-  scale.step_m = 0.7;
+  ScaleOptions scale{.source = ScaleSource::kNone, .step_m = 0.7};
   Chain chain({}, scale);
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
   chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));

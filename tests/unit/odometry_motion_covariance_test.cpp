@@ -1,25 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <memory>
-#include <set>
-#include <utility>
-#include <vector>
-
-#include <Eigen/Cholesky>
-#include <gtest/gtest.h>
-
 #include "odometry/motion_covariance.hpp"
 #include "odometry/pair_estimator.hpp"
 #include "odometry/window_estimator.hpp"
 #include "support/estimator_run.hpp"
 #include "support/motion_errors.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::config_without_scale;
-using testing::DriveTracks;
-using testing::EstimatorRun;
 
 /// Driving, standing, driving, turning on the spot, driving.
 std::vector<Rigid3> eventful_path() {
@@ -29,16 +17,14 @@ std::vector<Rigid3> eventful_path() {
   for (const auto& [motion, count] :
        {std::pair(ahead, 14), std::pair(Rigid3(), 4), std::pair(ahead, 8), std::pair(turn, 4),
         std::pair(ahead, 10)}) {
-    for (int i = 0; i < count; ++i) {
-      path.push_back(path.back() * motion);
-    }
+    path = DriveTracks::go_on(path, motion, count);
   }
   return path;
 }
 
 DriveTracks eventful_drive(double noise_px) {
   const std::vector<Rigid3> path = eventful_path();
-  return {path, testing::points_along(path, 1500, 3), noise_px, 3};
+  return {path, points_along(path, 1500, 3), noise_px, 3};
 }
 
 double sigma_of_length(const FrameResult& result) {
@@ -59,11 +45,11 @@ TEST(MotionCovariance, IsHonestWhateverTheNoiseOfTheTracks) {
   const Rigid3 bend(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, 1.0});
   const std::vector<Rigid3> path = DriveTracks::repeat(bend, 80);
   for (const double noise_px : {0.05, 0.6}) {
-    const DriveTracks drive(path, testing::points_along(path, 3000, 8), noise_px, 8);
+    const DriveTracks drive(path, points_along(path, 3000, 8), noise_px, 8);
     WindowEstimator estimator(config_without_scale(), drive.camera);
     EstimatorRun run(estimator, drive);
     run.add_all();
-    const testing::MotionErrors errors = testing::errors_of(run.results, path);
+    const MotionErrors errors = errors_of(run.results, path);
     EXPECT_GT(errors.count, 60) << noise_px;
     EXPECT_GT(errors.mean, 0.3) << noise_px;  // adjustments move much where tracks are bad
     EXPECT_LT(errors.mean, 1.6) << noise_px;
@@ -79,12 +65,12 @@ TEST(MotionCovariance, IsHonestWhereThereIsHardlyAnyParallax) {
     x += i < 60 ? 0.02 : 0.0015 * std::sin(0.1 * i);
     path.emplace_back(so3_exp({0.0, 0.001 * i, 0.0}), Eigen::Vector3d(x, 0.0, 0.0));
   }
-  const DriveTracks drive(path, testing::points_of_room(2500, 4.0, 4), 0.1, 4);
+  const DriveTracks drive(path, points_of_room(2500, 4.0, 4), 0.1, 4);
   WindowEstimator estimator(config_without_scale(), drive.camera);
   EstimatorRun run(estimator, drive);
   run.interval_s = 1.0 / 30.0;
   run.add_all();
-  const double unit = testing::length_ratio(estimator.trajectory(), path, 20, 59);
+  const double unit = length_ratio(estimator.trajectory(), path, 20, 59);
   double sum = 0.0;
   int count = 0;
   int inside = 0;
@@ -92,10 +78,10 @@ TEST(MotionCovariance, IsHonestWhereThereIsHardlyAnyParallax) {
     if (run.results[i].state == FrameState::kTracking) {
       continue;
     }
-    Rigid3 motion = testing::motion_to(path, i);
+    Rigid3 motion = motion_to(path, i);
     motion.translation *= unit;
-    const double squared = testing::squared_error(testing::motion_to(estimator.trajectory(), i),
-                                                  motion, run.results[i].motion_covariance);
+    const double squared = squared_error(motion_to(estimator.trajectory(), i), motion,
+                                         run.results[i].motion_covariance);
     sum += squared / 6.0;
     inside += squared < 12.592 ? 1 : 0;
     ++count;
@@ -164,7 +150,7 @@ MotionCovariance::Motion known_motion() {
                                   .usual_step = 2.0,
                                   .hidden_px = 0.15,
                                   .two_view = Matrix6d::Zero(),
-                                  .camera = testing::kitti_camera(),
+                                  .camera = kitti_camera(),
                                   .camera_sigma = std::nullopt,
                                   .scale_sigma = std::nullopt};
   return motion;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <gtest/gtest.h>
-
 #include "odometry/motion_model.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -20,7 +19,7 @@ struct Followed {
   MotionModel model;
   Rigid3 truth;
   Rigid3 pose;
-  testing::SceneRandom random{7};
+  SceneRandom random{7};
 
   void step(const Rigid3& motion, double sigma, double weight) {
     truth = truth * motion;
@@ -71,7 +70,7 @@ TEST(MotionModel, KeepsToTheUnitOfTheMap) {
   MotionModel one;
   MotionModel other;
   Vector6d units = Vector6d::Ones();
-  testing::SceneRandom random(3);
+  SceneRandom random(3);
   for (int i = 0; i < 60; ++i) {
     if (i == 30) {
       units.head<3>().setConstant(4.0);

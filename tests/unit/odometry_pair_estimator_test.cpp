@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <gtest/gtest.h>
-
 #include "odometry/pair_estimator.hpp"
 #include "support/estimator_run.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-using testing::DriveTracks;
-using testing::EstimatorRun;
-
 struct Driven {
   DriveTracks drive;
-  PairEstimator estimator{testing::config_without_scale(OdometryMode::kTwoFrame), drive.camera};
+  PairEstimator estimator{config_without_scale(OdometryMode::kTwoFrame), drive.camera};
   EstimatorRun run{estimator, drive};
 
   explicit Driven(DriveTracks tracks = DriveTracks(20, 0.1, 41)) : drive(std::move(tracks)) {}
@@ -29,8 +25,8 @@ TEST(PairEstimator, EveryMeasuredStepIsOneUnitAndPosesStayAsTheyCame) {
   EXPECT_EQ(d.run.state(0), FrameState::kFirst);
   EXPECT_EQ(d.run.state(1), FrameState::kInitializing);
   EXPECT_EQ(d.run.count(FrameState::kTracking), 18);
-  EXPECT_LT(testing::fitted_error_share(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
-  EXPECT_LT(testing::rotation_error_rad(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
+  EXPECT_LT(fitted_error_share(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
+  EXPECT_LT(rotation_error_rad(d.estimator.trajectory(), d.drive.world_from_camera), 0.01);
   EXPECT_NEAR(d.last_motion().translation.norm(), 1.0, 1e-9);
   const std::vector<Rigid3>& poses = d.estimator.trajectory();
   ASSERT_EQ(poses.size(), d.drive.world_from_camera.size());
@@ -50,11 +46,9 @@ TEST(PairEstimator, MissingImagesBeforeTheFirstOneAreNoStart) {
 
 TEST(PairEstimator, StationaryAndTurningHoldThePosition) {
   std::vector<Rigid3> path = DriveTracks::repeat(Rigid3({1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}), 8);
-  path.insert(path.end(), 4, path.back());
-  for (int i = 0; i < 4; ++i) {
-    path.push_back(path.back() * Rigid3(so3_exp({0.0, 0.04, 0.0}), Eigen::Vector3d::Zero()));
-  }
-  Driven d(DriveTracks(path, testing::points_along(path, 1500, 42), 0.02, 42));
+  const Rigid3 turn(so3_exp({0.0, 0.04, 0.0}), Eigen::Vector3d::Zero());
+  path = DriveTracks::go_on(DriveTracks::go_on(path, Rigid3(), 4), turn, 4);
+  Driven d(DriveTracks(path, points_along(path, 1500, 42), 0.02, 42));
   d.run.add_all();
   for (int i = 8; i < d.drive.num_frames(); ++i) {
     EXPECT_EQ(d.run.state(i), i < 12 ? FrameState::kStationary : FrameState::kRotating) << i;

@@ -1,24 +1,18 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <random>
-#include <string>
-
-#include <gtest/gtest.h>
-
 #include "odometry/road/belief.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 /// A frame on which a textured road is measured without error.
 RoadEvidence good_frame() {
-  RoadEvidence frame;
-  frame.num_on = 8;
-  frame.num_above = 1;
-  frame.is_in_sight = true;
-  frame.measured_share = 1.0;
-  frame.innovation = 0.0;
-  frame.correlation = 0.8;
+  RoadEvidence frame{.num_on = 8,
+                     .num_above = 1,
+                     .is_in_sight = true,
+                     .measured_share = 1.0,
+                     .innovation = 0.0,
+                     .correlation = 0.8};
   return frame;
 }
 

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/road_landmarks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

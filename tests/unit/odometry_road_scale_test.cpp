@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <array>
-#include <cmath>
-#include <map>
-#include <utility>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/road/path.hpp"
 #include "odometry/road/region.hpp"
 #include "odometry/road/scale.hpp"
 #include "support/road_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::RoadScene;
 
 constexpr double kDriftSigma = 0.019;  // in a second
 
@@ -36,8 +27,7 @@ TEST(RoadRegion, FollowsTheTurn) {
 }
 
 TEST(RoadPath, TellsSlopeAndBendOfTheRoadWhateverTheCamerasPitch) {
-  RoadOptions options;
-  options.heave_sigma_m = 0.01;
+  RoadOptions options{.heave_sigma_m = 0.01};
   const double units_per_m = 0.25;
   const double pitch_rad = 0.02;  // of the camera, looking up
   const double bend_per_m = 4e-4;
@@ -119,7 +109,7 @@ class Drive {
   }
   [[nodiscard]] cv::Mat view(int frame, std::uint64_t seed) const {
     const Rigid3 camera_from_first(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kStep_m * frame});
-    return testing::render_road(scene_, camera_from_first, seed);
+    return render_road(scene_, camera_from_first, seed);
   }
   const RoadScene scene_{};
   int frame_ = 0;
@@ -185,8 +175,7 @@ std::array<double, 2> errors_on_a_crest(std::array<Scale, 2> scales) {
   constexpr double kBend_per_m = 8e-4;
   constexpr int kFrames = 15;
   constexpr double kCrestStep_m = 1.1;
-  RoadScene scene;
-  scene.bump = [](double /*x*/, double z) { return -kBend_per_m * z * z; };
+  RoadScene scene{.bump = [](double /*x*/, double z) { return -kBend_per_m * z * z; }};
   const auto first_from_camera = [](int frame) {
     const double z = kCrestStep_m * (frame - kFrames);
     return Rigid3(so3_exp({-2.0 * kBend_per_m * z, 0.0, 0.0}), {0.0, kBend_per_m * z * z, z});
@@ -194,8 +183,7 @@ std::array<double, 2> errors_on_a_crest(std::array<Scale, 2> scales) {
   std::array<Estimate, 2> estimates;
   for (int frame = 0; frame <= kFrames; ++frame) {
     const Rigid3 camera_from_first = first_from_camera(frame).inverse();
-    const cv::Mat image =
-        testing::render_road(scene, camera_from_first, static_cast<std::uint64_t>(frame));
+    const cv::Mat image = render_road(scene, camera_from_first, static_cast<std::uint64_t>(frame));
     for (std::size_t k = 0; k < scales.size(); ++k) {
       estimates[k] = scales[k].update(make_road_image({image, {}}, scene.camera),
                                       camera_from_first * first_from_camera(frame - 1));

@@ -1,30 +1,22 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <cstdint>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/robust_models.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
 struct PoseScene {
-  testing::Scene scene;
+  Scene scene;
   Rigid3 camera_from_world;
   std::vector<Eigen::Vector3d> points_in_world;
 };
 
 /// A camera somewhere far from the origin that sees 150 points.
 PoseScene pose_scene(double noise_px, double outlier_ratio, std::uint64_t seed) {
-  testing::SceneOptions options;
-  options.num_points = 150;
-  options.noise_px = noise_px;
-  options.outlier_ratio = outlier_ratio;
-  options.seed = seed;
-  PoseScene result{testing::make_scene(options), {}, {}};
+  SceneOptions options{
+      .num_points = 150, .noise_px = noise_px, .outlier_ratio = outlier_ratio, .seed = seed};
+  PoseScene result{make_scene(options), {}, {}};
   const Rigid3 world_from_prev(so3_exp({0.2, 2.5, -0.1}), {1200.0, -30.0, 2500.0});
   result.camera_from_world = result.scene.cur_from_prev * world_from_prev.inverse();
   for (const Eigen::Vector3d& point : result.scene.points_in_prev) {
@@ -51,7 +43,7 @@ TEST(RobustPose, FindsThePoseWithoutAGuessAmongWrongMatchesAndTheSameBitsAgain) 
 }
 
 TEST(RobustPose, TooLittleOrDegenerateInputIsNoCrash) {
-  const testing::Scene scene = testing::make_scene({});
+  const Scene scene = make_scene({});
   const std::vector<Eigen::Vector3d> few(5, Eigen::Vector3d(1.0, 2.0, 9.0));
   const std::vector<Eigen::Vector2d> few_uv(5, Eigen::Vector2d(100.0, 80.0));
   EXPECT_FALSE(estimate_absolute_pose(few, few_uv, scene.camera, 2.0, 1).has_value());

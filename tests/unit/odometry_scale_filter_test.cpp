@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <random>
-
-#include <gtest/gtest.h>
-
 #include "odometry/scale_filter.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

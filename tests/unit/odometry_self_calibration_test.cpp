@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <iostream>
-
-#include <gtest/gtest.h>
-
 #include "odometry/self_calibration.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 constexpr int kLength = SelfCalibration::kNumKeyframes;
 constexpr int kNumRuns = 12;
@@ -62,13 +55,12 @@ void walk_runs(const Camera& true_camera, SelfCalibration& calibration) {
       return Eigen::Vector3d(0.06 * std::sin(i), k % 2 == 0 ? 0.08 : -0.08, 0.1 * std::cos(i));
     };
     observe_run(k, turn, {0.05, 0.02, 0.05},
-                testing::points_of_room(4000, 4.0, static_cast<std::uint64_t>(k)), true_camera,
-                calibration);
+                points_of_room(4000, 4.0, static_cast<std::uint64_t>(k)), true_camera, calibration);
   }
 }
 
 TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   Camera given = truth;
   given.cx_px += 3.0;
   given.cy_px -= 2.0;
@@ -84,7 +76,7 @@ TEST(SelfCalibration, FindsAPrincipalPointThatIsWrong) {
 }
 
 TEST(SelfCalibration, FindsAFocalLengthThatIsWrongWithinItsSigma) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   for (const double share : {0.97, 1.03}) {
     Camera given = truth;
     given.fx_px *= share;
@@ -103,7 +95,7 @@ TEST(SelfCalibration, FindsAFocalLengthThatIsWrongWithinItsSigma) {
 /// they are doubled, and robust weights and the error before the solve do the rest.
 TEST(SelfCalibration, IndependentErrorsAreFarWithinTheSigma) {
   constexpr int kNumDrives = 12;
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   double sum_sq = 0.0;
   for (int k = 0; k < kNumDrives; ++k) {
     SelfCalibration calibration(truth, CameraRefinement::kPrincipalPoint);
@@ -121,7 +113,7 @@ TEST(SelfCalibration, IndependentErrorsAreFarWithinTheSigma) {
 
 /// Which a drive does not tell: the sigma says so.
 TEST(SelfCalibration, AFocalLengthThatIsNotToldStaysWithinItsSigma) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   Camera given = truth;
   given.fx_px *= 1.03;
   given.fy_px *= 1.03;
@@ -132,7 +124,7 @@ TEST(SelfCalibration, AFocalLengthThatIsNotToldStaysWithinItsSigma) {
 }
 
 TEST(SelfCalibration, ARightCameraIsKept) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   SelfCalibration calibration(truth, CameraRefinement::kAll);
   drive_runs(truth, calibration);
   EXPECT_EQ(calibration.estimate()->num_bundles, kNumRuns);
@@ -143,7 +135,7 @@ TEST(SelfCalibration, ARightCameraIsKept) {
 
 /// However sure its runs are: as much is missed where all turns are to one side.
 TEST(SelfCalibration, ACameraThatIsHalfAPixelOffIsKept) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   Camera given = truth;
   given.cx_px += 0.5;
   SelfCalibration calibration(given, CameraRefinement::kPrincipalPoint);
@@ -155,10 +147,10 @@ TEST(SelfCalibration, ACameraThatIsHalfAPixelOffIsKept) {
 
 /// Drives miss it by more than their runs' sigmas.
 TEST(SelfCalibration, TheSigmaOfAFocalLengthIsThreeTimesWhatTheInformationSays) {
-  const SelfCalibration calibration(testing::kitti_camera(), CameraRefinement::kAll);
+  const SelfCalibration calibration(kitti_camera(), CameraRefinement::kAll);
   EXPECT_NEAR(calibration.estimate()->sigma[2], 3.0 * 0.03, 1e-12);  // of the prior
   EXPECT_NEAR(calibration.estimate()->sigma[0], 30.0, 1e-9);
-  EXPECT_NEAR(calibration.camera_sigma()->fx_px, 3.0 * 0.03 * testing::kitti_camera().fx_px, 1e-9);
+  EXPECT_NEAR(calibration.camera_sigma()->fx_px, 3.0 * 0.03 * kitti_camera().fx_px, 1e-9);
 }
 
 TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
@@ -191,7 +183,7 @@ TEST(SelfCalibration, ARunThatWasBegunAnewOrRescaledIsMeasuredWhole) {
 }
 
 TEST(SelfCalibration, OffMeansOff) {
-  const Camera truth = testing::kitti_camera();
+  const Camera truth = kitti_camera();
   Camera given = truth;
   given.cx_px += 3.0;
   SelfCalibration calibration(given, CameraRefinement::kOff);

@@ -1,27 +1,23 @@
 // SPDX-License-Identifier: MIT
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "odometry/localization.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-constexpr double kDeg = std::numbers::pi / 180.0;
 constexpr double kBound_px = 4.0;
 
 /// Landmarks that a camera sees `way` after it stood at `held`.
 struct Moved {
-  Camera camera = testing::kitti_camera();
+  Camera camera = kitti_camera();
   Rigid3 held{so3_exp({0.02, 0.4, -0.01}), {3.0, -0.2, 8.0}};
   Rigid3 world_from_camera;
   SeenLandmarks seen;
 
   Moved(const Rigid3& way, double min_depth_m, double noise_px, int count = 200)
       : world_from_camera(held * way) {
-    testing::SceneRandom random(5);
+    SceneRandom random(5);
     for (int i = 0; i < count; ++i) {
       const Eigen::Vector2d uv = random.pixel(camera);
       const double depth_m = random.uniform(min_depth_m, 2.0 * min_depth_m);

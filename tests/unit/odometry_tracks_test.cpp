@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <gtest/gtest.h>
-
 #include "odometry/tracks.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
@@ -54,15 +53,15 @@ TEST(Observations, PairsAreOfTracksThatBothFramesSee) {
 }
 
 TEST(Parallax, IsWhatARotationLeavesOfTheFlow) {
-  testing::SceneOptions options;
-  options.cur_from_prev = Rigid3(so3_exp({0.01, 0.03, 0.0}), Eigen::Vector3d::Zero());
-  const testing::Scene turned = testing::make_scene(options);
+  SceneOptions options{.cur_from_prev =
+                           Rigid3(so3_exp({0.01, 0.03, 0.0}), Eigen::Vector3d::Zero())};
+  const Scene turned = make_scene(options);
   EXPECT_GT(median_flow_px({turned.prev_uv, turned.cur_uv}), 15.0);
   EXPECT_LT(median_parallax_px(turned.cur_from_prev.rotation, {turned.prev_uv, turned.cur_uv},
                                turned.camera),
             1e-9);
   options.cur_from_prev = Rigid3(so3_exp({0.01, 0.03, 0.0}), {0.1, 0.0, 0.0});
-  const testing::Scene moved = testing::make_scene(options);
+  const Scene moved = make_scene(options);
   EXPECT_GT(
       median_parallax_px(moved.cur_from_prev.rotation, {moved.prev_uv, moved.cur_uv}, moved.camera),
       2.0);
@@ -88,9 +87,8 @@ TEST(IsStationary, ByTheMedianFlowOfTwentyTracks) {
 }
 
 TEST(Parallax, EpipolarInliersAreThoseWithinTheBound) {
-  testing::SceneOptions options;
-  options.cur_from_prev = Rigid3(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0});
-  testing::Scene scene = testing::make_scene(options);
+  SceneOptions options{.cur_from_prev = Rigid3(Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0})};
+  Scene scene = make_scene(options);
   for (std::size_t i = 0; i < scene.cur_uv.size(); ++i) {
     scene.cur_uv[i].y() += i % 2 == 0 ? 0.5 : 3.0;  // across the epipolar lines
   }

@@ -1,34 +1,25 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <limits>
-
-#include <gtest/gtest.h>
-
 #include "geometry/median.hpp"
 #include "odometry/two_view_estimator.hpp"
 #include "stemvo/two_view.hpp"
 #include "support/synthetic_scene.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::make_scene;
-using testing::Scene;
-using testing::SceneOptions;
 
 /// A car's scene: metres, points 5 to 40 m away.
 Scene drive_scene(const Rigid3& prev_from_cur,
                   double noise_px,
                   double outliers,
                   std::uint64_t seed) {
-  SceneOptions options;
-  options.num_points = 600;
-  options.noise_px = noise_px;
-  options.outlier_ratio = outliers;
-  options.seed = seed;
-  options.min_depth = 5.0;
-  options.max_depth = 40.0;
-  options.cur_from_prev = prev_from_cur.inverse();
+  SceneOptions options{.num_points = 600,
+                       .noise_px = noise_px,
+                       .outlier_ratio = outliers,
+                       .seed = seed,
+                       .min_depth = 5.0,
+                       .max_depth = 40.0,
+                       .cur_from_prev = prev_from_cur.inverse()};
   return make_scene(options);
 }
 
@@ -54,7 +45,6 @@ TEST(TwoViewEstimator, ThePublicFunctionFindsTheMotionFromMatchesAlone) {
   const Rigid3 prev_from_cur(so3_exp({0.002, 0.03, -0.001}), {0.05, 0.01, 1.0});
   const Scene scene = drive_scene(prev_from_cur, 0.3, 0.3, 5);
   const auto motion = estimate_two_view(scene.prev_uv, scene.cur_uv, scene.camera);
-  ASSERT_TRUE(motion) << motion.error().message;
   ASSERT_EQ(motion->state, FrameState::kTracking);
   EXPECT_EQ(motion->model, TwoViewModel::kEssential);
   EXPECT_LT(motion->homography_ratio, 0.4);
@@ -103,11 +93,11 @@ TEST(TwoViewEstimator, NoiseAndOutliersOver50Seeds) {
 }
 
 TEST(TwoViewEstimator, InitialModelFollowsTheScene) {
-  SceneOptions options;
-  options.num_points = 500;
-  options.noise_px = 0.3;
-  options.cur_from_prev = Rigid3(so3_exp({0.0, 0.02, 0.0}), {0.8, 0.1, -0.6}).inverse();
-  options.planar = true;
+  SceneOptions options{
+      .num_points = 500,
+      .noise_px = 0.3,
+      .planar = true,
+      .cur_from_prev = Rigid3(so3_exp({0.0, 0.02, 0.0}), {0.8, 0.1, -0.6}).inverse()};
   int num_right = 0;
   for (options.seed = 1; options.seed <= 20; ++options.seed) {
     const MeasuredMotion planar = measure(make_scene(options), /*is_initializing=*/true);

@@ -1,23 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <gtest/gtest.h>
-
 #include "support/driven.hpp"
 #include "support/road_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::car_drive;
-using testing::Driven;
-using testing::DriveTracks;
-using testing::EstimatorRun;
-using testing::hand_walk;
-
-constexpr double kDeg = std::numbers::pi / 180.0;
 
 /// From the frame that opened the window on, against the truth.
 void expect_accurate(const Driven& d, double max_share, double max_rad) {
@@ -32,8 +19,8 @@ void expect_accurate(const Driven& d, double max_share, double max_rad) {
   const auto since_open = [&](const std::vector<Rigid3>& poses) {
     return std::span(poses).subspan(open);
   };
-  EXPECT_LT(testing::fitted_error_share(since_open(online), since_open(truth)), max_share);
-  EXPECT_LT(testing::rotation_error_rad(since_open(online), since_open(truth)), max_rad);
+  EXPECT_LT(fitted_error_share(since_open(online), since_open(truth)), max_share);
+  EXPECT_LT(rotation_error_rad(since_open(online), since_open(truth)), max_rad);
 }
 
 void expect_tracking_since_opening(const Driven& d) {
@@ -85,7 +72,7 @@ TEST(WindowEstimator, KeepsTheScaleOfItsFirstStep) {
   EXPECT_NEAR(d.moved(0, 1), 1.0, 1e-9);  // the unit
   const std::vector<Rigid3>& truth = d.drive.world_from_camera;
   const double unit_m = truth[1].translation.norm();
-  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), truth, 0, 24) * unit_m, 1.0, 0.02);
+  EXPECT_NEAR(length_ratio(d.estimator.trajectory(), truth, 0, 24) * unit_m, 1.0, 0.02);
   EXPECT_LE(d.pose(24).rotation.angularDistance(truth[24].rotation), 2e-3);
 }
 
@@ -126,8 +113,8 @@ TEST(WindowEstimator, AMissingImageWhileInitializingIsNoEnd) {
 
 // A cut to another place: the road's scale belonged to the map before.
 TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
-  const testing::RoadDrive drive(24);
-  WindowEstimator estimator(testing::metric_config(), drive.scene.camera);
+  const RoadDrive drive(24);
+  WindowEstimator estimator(metric_config(), drive.scene.camera);
   EstimatorRun run(estimator, drive.tracks);
   run.road = [&](int i) { return drive.road_image(i, true); };
   run.add_range(0, 10);
@@ -140,11 +127,7 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
   EXPECT_GE(lost.scale_sigma.value(), run.results[9].scale_sigma.value());
   bool is_new_map = false;
   for (int i = 11; i < 24; ++i) {
-    Matches matches = drive.tracks.matches(i);
-    for (int& id : matches.track_ids) {
-      id += 100000;
-    }
-    const FrameResult result = run.add_matches(matches, i);
+    const FrameResult result = run.add_matches(drive.tracks.other_matches(i), i);
     EXPECT_NE(result.state, FrameState::kLost) << i;
     if (result.state == FrameState::kInitializing) {  // the old map's scale is not the new one's
       EXPECT_NE(result.scale_state, ScaleState::kHeld) << i;
@@ -160,7 +143,7 @@ TEST(WindowEstimator, ALossAndTheNewMapSaySo) {
   const double step = (run.results[23].world_from_camera.translation -
                        run.results[22].world_from_camera.translation)
                           .norm();
-  EXPECT_NEAR(step, testing::RoadDrive::kStep_m, 0.03 * testing::RoadDrive::kStep_m);
+  EXPECT_NEAR(step, RoadDrive::kStep_m, 0.03 * RoadDrive::kStep_m);
 }
 
 TEST(WindowEstimator, SaysWhichMapAndWhereItsUnitBegins) {
@@ -168,11 +151,7 @@ TEST(WindowEstimator, SaysWhichMapAndWhereItsUnitBegins) {
   d.add_range(0, 15);
   d.run.add_matches({}, 15);
   for (int i = 16; i < d.drive.num_frames(); ++i) {
-    Matches other = d.drive.matches(i);
-    for (int& id : other.track_ids) {
-      id += 100000;
-    }
-    d.run.add_matches(other, i);
+    d.run.add_matches(d.drive.other_matches(i), i);
   }
   int num_new = 0;
   for (const FrameResult& result : d.run.results) {
@@ -202,7 +181,7 @@ TEST(WindowEstimator, TheSpeedOfAHandFadesWithinASecondAndThatOfACarLasts) {
     path.emplace_back(Eigen::Quaterniond::Identity(),
                       Eigen::Vector3d(0.3 * std::sin(4.0 * i / 30.0), 0.0, 0.0));
   }
-  Driven hand(DriveTracks(path, testing::points_of_room(2500, 4.0, 10), 0.1, 10));
+  Driven hand(DriveTracks(path, points_of_room(2500, 4.0, 10), 0.1, 10));
   hand.run.interval_s = 1.0 / 30.0;
   hand.add_range(0, 160);
   const std::vector<double> fading = steps_without_images(hand, 159, 60);

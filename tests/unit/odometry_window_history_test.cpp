@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "odometry/window_estimator.hpp"
 #include "odometry/window_history.hpp"
 #include "support/estimator_run.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
-using testing::EstimatorRun;
 
 TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
   Window window;
@@ -41,7 +34,7 @@ TEST(WindowHistory, ALandmarkIsKeptInTheUnitsThatItsLastKeyframeCameIn) {
 
 TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
   const DriveTracks drive(40, 0.1, 24);
-  WindowEstimator estimator(testing::config_without_scale(), drive.camera);
+  WindowEstimator estimator(config_without_scale(), drive.camera);
   EstimatorRun run(estimator, drive);
   for (int i = 0; i < drive.num_frames(); ++i) {
     run.image = cv::Mat(drive.camera.height_px, drive.camera.width_px, CV_8UC3,
@@ -49,12 +42,12 @@ TEST(WindowHistory, LandmarksThatHaveLeftAreWhereTheyWere) {
     run.add(i);
   }
   const std::vector<Rigid3>& poses = estimator.trajectory();
-  const double unit_m = 1.0 / testing::length_ratio(poses, drive.world_from_camera, 0, 39);
+  const double unit_m = 1.0 / length_ratio(poses, drive.world_from_camera, 0, 39);
   std::vector<double> errors;
   for (const KeptLandmark& landmark : estimator.landmarks_since(0).landmarks) {
     ASSERT_GE(landmark.frame, 0);
     ASSERT_LT(landmark.frame, drive.num_frames());
-    errors.push_back(testing::placing_error(landmark, poses, unit_m, drive));
+    errors.push_back(placing_error(landmark, poses, unit_m, drive));
     EXPECT_GE(landmark.rgb[0], landmark.frame);  // of the last keyframe that saw it
     EXPECT_LT(landmark.rgb[0], landmark.frame + 30);
     EXPECT_EQ(landmark.rgb[2], 3 * landmark.rgb[0]);

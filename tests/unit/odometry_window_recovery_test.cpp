@@ -1,44 +1,27 @@
 // SPDX-License-Identifier: MIT
 // A bad frame must not spoil a window that was fine before.
-#include <algorithm>
-
-#include <gtest/gtest.h>
-
-#include "odometry/window_estimator.hpp"
-#include "support/estimator_run.hpp"
+#include "support/driven.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-using testing::DriveTracks;
-using testing::EstimatorRun;
-
 constexpr int kBadFrame = 12;
 
 std::vector<Rigid3> path_with_a_jerk(const Rigid3& jerk) {
-  std::vector<Rigid3> path(1);
   const Rigid3 motion(so3_exp({0.0, 0.01, 0.002}), {0.02, 0.0, 1.0});
-  for (int i = 1; i < 20; ++i) {
-    path.push_back(path.back() * (i == kBadFrame ? jerk : motion));
-  }
-  return path;
+  const std::vector<Rigid3> before = DriveTracks::repeat(motion, kBadFrame);
+  return DriveTracks::go_on(DriveTracks::go_on(before, jerk, 1), motion, 19 - kBadFrame);
 }
 
 /// Driven up to kBadFrame.
-struct Driven {
-  DriveTracks drive;
-  WindowEstimator estimator{testing::config_without_scale(), drive.camera};
-  EstimatorRun run{estimator, drive};
-  int first_keyframe = 0;
-
-  explicit Driven(DriveTracks tracks = DriveTracks(20, 0.2, 31)) : drive(std::move(tracks)) {
+struct WellDriven : Driven {
+  explicit WellDriven(DriveTracks tracks = DriveTracks(20, 0.2, 31)) : Driven(std::move(tracks)) {
     run.add_range(0, kBadFrame);
     EXPECT_EQ(run.results.back().state, FrameState::kTracking);
-    first_keyframe = estimator.window().keyframes.front().frame;
   }
   [[nodiscard]] double unit_m() const {
-    return 1.0 /
-           testing::length_ratio(estimator.trajectory(), drive.world_from_camera, 0, kBadFrame - 1);
+    return 1.0 / length_ratio(estimator.trajectory(), drive.world_from_camera, 0, kBadFrame - 1);
   }
   [[nodiscard]] bool keeps_map() const {
     const auto& keyframes = estimator.window().keyframes;
@@ -58,7 +41,7 @@ TEST(WindowRecovery, AMotionThatNobodyExpectedDoesNotTakeTheMapDown) {
   // To the side, turning the other way.
   const Rigid3 jerk(so3_exp({0.02, -0.15, 0.05}), {0.6, -0.1, 0.3});
   const std::vector<Rigid3> path = path_with_a_jerk(jerk);
-  Driven d(DriveTracks(path, testing::points_along(path, 1500, 31), 0.2, 31));
+  WellDriven d(DriveTracks(path, points_along(path, 1500, 31), 0.2, 31));
   EXPECT_EQ(d.run.add(kBadFrame).state, FrameState::kTracking);
   EXPECT_TRUE(d.keeps_map());
   d.expect_true_step(kBadFrame - 1, kBadFrame);
@@ -67,9 +50,9 @@ TEST(WindowRecovery, AMotionThatNobodyExpectedDoesNotTakeTheMapDown) {
 }
 
 TEST(WindowRecovery, ManyWrongTracksAreOutvoted) {
-  Driven d;
+  WellDriven d;
   Matches matches = d.drive.matches(kBadFrame);
-  testing::SceneRandom random(5);
+  SceneRandom random(5);
   for (std::size_t i = 0; i < matches.cur_uv.size(); ++i) {
     if (matches.track_ids[i] % 10 < 6) {
       matches.cur_uv[i] = random.pixel(d.drive.camera);
@@ -91,10 +74,10 @@ TEST(WindowRecovery, ManyWrongTracksAreOutvoted) {
 }
 
 TEST(WindowRecovery, TracksThatEndAnywhereAreLostAndTheOldMapServesAgain) {
-  Driven d;
+  WellDriven d;
   const std::vector<Rigid3> before = d.estimator.trajectory();
   Matches matches = d.drive.matches(kBadFrame);
-  testing::SceneRandom random(6);
+  SceneRandom random(6);
   for (Eigen::Vector2d& uv : matches.cur_uv) {
     uv = random.pixel(d.drive.camera);
   }
@@ -105,21 +88,12 @@ TEST(WindowRecovery, TracksThatEndAnywhereAreLostAndTheOldMapServesAgain) {
   d.expect_true_step(kBadFrame - 1, kBadFrame);
 }
 
-/// The views of kBadFrame and later under numbers that nobody has seen.
-Matches of_other_things(const DriveTracks& drive, int i) {
-  Matches matches = drive.matches(i);
-  for (int& id : matches.track_ids) {
-    id += 100000;
-  }
-  return matches;
-}
-
 TEST(WindowRecovery, AfterALossANewMapIsMadeInAUnitOfItsOwn) {
-  Driven d;
+  WellDriven d;
   EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
   bool was_initializing = false;
   for (int i = kBadFrame + 1; i < 20; ++i) {
-    const FrameResult result = d.run.add_matches(of_other_things(d.drive, i), i);
+    const FrameResult result = d.run.add_matches(d.drive.other_matches(i), i);
     EXPECT_TRUE(result.state == FrameState::kInitializing || result.state == FrameState::kTracking)
         << i << ": " << to_string(result.state);
     was_initializing = was_initializing || result.state == FrameState::kInitializing;
@@ -129,21 +103,21 @@ TEST(WindowRecovery, AfterALossANewMapIsMadeInAUnitOfItsOwn) {
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
   EXPECT_GE(d.estimator.window().keyframes.front().frame, kBadFrame);
   // As long as the steps before: the last one measured is the new unit.
-  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), d.drive.world_from_camera, 18, 19) *
-                  d.unit_m(),
-              1.0, 0.1);
+  EXPECT_NEAR(
+      length_ratio(d.estimator.trajectory(), d.drive.world_from_camera, 18, 19) * d.unit_m(), 1.0,
+      0.1);
 }
 
 TEST(WindowRecovery, StandingStillAfterALossDoesNotLengthenTheUnit) {
-  Driven d;
+  WellDriven d;
   EXPECT_EQ(d.run.add_matches({}, kBadFrame).state, FrameState::kLost);
-  Matches still = of_other_things(d.drive, kBadFrame);
+  Matches still = d.drive.other_matches(kBadFrame);
   still.prev_uv = still.cur_uv;
   for (int k = 0; k < 40; ++k) {
     EXPECT_EQ(d.run.add_matches(still, kBadFrame).state, FrameState::kStationary) << k;
   }
   for (int i = kBadFrame + 1; i < 20; ++i) {
-    d.run.add_matches(of_other_things(d.drive, i), i);
+    d.run.add_matches(d.drive.other_matches(i), i);
   }
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
   const std::vector<Rigid3>& poses = d.estimator.trajectory();
@@ -153,8 +127,8 @@ TEST(WindowRecovery, StandingStillAfterALossDoesNotLengthenTheUnit) {
 }
 
 TEST(WindowRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewWithoutAGap) {
-  Driven d;
-  const FrameResult first = d.run.add_matches(of_other_things(d.drive, kBadFrame), kBadFrame);
+  WellDriven d;
+  const FrameResult first = d.run.add_matches(d.drive.other_matches(kBadFrame), kBadFrame);
   EXPECT_EQ(first.state, FrameState::kInitializing);
   EXPECT_EQ(d.estimator.window().keyframes.size(), 2U);
   EXPECT_EQ(d.estimator.window().keyframes.front().frame, kBadFrame - 1);
@@ -163,8 +137,7 @@ TEST(WindowRecovery, WhereTheLandmarksAreOutOfViewTheMapStartsAnewWithoutAGap) {
               .norm() *
           d.unit_m(),
       1.0, 0.1);  // as long as the step before
-  const FrameResult second =
-      d.run.add_matches(of_other_things(d.drive, kBadFrame + 1), kBadFrame + 1);
+  const FrameResult second = d.run.add_matches(d.drive.other_matches(kBadFrame + 1), kBadFrame + 1);
   EXPECT_EQ(second.state, FrameState::kTracking);
   d.expect_true_step(kBadFrame, kBadFrame + 1);
 }
@@ -189,12 +162,12 @@ TEST(WindowRecovery, ANewMapIsMadeByTheCameraThatWasLearnt) {
   constexpr int kCut = 110;
   const std::vector<Rigid3> path =
       DriveTracks::repeat({so3_exp({0.002, 0.02, 0.0}), {0.0, 0.0, 0.9}}, kCut + 10);
-  const Camera truth = testing::kitti_camera();
-  const DriveTracks drive(path, testing::points_along(path, 3000, 41), 0.05, 41);
+  const Camera truth = kitti_camera();
+  const DriveTracks drive(path, points_along(path, 3000, 41), 0.05, 41);
   Camera given = truth;
   given.cx_px += 4.0;
   given.cy_px -= 3.0;
-  Options config = testing::config_without_scale();
+  Options config = config_without_scale();
   config.camera.refine = CameraRefinement::kPrincipalPoint;
   WindowEstimator estimator(config, given);
   EstimatorRun run(estimator, drive);
@@ -205,7 +178,7 @@ TEST(WindowRecovery, ANewMapIsMadeByTheCameraThatWasLearnt) {
   EXPECT_EQ(run.add_matches({}, kCut).state, FrameState::kLost);
   for (int i = kCut + 1; estimator.window().keyframes.front().frame < kCut; ++i) {
     ASSERT_LT(i, drive.num_frames());
-    run.add_matches(of_other_things(drive, i), i);
+    run.add_matches(drive.other_matches(i), i);
   }
   EXPECT_LT(reprojection_error_px(estimator.window(), learnt), 0.2);
   const Keyframe& first = estimator.window().keyframes.front();

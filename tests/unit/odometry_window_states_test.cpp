@@ -1,33 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <vector>
-
-#include <gtest/gtest.h>
-
 #include "support/driven.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-using testing::car_drive;
-using testing::Driven;
-using testing::DriveTracks;
-
-constexpr double kDeg = std::numbers::pi / 180.0;
-
 /// Drives 20 frames, lets `event` happen for some frames, and drives 20 more.
 std::vector<Rigid3> path_with(const Rigid3& event, int num_frames) {
   const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
-  std::vector<Rigid3> path = DriveTracks::repeat(step, 20);
-  for (int i = 0; i < num_frames; ++i) {
-    path.push_back(path.back() * event);
-  }
-  for (int i = 0; i < 20; ++i) {
-    path.push_back(path.back() * step);
-  }
-  return path;
+  return DriveTracks::go_on(DriveTracks::go_on(DriveTracks::repeat(step, 20), event, num_frames),
+                            step, 20);
 }
 
 /// The second drive is as long, in units, as the first: the scale was kept.
@@ -35,14 +17,14 @@ void expect_scale_kept(const Driven& d, int event_end) {
   const std::vector<Rigid3>& truth = d.drive.world_from_camera;
   const int last = d.drive.num_frames() - 1;
   const int begin = 5;  // the first frames may have waited for parallax
-  EXPECT_NEAR(testing::length_ratio(d.estimator.trajectory(), truth, event_end, last) /
-                  testing::length_ratio(d.estimator.trajectory(), truth, begin, 19),
+  EXPECT_NEAR(length_ratio(d.estimator.trajectory(), truth, event_end, last) /
+                  length_ratio(d.estimator.trajectory(), truth, begin, 19),
               1.0, 0.02);
 }
 
 TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
   const std::vector<Rigid3> path = path_with(Rigid3(), 40);
-  Driven d(DriveTracks(path, testing::points_along(path, 2000, 4), 0.04, 4));
+  Driven d(DriveTracks(path, points_along(path, 2000, 4), 0.04, 4));
   d.add_range(0, 20);
   const int oldest = d.estimator.window().keyframes.front().frame;
   const std::size_t num_landmarks = d.estimator.window().landmarks.size();
@@ -62,7 +44,7 @@ TEST(WindowEstimator, StationaryKeepsPoseMapAndScale) {
 TEST(WindowEstimator, TurningOnTheSpotStaysThere) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.0 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 10);
-  Driven d(DriveTracks(path, testing::points_along(path, 3000, 5), 0.1, 5));
+  Driven d(DriveTracks(path, points_along(path, 3000, 5), 0.1, 5));
   d.add_range(0, d.drive.num_frames());
   d.expect_only(20, 30, FrameState::kRotating);
   for (int i = 20; i < 30; ++i) {
@@ -77,7 +59,7 @@ TEST(WindowEstimator, TurningOnTheSpotStaysThere) {
 TEST(WindowEstimator, ATurnThatLosesEveryLandmarkFromViewStaysWhereItIs) {
   const std::vector<Rigid3> path =
       path_with(Rigid3(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero()), 44);
-  std::vector<Eigen::Vector3d> points = testing::points_along(path, 3000, 6);
+  std::vector<Eigen::Vector3d> points = points_along(path, 3000, 6);
   Driven d(DriveTracks(path, points, 0.1, 6));
   d.add_range(0, d.drive.num_frames());
   d.expect_only(20, 64, FrameState::kRotating);
@@ -96,9 +78,9 @@ TEST(WindowEstimator, ACameraThatStandsDoesNotDrift) {
     path.emplace_back(Eigen::Quaterniond::Identity(),
                       Eigen::Vector3d(0.3 * (1.0 - std::cos(t)), 0.0, 0.3 * t));
   }
-  Driven d(DriveTracks(path, testing::points_of_room(500, 4.0, 3), 0.1, 3));
+  Driven d(DriveTracks(path, points_of_room(500, 4.0, 3), 0.1, 3));
   d.add_range(0, d.drive.num_frames());
-  const double unit_m = 1.0 / testing::length_ratio(d.estimator.trajectory(), path, 20, 60);
+  const double unit_m = 1.0 / length_ratio(d.estimator.trajectory(), path, 20, 60);
   for (int i = 70; i < d.drive.num_frames(); ++i) {
     EXPECT_LT(unit_m * d.moved(65, i), 0.004) << i;  // 1 mm of a metre
   }
@@ -112,13 +94,13 @@ TEST(WindowEstimator, ASlowHandIsFollowedWithoutAJump) {
     x += i < 60 ? 0.02 : 0.001 * (1.0 + std::sin(0.05 * i));  // 0.1 px a frame
     path.emplace_back(so3_exp({0.0, 0.002 * i, 0.0}), Eigen::Vector3d(x, 0.0, 0.0));
   }
-  Driven d(DriveTracks(path, testing::points_of_room(2500, 4.0, 6), 0.05, 6));
+  Driven d(DriveTracks(path, points_of_room(2500, 4.0, 6), 0.05, 6));
   d.run.interval_s = 1.0 / 30.0;
   d.add_range(0, d.drive.num_frames());
   EXPECT_GT(d.run.count(FrameState::kRotating) + d.run.count(FrameState::kStationary) +
                 d.run.count(FrameState::kLowParallax),
             100);
-  const double unit_m = 1.0 / testing::length_ratio(d.estimator.trajectory(), path, 20, 59);
+  const double unit_m = 1.0 / length_ratio(d.estimator.trajectory(), path, 20, 59);
   for (int i = 70; i < d.drive.num_frames(); ++i) {
     EXPECT_GT(d.moved(i - 1, i), 0.0) << i;
     EXPECT_LT(unit_m * d.moved(i - 1, i), 0.006) << i;
@@ -131,12 +113,9 @@ TEST(WindowEstimator, ASlowHandIsFollowedWithoutAJump) {
 TEST(WindowEstimator, AReferenceThatIsWornOutIsRenewed) {
   const Rigid3 turn(so3_exp({0.0, 2.5 * kDeg, 0.0}), Eigen::Vector3d::Zero());
   const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.4});
-  std::vector<Rigid3> path = DriveTracks::repeat(turn, 45);
-  for (int i = 0; i < 20; ++i) {
-    path.push_back(path.back() * step);
-  }
-  std::vector<Eigen::Vector3d> points = testing::points_along(path, 2500, 12);
-  const std::vector<Eigen::Vector3d> room = testing::points_of_room(1500, 14.0, 12);
+  const std::vector<Rigid3> path = DriveTracks::go_on(DriveTracks::repeat(turn, 45), step, 20);
+  std::vector<Eigen::Vector3d> points = points_along(path, 2500, 12);
+  const std::vector<Eigen::Vector3d> room = points_of_room(1500, 14.0, 12);
   points.insert(points.end(), room.begin(), room.end());
   Driven d(DriveTracks(path, points, 0.1, 12));
   d.add_range(0, d.drive.num_frames());
@@ -146,23 +125,20 @@ TEST(WindowEstimator, AReferenceThatIsWornOutIsRenewed) {
   EXPECT_NEAR(turned.angle_rad(), 110.0 * kDeg, 0.5 * kDeg);
   EXPECT_EQ(d.run.count(FrameState::kLost), 0);
   EXPECT_EQ(d.run.results.back().state, FrameState::kTracking);
-  EXPECT_LT(testing::rotation_error_rad(d.estimator.trajectory(), path), 1.0 * kDeg);
+  EXPECT_LT(rotation_error_rad(d.estimator.trajectory(), path), 1.0 * kDeg);
 }
 
 TEST(WindowEstimator, StandingFromTheStartWaitsForTheDrive) {
-  std::vector<Rigid3> path(15);
   const Rigid3 step(so3_exp({0.0, 0.003, 0.0}), {0.0, 0.0, 0.8});
-  for (int i = 0; i < 15; ++i) {
-    path.push_back(path.back() * step);
-  }
-  Driven d(DriveTracks(path, testing::points_along(path, 1500, 7), 0.04, 7));
+  const std::vector<Rigid3> path = DriveTracks::go_on(std::vector<Rigid3>(15), step, 15);
+  Driven d(DriveTracks(path, points_along(path, 1500, 7), 0.04, 7));
   d.add_range(0, d.drive.num_frames());
   d.expect_only(1, 15, FrameState::kStationary);
   EXPECT_EQ(d.moved(0, 14), 0.0);
   EXPECT_EQ(d.run.state(15), FrameState::kInitializing);
   d.expect_only(17, 30, FrameState::kTracking);
-  EXPECT_LT(testing::fitted_error_share(std::span(d.estimator.trajectory()).subspan(15),
-                                        std::span(path).subspan(15)),
+  EXPECT_LT(fitted_error_share(std::span(d.estimator.trajectory()).subspan(15),
+                               std::span(path).subspan(15)),
             0.01);
 }
 

@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <map>
-
-#include <gtest/gtest.h>
-
 #include "odometry/bundle_adjustment.hpp"
 #include "odometry/window.hpp"
 #include "support/synthetic_drive_tracks.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::DriveTracks;
 
 Window window_of(const DriveTracks& drive, const WindowOptions& options) {
   Window window;
@@ -62,8 +56,7 @@ TEST(Window, OneViewIsKeptFromItsFirstKeyframeOn) {
 }
 
 TEST(Window, TheWindowForgetsOldKeyframesAndTheirLandmarks) {
-  WindowOptions options;
-  options.num_keyframes = 5;
+  WindowOptions options{.num_keyframes = 5};
   DriveTracks drive(14, 0.0, 1);
   drive.renew_tracks(4, 0);
   drive.renew_tracks(7, 1);
@@ -101,8 +94,7 @@ TEST(BundleAdjustment, BringsAPushedWindowBackAndKeepsTheGauge) {
     Rigid3& pose = window.keyframes[i].world_from_camera;
     pose = pose * Rigid3(so3_exp({0.001, -0.002, 0.001}), {0.01, -0.02, 0.03});
   }
-  BundleOptions refinement;
-  refinement.max_iterations = 30;
+  const BundleOptions refinement{.max_iterations = 30, .camera = std::nullopt};
   ASSERT_TRUE(refine_window(window, drive.camera, refinement));
   for (std::size_t i = 0; i < window.keyframes.size(); ++i) {
     const Rigid3& truth = drive.world_from_camera[i];

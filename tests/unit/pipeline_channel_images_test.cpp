@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "pipeline/channel_images.hpp"
 #include "support/small_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-
-class ChannelImages : public testing::SmallDrive {};
+class ChannelImages : public SmallDrive {};
 
 TEST_F(ChannelImages, OfTheInputLayer) {
   ChannelImagesRequest request;
@@ -21,14 +15,11 @@ TEST_F(ChannelImages, OfTheInputLayer) {
   request.config.stem.model = "input_layer";
   request.frames = FrameRangeRequest{2, 4};
   const auto written = write_channel_images(request);
-  ASSERT_TRUE(written) << written.error().message;
   EXPECT_EQ(*written, 2U * (1 + 3 + 1));
   EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
   EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
   request.filters = FrameRangeRequest{2, 4};
-  const auto outside = write_channel_images(request);
-  ASSERT_FALSE(outside);
-  EXPECT_THAT(outside.error().message,
+  EXPECT_THAT(message_of(write_channel_images(request)),
               ::testing::HasSubstr("expected filters inside 0:3, found --filters 2:4"));
 }
 

@@ -1,23 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-#include <fstream>
-#include <optional>
-#include <stdexcept>
-#include <vector>
-
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-
 #include "dataset/frame_source.hpp"
 #include "pipeline/frame_pipeline.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
 
 FrameResult process(PhasedOdometry& odometry, Frame frame) {
   odometry.track(std::move(frame));
@@ -64,7 +51,7 @@ class FramePipeline : public ::testing::Test {
   }
 
   Config config_;
-  testing::TempFolder folder_;
+  TempFolder folder_;
   std::optional<FrameSource> sequence_;
 };
 
@@ -98,52 +85,6 @@ TEST_F(FramePipeline, GivesTheSamePosesAsOneFrameAfterTheOtherForAnyNumberOfThre
           return true;
         });
     EXPECT_EQ(num_visited, sequence_->size()) << num_threads << " threads";
-  }
-}
-
-TEST_F(FramePipeline, StopsAtTheFrameWhoseVisitorSaysSo) {
-  PhasedOdometry piped = odometry();
-  std::vector<std::size_t> visited;
-  pipeline::run_frames(*sequence_, piped,
-                       [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
-                         visited.push_back(i);
-                         return i < 2;
-                       });
-  EXPECT_EQ(visited, (std::vector<std::size_t>{0, 1, 2}));
-}
-
-/// The last frame is finished after the graph has ended.
-TEST_F(FramePipeline, CarriesWhatTheVisitorThrowsAtTheFirstAndTheLastFrame) {
-  for (const std::size_t bad : {std::size_t{0}, std::size_t{kNumFrames - 1}}) {
-    PhasedOdometry piped = odometry();
-    std::size_t num_visited = 0;
-    const auto visit = [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) -> bool {
-      ++num_visited;
-      if (i == bad) {
-        throw std::runtime_error("disk on fire");
-      }
-      return true;
-    };
-    EXPECT_THROW(pipeline::run_frames(*sequence_, piped, visit), std::runtime_error);
-    EXPECT_EQ(num_visited, bad + 1);
-  }
-}
-
-TEST_F(FramePipeline, VisitsEveryFrameOfTheShortestSequences) {
-  for (const std::size_t num_frames : {1, 2, 3}) {
-    const auto sequence =
-        open_kitti(folder_ / "sequences/08",
-                   {.frames = parse_frame_range(fmt::format("0:{}", num_frames)).value()});
-    ASSERT_TRUE(sequence) << sequence.error().message;
-    PhasedOdometry piped = odometry();
-    std::vector<std::size_t> visited;
-    pipeline::run_frames(*sequence, piped,
-                         [&](std::size_t i, const Expected<cv::Mat>&, const FrameResult&) {
-                           visited.push_back(i);
-                           return true;
-                         });
-    EXPECT_EQ(visited.size(), num_frames);
-    EXPECT_EQ(visited.back(), num_frames - 1);
   }
 }
 

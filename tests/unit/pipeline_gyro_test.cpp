@@ -1,26 +1,14 @@
 // SPDX-License-Identifier: MIT
-#include <filesystem>
-#include <fstream>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <fmt/format.h>
-#include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-
 #include "evaluation/trajectory.hpp"
 #include "pipeline/run.hpp"
 #include "support/small_drive.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// A street whose last frames are dark, and a gyro that is right before them.
-class GyroRun : public testing::SmallDrive {
+class GyroRun : public SmallDrive {
  protected:
   static constexpr int kNumSeen = 18;
 

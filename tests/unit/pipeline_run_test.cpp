@@ -1,15 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <string>
-
-#include <fmt/format.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "evaluation/trajectory.hpp"
 #include "pipeline/run.hpp"
@@ -18,17 +8,10 @@
 #include "support/ply_reader.hpp"
 #include "support/report_content.hpp"
 #include "support/state_runs.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using ::testing::AllOf;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// A wall of blurred noise that the camera drives towards: a few small gray frames in KITTI's
 /// layout, as input of the gray channel.
@@ -73,11 +56,10 @@ class PipelineRun : public ::testing::Test {
   }
 
   [[nodiscard]] std::string error_of(const RunRequest& request) const {
-    const Expected<RunSummary> summary = run_sequence(request);
-    return summary ? "no error" : summary.error().message;
+    return message_of(run_sequence(request));
   }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
   RunRequest request_;
 };
 
@@ -85,12 +67,11 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   request_.image_every = 4;
   const Expected<RunSummary> summary = run_sequence(request_);
-  ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_EQ(summary->report.num_frames, 6U);
   EXPECT_EQ(summary->report.sequence, "07");
   ASSERT_TRUE(summary->report.metrics.has_value());
-  const std::string csv = testing::read_all(request_.out_dir / "frames.csv");
-  const auto errors = test::column(csv, "error_m");
+  const std::string csv = read_all(request_.out_dir / "frames.csv");
+  const auto errors = column(csv, "error_m");
   double sum = 0.0;
   for (const std::string& error : errors) {
     sum += std::pow(std::stod(error), 2) / static_cast<double>(errors.size());
@@ -99,7 +80,6 @@ TEST_F(PipelineRun, WritesAPosePerFrameOfUnitLengthSteps) {
   EXPECT_FALSE(summary->interrupted);
   EXPECT_TRUE(summary->warnings.empty());
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
-  ASSERT_TRUE(poses) << poses.error().message;
   EXPECT_EQ(poses->size(), 6U);
   for (const char* name :
        {"trajectory_tum.txt", "trajectory_map_tum.txt", "map.ply", "frames.csv", "config.yaml",
@@ -130,17 +110,15 @@ TEST_F(PipelineRun, GroundTruthScaleRescalesStepsAndNothingElse) {
 
 TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
   const auto plain = run_sequence(request_);
-  ASSERT_TRUE(plain) << plain.error().message;
   EXPECT_FALSE(plain->report.timing.has_value());
-  const std::string poses = testing::read_all(request_.out_dir / "trajectory_kitti.txt");
-  auto keys = nlohmann::ordered_json::parse(testing::read_all(request_.out_dir / "metrics.json"));
+  const std::string poses = read_all(request_.out_dir / "trajectory_kitti.txt");
+  auto keys = nlohmann::ordered_json::parse(read_all(request_.out_dir / "metrics.json"));
   EXPECT_FALSE(keys.contains("timing"));
 
   request_.measure_times = true;
   const auto measured = run_sequence(request_);
-  ASSERT_TRUE(measured) << measured.error().message;
-  EXPECT_EQ(testing::read_all(request_.out_dir / "trajectory_kitti.txt"), poses);
-  auto json = nlohmann::ordered_json::parse(testing::read_all(request_.out_dir / "metrics.json"));
+  EXPECT_EQ(read_all(request_.out_dir / "trajectory_kitti.txt"), poses);
+  auto json = nlohmann::ordered_json::parse(read_all(request_.out_dir / "metrics.json"));
   const auto timing = json["timing"];
   for (const char* name : {"read and decode", "stem", "contrast", "pyramid"}) {
     EXPECT_EQ(timing["stages"][name]["calls"], 6) << name;
@@ -165,7 +143,6 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   request_.config.scale.step_m = 0.25;
   const auto summary = run_sequence(request_);
-  ASSERT_TRUE(summary) << summary.error().message;
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_kitti.txt");
   ASSERT_TRUE(poses);
   for (std::size_t i = 1; i < poses->size(); ++i) {
@@ -175,9 +152,8 @@ TEST_F(PipelineRun, WithoutAScaleTheErrorIsTakenAfterAFit) {
   EXPECT_EQ(metrics.alignment, Alignment::kSim3);
   EXPECT_LE(metrics.average_offset_m, 0.2 * metrics.null_offset_m);
   EXPECT_GE(metrics.ate_rmse.none_m, metrics.null_offset_m * 0.5) << "two times too long";
-  EXPECT_THAT(testing::read_all(request_.out_dir / "metrics.json"),
-              HasSubstr("\"alignment\": \"sim3\""));
-  EXPECT_THAT(testing::read_all(request_.out_dir / "trajectory.png"), HasSubstr("PNG"));
+  EXPECT_THAT(read_all(request_.out_dir / "metrics.json"), HasSubstr("\"alignment\": \"sim3\""));
+  EXPECT_THAT(read_all(request_.out_dir / "trajectory.png"), HasSubstr("PNG"));
 }
 
 TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
@@ -187,9 +163,8 @@ TEST_F(PipelineRun, ThePageHoldsFramesThatLackATruePose) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
-  const nlohmann::json page =
-      testing::report_content(testing::read_all(request_.out_dir / "report.html"));
-  EXPECT_EQ(page["frames_csv"], testing::read_all(request_.out_dir / "frames.csv"));
+  const nlohmann::json page = report_content(read_all(request_.out_dir / "report.html"));
+  EXPECT_EQ(page["frames_csv"], read_all(request_.out_dir / "frames.csv"));
   EXPECT_EQ(page["estimate"]["x"].size(), 1U * kNumFrames);
   EXPECT_EQ(page["truth"]["x"].size(), 2U);
   EXPECT_THAT(page["subtitle"].get<std::string>(),
@@ -203,8 +178,7 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   const auto summary = run_sequence(request_);
   ASSERT_TRUE(summary) << summary.error().message;
   const auto poses = read_kitti_trajectory(request_.out_dir / "trajectory_map_kitti.txt");
-  ASSERT_TRUE(poses) << poses.error().message;
-  const testing::PlyFile map = testing::read_ply(request_.out_dir / "map.ply");
+  const PlyFile map = read_ply(request_.out_dir / "map.ply");
   ASSERT_EQ(map.edges.size() + 1, poses->size());
   ASSERT_GT(map.vertices.size(), 100U + poses->size());
   const std::size_t num_points = map.vertices.size() - poses->size();
@@ -217,7 +191,7 @@ TEST_F(PipelineRun, TheMapHoldsTheWallAndThePathInMetres) {
   // The wall's left half stands at 12 m, its right half at 20 m.
   std::size_t num_good = 0;
   for (std::size_t i = 0; i < num_points; ++i) {
-    const testing::PlyFile::Vertex& point = map.vertices[i];
+    const PlyFile::Vertex& point = map.vertices[i];
     const float depth_m = point.position.x() < 0.0F ? 12.0F : 20.0F;
     num_good += std::abs(point.position.z() - depth_m) < 0.05F * depth_m ? 1 : 0;
     EXPECT_EQ(point.rgb[0], point.rgb[1]) << "a gray camera";
@@ -243,7 +217,7 @@ TEST_F(PipelineRun, ReplacesItsOwnFolderAndNoOther) {
   fs::create_directories(request_.out_dir);
   std::ofstream(request_.out_dir / "map.ply") << "somebody's";
   EXPECT_THAT(error_of(request_), HasSubstr("expected a new folder, an empty one or results of"));
-  EXPECT_EQ(testing::read_all(request_.out_dir / "map.ply"), "somebody's");
+  EXPECT_EQ(read_all(request_.out_dir / "map.ply"), "somebody's");
   fs::remove(request_.out_dir / "map.ply");
   request_.image_every = 1;
   ASSERT_TRUE(run_sequence(request_));
@@ -264,8 +238,7 @@ TEST_F(PipelineRun, TwoFramesMakeNoMap) {
   for (const char* name : {"map.ply", "trajectory_map_kitti.txt", "trajectory_map_tum.txt"}) {
     EXPECT_FALSE(fs::exists(request_.out_dir / name)) << name;
   }
-  EXPECT_TRUE(
-      nlohmann::json::parse(testing::read_all(request_.out_dir / "metrics.json"))["map"].is_null());
+  EXPECT_TRUE(nlohmann::json::parse(read_all(request_.out_dir / "metrics.json"))["map"].is_null());
   request_.saved_map = folder_ / "saved.map";
   EXPECT_THAT(error_of(request_), HasSubstr("--save-map: expected odometry.mode map with"));
   request_.saved_map.reset();
@@ -292,7 +265,6 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
             std::size_t{kNumFrames});
   request_.map = request_.saved_map;
   const auto second = run_sequence(request_);
-  ASSERT_TRUE(second) << second.error().message;
   EXPECT_GT(second->report.map->num_keyframes, first->report.map->num_keyframes);
   request_.config.stem.model = "log";
   EXPECT_THAT(error_of(request_), HasSubstr("saved.map: expected a map of channel 'log"));
@@ -304,10 +276,8 @@ TEST_F(PipelineRun, AMapIsSavedAndTakenUpAgain) {
 TEST_F(PipelineRun, ConfigYamlHoldsWhatRan) {
   request_.config.seed = 42;
   ASSERT_TRUE(run_sequence(request_).value().written);
-  EXPECT_THAT(testing::read_all(request_.out_dir / "config.yaml"),
-              HasSubstr("# frames 0:6 of 07\n"));
+  EXPECT_THAT(read_all(request_.out_dir / "config.yaml"), HasSubstr("# frames 0:6 of 07\n"));
   const Expected<Config> config = load_config(request_.out_dir / "config.yaml");
-  ASSERT_TRUE(config) << config.error().message;
   EXPECT_EQ(config->seed, 42U);
   EXPECT_EQ(config->stem.filter, 0);       // what -1 stood for
   EXPECT_EQ(config->stem.sampling_px, 1);  // what 0 stood for
@@ -319,7 +289,6 @@ TEST_F(PipelineRun, StoppedEarlyHoldsWhatWasComputed) {
     EXPECT_EQ(total, 5U);
     return done < 3;
   });
-  ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_TRUE(summary->interrupted);
   EXPECT_EQ(summary->report.num_frames, 3U);
   EXPECT_EQ(summary->report.first_frame, 1U);
@@ -338,21 +307,18 @@ TEST_F(PipelineRun, BrokenFrameIsAWarningWithItsFile) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000003.png", 200);
   const auto summary = run_sequence(request_);
-  ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));
   EXPECT_EQ(summary->report.num_frames, 6U);
   EXPECT_LT(summary->report.tracked_fraction, 1.0);
-  EXPECT_THAT(testing::read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
+  EXPECT_THAT(read_all(request_.out_dir / "frames.csv"), HasSubstr(",no_image,"));
 }
 
 TEST_F(PipelineRun, IsScoredFromWhereTheCameraStarts) {
   request_.config.scale_choice = ScaleChoice::kOptions;
   fs::resize_file(request_.sequence_dir / "image_0/000000.png", 200);
   const auto summary = run_sequence(request_);
-  ASSERT_TRUE(summary) << summary.error().message;
   EXPECT_NEAR(summary->report.metrics->path_length_m, (kNumFrames - 2) * kStep_m, 1e-6);
-  const nlohmann::json page =
-      testing::report_content(testing::read_all(request_.out_dir / "report.html"));
+  const nlohmann::json page = report_content(read_all(request_.out_dir / "report.html"));
   EXPECT_EQ(page["truth"]["x"].size(), kNumFrames - 1U);
 }
 
@@ -381,7 +347,6 @@ TEST_F(PipelineRun, OneResultThatCannotBeWrittenDoesNotLoseTheOthers) {
     fs::create_directories(request_.out_dir / "report.html");
     return true;
   });
-  ASSERT_TRUE(summary) << summary.error().message;
   ASSERT_FALSE(summary->written);
   EXPECT_THAT(summary->written.error().message, HasSubstr("trajectory_tum.txt"));
   EXPECT_THAT(summary->warnings, ElementsAre(HasSubstr("000003.png")));

@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <clocale>
-#include <filesystem>
 #include <locale>
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "report/frames_csv.hpp"
 #include "support/run_program.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {
-
-namespace fs = std::filesystem;
-using ::testing::StartsWith;
 
 constexpr char kHeader[] =
     "frame,timestamp_s,state,matches,inliers,s_h,s_f,r_h,model,stem_ms,features_ms,pose_ms,"
@@ -70,7 +63,7 @@ TEST(FramesCsv, ErrorsStandInTheRowsThatHaveATruth) {
 }
 
 TEST(FramesCsv, EveryColumnIsOnItsPageInOrder) {
-  const std::string page = test::read_file(fs::path(STEMVO_SOURCE_DIR) / "docs/results.md");
+  const std::string page = read_file(fs::path(STEMVO_SOURCE_DIR) / "docs/results.md");
   const std::string table = page.substr(page.find("## frames.csv"));
   std::string found;
   for (std::size_t at = table.find("\n| `"); at != std::string::npos;) {

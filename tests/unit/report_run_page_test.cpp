@@ -1,25 +1,17 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <string>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "evaluation/pose_file.hpp"
 #include "report/run_page.hpp"
 #include "report/small_frames.hpp"
 #include "support/report_content.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "text/text_file.hpp"
 
 namespace stemvo {
 namespace {
 
 using nlohmann::json;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 /// 201 frames straight ahead, a metre each; the estimate is 1 % too long and drifts up.
 class RunPageTest : public ::testing::Test {
@@ -52,10 +44,10 @@ class RunPageTest : public ::testing::Test {
                                                          small_frames_,
                                                          "key: value",
                                                          "stemvo run"}));
-    return testing::report_content(read_text_file(folder_ / "report.html").value_or(""));
+    return report_content(read_text_file(folder_ / "report.html").value_or(""));
   }
 
-  testing::TempFolder folder_;
+  TempFolder folder_;
   Trajectory estimate_;
   std::optional<MapPage> map_;
   std::optional<GroundTruth> truth_;

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "report/trajectory_plot.hpp"
+#include "support/test.hpp"
 
 namespace stemvo {
 namespace {

@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <limits>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "stem/stem.hpp"
+#include "support/test.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
-
-using testing::TinyStem;
 
 Channel ramp(float low, float high) {
   Channel channel;
@@ -24,9 +17,7 @@ Channel ramp(float low, float high) {
 }
 
 TEST(ContrastNormalization, PercentilesBecomeBlackAndWhite) {
-  StemOptions options;
-  options.contrast_low_percent = 10.0;
-  options.contrast_high_percent = 60.0;
+  StemOptions options{.contrast_low_percent = 10.0, .contrast_high_percent = 60.0};
   ContrastNormalization contrast(options);
   const ChannelImage image = contrast.apply(ramp(-3.0F, 7.0F));
   ASSERT_EQ(image.pixels.type(), CV_8UC1);
@@ -42,10 +33,8 @@ TEST(ContrastNormalization, PercentilesBecomeBlackAndWhite) {
 }
 
 TEST(ContrastNormalization, LimitsFollowSlowly) {
-  StemOptions options;
-  options.contrast_low_percent = 0.0;
-  options.contrast_high_percent = 100.0;
-  options.contrast_memory = 0.75;
+  StemOptions options{
+      .contrast_low_percent = 0.0, .contrast_high_percent = 100.0, .contrast_memory = 0.75};
   ContrastNormalization contrast(options);
   (void)contrast.apply(ramp(0.0F, 100.0F));
   // White moves from 100 to 0.75 * 100 + 0.25 * 116 = 104.
@@ -57,9 +46,7 @@ TEST(ContrastNormalization, LimitsFollowSlowly) {
 
 /// A lamp goes on, a tunnel ends: nothing of the new image is cut off or lost in a few gray values.
 TEST(ContrastNormalization, LimitsJumpWithTheLight) {
-  StemOptions options;
-  options.contrast_low_percent = 0.0;
-  options.contrast_high_percent = 100.0;
+  StemOptions options{.contrast_low_percent = 0.0, .contrast_high_percent = 100.0};
   ContrastNormalization contrast(options);
   const cv::Mat before = contrast.apply(ramp(0.0F, 100.0F)).pixels;
   for (const float white : {200.0F, 20.0F}) {
@@ -108,8 +95,7 @@ TEST(ContrastNormalization, HalfIsNativeWhereTheChannelIsOfThatSize) {
     Channel channel = ramp(0.0F, 1.0F);
     channel.map.scale = Eigen::Vector2d::Constant(sampling);
     channel.map.offset_px = Eigen::Vector2d(1.5, 0.5);
-    StemOptions options;
-    options.tracking_resolution = TrackingResolution::kNative;
+    StemOptions options{.tracking_resolution = TrackingResolution::kNative};
     const ChannelImage native = ContrastNormalization(options).apply(channel);
     options.tracking_resolution = TrackingResolution::kHalf;
     const ChannelImage half = ContrastNormalization(options).apply(channel);
@@ -125,10 +111,9 @@ TEST(ContrastNormalization, HalfOfAFineChannelIsTheMeanOfTwoByTwo) {
   channel.values.create(37, 51, CV_32F);
   cv::theRNG().state = 1;
   cv::randu(channel.values, 0.0, 255.0);
-  StemOptions options;
-  options.tracking_resolution = TrackingResolution::kHalf;
-  options.contrast_low_percent = 0.0;
-  options.contrast_high_percent = 100.0;
+  StemOptions options{.tracking_resolution = TrackingResolution::kHalf,
+                      .contrast_low_percent = 0.0,
+                      .contrast_high_percent = 100.0};
   const ChannelImage half = ContrastNormalization(options).apply(channel);
   ASSERT_EQ(half.pixels.size(), cv::Size(25, 18));
   const Eigen::Vector2d centre = half.map.to_input({7.0, 3.0});
@@ -149,30 +134,16 @@ Eigen::Vector2d centre_of(const cv::Mat& pixels) {
   return {moments.m10 / moments.m00, moments.m01 / moments.m00};
 }
 
-struct Case {
-  const TinyStem* stem;
-  int sampling;
-  TrackingResolution resolution;
-};
-
-void PrintTo(const Case& tested, std::ostream* out) {
-  *out << tested.stem->name << "_at_" << tested.sampling << '_'
-       << static_cast<int>(tested.resolution);
-}
-
-class BrightSpot : public ::testing::TestWithParam<Case> {};
-
-TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
-  const auto& [tiny, sampling, resolution] = GetParam();
-  StemOptions options;
-  options.model = testing::tiny_model(tiny->name);
-  options.filter = 0;  // a box: the only symmetric one
-  options.sampling_px = sampling;
-  options.tracking_resolution = resolution;
-  options.contrast_low_percent = 0.0;
-  options.contrast_high_percent = 100.0;
-  auto stem = Stem::load(options);
-  ASSERT_TRUE(stem) << stem.error().message;
+/// A bright spot is found at its input pixel.
+void expect_spots(const TinyStem& tiny, int sampling, TrackingResolution resolution) {
+  SCOPED_TRACE(fmt::format("{} at {}: {}", tiny.name, sampling, static_cast<int>(resolution)));
+  const StemOptions options{.model = tiny_model(tiny.name),
+                            .filter = 0,  // a box: the only symmetric one
+                            .sampling_px = sampling,
+                            .tracking_resolution = resolution,
+                            .contrast_low_percent = 0.0,
+                            .contrast_high_percent = 100.0};
+  const Stem stem = Stem::load(options).value();
   for (const Eigen::Vector2d& spot :
        {Eigen::Vector2d(60.0, 45.0), Eigen::Vector2d(61.3, 43.8), Eigen::Vector2d(58.5, 47.25)}) {
     cv::Mat1b frame(90, 121);
@@ -183,7 +154,7 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
       }
     }
     ContrastNormalization contrast(options);
-    const auto channel = stem->apply(frame);
+    const auto channel = stem.apply(frame);
     ASSERT_TRUE(channel);
     const ChannelImage image = contrast.apply(*channel);
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
@@ -204,22 +175,20 @@ TEST_P(BrightSpot, IsFoundAtItsInputPixel) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All,
-                         BrightSpot,
-                         ::testing::Values(Case{&testing::kPlain4, 4, TrackingResolution::kInput},
-                                           Case{&testing::kPlain4, 2, TrackingResolution::kInput},
-                                           Case{&testing::kPlain4, 2, TrackingResolution::kNative},
-                                           Case{&testing::kPlain4, 4, TrackingResolution::kHalf},
-                                           Case{&testing::kPlain4, 2, TrackingResolution::kHalf},
-                                           Case{&testing::kPlain4, 1, TrackingResolution::kHalf},
-                                           Case{&testing::kPlain4, 1, TrackingResolution::kInput},
-                                           Case{&testing::kPadded3, 2, TrackingResolution::kInput},
-                                           Case{&testing::kPadded3, 2, TrackingResolution::kNative},
-                                           Case{&testing::kPadded3, 1, TrackingResolution::kInput},
-                                           Case{&testing::kSame3, 2, TrackingResolution::kInput},
-                                           Case{&testing::kPadded7, 2, TrackingResolution::kInput},
-                                           Case{&testing::kPadded7, 1, TrackingResolution::kInput}),
-                         ::testing::PrintToStringParamName());
+TEST(ContrastNormalization, KeepsABrightSpotAtItsInputPixel) {
+  using enum TrackingResolution;
+  for (const int sampling : {4, 2, 1}) {
+    expect_spots(kPlain4, sampling, kInput);
+    expect_spots(kPlain4, sampling, kHalf);
+  }
+  for (const TinyStem& tiny : {kPadded3, kSame3, kPadded7}) {
+    expect_spots(tiny, 2, kInput);
+  }
+  expect_spots(kPadded3, 1, kInput);
+  expect_spots(kPadded7, 1, kInput);
+  expect_spots(kPlain4, 2, kNative);
+  expect_spots(kPadded3, 2, kNative);
+}
 
 TEST(Upsampling, AutoGoesByFeaturesAndFocalLength) {
   using enum TrackingResolution;

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <string>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include "stem/model.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "support/tiny_stem.hpp"
 
 namespace stemvo {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-
 TEST(Model, SaysWhatItIs) {
-  const auto info = read_model_info(testing::tiny_model("plain_k3s2same"));
-  ASSERT_TRUE(info) << info.error().message;
+  const auto info = read_model_info(tiny_model("plain_k3s2same"));
   EXPECT_EQ(info->network, "tiny");
   EXPECT_EQ(info->layer, "stem");
   EXPECT_EQ(info->licence, "MIT");
@@ -29,21 +19,20 @@ TEST(Model, SaysWhatItIs) {
   EXPECT_EQ(info->stride_px, 2);
   EXPECT_THAT(info->padding_px, ElementsAre(0, 0, 1, 1));
   EXPECT_FALSE(info->native_sampling_only);
-  EXPECT_TRUE(read_model_info(testing::tiny_model("deep_k12s4"))->native_sampling_only);
-  EXPECT_EQ(read_model_info(testing::tiny_model("gray_k4s4_filter_1"))->only_filter, 1);
+  EXPECT_TRUE(read_model_info(tiny_model("deep_k12s4"))->native_sampling_only);
+  EXPECT_EQ(read_model_info(tiny_model("gray_k4s4_filter_1"))->only_filter, 1);
 }
 
 TEST(Model, TheBuiltInOnesAreThoseOfTheFolder) {
   EXPECT_THAT(built_in_models(), ElementsAre("default", "default_filter_2", "paper"));
   for (const std::string& model : built_in_models()) {
-    EXPECT_EQ(read_model(model).value(),
-              testing::read_all(STEMVO_SOURCE_DIR "/models/" + model + ".onnx"));
+    EXPECT_EQ(read_model(model).value(), read_all(STEMVO_SOURCE_DIR "/models/" + model + ".onnx"));
     EXPECT_TRUE(internal::open_model(model)) << model;
   }
 }
 
 TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
-  const std::string model = testing::tiny_model("wrong_no_metadata");
+  const std::string model = tiny_model("wrong_no_metadata");
   EXPECT_THAT(internal::open_model(model).error().message,
               AllOf(HasSubstr(model + ": expected metadata stemvo.network, found none"),
                     HasSubstr("tools/export_stem.py " + model)));
@@ -51,11 +40,10 @@ TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
 
 /// Error of a model that says something else under a key.
 std::string error_with(const std::string& name, const std::string& key, const std::string& value) {
-  const testing::TempFolder folder;
-  const std::string bytes = testing::read_all(testing::tiny_model(name));
-  const auto file = folder.file("changed.onnx", testing::with_metadata(bytes, key, value));
-  const auto model = internal::open_model(file.string());
-  return model ? "no error" : model.error().message;
+  const TempFolder folder;
+  const std::string bytes = read_all(tiny_model(name));
+  const auto file = folder.file("changed.onnx", with_metadata(bytes, key, value));
+  return message_of(internal::open_model(file.string()));
 }
 
 TEST(Model, MetadataThatAreNoneAreNamed) {
@@ -88,16 +76,16 @@ TEST(Model, IsHeldAgainstItsGraph) {
               HasSubstr("found that pixels outside it matter"));
   EXPECT_THAT(error_with("deep_k12s4", "sampling", "any"),
               HasSubstr("found that pixels outside it matter"));
-  EXPECT_THAT(internal::open_model(testing::tiny_model("wrong_infinite")).error().message,
+  EXPECT_THAT(internal::open_model(tiny_model("wrong_infinite")).error().message,
               HasSubstr("expected finite channels"));
 }
 
 /// Every side of the window matters.
 TEST(Model, ALargerWindowThanTheGraphsIsRefused) {
-  const testing::TempFolder folder;
-  std::string bytes = testing::read_all(testing::tiny_model("plain_k3s2p1"));
-  bytes = testing::with_metadata(bytes, "kernel", "4 3");
-  bytes = testing::with_metadata(bytes, "padding", "1 1 2 1");
+  const TempFolder folder;
+  std::string bytes = read_all(tiny_model("plain_k3s2p1"));
+  bytes = with_metadata(bytes, "kernel", "4 3");
+  bytes = with_metadata(bytes, "padding", "1 1 2 1");
   EXPECT_THAT(internal::open_model(folder.file("changed.onnx", bytes).string()).error().message,
               HasSubstr("found that the 3x1 pixels at 0, 3 of it do not matter"));
 }

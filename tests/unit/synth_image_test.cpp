@@ -1,25 +1,15 @@
 // SPDX-License-Identifier: MIT
-#include <cmath>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "geometry/median.hpp"
 #include "support/rendered_frames.hpp"
+#include "support/test.hpp"
 #include "synth/basics.hpp"
 #include "synth/materials.hpp"
 #include "synth/renderer.hpp"
 
 namespace stemvo::synth {
 namespace {
-
-using testing::gray_of;
-using testing::hand_camera;
-using testing::kitti_camera;
-using testing::predict;
 
 /// Offsets that tracking finds between frames and their successors warped on to them, in pixels.
 struct Offsets {

@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <opencv2/core.hpp>
-
+#include "support/test.hpp"
 #include "synth/drive.hpp"
 
 namespace stemvo::synth {
 namespace {
 
-double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
+double degrees(double radians) { return radians / kDeg; }
 
 double deviation(const std::vector<double>& values) {
   cv::Scalar mean;

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "support/rendered_frames.hpp"
+#include "support/test.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
 #include "synth/sensor.hpp"
@@ -93,7 +87,7 @@ TEST(SmallChip, SpreadsPoints) {
 /// A smaller part of each pixel sees finer texture.
 TEST(SmallChip, GapsBetweenPixelsLeaveMoreContrast) {
   const Drive drive = make_own_drive(3, 3);
-  const Camera camera = testing::kitti_camera(0.25);
+  const Camera camera = kitti_camera(0.25);
   const Textures textures(3);
   Scene scene(drive.world_from_camera[1].translation, {0.0, -0.8, 0.6}, 0.4);
   add_street(drive.road, drive.arcs_m[1], 1, scene);

@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "support/rendered_frames.hpp"
+#include "support/test.hpp"
 #include "synth/basics.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
@@ -18,15 +11,7 @@ namespace {
 constexpr double kRate_hz = 30.0;
 constexpr double kTurn_rad_s = radians(60.0);
 
-Camera small_camera() {
-  Camera camera = testing::hand_camera();
-  camera.fx_px = camera.fy_px = 292.5;
-  camera.cx_px = 160.0;
-  camera.cy_px = 120.0;
-  camera.width_px = 320;
-  camera.height_px = 240;
-  return camera;
-}
+Camera small_camera() { return {292.5, 292.5, 160.0, 120.0, 320, 240}; }
 
 /// A camera that turns to the right in the middle of the courtyard's first walkway.
 Walk turning() {
@@ -43,7 +28,7 @@ Walk turning() {
 cv::Mat render(const RenderOptions& options) {
   const Renderer renderer(turning(), small_camera(), 3, options);
   cv::Mat gray;
-  testing::gray_of(renderer.render(2)).convertTo(gray, CV_32F);
+  gray_of(renderer.render(2)).convertTo(gray, CV_32F);
   return gray;
 }
 
@@ -127,7 +112,7 @@ TEST(AutoExposure, FollowsTheLightWithDelay) {
   Walk walk = turning();
   const Rigid3 first = walk.world_from_camera.front();
   const auto mean_of = [](const Renderer& renderer, std::size_t i) {
-    return cv::mean(testing::gray_of(renderer.render(i)))[0];
+    return cv::mean(gray_of(renderer.render(i)))[0];
   };
   // The brightest and the darkest view of eight, with constant exposure.
   walk.world_from_camera.clear();

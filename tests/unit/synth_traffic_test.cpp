@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "geometry/median.hpp"
 #include "support/rendered_frames.hpp"
+#include "support/test.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
 #include "synth/traffic.hpp"
@@ -16,9 +9,7 @@
 namespace stemvo::synth {
 namespace {
 
-using testing::gray_of;
-
-const Camera kCamera = testing::kitti_camera(0.25);
+const Camera kCamera = kitti_camera(0.25);
 
 Renderer with_traffic(const Drive& drive, std::uint64_t seed) {
   return {drive, kCamera, seed, {.traffic = true}};
@@ -48,7 +39,7 @@ struct Differences {
     const RenderedFrame a = renderer.render(i);
     const RenderedFrame b = renderer.render(i + 1);
     const auto& poses = renderer.world_from_camera();
-    const cv::Mat map = testing::predict(a, b, poses[i + 1].inverse() * poses[i], kCamera);
+    const cv::Mat map = predict(a, b, poses[i + 1].inverse() * poses[i], kCamera);
     cv::Mat warped;
     cv::Mat mask;
     cv::remap(gray_of(b), warped, map, {}, cv::INTER_CUBIC);

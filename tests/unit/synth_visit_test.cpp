@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <set>
-#include <vector>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
 #include "support/rendered_frames.hpp"
+#include "support/test.hpp"
 #include "synth/drive.hpp"
 #include "synth/renderer.hpp"
 #include "synth/visit.hpp"
@@ -141,7 +132,7 @@ TEST(Visit, SameCourtyardOnAnotherWay) {
 cv::Mat texture_of(const RenderedFrame& frame) {
   cv::Mat gray;
   cv::Mat shades;
-  testing::gray_of(frame).convertTo(gray, CV_32F);
+  gray_of(frame).convertTo(gray, CV_32F);
   cv::GaussianBlur(gray, shades, {}, 8.0);
   return gray - shades;
 }
@@ -152,7 +143,7 @@ double correlation(const Renderer& first, const Renderer& again, std::size_t i, 
   const RenderedFrame a = first.render(i);
   const RenderedFrame b = again.render(i);
   const Rigid3 b_from_a = again.world_from_camera()[i].inverse() * first.world_from_camera()[i];
-  const cv::Mat map = testing::predict(a, b, b_from_a, at);
+  const cv::Mat map = predict(a, b, b_from_a, at);
   cv::Mat there;
   cv::remap(texture_of(b), there, map, {}, cv::INTER_LINEAR);
   std::vector<cv::Mat> xy;
@@ -164,7 +155,7 @@ double correlation(const Renderer& first, const Renderer& again, std::size_t i, 
 }
 
 TEST(Visit, ShowsTheSameThingsInOtherLight) {
-  const Camera camera = testing::kitti_camera(0.5);
+  const Camera camera = kitti_camera(0.5);
   const Drive first_drive = make_own_drive(40, 3);
   Drive again_drive = first_drive;
   drive_again(3, 1, again_drive);
@@ -174,8 +165,8 @@ TEST(Visit, ShowsTheSameThingsInOtherLight) {
   for (const std::size_t i : {5U, 25U}) {
     EXPECT_GT(correlation(first, again, i, camera), 0.8);
     EXPECT_LT(correlation(first, elsewhere, i, camera), 0.65) << "kerbs and the horizon remain";
-    const double before = cv::mean(testing::gray_of(first.render(i)))[0];
-    const double now = cv::mean(testing::gray_of(again.render(i)))[0];
+    const double before = cv::mean(gray_of(first.render(i)))[0];
+    const double now = cv::mean(gray_of(again.render(i)))[0];
     EXPECT_GT(std::abs(now / before - 1.0), 0.03) << "no other light";
   }
 }

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
+#include "support/test.hpp"
 #include "synth/drive.hpp"
 
 namespace stemvo::synth {
@@ -14,7 +8,7 @@ namespace {
 constexpr double kRate_hz = 30.0;
 constexpr int kFrames = 600;  // 20 s
 
-double degrees(double radians) { return radians * 180.0 / std::numbers::pi; }
+double degrees(double radians) { return radians / kDeg; }
 
 Eigen::Vector3d level(const Eigen::Vector3d& v) { return {v.x(), 0.0, v.z()}; }
 

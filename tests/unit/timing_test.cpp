@@ -1,15 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <chrono>
 #include <ctime>
-#include <string>
-#include <thread>
-#include <vector>
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "report/metrics_json.hpp"
-#include "support/temp_folder.hpp"
+#include "support/test.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -17,8 +10,6 @@ namespace {
 
 using namespace std::chrono_literals;
 using ::testing::ContainsRegex;
-using ::testing::HasSubstr;
-using ::testing::Not;
 
 /// Uses the processor until this thread has had it for so long.
 void work_for(std::chrono::milliseconds time) {
@@ -101,14 +92,13 @@ TEST(Timing, ThreadsAreSeenAndSharesAddUp) {
 }
 
 TimingReport example() {
-  TimingReport report;
-  report.stages = {{"stem", 400, 3.25, 4.5, 1.5}, {"tracking", 399, 5.0, 7.0, 2.0}};
-  report.rest_cpu_s = 0.5;
-  report.cpu_s = 4.0;
-  report.num_frames = 400;
-  report.fps = 180.0;
-  report.num_threads = 2;
-  report.peak_memory_mib = 222.4;
+  TimingReport report{.stages = {{"stem", 400, 3.25, 4.5, 1.5}, {"tracking", 399, 5.0, 7.0, 2.0}},
+                      .rest_cpu_s = 0.5,
+                      .cpu_s = 4.0,
+                      .fps = 180.0,
+                      .num_frames = 400,
+                      .num_threads = 2,
+                      .peak_memory_mib = 222.4};
   return report;
 }
 

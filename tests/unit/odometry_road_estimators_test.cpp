@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include "odometry/road/estimators.hpp"
+#include "odometry/road/region.hpp"
+#include "support/road_scene.hpp"
+#include "support/test.hpp"
+
+namespace stemvo {
+namespace {
+
+/// An estimator, and how far it may be off from planes and scenes that are planted.
+struct Estimator {
+  const char* name;
+  RoadMeasurement (*measure)(const RoadStep&);
+  double log_scale;
+  double sigma;
+  double slope_rad;
+  double roll_rad;
+  double behind_a_car;  ///< log scale again
+  const char* blank;    ///< why there is none on a plain road
+};
+struct PlaneCase {
+  double height_m;
+  double slope_rad;
+  double roll_rad;
+  double step_m;
+  double yaw_rad;
+};
+
+class RoadEstimator : public ::testing::TestWithParam<Estimator> {};
+
+TEST_P(RoadEstimator, FindsThePlantedPlane) {
+  const Estimator& bounds = GetParam();
+  for (const PlaneCase& c : {PlaneCase{1.65, 0.0, 0.0, 0.8, 0.0},
+                             {1.65, 0.015, 0.0, 0.8, 0.0},
+                             {1.65, -0.02, 0.02, 0.8, 0.0},
+                             {1.65, 0.0, -0.03, 1.4, 0.0},
+                             {1.2, 0.01, 0.01, 0.5, 0.0},
+                             {1.65, 0.0, 0.0, 0.8, 0.04},
+                             {1.65, 0.0, 0.0, 0.8, -0.04}}) {
+    SCOPED_TRACE(fmt::format("{} m, {}, {}, {}", c.height_m, c.slope_rad, c.roll_rad, c.yaw_rad));
+    const RoadScene scene{.height_m = c.height_m,
+                          .slope_rad = c.slope_rad,
+                          .roll_rad = c.roll_rad,
+                          .noise_gray = 1.0};
+    const RoadPair pair = render_pair(scene, c.step_m, c.yaw_rad);
+    const RoadOptions options{.camera_height_m = c.height_m};
+    const RoadMeasurement road = bounds.measure(
+        {pair.prev, pair.cur, in_units(pair.cur_from_prev, 2.0), near(2.0 * 1.02), options});
+    ASSERT_TRUE(road.is_valid) << road.reason;
+    EXPECT_NEAR(road.log_scale, std::log(2.0), bounds.log_scale);
+    EXPECT_LT(std::abs(road.log_scale - std::log(2.0)), 4.0 * road.sigma);
+    EXPECT_LT(road.sigma, bounds.sigma);
+    EXPECT_NEAR(road.slope_rad, c.slope_rad, bounds.slope_rad);
+    EXPECT_NEAR(road.roll_rad, c.roll_rad, bounds.roll_rad);
+  }
+}
+
+TEST_P(RoadEstimator, ACarAheadThatCoversHalfOfTheStripIsLeftOut) {
+  const RoadScene scene{
+      .is_covered = [](int u, int v) { return u > 320 && u < 480 && v > 110 && v < 230; }};
+  const RoadPair pair = render_pair(scene, 0.8);
+  const RoadMeasurement road =
+      GetParam().measure({pair.prev, pair.cur, pair.cur_from_prev, near(1.0), RoadOptions{}});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, GetParam().behind_a_car);
+}
+
+TEST_P(RoadEstimator, SaysWhyThereIsNoMeasurement) {
+  const auto measured = [](const RoadPair& pair, const Rigid3& motion) {
+    return GetParam().measure({pair.prev, pair.cur, motion, near(1.0), RoadOptions{}});
+  };
+  RoadScene blank{.has_road = false};
+  const RoadPair plain = render_pair(blank, 0.8);
+  EXPECT_FALSE(measured(plain, plain.cur_from_prev).is_valid);
+  EXPECT_EQ(measured(plain, plain.cur_from_prev).reason, GetParam().blank);
+  blank.noise_gray = 20.0;  // two images that have nothing to do with each other
+  const RoadPair noise = render_pair(blank, 0.8);
+  EXPECT_FALSE(measured(noise, noise.cur_from_prev).is_valid);
+  EXPECT_EQ(measured(render_pair(RoadScene{}, 0.8), Rigid3{}).reason, "no motion");
+}
+
+INSTANTIATE_TEST_SUITE_P(Both,
+                         RoadEstimator,
+                         ::testing::Values(Estimator{"dense", measure_dense, 0.015, 0.03, 0.003,
+                                                     0.004, 0.015, "nothing moves like a road"},
+                                           Estimator{"points", measure_points, 0.025, 0.04, 0.006,
+                                                     0.02, 0.025, "no corners on the road"}),
+                         [](const auto& estimator) { return estimator.param.name; });
+
+TEST(RoadDense, FindsAnUnknownScale) {
+  const RoadScene scene;
+  const RoadPair pair = render_pair(scene, 1.1);
+  RoadPrior prior{.log_scale = std::log(0.8), .log_scale_sigma = 1.0};
+  const RoadMeasurement road =
+      measure_dense({pair.prev, pair.cur, in_units(pair.cur_from_prev, 1.1), prior, RoadOptions{}});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, std::log(1.1), 0.01);
+}
+
+TEST(RoadDense, SmallErrorsOfTheGivenRotationAreTakenUp) {
+  const RoadScene scene;
+  const RoadPair pair = render_pair(scene, 0.8);
+  Rigid3 motion = pair.cur_from_prev;
+  motion.rotation = so3_exp({2e-4, -2e-4, 1e-4}) * motion.rotation;
+  RoadOptions options{.rotation_sigma_rad = 3e-4};
+  const RoadMeasurement free = measure_dense({pair.prev, pair.cur, motion, near(1.0), options});
+  options.rotation_sigma_rad = 1e-7;
+  const RoadMeasurement fixed = measure_dense({pair.prev, pair.cur, motion, near(1.0), options});
+  ASSERT_TRUE(free.is_valid) << free.reason;
+  ASSERT_TRUE(fixed.is_valid) << fixed.reason;
+  EXPECT_NEAR(free.log_scale, 0.0, 0.012);
+  EXPECT_GT(free.sigma, fixed.sigma);
+}
+
+TEST(RoadDense, AKerbAtTheSideCostsLittle) {
+  RoadScene scene{.bump = [](double x, double /*z*/) { return x > 1.1 ? 0.12 : 0.0; }};
+  const RoadPair pair = render_pair(scene, 0.8);
+  const RoadMeasurement road =
+      measure_dense({pair.prev, pair.cur, pair.cur_from_prev, near(1.0), RoadOptions{}});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.025);
+}
+
+TEST(RoadDense, AnImageThatEndsAtTheHorizonShowsNoRoad) {
+  const Rigid3 motion(Eigen::Quaterniond::Identity(), {0.0, 0.0, -0.8});
+  const cv::Mat sky(130, 660, CV_8U, cv::Scalar(200));
+  const RoadImage above = make_road_image({sky, {}}, RoadScene{}.camera);
+  EXPECT_EQ(measure_dense({above, above, motion, near(1.0), RoadOptions{}}).reason,
+            "the image ends above the road");
+}
+
+/// Too few for the coarse grid: that must not be the end.
+TEST(RoadDense, ANarrowStripIsEnoughWhereTheScaleIsKnown) {
+  RoadOptions options{.half_width_m = 0.1};
+  const RoadPair pair = render_pair(RoadScene{}, 0.8);
+  const RoadPrior prior = near(1.02);
+  const RoadImage::Level& level = pair.cur.full;
+  const std::size_t num_pixels = RoadRegion(pair.cur_from_prev, prior, options)
+                                     .samples(level.camera, level.first_row, 1, 1)
+                                     .size();
+  ASSERT_GT(num_pixels, 600U);
+  ASSERT_LT(num_pixels, 2400U);
+  const RoadMeasurement road =
+      measure_dense({pair.prev, pair.cur, pair.cur_from_prev, prior, options});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.03);
+}
+
+TEST(RoadDense, AnImageOfHalfTheSizeGivesTheSameScale) {
+  const RoadScene scene;
+  RoadPair pair = render_pair(scene, 0.8);
+  const auto halve = [&](const RoadImage& full) {
+    ChannelImage image;
+    cv::resize(full.pixels, image.pixels, {}, 0.5, 0.5, cv::INTER_AREA);
+    image.map = {{2.0, 2.0}, {0.5, 0.5}};
+    return make_road_image(image, scene.camera);
+  };
+  const RoadMeasurement road = measure_dense(
+      {halve(pair.prev), halve(pair.cur), pair.cur_from_prev, near(1.0), RoadOptions{}});
+  ASSERT_TRUE(road.is_valid) << road.reason;
+  EXPECT_NEAR(road.log_scale, 0.0, 0.02);
+}
+
+}  // namespace
+}  // namespace stemvo
