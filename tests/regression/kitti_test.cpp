@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <nlohmann/json.hpp>
+
 #include "support/kitti_clips.hpp"
 #include "support/test.hpp"
 
@@ -19,6 +21,74 @@ INSTANTIATE_TEST_SUITE_P(Clips,
                          Kitti,
                          ::testing::Values("00", "02", "03", "06"),
                          [](const auto& clip) { return clip.param; });
+
+class RoadOfClip : public NeedsClips {
+ protected:
+  static constexpr int kFrames = 80;
+
+  /// The first frames of clip 03, seen by a camera that is mounted otherwise.
+  ProgramResult run(const std::function<void(cv::Mat&)>& turn, double cx_px, double cy_px) {
+    const fs::path clip = shared_data() / "kitti/sequences/03";
+    const fs::path images = folder_ / "images";
+    fs::create_directories(images);
+    cv::Size size;
+    for (int i = 0; i < kFrames; ++i) {
+      const std::string name = fmt::format("{:06}.png", i);
+      cv::Mat image = cv::imread((clip / "image_0" / name).string(), cv::IMREAD_GRAYSCALE);
+      turn(image);
+      size = image.size();
+      EXPECT_TRUE(cv::imwrite((images / name).string(), image));
+    }
+    std::ofstream(folder_ / "camera.yaml")
+        << "image_width: " << size.width << "\nimage_height: " << size.height
+        << "\ncamera_model: pinhole\nintrinsics: [721.54, 721.54, " << cx_px << ", " << cy_px
+        << "]\ndistortion_model: none\ndistortion_coefficients: []\nrate_hz: 10\n"
+           "camera_height: 1.65\n";
+    return run_stemvo(
+        {"run", images.parent_path().string(), "--out", folder_ / "result", "--quiet"});
+  }
+  [[nodiscard]] double believed() const {
+    return nlohmann::json::parse(read_file(folder_ / "result/metrics.json"))
+        .at("road_believed_fraction");
+  }
+};
+
+constexpr double kCx_px = 609.56;
+constexpr double kCy_px = 172.85;
+constexpr int kWidth = 1242;
+constexpr int kHeight = 375;
+
+TEST_F(RoadOfClip, IsBelievedByTheCameraAsItIs) {
+  const ProgramResult done = succeeded(run([](cv::Mat&) {}, kCx_px, kCy_px));
+  EXPECT_THAT(done.err, Not(HasSubstr("warning: scale")));
+  EXPECT_GT(believed(), 0.85);
+}
+
+TEST_F(RoadOfClip, IsNotBelievedUpsideDown) {
+  const auto turn = [](cv::Mat& image) { cv::rotate(image, image, cv::ROTATE_180); };
+  const ProgramResult done = run(turn, kWidth - 1 - kCx_px, kHeight - 1 - kCy_px);
+  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+  EXPECT_EQ(believed(), 0.0);
+}
+
+TEST_F(RoadOfClip, IsNotBelievedByACameraOnItsSide) {
+  const auto turn = [](cv::Mat& image) {
+    cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
+  };
+  const ProgramResult done = run(turn, kCy_px, kWidth - 1 - kCx_px);
+  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+  EXPECT_EQ(believed(), 0.0);
+}
+
+class HandHeld : public NeedsClips {};
+
+TEST_F(HandHeld, ARoomHasNoRoad) {
+  const ProgramResult done =
+      succeeded(run_stemvo({"run", (shared_data() / "handheld").string(), "--out",
+                            folder_ / "result", "--quiet", "--frames", "0:150", "--set",
+                            "scale.source=camera_height", "--set", "scale.camera_height_m=1.5"}));
+  EXPECT_THAT(done.err, HasSubstr("the path is in units, not metres"));
+}
 
 }  // namespace
 }  // namespace stemvo

@@ -114,14 +114,13 @@ TEST_F(Recordings, EurocByItsFolderItsMav0OrOneCamera) {
 
 TEST_F(Recordings, EurocTruthIsTheCamerasAndOfFramesThatHaveSome) {
   const auto source = open_source(request(write_euroc()));
-  const auto truth = source->ground_truth_of(6);
+  const auto truth = source->ground_truth_of(6).value();
   ASSERT_TRUE(truth);
-  ASSERT_TRUE(*truth);
-  EXPECT_THAT((*truth)->frames, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(truth->frames, ElementsAre(1, 2, 3, 4));
   for (std::size_t i = 0; i < 4; ++i) {  // along the camera's z, which is the body's x
-    EXPECT_TRUE((*truth)->poses[i].translation.isApprox(
+    EXPECT_TRUE(truth->poses[i].translation.isApprox(
         Eigen::Vector3d(0.0, 0.0, static_cast<double>(i)), 1e-9))
-        << (*truth)->poses[i].translation.transpose();
+        << truth->poses[i].translation.transpose();
   }
   const auto interrupted = source->ground_truth_of(3);
   EXPECT_THAT((*interrupted)->frames, ElementsAre(1, 2));
@@ -175,9 +174,8 @@ TEST_F(Recordings, AVideoIsReadFrameByFrame) {
     expect_frame(source->read(i), static_cast<int>(i) + 1);
     EXPECT_NEAR(source->time_s(i), 0.04 * static_cast<double>(i + 1), 1e-3);
   }
-  const auto behind = source->read(5);
-  ASSERT_TRUE(behind);
-  EXPECT_TRUE(behind->empty());
+  const auto behind = source->read(5).value();
+  EXPECT_TRUE(behind.empty());
 }
 
 TEST_F(Recordings, AVideoHasTruthByTimeOrByFrame) {

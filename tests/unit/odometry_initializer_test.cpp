@@ -10,7 +10,6 @@ namespace {
 struct Decided {
   int frame = -1;  ///< -1: none did
   MeasuredMotion motion;
-  std::vector<FrameState> states;  ///< of the frames from 1 on
   std::optional<Window> window;
 };
 
@@ -26,7 +25,6 @@ Decided initialize(const DriveTracks& drive, const Options& config = {}) {
     const Matches matches = drive.matches(i);
     View now = view_of(matches, Rigid3(), i);
     result.motion = initializer.measure(matches, now.points, drive.camera);
-    result.states.push_back(result.motion.state);
     if (result.motion.state == FrameState::kTracking && result.motion.is_decisive) {
       result.frame = i;
       now.world_from_camera = result.motion.cur_from_prev.inverse();
@@ -90,18 +88,6 @@ TEST(Initializer, APlanarSceneDecidesByTheHomography) {
   EXPECT_GE(num_right, 4);
 }
 
-TEST(Initializer, WaitsWhileTheCameraOnlyTurnsOrStands) {
-  const Rigid3 turn(so3_exp({0.0, 0.006, 0.0}), Eigen::Vector3d::Zero());
-  for (const auto& [path, noise_px, expected] :
-       {std::tuple(DriveTracks::repeat(turn, 40), 0.15, FrameState::kRotating),
-        std::tuple(std::vector<Rigid3>(15), 0.03, FrameState::kStationary)}) {
-    const Decided decided =
-        initialize(DriveTracks(path, points_of_room(1500, 4.0, 7), noise_px, 7));
-    EXPECT_EQ(decided.frame, -1);
-    EXPECT_EQ(decided.states, std::vector<FrameState>(path.size() - 1, expected));
-  }
-}
-
 TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   const DriveTracks walk = sideways_walk(0.0, 9);
   Matches matches = walk.matches(1);
@@ -116,18 +102,6 @@ TEST(Initializer, MatchesThatAgreeOnNothingAreLost) {
   EXPECT_FALSE(motion.state == FrameState::kTracking && motion.is_decisive);
   initializer.start({0, Rigid3(), {}});
   EXPECT_EQ(initializer.measure({}, {}, walk.camera).state, FrameState::kLost);
-}
-
-TEST(Initializer, AReferenceIsWornOutOnceItsTracksHaveEnded) {
-  const DriveTracks walk = sideways_walk(0.0, 10);
-  Initializer initializer(Options{});
-  Observations points = view_of(walk.matches(0, 1), Rigid3(), 1).points;
-  initializer.start({0, Rigid3(), points});
-  EXPECT_FALSE(initializer.lost_reference(points));
-  points.resize(points.size() * 6 / 10);
-  EXPECT_FALSE(initializer.lost_reference(points));
-  points.resize(points.size() / 4);
-  EXPECT_TRUE(initializer.lost_reference(points));
 }
 
 TEST(Initializer, TheMaskIsOfAllMatchesAndKeepsThoseTheReferenceDoesNotSee) {

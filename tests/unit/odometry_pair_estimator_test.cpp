@@ -6,6 +6,145 @@
 namespace stemvo {
 namespace {
 
+/// A measured motion from prev_from_cur (what the car did), as the estimator reports it.
+MeasuredMotion driven(const Eigen::Vector3d& direction,
+                      double yaw_deg,
+                      FrameState state = FrameState::kTracking) {
+  MeasuredMotion motion;
+  motion.state = state;
+  motion.cur_from_prev = Rigid3(so3_exp({0.0, yaw_deg * kDeg, 0.0}), direction).inverse();
+  motion.parallax_px = 5.0;
+  motion.runner_up_ratio = 0.1;
+  motion.is_decisive = true;
+  return motion;
+}
+
+/// Frames come every tenth of a second, or as they say.
+class Chain : public MotionChain {
+ public:
+  Chain(const OdometryOptions& options, const ScaleOptions& scale) : MotionChain(options, scale) {
+    advance_to(time_s_);
+  }
+  FrameState add(const MeasuredMotion& motion, double interval_s = 0.1) {
+    advance_to(time_s_ += interval_s);
+    return MotionChain::add(motion);
+  }
+  void add_missing(double interval_s = 0.1) {
+    advance_to(time_s_ += interval_s);
+    extrapolate(/*has_image=*/false);
+  }
+
+ private:
+  double time_s_ = 5.0;
+};
+
+Chain make_chain(const OdometryOptions& options = {}, double step_m = 1.0) {
+  ScaleOptions scale{.source = ScaleSource::kConstantSpeed, .step_m = step_m};
+  return {options, scale};
+}
+
+TEST(MotionChain, ForwardDriveGoesForwardByConstantSteps) {
+  Chain chain = make_chain({}, 0.7);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.4, 1e-12);
+}
+
+TEST(MotionChain, TheRightOrderReproducesTheDriveAndThePapersDoesNot) {
+  OdometryOptions paper{.composition = Composition::kPaper};
+  Chain right = make_chain();
+  Chain wrong = make_chain(paper);
+  Rigid3 truth;
+  for (int i = 0; i < 36; ++i) {  // a right turn over a road that rolls
+    const Eigen::Vector3d turn(0.01, 10.0 * kDeg, 0.05 * std::sin(0.5 * i));
+    const Rigid3 prev_from_cur(so3_exp(turn), Eigen::Vector3d(0.1, 0.05, 1.0).normalized());
+    truth = truth * prev_from_cur;
+    MeasuredMotion motion = driven(Eigen::Vector3d::UnitZ(), 0.0);
+    motion.cur_from_prev = prev_from_cur.inverse();
+    right.add(motion);
+    wrong.add(motion);
+  }
+  EXPECT_LT((right.world_from_camera().translation - truth.translation).norm(), 1e-9);
+  EXPECT_LT(right.world_from_camera().rotation.angularDistance(truth.rotation), 1e-9);
+  EXPECT_GT((wrong.world_from_camera().translation - truth.translation).norm(), 0.1);
+}
+
+TEST(MotionChain, WithoutAScaleAStepIsOneUnitWhateverTheMetresAre) {
+  ScaleOptions scale{.source = ScaleSource::kNone, .step_m = 0.7};
+  Chain chain({}, scale);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
+}
+
+TEST(MotionChain, InitializesUntilAMotionIsDecisive) {
+  Chain chain = make_chain();
+  MeasuredMotion doubtful = driven(Eigen::Vector3d::UnitZ(), 0.0);
+  doubtful.is_decisive = false;
+  EXPECT_EQ(chain.add(doubtful), FrameState::kInitializing);
+  EXPECT_TRUE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kInitializing);
+  EXPECT_FALSE(chain.is_initializing());
+  EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kTracking);
+}
+
+TEST(MotionChain, TheGateKeepsTheRotationAndGoesOnAndThePapersDropsBoth) {
+  for (const bool is_papers : {false, true}) {
+    Chain chain = make_chain({.gate = is_papers ? ForwardGate::kPaper : ForwardGate::kTranslation});
+    chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+    EXPECT_EQ(chain.add(driven(Eigen::Vector3d::UnitX(), 5.0)), FrameState::kGated);
+    EXPECT_NEAR(chain.world_from_camera().angle_rad(), is_papers ? 0.0 : 5.0 * kDeg, 1e-12);
+    EXPECT_NEAR(chain.world_from_camera().translation.z(), is_papers ? 1.0 : 2.0, 1e-12);
+  }
+}
+
+TEST(MotionChain, ReversingIsBelievedOnlyWhenTheEvidenceIsClear) {
+  Chain chain = make_chain({.gate = ForwardGate::kTranslation});
+  EXPECT_NE(chain.add(driven(-Eigen::Vector3d::UnitZ(), 0.0)), FrameState::kGated);
+  MeasuredMotion doubtful = driven(-Eigen::Vector3d::UnitZ(), 0.0);
+  doubtful.runner_up_ratio = 0.9;
+  EXPECT_EQ(chain.add(doubtful), FrameState::kGated);
+}
+
+TEST(MotionChain, LowParallaxKeepsTheDirectionAndStationaryStays) {
+  Chain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  MeasuredMotion low_parallax = driven(-Eigen::Vector3d::UnitZ(), 1.0, FrameState::kLowParallax);
+  low_parallax.parallax_px = 0.5 * OdometryOptions{}.min_parallax_px;
+  chain.add(low_parallax);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 1.0 * kDeg, 1e-12);
+  MeasuredMotion stationary;
+  stationary.state = FrameState::kStationary;
+  chain.add(stationary);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 1.5, 1e-12);
+}
+
+TEST(MotionChain, AMissingImageIsBridged) {
+  Chain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));
+  chain.add_missing();
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 2.0, 1e-12);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0));  // from the last image, two frames away
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.0, 1e-12);
+  MeasuredMotion lost;
+  EXPECT_EQ(chain.add(lost), FrameState::kLost);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 6.0 * kDeg, 1e-9);  // half the turn more
+}
+
+TEST(MotionChain, AStepIsAsLongAsItsIntervalAndALostFrameTurnsOnForIt) {
+  Chain chain = make_chain();
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0));  // one step in 0.1 s
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 4.0), 0.25);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.5, 1e-12);
+  EXPECT_EQ(chain.add({}, 0.05), FrameState::kLost);
+  EXPECT_NEAR(chain.world_from_camera().angle_rad(), 4.8 * kDeg, 1e-12);
+  EXPECT_NEAR(chain.world_from_camera().translation.z(), 3.5 + 0.5 * std::cos(4.0 * kDeg), 1e-9);
+  chain.add_missing(0.1);
+  chain.add(driven(Eigen::Vector3d::UnitZ(), 0.0), 0.1);  // from the lost frame on
+  EXPECT_NEAR(chain.world_from_camera().translation.norm(), 6.0, 0.02);
+}
+
 struct Driven {
   DriveTracks drive;
   PairEstimator estimator{config_without_scale(OdometryMode::kTwoFrame), drive.camera};

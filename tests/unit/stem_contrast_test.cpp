@@ -154,22 +154,21 @@ void expect_spots(const TinyStem& tiny, int sampling, TrackingResolution resolut
       }
     }
     ContrastNormalization contrast(options);
-    const auto channel = stem.apply(frame);
-    ASSERT_TRUE(channel);
-    const ChannelImage image = contrast.apply(*channel);
+    const auto channel = stem.apply(frame).value();
+    const ChannelImage image = contrast.apply(channel);
     const Eigen::Vector2d found = image.map.to_input(centre_of(image.pixels));
     EXPECT_LE((found - spot).cwiseAbs().maxCoeff(), 0.05) << found.transpose();
     EXPECT_LE((image.map.from_input(found) - centre_of(image.pixels)).norm(), 1e-9);
     if (resolution == TrackingResolution::kNative) {
-      EXPECT_EQ(image.pixels.size(), channel->values.size());
+      EXPECT_EQ(image.pixels.size(), channel.values.size());
     }
     if (resolution == TrackingResolution::kHalf) {
-      const cv::Size size = channel->values.size();
+      const cv::Size size = channel.values.size();
       EXPECT_EQ(image.pixels.size(), sampling == 1 ? size / 2 : size * (sampling / 2));
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(2, 2));
     }
     if (resolution == TrackingResolution::kInput) {
-      EXPECT_EQ(image.pixels.size(), channel->values.size() * sampling);
+      EXPECT_EQ(image.pixels.size(), channel.values.size() * sampling);
       EXPECT_EQ(image.map.scale, Eigen::Vector2d(1, 1));
     }
   }

@@ -82,13 +82,12 @@ TEST(Stem, SameBytesForAnyNumberOfThreadsAndAnyHistory) {
   for (const int threads : {1, 2, 3, 8}) {
     cv::setNumThreads(threads);
     ASSERT_TRUE(stem.apply(other));  // another size in between
-    const auto channel = stem.apply(frame);
-    ASSERT_TRUE(channel);
+    const auto channel = stem.apply(frame).value();
     if (first.empty()) {
-      first = channel->values;
+      first = channel.values;
     }
-    ASSERT_EQ(channel->values.size(), first.size());
-    EXPECT_EQ(std::memcmp(channel->values.data, first.data, first.total() * sizeof(float)), 0);
+    ASSERT_EQ(channel.values.size(), first.size());
+    EXPECT_EQ(std::memcmp(channel.values.data, first.data, first.total() * sizeof(float)), 0);
   }
   cv::setNumThreads(threads_before);
 }
@@ -128,14 +127,13 @@ TEST(Stem, InputLayerAndGray) {
   EXPECT_EQ(colours->info().num_filters, 3);
   EXPECT_EQ(colours->info().filter, 0);
   cv::Mat frame(2, 3, CV_8UC3, cv::Scalar(10, 20, 40));
-  const auto channels = colours->apply_all(frame);
-  ASSERT_TRUE(channels);
-  ASSERT_EQ(channels->size(), 3U);
-  EXPECT_EQ((*channels)[0].values.at<float>(1, 2), 10.0F);
-  EXPECT_EQ((*channels)[1].values.at<float>(1, 2), 20.0F);
-  EXPECT_EQ((*channels)[2].values.at<float>(1, 2), 40.0F);
-  EXPECT_EQ((*channels)[2].map.scale, Eigen::Vector2d(1, 1));
-  EXPECT_EQ((*channels)[2].map.offset_px, Eigen::Vector2d(0, 0));
+  const auto channels = colours->apply_all(frame).value();
+  ASSERT_EQ(channels.size(), 3U);
+  EXPECT_EQ(channels[0].values.at<float>(1, 2), 10.0F);
+  EXPECT_EQ(channels[1].values.at<float>(1, 2), 20.0F);
+  EXPECT_EQ(channels[2].values.at<float>(1, 2), 40.0F);
+  EXPECT_EQ(channels[2].map.scale, Eigen::Vector2d(1, 1));
+  EXPECT_EQ(channels[2].map.offset_px, Eigen::Vector2d(0, 0));
   options.filter = 2;
   EXPECT_EQ(Stem::load_all(options)->apply(frame)->values.at<float>(0, 0), 40.0F);
   EXPECT_EQ(Stem::load_all(options)->apply(cv::Mat1b(2, 2, 7))->values.at<float>(0, 0), 7.0F);

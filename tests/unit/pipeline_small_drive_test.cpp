@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "evaluation/trajectory.hpp"
+#include "pipeline/channel_images.hpp"
 #include "pipeline/run.hpp"
 #include "support/small_drive.hpp"
 #include "support/test.hpp"
@@ -66,6 +67,23 @@ TEST_F(GyroRun, TurnsALostCameraIfItWasRightBefore) {
   EXPECT_LT(turn_in_the_dark(write_gyro(none, in_the_dark)).angularDistance(said), 0.01);
   const Eigen::Vector3d off(0.0, 1.0, 0.0);
   EXPECT_LT(turn_in_the_dark(write_gyro(off, in_the_dark)).angularDistance(without), 0.02);
+}
+
+class ChannelImages : public SmallDrive {};
+
+TEST_F(ChannelImages, OfTheInputLayer) {
+  ChannelImagesRequest request;
+  request.sequence_dir = sequence_;
+  request.out_dir = folder_.path() / "out";
+  request.config.stem.model = "input_layer";
+  request.frames = FrameRangeRequest{2, 4};
+  const auto written = write_channel_images(request);
+  EXPECT_EQ(*written, 2U * (1 + 3 + 1));
+  EXPECT_TRUE(fs::exists(request.out_dir / "000003_filter_002.png"));
+  EXPECT_TRUE(fs::exists(request.out_dir / "000002_sheet.png"));
+  request.filters = FrameRangeRequest{2, 4};
+  EXPECT_THAT(message_of(write_channel_images(request)),
+              ::testing::HasSubstr("expected filters inside 0:3, found --filters 2:4"));
 }
 
 }  // namespace
