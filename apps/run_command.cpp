@@ -195,6 +195,8 @@ void add_options(CLI::App& command, RunArguments& arguments) {
   command.add_option("--pictures", request.image_every, "Draw the tracks of every Nth frame")
       ->type_name("N")
       ->check(in_range(1, 1000000));
+  add_file_option(command, "--video", request.video,
+                  "Write a video of frames, tracks and path: .mp4, .mkv or .avi");
   add_file_option(
       command, "--map", request.map,
       "A map that --save-map wrote: the camera finds itself in it (map_* in frames.csv)");

@@ -44,13 +44,7 @@ Status check_request(const CalibrationRequest& request, const FrameSource& seque
   std::vector<fs::path> inputs = pipeline::input_files(request, sequence, request.config);
   inputs.insert(inputs.end(), {calibration_file(request, sequence), request.config.file,
                                request.sequence_dir / "times.txt"});
-  for (const fs::path& input : inputs) {
-    std::error_code code;
-    if (fs::equivalent(request.out_file, input, code)) {
-      return fail(fmt::format("{}: expected a file to write that is no input, found {}",
-                              request.out_file.string(), input.string()));
-    }
-  }
+  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, inputs));
   return check_can_write(request.out_file);
 }
 

@@ -4,7 +4,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
-#include "dataset/video_decoder.hpp"
+#include "io/loaded_module.hpp"
 #include "try.hpp"
 
 namespace stemvo {
@@ -18,7 +18,7 @@ Expected<FindMarkers*> load_markers() {
         "libopencv-objdetect4xx), found none: {}",
         STEMVO_MARKER_LIBRARY, ::dlerror()));
   }
-  return dataset::load_symbol(STEMVO_MARKER_MODULE, kFindMarkers, "finds markers")
+  return io::load_symbol("libstemvo_markers.so", kFindMarkers, "finds markers")
       .map([](void* symbol) { return reinterpret_cast<FindMarkers*>(symbol); });
 }
 

@@ -37,6 +37,7 @@ struct StreamInfo {
   bool is_live = false;                       ///< ends when the user says so
   std::function<double(std::size_t)> time_s;  ///< of a frame that was read
   std::function<std::size_t()> num_counted;   ///< frames so far that came without a time
+  double rate_hz = 30.0;                      ///< as the container or the camera file says
 };
 
 /// True poses of some frames.

@@ -1,41 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "dataset/video_decoder.hpp"
 
-#include <array>
+#include <algorithm>
 #include <string>
-#include <system_error>
 
-#include <dlfcn.h>
 #include <fmt/format.h>
+
+#include "io/loaded_module.hpp"
+#include "text/text_file.hpp"
+#include "try.hpp"
 
 namespace stemvo::dataset {
 
-namespace fs = std::filesystem;
-
-Expected<void*> load_symbol(const fs::path& built, const char* symbol, std::string_view what) {
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  const std::array<fs::path, 2> places = {
-      program.parent_path() / STEMVO_RUNTIME_FROM_BIN / built.filename(), built};  // installed
-  std::string why;
-  for (const fs::path& place : places) {
-    // Never unloaded: decoders live as long as their videos.
-    void* const module = ::dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (void* const found = module != nullptr ? ::dlsym(module, symbol) : nullptr) {
-      return found;
-    }
-    why += fmt::format("; {}", ::dlerror());
-  }
-  return fail(
-      fmt::format("{}: expected the module that {} beside the program, found none that loads{}",
-                  places.front().lexically_normal().string(), what, why));
-}
-
 namespace {
+
+constexpr const char* kVideoModule = "libstemvo_video.so";
 
 Expected<std::unique_ptr<VideoDecoder>> open(const char* file, int number, const cv::Size& size) {
   static const Expected<void*> found =
-      load_symbol(STEMVO_VIDEO_MODULE, kOpenDecoder, "decodes videos");
+      io::load_symbol(kVideoModule, kOpenDecoder, "decodes videos");
   return found.map([&](void* open_decoder) {
     return std::unique_ptr<VideoDecoder>(
         reinterpret_cast<OpenDecoder*>(open_decoder)(file, number, size.width, size.height));
@@ -50,6 +33,25 @@ Expected<std::unique_ptr<VideoDecoder>> decode_file(const std::string& file, con
 
 Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number, const cv::Size& size) {
   return open(nullptr, number, size);
+}
+
+Expected<WriteFrame> encode_file(const std::filesystem::path& file,
+                                 double rate_hz,
+                                 const cv::Size& size) {
+  constexpr const char* kEndings[] = {".mp4", ".mkv", ".avi"};
+  if (std::ranges::find(kEndings, file.extension()) == std::end(kEndings)) {
+    return fail(fmt::format("{}: expected a video to write that ends in .mp4, .mkv or .avi",
+                            file.string()));
+  }
+  STEMVO_TRY(check_can_write(file));
+  STEMVO_TRY_GET(void* const found, io::load_symbol(kVideoModule, kOpenWriter, "writes videos"));
+  WriteFrame write;
+  if (!reinterpret_cast<OpenWriter*>(found)(file.c_str(), rate_hz, size, write)) {
+    return fail(fmt::format(
+        "{}: expected an encoder of H.264, MPEG-4 or MJPEG for {}x{} pixels, FFmpeg found none",
+        file.string(), size.width, size.height));
+  }
+  return write;
 }
 
 }  // namespace stemvo::dataset

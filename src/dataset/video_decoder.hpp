@@ -2,9 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include <opencv2/core.hpp>
 
@@ -37,12 +37,6 @@ class VideoDecoder {
   [[nodiscard]] virtual double turned_deg() const = 0;
 };
 
-/// A symbol of a module that is loaded now: where the program is installed, else as `built`. Error:
-/// the module, which does `what`, is in neither place or does not load.
-[[nodiscard]] Expected<void*> load_symbol(const std::filesystem::path& built,
-                                          const char* symbol,
-                                          std::string_view what);
-
 /// A file or an address by FFmpeg, turned as the container asks unless frames that are not have
 /// this size. Null: nothing there that can be decoded. Error: the module is not where it was
 /// installed.
@@ -53,10 +47,22 @@ class VideoDecoder {
 [[nodiscard]] Expected<std::unique_ptr<VideoDecoder>> decode_camera(int number,
                                                                     const cv::Size& size);
 
-/// The module's only symbol; the caller owns the decoder. Null: it cannot be opened. `file` is a
+/// Adds a frame to a video, CV_8UC3, BGR; an empty one ends the file. False: it is not whole.
+using WriteFrame = std::function<bool(const cv::Mat& bgr)>;
+/// A video of frames of this size, both sides even; replaces a file. Errors: another ending than
+/// .mp4, .mkv, .avi; a place that cannot be written; no encoder.
+[[nodiscard]] Expected<WriteFrame> encode_file(const std::filesystem::path& file,
+                                               double rate_hz,
+                                               const cv::Size& size);
+
+/// The module's symbols. The caller owns the decoder; null: it cannot be opened. `file` is a
 /// whole path, or an address; without it camera `number`.
 extern "C" using OpenDecoder =
     VideoDecoder * (const char* file, int number, int width_px, int height_px);
 inline constexpr const char* kOpenDecoder = "stemvo_open_decoder";
+/// False: no encoder.
+extern "C" using OpenWriter =
+    bool(const char* file, double rate_hz, const cv::Size& size, WriteFrame& write);
+inline constexpr const char* kOpenWriter = "stemvo_open_writer";
 
 }  // namespace stemvo::dataset

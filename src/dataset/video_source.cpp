@@ -72,10 +72,12 @@ Expected<FrameSource> open_stream(const std::shared_ptr<VideoStream>& stream,
   const std::size_t end = range.end.value_or(std::numeric_limits<std::size_t>::max());
   frames.range = {range.begin, end};
   const std::size_t all = stream->expected_frames();
-  frames.stream =
-      StreamInfo{end - range.begin, all > range.begin ? std::min(all, end) - range.begin : 0U,
-                 stream->is_live(), [stream](std::size_t index) { return stream->time_s(index); },
-                 [stream] { return stream->num_counted(); }};
+  frames.stream = StreamInfo{end - range.begin,
+                             all > range.begin ? std::min(all, end) - range.begin : 0U,
+                             stream->is_live(),
+                             [stream](std::size_t index) { return stream->time_s(index); },
+                             [stream] { return stream->num_counted(); },
+                             stream->rate_hz()};
   frames.given_calibration = request.camera_file;
   frames.camera_height_m = camera.camera_height_m;
   frames.warnings = camera.warnings;

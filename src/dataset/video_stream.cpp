@@ -60,6 +60,11 @@ std::size_t VideoStream::expected_frames() const {
   return count > 0.0 && count < 1e12 ? static_cast<std::size_t>(count) : 0U;
 }
 
+double VideoStream::rate_hz() const {
+  const double told_hz = decoder_->rate_hz();
+  return told_hz > 0.0 ? told_hz : default_rate_hz_;
+}
+
 double VideoStream::next_time_s() {
   constexpr double kMillisecond_s = 1e-3;
   if (is_live_) {
@@ -72,9 +77,7 @@ double VideoStream::next_time_s() {
     return told_s;
   }
   ++num_counted_;
-  const double told_hz = decoder_->rate_hz();
-  const double step_s = 1.0 / (told_hz > 0.0 ? told_hz : default_rate_hz_);
-  return last_time_s_ ? *last_time_s_ + step_s : 0.0;
+  return last_time_s_ ? *last_time_s_ + 1.0 / rate_hz() : 0.0;
 }
 
 bool VideoStream::grab() {

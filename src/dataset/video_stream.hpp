@@ -43,6 +43,7 @@ class VideoStream {
   [[nodiscard]] double turned_deg() const { return decoder_->turned_deg(); }
   /// As the container says, which may be wrong; 0: it does not say.
   [[nodiscard]] std::size_t expected_frames() const;
+  [[nodiscard]] double rate_hz() const;
   /// Frames per second where the container says none.
   void set_default_rate(double rate_hz) { default_rate_hz_ = rate_hz; }
 

@@ -85,6 +85,7 @@ class DriveLoop {
     for (const GrowingFile* file : {&rows_, &kitti_, &tum_}) {
       keep_first(drive_.written, file->status());
     }
+    keep_first(drive_.written, run_.video.finish());
     return std::move(drive_);
   }
 
@@ -137,16 +138,29 @@ class DriveLoop {
     const bool is_asked_for =
         request.image_every > 0 && i % static_cast<std::size_t>(request.image_every) == 0;
     const bool is_reported = is_in_report(i, expected_frames(run_.sequence, i + 1));
-    if (!is_asked_for && !is_reported) {
+    if (!is_asked_for && !is_reported && !run_.video.is_on()) {
       return;
     }
     const ChannelOdometry& seen = run_.odometry.frames();
-    const cv::Mat image = draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(),
-                                           seen.inlier_mask());
     const std::string caption =
         fmt::format("frame {}: {}, {} of {} matches", number, to_string(pose.state),
                     pose.num_inliers, pose.num_matches);
     const std::string colors = describe_flow(seen.matches(), seen.inlier_mask());
+    if (run_.video.is_on()) {
+      const Camera& camera = run_.sequence.camera;
+      const cv::Mat plain =
+          frame.value_or(cv::Mat(camera.height_px, camera.width_px, CV_8UC1, cv::Scalar(60)));
+      const cv::Mat drawn = draw_frame_image(plain, {}, seen.matches(), seen.inlier_mask());
+      has_scale_ = has_scale_ || pose.scale_state >= ScaleState::kHeld ||
+                   request.config.scale_choice == ScaleChoice::kGroundTruth;
+      run_.video.add(draw_under_caption(drawn, caption, colors), drive_.trajectory,
+                     has_scale_ ? "m" : "units");
+    }
+    if (!is_asked_for && !is_reported) {
+      return;
+    }
+    const cv::Mat image = draw_frame_image(frame.value_or(cv::Mat()), seen.image(), seen.matches(),
+                                           seen.inlier_mask());
     if (is_asked_for) {
       const auto file = request.out_dir / "pictures" / fmt::format("{:06}.png", number);
       keep_first(drive_.written, write_image(file, draw_under_caption(image, caption, colors)));
@@ -200,6 +214,7 @@ class DriveLoop {
   GrowingFile kitti_{run_.request.out_dir / "trajectory_kitti.txt"};
   GrowingFile tum_{run_.request.out_dir / "trajectory_tum.txt"};
   Clock::time_point last_written_;
+  bool has_scale_ = false;  ///< lengths of the path are metres
 };
 
 }  // namespace

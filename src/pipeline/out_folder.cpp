@@ -114,6 +114,16 @@ Expected<FolderLock> open_out_folder(const fs::path& folder,
   return marked ? Expected<FolderLock>(lock) : refuse(folder, marked.error().message);
 }
 
+Status check_is_no_input(const fs::path& file, const std::vector<fs::path>& inputs) {
+  for (const fs::path& input : inputs) {
+    if (std::error_code code; fs::equivalent(file, input, code)) {
+      return fail(fmt::format("{}: expected a file to write that is no input, found {}",
+                              file.string(), input.string()));
+    }
+  }
+  return {};
+}
+
 std::vector<fs::path> input_files(const FrameSourceRequest& request,
                                   const FrameSource& source,
                                   const Config& config) {

@@ -33,6 +33,10 @@ using FolderLock = std::shared_ptr<void>;
     const std::string& command,
     const std::vector<std::filesystem::path>& inputs);
 
+/// Error: the file to write is one of the inputs, also through a link.
+[[nodiscard]] Status check_is_no_input(const std::filesystem::path& file,
+                                       const std::vector<std::filesystem::path>& inputs);
+
 /// Files that are read for a source's frames, its model and what was asked for; some need not be
 /// there, and a mask may also be a rectangle, which is no file.
 [[nodiscard]] std::vector<std::filesystem::path> input_files(const FrameSourceRequest& request,

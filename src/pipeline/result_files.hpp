@@ -11,6 +11,7 @@
 #include "html/page.hpp"
 #include "odometry/phased_odometry.hpp"
 #include "pipeline/beside_frames.hpp"
+#include "pipeline/drive_video.hpp"
 #include "pipeline/run.hpp"
 #include "report/small_frames.hpp"
 #include "stemvo/error.hpp"
@@ -35,6 +36,7 @@ struct Run {
   const FrameSource& sequence;
   PhasedOdometry& odometry;
   const BesideFrames& beside;
+  const DriveVideo& video;
 };
 
 /// The loop over the frames leaves this behind.

@@ -91,7 +91,7 @@ std::string describe_size(const FrameSource& sequence) {
 
 /// Says what the input was taken for, and what is lost.
 void note_start(const Run& run, bool is_replacing) {
-  const auto& [request, sequence, odometry, beside] = run;
+  const auto& [request, sequence, odometry, beside, video] = run;
   if (!request.note) {
     return;
   }
@@ -150,7 +150,8 @@ Expected<RunSummary> run_source(RunRequest request,
     STEMVO_TRY_GET(const auto folder, pipeline::create_results_folder(sequence.name));
     request.out_dir = folder;
   }
-  const Run run{request, sequence, odometry, beside};
+  pipeline::DriveVideo video;
+  const Run run{request, sequence, odometry, beside, video};
   const bool is_replacing = pipeline::is_folder_of(request.out_dir, "run");
   auto inputs = pipeline::input_files(request, sequence, request.config);
   inputs.insert(inputs.end(),
@@ -159,6 +160,10 @@ Expected<RunSummary> run_source(RunRequest request,
   const Status prepared = lock ? prepare_out_folder(run) : lock.error();
   if (!prepared) {
     return prepared.error();
+  }
+  if (request.video) {
+    STEMVO_TRY(pipeline::check_is_no_input(*request.video, inputs));
+    STEMVO_TRY_GET(video, pipeline::DriveVideo::create(request, sequence));
   }
   if (request.measure_times) {
     recorder.emplace();

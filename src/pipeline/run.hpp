@@ -29,6 +29,7 @@ struct RunRequest : FrameSourceRequest {
   /// An earlier run's map, whose places are recognized; needs odometry.mode map with loops.
   std::optional<std::filesystem::path> map;
   std::optional<std::filesystem::path> saved_map;  ///< is written in the end; needs the same
+  std::optional<std::filesystem::path> video;      ///< as DriveVideo draws it
   bool adjust_map = false;     ///< keyframes, landmarks and camera together, in the end
   bool measure_times = false;  ///< RunSummary::report.timing
   std::string command;         ///< that repeats the run, for report.html; may be empty

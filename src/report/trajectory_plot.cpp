@@ -55,6 +55,11 @@ struct View {
              std::max(480, cvRound(span_m.y() * px_per_m))};
     low_m = box.center() - 0.5 / px_per_m * Eigen::Vector2d(frame.width, frame.height);
   }
+  View(const Eigen::AlignedBox2d& box, int side_px) : frame(0, 0, side_px, side_px) {
+    const double side_m = 1.5 * std::max(box.sizes().maxCoeff(), 0.1);
+    px_per_m = side_px / side_m;
+    low_m = box.center() - Eigen::Vector2d::Constant(0.5 * side_m);
+  }
   [[nodiscard]] cv::Point2d to_px(const Eigen::Vector2d& xz_m) const {
     const Eigen::Vector2d px = px_per_m * (xz_m - low_m);
     return {frame.x + px.x(), frame.br().y - px.y()};
@@ -150,17 +155,34 @@ void draw_legend(bool has_truth, cv::Mat& image) {
   }
 }
 
+Eigen::AlignedBox2d box_of(const Trajectory& path) {
+  Eigen::AlignedBox2d box;
+  for (const Rigid3& pose : path) {
+    box.extend(seen_from_above(pose));
+  }
+  return box;
+}
+
 }  // namespace
+
+cv::Mat draw_path(const Trajectory& path, int side_px, const std::string& unit) {
+  STEMVO_CHECK(!path.empty(), "at least one pose to draw");
+  const View view(box_of(path), side_px);
+  cv::Mat image(side_px, side_px, CV_8UC3, kWhite);
+  draw_path(path, view, kEstimate, kEstimateWidth_px, image);
+  draw_marker(true, view.to_px(seen_from_above(path.front())), image);
+  draw_marker(false, view.to_px(seen_from_above(path.back())), image);
+  const double bar_m = round_tick(side_px / (8.0 * view.px_per_m));
+  const int end_px = 12 + cvRound(bar_m * view.px_per_m);
+  cv::line(image, {12, side_px - 16}, {end_px, side_px - 16}, kPlotInk, 2);
+  put_caption(image, {end_px + 8, side_px - 32, side_px / 3, 32},
+              fmt::format("{:g} {}", bar_m, unit), kPlotInk);
+  return image;
+}
 
 cv::Mat draw_trajectory(const TrajectoryPlot& plot) {
   STEMVO_CHECK(!plot.estimate.empty(), "at least one pose to draw");
-  Eigen::AlignedBox2d box;
-  for (const auto& trajectory : {plot.estimate, plot.ground_truth.value_or(Trajectory())}) {
-    for (const Rigid3& pose : trajectory) {
-      box.extend(seen_from_above(pose));
-    }
-  }
-  const View view(box);
+  const View view(box_of(plot.estimate).merged(box_of(plot.ground_truth.value_or(plot.estimate))));
   const int width_px = view.frame.br().x + kRight_px;
   cv::Mat image(view.frame.br().y + kBottom_px, width_px, CV_8UC3, kWhite);
   const int room_px = width_px - kLeft_px - kRight_px;

@@ -22,5 +22,7 @@ struct TrajectoryPlot {
 
 /// 1100 to 1600 pixels wide, 780 to 1400 high, after the drive's shape; CV_8UC3, RGB.
 [[nodiscard]] cv::Mat draw_trajectory(const TrajectoryPlot& plot);
+/// The path alone, at least one pose, in a square of this side, beside a bar that tells its size.
+[[nodiscard]] cv::Mat draw_path(const Trajectory& path, int side_px, const std::string& unit);
 
 }  // namespace stemvo

@@ -2,6 +2,7 @@
 // Loaded by dataset/video_decoder.cpp; the only source that links OpenCV's videoio.
 #include <cstdlib>
 #include <memory>
+#include <string>
 
 #include <opencv2/videoio.hpp>
 
@@ -69,6 +70,34 @@ extern "C" __attribute__((visibility("default"))) VideoDecoder* stemvo_open_deco
   const cv::VideoCapture capture = file != nullptr ? open_file(file, {width_px, height_px})
                                                    : open_camera(number, width_px, height_px);
   return capture.isOpened() ? std::make_unique<OpenCvDecoder>(capture).release() : nullptr;
+}
+
+extern "C" __attribute__((visibility("default"))) bool stemvo_open_writer(const char* file,
+                                                                          double rate_hz,
+                                                                          const cv::Size& size,
+                                                                          WriteFrame& write) {
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+  for (const int codec :
+       {cv::VideoWriter::fourcc('a', 'v', 'c', '1'),  // browsers play it
+        cv::VideoWriter::fourcc('m', 'p', '4', 'v'), cv::VideoWriter::fourcc('M', 'J', 'P', 'G')}) {
+    const auto writer =
+        std::make_shared<cv::VideoWriter>(file, cv::CAP_FFMPEG, codec, rate_hz, size);
+    if (writer->isOpened()) {
+      write = [writer, count = 0.0, name = std::string(file)](const cv::Mat& bgr) mutable {
+        if (!bgr.empty()) {
+          writer->write(bgr);
+          ++count;
+          return true;
+        }
+        writer->release();  // which tells no errors: a full disk leaves fewer frames, or none
+        constexpr double kMinShare = 0.9;  // containers without a count guess
+        const cv::VideoCapture whole(name, cv::CAP_FFMPEG);
+        return whole.isOpened() && whole.get(cv::CAP_PROP_FRAME_COUNT) >= kMinShare * count;
+      };
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace stemvo::dataset

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <nlohmann/json.hpp>
 
+#include "dataset/video_decoder.hpp"
 #include "evaluation/trajectory.hpp"
 #include "support/program_test.hpp"
 #include "support/shared_data.hpp"
@@ -184,6 +185,44 @@ TEST_F(RecordingsRun, AMaskKeepsPointsAway) {
   expect_error(run(sequence_.string(), {"--mask", "0,0,620,188"}), 1, {"--mask"});
   expect_error(run(sequence_.string(), {"--mask", "0,0,10,10", "--mask", "nowhere.png"}), 1,
                {"--mask", "nowhere.png"});
+}
+
+TEST_F(RecordingsRun, AVideoShowsFramesTracksAndPath) {
+  const std::string avi = write_video();
+  const std::string before = read_file(avi);
+  fs::resize_file(image(5), 100);
+  using Words = std::vector<std::string>;
+  for (const auto& [input, name, more] : {std::tuple(sequence_.string(), "kitti.mp4", Words()),
+                                          std::tuple(avi, "avi.mkv", Words{"--camera", camera_})}) {
+    Words words = {"--video", folder_ / name};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult result = run(input, words);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto video = dataset::decode_file(folder_ / name, {}).value();
+    ASSERT_NE(video, nullptr);
+    EXPECT_EQ(video->size(), cv::Size(620 + 188 + 40, 188 + 40));
+    EXPECT_NEAR(video->rate_hz(), 10.0, 0.1);
+    int count = 0;
+    for (; video->grab(); ++count) {
+      const cv::Mat shown = video->retrieve();
+      cv::Mat apart = cv::imread(image(count), cv::IMREAD_COLOR);
+      if (!apart.empty()) {
+        cv::absdiff(shown(cv::Rect(0, 40, 620, 188)), apart, apart);
+        EXPECT_LT(cv::mean(apart)[0], 25.0) << count;
+      }
+      const cv::Mat side = shown.colRange(620, shown.cols);
+      cv::Mat path;
+      cv::inRange(side, cv::Scalar(120, 60, 0), cv::Scalar(230, 150, 90), path);
+      EXPECT_GT(cv::mean(side)[0], 200.0) << count;
+      EXPECT_EQ(cv::countNonZero(path) > 300, count > 0) << count;
+    }
+    EXPECT_EQ(count, kNumFrames);
+  }
+  for (const fs::path& file :
+       {fs::path(avi), folder_ / "video.txt", folder_ / "none/video.mp4", image(3)}) {
+    expect_error(run(avi, {"--quiet", "--camera", camera_, "--video", file}), 1, {file});
+  }
+  EXPECT_EQ(read_file(avi), before);
 }
 
 TEST_F(RecordingsRun, WithoutOutResultsAreUnderTheirName) {
