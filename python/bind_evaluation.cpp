@@ -14,10 +14,12 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
+#include <nlohmann/json.hpp>
 
 #include "arrays.hpp"
 #include "dataset/ground_truth.hpp"
 #include "report/evaluate_report.hpp"
+#include "report/metrics_keys.hpp"
 
 namespace stemvo::python {
 namespace {
@@ -66,18 +68,10 @@ nb::dict evaluate_poses(const PosesArgument& estimate,
     return compare(estimate, truth, alignment);
   }();
   const Metrics metrics = value_or_raise(std::move(compared));
-  nb::dict result;  // the keys of metrics.json
-  result["t_rel_percent"] = metrics.t_rel_percent;
-  result["r_rel_deg_per_100m"] = metrics.r_rel_deg_per_100m;
-  result["ate_rmse_m"] = metrics.ate_rmse.after_m(alignment);
-  result["average_offset_m"] = metrics.average_offset_m;
-  result["null_offset_m"] = metrics.null_offset_m;
-  result["segments"] = metrics.num_segments;
-  result["segment_lengths_m"] = metrics.segment_lengths_m;
-  result["path_length_m"] = metrics.path_length_m;
-  result["rpe_translation_m"] = metrics.rpe_translation_m;
-  result["rpe_rotation_deg"] = metrics.rpe_rotation_deg;
-  return result;
+  nlohmann::ordered_json json;  // as metrics.json has them
+  json["alignment"] = to_string(alignment);
+  add_metrics(json, metrics);
+  return nb::cast<nb::dict>(nb::module_::import_("json").attr("loads")(json.dump()));
 }
 
 DoubleArray align_poses(const AnyArray& estimate,
@@ -203,7 +197,7 @@ void bind_comparison(nb::module_& module) {
 
 void bind_evaluation(nb::module_& module) {
   module.def("evaluate", &evaluate_poses, "estimate"_a, "truth"_a, "align"_a = "none",
-             "Files or Nx4x4 arrays; align: none, scale, se3, sim3");
+             "Files or Nx4x4 arrays; align: none, scale, se3, sim3. As metrics.json has it");
   module.def(
       "align", &align_poses, "estimate"_a, "truth"_a, "frames"_a = nb::none(), "align"_a = "sim3",
       "The estimate as report.html draws it: moved to start at the first true pose, fitted to "

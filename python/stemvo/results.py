@@ -11,6 +11,9 @@ from . import _core
 NUMBERS = ("timestamp", "state", "is_measured", "num_matches", "num_inliers", "scale_state", "scale_sigma", "map_id", "is_scale_new", "recognized_frame")
 
 
+MAPS = (_core.Keyframe, _core.MapChanges, _core.AdjustedKeyframe, _core.AdjustedMap)
+
+
 class Kept(types.SimpleNamespace):
     """An object that was pickled: the same attributes and repr, without the library."""
 
@@ -22,17 +25,49 @@ def _kept(values: dict[str, Any]) -> Kept:
     return Kept(**values)
 
 
-def _reduce(value: Any) -> tuple[Any, ...]:
+def _members(value: Any) -> dict[str, Any]:
     kind = type(value)
-    names = [name for name in dir(kind) if not name.startswith("_") and not callable(getattr(kind, name))]
-    return _kept, ({name: getattr(value, name) for name in names} | {"_repr": repr(value)},)
+    return {name: getattr(value, name) for name in dir(kind) if not name.startswith("_") and not callable(getattr(kind, name))}
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"{len(value)} of them"
+    return "x".join(map(str, value.shape)) if hasattr(value, "shape") else repr(value)
+
+
+def _repr(value: Any) -> str:
+    return f"{type(value).__name__}({', '.join(f'{name}: {_short(member)}' for name, member in _members(value).items())})"
+
+
+def _keys(options: _core.Options) -> dict[str, str]:
+    section, keys = "", {}
+    for line in str(options).splitlines():
+        if line.endswith(":") and not line.startswith(" "):
+            section = line[:-1] + "."
+        elif ": " in line and not line.strip().startswith("#"):
+            key, _, text = line.partition(": ")
+            keys[section + key.strip() if line.startswith(" ") else key] = text
+    return keys
+
+
+def _repr_options(options: _core.Options) -> str:
+    """What differs from the default."""
+    return f"Options({dict(_keys(options).items() - _keys(_core.Options()).items())})"
+
+
+def _reduce(value: Any) -> tuple[Any, ...]:
+    return _kept, (_members(value) | {"_repr": repr(value)},)
 
 
 def _reduce_camera(camera: _core.Camera) -> tuple[Any, ...]:
     return _core.Camera, (camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height, camera.distortion, camera.coefficients)
 
 
-for _kind in (_core.Result, _core.CameraSigma, _core.Keyframe, _core.MapChanges, _core.AdjustedKeyframe, _core.AdjustedMap):
+for _kind in MAPS:
+    setattr(_kind, "__repr__", _repr)
+setattr(_core.Options, "__repr__", _repr_options)
+for _kind in (_core.Result, _core.CameraSigma, *MAPS):
     copyreg.pickle(_kind, _reduce)
 copyreg.pickle(_core.Camera, _reduce_camera)
 

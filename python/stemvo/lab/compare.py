@@ -54,7 +54,8 @@ def load(given, name, truth_file, align, camera_file, tolerance_s, first):
     if len(frames) < 2:
         raise ValueError(f"{file}: expected times of {truth_file}, found {len(frames)} within {tolerance_s} s")
     poses, truth = poses[which], true_poses[frames]
-    metrics = stemvo.evaluate(poses, truth, align) | {"poses": len(poses)}
+    metrics = stemvo.evaluate(poses, truth, align)
+    metrics |= {"poses": len(poses), "ate_rmse_m": metrics["ate_rmse_m"][align]}
     return Path(name, file, stemvo.align(poses, truth, align=align), frames, metrics)
 
 
@@ -112,7 +113,7 @@ def compare(paths, truth_file, camera_file, align):
     along = distance_along(truth)
     still = np.tile(np.eye(4), (len(truth), 1, 1))
     rows = [{"path": path.name} | {title: path.metrics[key] for key, title in METRICS.items()} for path in paths]
-    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": stemvo.evaluate(still, truth)["ate_rmse_m"],
+    rows.append({"path": "zero motion", "poses": len(truth), "ATE, m": stemvo.evaluate(still, truth)["ate_rmse_m"]["none"],
                  "offset, m": stemvo.evaluate(still, truth)["average_offset_m"]})
     segments = by_segment(aligned, truth)
     lines = {"position error over distance": ({name: (along, np.linalg.norm(poses[:, :3, 3] - truth[:, :3, 3], axis=1))
