@@ -4,6 +4,7 @@
 import csv
 import dataclasses
 import io
+import json
 import pathlib
 import shutil
 
@@ -34,28 +35,29 @@ class Frame:
     seconds: float  # since the frame before; 0: the first
 
 
-def rotation_of(x, y, z, w):
-    x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+def cross(vector):
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def rotation_vector(rotation):
-    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
-    sine = np.linalg.norm(axis)
-    angle = np.arctan2(sine, np.trace(rotation) - 1.0)
-    return axis * (0.5 if sine < 1e-9 else angle / sine)
+def rotation_of(*quaternion):
+    x, y, z, w = np.array(quaternion) / np.linalg.norm(quaternion)
+    turn = cross((x, y, z))
+    return np.eye(3) + 2.0 * w * turn + 2.0 * turn @ turn
 
 
 def quaternion_of(rotation):
     """x, y, z, w; w >= 0."""
-    k = np.array([[rotation[0, 0] - rotation[1, 1] - rotation[2, 2], 0, 0, 0],
-                  [rotation[0, 1] + rotation[1, 0], rotation[1, 1] - rotation[0, 0] - rotation[2, 2], 0, 0],
-                  [rotation[0, 2] + rotation[2, 0], rotation[1, 2] + rotation[2, 1], rotation[2, 2] - rotation[0, 0] - rotation[1, 1], 0],
-                  [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1], np.trace(rotation)]])
-    quaternion = np.linalg.eigh(k)[1][:, -1]
+    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    trace = np.trace(rotation)
+    quaternion = np.linalg.eigh(np.block([[rotation + rotation.T - trace * np.eye(3), axis[:, None]], [axis, trace]]))[1][:, -1]
     return quaternion if quaternion[3] >= 0.0 else -quaternion
+
+
+def rotation_vector(rotation):
+    *axis, cosine = quaternion_of(rotation)
+    sine = np.linalg.norm(axis)
+    return np.array(axis) * (2.0 if sine < 1e-9 else 2.0 * np.arctan2(sine, cosine) / sine)
 
 
 def rigid(rotation, translation):
@@ -68,29 +70,32 @@ def in_body_axes(pose):
     return rigid(BODY_FROM_OPTICAL @ pose[:3, :3] @ BODY_FROM_OPTICAL.T, BODY_FROM_OPTICAL @ pose[:3, 3])
 
 
-def cross(vector):
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def read_frames(folder):
     """Frames of frames.csv. A pose's covariance joins those of its steps, whose errors are taken for independent."""
-    with (folder / "frames.csv").open(newline="", encoding="utf-8") as file:
+    with (folder / "frames.csv").open(newline="", encoding="utf-8", errors="replace") as file:
         rows = list(csv.DictReader(file))
     if not rows or not rows[0].get("step_var_rz"):
         raise ResultError("frames.csv: expected rows with poses and variances, found none; run it again")
     covariance, frames, last = np.zeros((6, 6)), [], None
-    for row in rows:
+    for line, row in enumerate(rows, 2):
         def numbers(prefix, names):
-            return [float(row[prefix + name]) for name in names.split()]
+            found = [row[prefix + name] for name in names.split()]
+            try:
+                values = [float(text) for text in found]
+            except (TypeError, ValueError):
+                values = [np.nan]
+            if not np.all(np.isfinite(values)) or names.endswith("qw") and not np.any(values):
+                raise ResultError(f"frames.csv:{line}: expected numbers {prefix}({names}), found {found}")
+            return values
 
         optical = rigid(rotation_of(*numbers("", "qx qy qz qw")), numbers("", "x y z"))
         in_map = rigid(rotation_of(*numbers("map_", "qx qy qz qw")) @ optical[:3, :3],
-                       float(row["map_scale"]) * rotation_of(*numbers("map_", "qx qy qz qw")) @ optical[:3, 3] + numbers("map_", "x y z"))
+                       numbers("", "map_scale")[0] * rotation_of(*numbers("map_", "qx qy qz qw")) @ optical[:3, 3] + numbers("map_", "x y z"))
         odom_from_base, map_from_base = in_body_axes(optical), in_body_axes(in_map)
         variances = np.array(numbers("step_var_", "x y z rx ry rz"))
         variances = np.concatenate([BODY_FROM_OPTICAL**2 @ variances[:3], BODY_FROM_OPTICAL**2 @ variances[3:]])
-        time_s = float(row["timestamp_s"])
+        number, time_s = numbers("", "frame timestamp_s")
+        first = int(number) if last is None else first
         step, seconds = (np.eye(4), 0.0) if last is None else (np.linalg.inv(last[0]) @ odom_from_base, time_s - last[1])
         back = step[:3, :3].T
         carried = np.block([[back, -back @ cross(step[:3, 3])], [np.zeros((3, 3)), back]])
@@ -99,17 +104,35 @@ def read_frames(folder):
         frames.append(Frame(round(time_s * 1e9), odom_from_base, map_from_base @ np.linalg.inv(odom_from_base), turned @ covariance @ turned.T,
                             step, variances, seconds))
         last = odom_from_base, time_s
-    return int(rows[0]["frame"]), frames
+    return first, frames
 
 
 def read_landmarks(file):
     """Positions in the map (its x forward, z up) and colours of map.ply, without the path behind them."""
-    data = file.read_bytes()
-    header, _, body = data.partition(b"end_header\n")
-    counts = {words[1]: int(words[2]) for words in (line.split() for line in header.decode("ascii").splitlines()) if words[0] == "element"}
-    vertices = np.frombuffer(body, np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)]), counts["vertex"])
-    landmarks = vertices[:counts["vertex"] - (counts["edge"] + 1)]
+    header, _, body = file.read_bytes().partition(b"end_header\n")
+    counts = {words[1]: int(words[2]) for words in (line.split() for line in header.decode("latin-1").splitlines()) if words[0] == "element"}
+    kind = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
+    if "edge" not in counts or len(body) < counts["vertex"] * kind.itemsize:
+        raise ResultError(f"{file.name}: expected vertices and edges as `stemvo run` writes them, found {len(body)} bytes behind the header")
+    landmarks = np.frombuffer(body, kind, counts["vertex"])[:counts["vertex"] - (counts["edge"] + 1)]
     return landmarks["xyz"] @ BODY_FROM_OPTICAL.T.astype(np.float32), landmarks["rgb"]
+
+
+def check_recording(result, frames, recording):
+    """Its times are the result's, but those that are counted from a rate, which may have been another; its camera is, as far as it was refined."""
+    times, counted = (np.array(times) - times[0] for times in ([frame.time_ns * 1e-9 for frame in frames], recording.timestamps))
+    if len(counted) == len(times) > 1 and np.ptp(np.diff(counted)) < 1e-6:
+        counted *= times[-1] / counted[-1]
+    if len(counted) != len(times) or np.abs(counted - times).max() > 1e-3:
+        raise ResultError(f"--recording: expected {len(times)} frames over {times[-1]:.3f} s at the result's times, found {len(counted)} over {counted[-1]:.3f} s: another recording")
+    given = recording.camera
+    try:
+        camera = json.loads((result / "metrics.json").read_text(encoding="utf-8"))["camera"]
+        known = np.array([camera[name] for name in ("fx_px", "cx_px", "cy_px")], float)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ResultError(f"metrics.json: expected the camera of the result, found {type(error).__name__}: {error}") from None
+    if not np.abs(known - (given.fx, given.cx, given.cy)).max() < 0.05 * given.width:
+        raise ResultError(f"--recording: expected the result's camera (fx, cx, cy {known.round(1)}), found {given}: another recording, or another size")
 
 
 class Topics:
@@ -180,6 +203,8 @@ def write_result(result, out, open_recording=None):
     """Frames written. `open_recording(first, count)` gives (image, time) pairs and a `camera` without distortion."""
     first, frames = read_frames(result)
     recording = open_recording(first, len(frames)) if open_recording else None
+    if recording:
+        check_recording(result, frames, recording)
     unfinished = out.parent / f"{out.name}.unfinished"
     shutil.rmtree(unfinished, ignore_errors=True)
     try:

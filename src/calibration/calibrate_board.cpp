@@ -13,6 +13,7 @@
 #include "dataset/listing.hpp"
 #include "dataset/video_stream.hpp"
 #include "io/image_file.hpp"
+#include "pipeline/out_folder.hpp"
 #include "report/frame_image.hpp"
 #include "text/text_file.hpp"
 #include "text/text_table.hpp"
@@ -66,17 +67,15 @@ fs::path coverage_file(const BoardRequest& request) {
   return file;
 }
 
-/// Error: a picture would be overwritten.
-Status check_spares(const BoardRequest& request, const std::vector<fs::path>& pictures) {
-  for (const fs::path& out : {request.out_file, coverage_file(request)}) {
-    for (const fs::path& picture : pictures) {
-      if (std::error_code code; fs::equivalent(out, picture, code)) {
-        return fail(fmt::format("{}: expected a file to write that is no picture of the board",
-                                out.string()));
-      }
-    }
-  }
-  return {};
+/// Error: what is written would lie among the pictures.
+Status check_place(const fs::path& out, const fs::path& picture) {
+  const auto folder_of = [](const fs::path& file) { return fs::absolute(file).parent_path(); };
+  std::error_code code;
+  return fs::equivalent(folder_of(out), folder_of(picture), code)
+             ? Status(fail(fmt::format("{}: expected a file in another folder than the pictures', "
+                                       "for its coverage is no picture of the board",
+                                       out.string())))
+             : Status();
 }
 
 /// The size that most pictures have.
@@ -88,7 +87,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
                  dataset::list_images(dataset::is_folder(inside) ? inside : request.pictures));
   FrameSource frames;
   frames.files = listing.files;
-  STEMVO_TRY(check_spares(request, frames.files));
+  STEMVO_TRY(check_place(request.out_file, frames.files.front()));
   STEMVO_TRY_GET(const auto kind, dataset::vote_on_images(frames));
   ViewCollector collector(request, report);
   for (std::size_t i = 0; i < frames.files.size() && !report.interrupted; ++i) {
@@ -106,7 +105,7 @@ Expected<cv::Size> look_at_images(const BoardRequest& request,
 Expected<cv::Size> look_at_video(const BoardRequest& request,
                                  const CalibrationProgress& progress,
                                  BoardReport& report) {
-  STEMVO_TRY(check_spares(request, {request.pictures}));
+  STEMVO_TRY(pipeline::check_is_no_input(request.out_file, {request.pictures}));
   STEMVO_TRY_GET(const auto stream, dataset::VideoStream::open_file(request.pictures, {}));
   constexpr std::size_t kMaxLooks = 300;
   constexpr std::size_t kUsualStep = 5;

@@ -3,6 +3,7 @@
 
 import contextlib
 import io
+import json
 import os
 import pathlib
 import subprocess
@@ -206,6 +207,7 @@ class Result(unittest.TestCase):
         vertices = np.array([((1, 2, 3), (10, 20, 30)), ((4, 5, 6), (40, 50, 60)), ((0, 0, 0), (1, 1, 1)), ((0, 0, 2), (1, 1, 1))],
                             np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)]))
         header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nelement edge 1\nproperty int vertex1\nend_header\n"
+        (self.result / "metrics.json").write_text(json.dumps({"camera": {"fx_px": 150.0, "cx_px": 80.0, "cy_px": 59.0}}), encoding="utf-8")
         (self.result / "map.ply").write_bytes(header.encode() + vertices.tobytes() + bytes(8))
 
     def write(self, **more):
@@ -219,6 +221,10 @@ class Result(unittest.TestCase):
             self.latched = {c.topic for c in reader.connections if any(q.durability.name == "TRANSIENT_LOCAL" for q in c.ext.offered_qos_profiles)}
         return found
 
+    def recording(self, frames, **more):
+        times = [self.STEP_S * i for i in range(len(frames))]  # counted from a rate
+        return type("Recording", (list,), {"camera": self.CAMERA, "timestamps": times, **more})(frames)
+
     @staticmethod
     def vector(message):
         return [message.x, message.y, message.z]
@@ -230,7 +236,7 @@ class Result(unittest.TestCase):
 
         def open_recording(first, count):
             asked.append((first, count))
-            return type("Recording", (list,), {"camera": self.CAMERA})(recording)
+            return self.recording(recording)
 
         found = self.write(open_recording=open_recording)
         self.assertEqual(asked, [(7, self.FRAMES)])
@@ -288,6 +294,26 @@ class Result(unittest.TestCase):
         points = cloud.data.view(np.dtype([("xyz", "<f4", 3), ("rgb", "<u4")]))
         np.testing.assert_array_equal(points["xyz"], [[3, -1, -2], [6, -4, -5]])
         self.assertEqual(list(points["rgb"]), [0x0A141E, 0x28323C])
+
+    def test_a_recording_of_another_result_is_refused(self):
+        frames = [(scene(i), 0.0) for i in range(self.FRAMES)]
+        larger = types.SimpleNamespace(**vars(self.CAMERA) | {"fx": 300.0, "cx": 159.5, "cy": 119.5, "width": 2 * WIDTH})
+        for other in (self.recording(frames[1:]), self.recording(frames, camera=larger), self.recording(frames, timestamps=[0.0, 0.1, 0.19, 0.3])):
+            with self.assertRaisesRegex(bag_module.result_bag.ResultError, "--recording: expected .* another recording"):
+                self.write(open_recording=lambda first, count, other=other: other)
+        self.assertEqual(len(self.write(open_recording=lambda first, count: self.recording(frames))["/camera/camera_info"]), self.FRAMES)
+
+    def test_a_damaged_result_is_named_with_its_line(self):
+        lines = (self.result / "frames.csv").read_text(encoding="utf-8").splitlines()
+        for damaged, words in ((lines[2].replace("1700000000.1", "soon"), r"frames.csv:3: .*timestamp_s.*soon"), (lines[2][:30], r"frames.csv:3: expected numbers"),
+                               (lines[2].replace(",2,1,", ",2,nan,"), r"frames.csv:3: .*map_\(x y z\).*nan")):
+            (self.result / "frames.csv").write_text("\n".join([*lines[:2], damaged, *lines[3:]]), encoding="utf-8")
+            with self.assertRaisesRegex(bag_module.result_bag.ResultError, words):
+                self.write()
+        (self.result / "frames.csv").write_text("\n".join(lines), encoding="utf-8")
+        (self.result / "map.ply").write_bytes((self.result / "map.ply").read_bytes()[:-40])
+        with self.assertRaisesRegex(bag_module.result_bag.ResultError, "map.ply: expected vertices"):
+            self.write()
 
     def test_the_command_writes_one_file_or_says_why_not(self):
         out = self.folder / "made.mcap"

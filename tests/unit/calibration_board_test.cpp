@@ -122,9 +122,11 @@ TEST_F(BoardCalibration, ABoardThatIsNamedWrongIsRefused) {
 
 TEST_F(BoardCalibration, APictureIsNotOverwritten) {
   ASSERT_TRUE(try_to_calibrate("9x6:0.025", print_chessboard({9, 6}, 0.025), 4, 0.6));
-  EXPECT_THAT(message_of(calibrate_board({temp_ / "photos", temp_ / "photos/00.png",
-                                          parse_board("9x6:0.025").value(), "9x6:0.025"})),
-              HasSubstr("no picture of the board"));
+  for (const char* out : {"photos/00.png", "photos/camera.yaml"}) {
+    EXPECT_THAT(message_of(calibrate_board({temp_ / "photos", temp_ / out,
+                                            parse_board("9x6:0.025").value(), "9x6:0.025"})),
+                HasSubstr("no picture of the board"));
+  }
 }
 
 TEST_F(BoardCalibration, ViewsThatErrAreLeftOutAndSaid) {
