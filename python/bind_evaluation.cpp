@@ -19,7 +19,7 @@
 #include "arrays.hpp"
 #include "dataset/ground_truth.hpp"
 #include "report/evaluate_report.hpp"
-#include "report/metrics_keys.hpp"
+#include "report/metrics_json.hpp"
 
 namespace stemvo::python {
 namespace {
