@@ -38,7 +38,7 @@ demo: build
 	@tools/demo.sh
 
 test: build lab
-	@tools/setup.sh tools
+	@tools/setup.sh tex tools
 	@echo "==> Building the tests"
 	@cmake --build --preset release --parallel $(JOBS)
 	@echo "==> Running the tests"
@@ -49,14 +49,14 @@ test-all: test test-long
 # Without one of these groups the tests that need it are skipped.
 test-long:
 	@for group in peers browser root; do tools/setup.sh $$group || echo "==> Without $$group"; done
-	@tools/setup.sh tools docs
+	@tools/setup.sh lab tex docs
 	@echo "==> Running the long tests"
 	@ctest --preset long --parallel $(JOBS); failed=$$?; tools/skipped.sh; exit $$failed
 
 SEQUENCE ?=
 BENCH ?=
 bench: build
-	@tools/setup.sh tools peers
+	@tools/setup.sh lab peers
 	@bench/run.py $(SEQUENCE) $(BENCH)
 
 format:

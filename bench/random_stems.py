@@ -1,23 +1,16 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Writes OUT/full.onnx and OUT/folded.onnx: a stem of ConvNeXt-XLarge's shape (256 filters 4x4, stride 4, layer norm,
 random weights), and filter 10 of it folded into a network of its own (docs/search.md). Same values, other cost.
 
-    bench/random_stems.py OUT
+    build/lab/bin/python bench/random_stems.py OUT
 """
 
 import argparse
 import pathlib
-import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tools"))
-import _environment  # noqa: E402,F401  starts this tool again in build/venv
-
-import numpy as np  # noqa: E402
-
-from stems import families, fold, metadata, onnx_writer  # noqa: E402
-from stems import stem as stem_module  # noqa: E402
+import numpy as np
+from stemvo.stems import families, fold, metadata, onnx_writer
+from stemvo.stems import stem as stem_module
 
 FILTERS, FILTER = 256, 10
 

@@ -94,7 +94,7 @@ def bench(options):
         sequence.check_folder(options.sequence)
     places.WORK.mkdir(parents=True, exist_ok=True)
     if any("{stems}" in setting for row in chosen for setting in row.settings):
-        subprocess.run([sys.executable, places.ROOT / "bench/random_stems.py", places.WORK / "stems"], check=True)
+        subprocess.run([places.LAB_PYTHON, places.ROOT / "bench/random_stems.py", places.WORK / "stems"], check=True)
     folder = options.sequence or sequence.rendered_drive(options.program)
     with tempfile.TemporaryDirectory(dir=places.WORK) as scratch:
         contest = Contest(options, chosen, folder, pathlib.Path(scratch))

@@ -90,7 +90,7 @@ readonly CLIP=$STEMVO_SHARED_DATA/kitti/sequences/06
 emulated run "$CLIP" --out "$BUILD/clip"
 build/release/stemvo run "$CLIP" --out "$BUILD/clip-here"
 # Instructions round differently, and what is chosen by a hair may be chosen otherwise.
-build/venv/bin/python - "$BUILD"/clip{,-here}/trajectory_kitti.txt <<'PYTHON'
+build/lab/bin/python - "$BUILD"/clip{,-here}/trajectory_kitti.txt <<'PYTHON'
 import sys
 
 import numpy

@@ -14,8 +14,6 @@ the machine do not stretch; length is the estimated length of each quarter over 
 docs/accuracy.md shows a table.
 """
 
-import _environment  # noqa: F401  starts this tool again in build/venv
-
 import argparse
 import os
 import pathlib

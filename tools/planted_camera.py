@@ -10,8 +10,6 @@ in degrees per 100 m of the whole drive and from frame N on, no alignment; and h
 the true one in the runs with the camera's height, at the end and at most (x and y; from frame N on). docs/lab/accuracy_notes.md shows the table.
 """
 
-import _environment  # noqa: F401  starts this tool again in build/venv
-
 import csv
 import json
 import pathlib

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # setup.sh [GROUP..]: what a group needs on a fresh machine: apt packages, and a Python environment of the group of that name in
-# pyproject.toml. Without a group: what `make build` needs, ONNX Runtime and plotly.js too; `tools` adds what `make test` needs.
+# pyproject.toml. Without a group: what `make build` needs, ONNX Runtime and plotly.js too; `lab`, `tex` and `tools` add what `make test` needs.
 # Safe to repeat; takes about a second when nothing is missing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -30,6 +30,7 @@ lab       build/lab
 lint      build/venv-lint
 peers     build/venv-peers
 root      -                    debootstrap
+tex       -                    texlive-latex-recommended
 tools     build/venv
 wheel     build/venv-wheel"
 

@@ -70,7 +70,7 @@ class InfoReader {
     }
     if (status_) {
       status_ = value ? fail(fmt::format("{}: expected metadata stemvo.{}, found none; "
-                                         "tools/export_stem.py {} --layers NAME --preprocessing "
+                                         "stemvo-lab export {} --layers NAME --preprocessing "
                                          "KIND --out FOLDER writes a file that has it",
                                          label_, key, label_))
                       : value.error();

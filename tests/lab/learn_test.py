@@ -1,58 +1,150 @@
 # SPDX-License-Identifier: MIT
-"""A learned filter: the differentiable aligner against planted motions, learning, the file."""
+"""stemvo-lab learn on a planted drive: a textured wall that the camera approaches."""
 
-import jax.numpy as jnp
+import cv2
 import numpy as np
 import pytest
-import stemvo
-from stemvo import _core
-from stemvo.lab import aligner, learn, pairs, teaching
+from click.testing import CliRunner
+from exporting import run_onnx
+from stemvo.lab.cli import main
+from stemvo.stems import discriminant, drive, learn, metadata
+
+SIZE = (96, 128)
+FOCAL_PX = 100.0
+WALL_M = 10.0
 
 
-def waves(dx=0.0, dy=0.0, side=44):
-    y, x = np.indices((side, side)) * 1.0
-    return sum(20 * np.sin(((x - dx) * np.cos(2.4 * i) + (y - dy) * np.sin(2.4 * i)) * 2 * np.pi / (6 + 1.5 * i) + i) for i in range(1, 9))
+def wall_gray(x, y):
+    """Texture of the wall at metres x, y: waves of many lengths, weaker when shorter."""
+    rng = np.random.default_rng(5)
+    gray = np.full(x.shape, 120.0)
+    for _ in range(60):
+        length = 0.3 * 2.0 ** rng.uniform(0, 4)
+        angle, phase = rng.uniform(0, 2 * np.pi, 2)
+        gray += 12 * length**0.5 * np.sin(2 * np.pi * (np.cos(angle) * x + np.sin(angle) * y) / length + phase)
+    return np.clip(gray, 0, 255)
 
 
-@pytest.mark.parametrize("gain, bias", [(1, 0), (0.6, 50)])
-def test_the_aligner_lands_where_a_patch_is(gain, bias):
-    moved = jnp.array(gain * waves(1.3, -0.7) + bias)
-    landed = aligner.align(jnp.array(waves()), moved, jnp.array([21.5, 21.5]), jnp.array([21.5, 21.5]))
-    assert np.abs(np.array(landed) - [22.8, 20.8]).max() < 0.03
+def write_drive(folder, frames=4, *, step_m=0.4):
+    sequence = folder / "sequences" / "00"
+    for name in ("image_2", "depth"):
+        (sequence / name).mkdir(parents=True)
+    (folder / "poses").mkdir()
+    centre = (np.array(SIZE[::-1]) - 1) / 2
+    (sequence / "calib.txt").write_text(f"P2: {FOCAL_PX} 0 {centre[0]} 0 0 {FOCAL_PX} {centre[1]} 0 0 0 1 0\n")
+    (sequence / "times.txt").write_text("".join(f"{0.1 * i}\n" for i in range(frames)))
+    poses = []
+    y, x = np.mgrid[:SIZE[0], :SIZE[1]].astype(np.float64)
+    for index in range(frames):
+        position = np.array([0.11, -0.07, 1.0]) * step_m * index
+        depth = WALL_M - position[2]
+        gray = wall_gray((x - centre[0]) / FOCAL_PX * depth + position[0], (y - centre[1]) / FOCAL_PX * depth + position[1])
+        picture = np.repeat(np.rint(gray).astype(np.uint8)[:, :, None], 3, axis=2)
+        cv2.imwrite(str(sequence / "image_2" / f"{index:06d}.png"), picture)
+        np.save(sequence / "depth" / f"{index:06d}.npy", np.full(SIZE, depth, np.float32))
+        poses.append(np.column_stack([np.eye(3), position]).ravel())
+    np.savetxt(folder / "poses" / "00.txt", poses)
 
 
-def crops():
-    rng = np.random.default_rng(1)
-    frame = teaching.dead_leaves((240, 320), rng)
-    return teaching.crops_of(pairs.plant(frame, "as it is", rng), rng)
+@pytest.fixture
+def wall(tmp_path):
+    write_drive(tmp_path / "drive")
+    return tmp_path
 
 
-def test_crops_show_the_same_corner():
-    found = crops()
-    assert len(found.before) > 10 and found.before.shape[1:] == found.after.shape[1:] == (teaching.SIDE, teaching.SIDE)
-    assert np.abs(found.place).max() <= 0.5
-    offs = [np.linalg.norm(2 * np.array(aligner.align(*(learn.filtered(jnp.ones((8, 8)), jnp.array(image, float)) for image in (before, after)),
-                                                      jnp.full(2, 20.0), jnp.full(2, 20.0) + place / 2) - 20.0) - place)
-            for before, after, place in zip(found.before[:12], found.after[:12], found.place[:12], strict=True)]
-    assert np.median(offs) < 0.2
+def learned(wall, out, *options, code=0):
+    done = CliRunner().invoke(main, ["learn", str(wall / "drive"), "--out", str(wall / out), "--pairs", "3000", *options])
+    assert done.exit_code == code, done.output
+    return done.output if code else wall / out
 
 
-def test_learning_lowers_the_cost(monkeypatch):
-    monkeypatch.setattr(learn, "BATCH", 32)
-    found = crops()
-    steps = list(learn.learn(found, 12, 1))
-    weights = steps[-1][0]
-    assert np.allclose(weights, weights.T) and np.allclose(weights, weights[::-1]) and weights.sum() == pytest.approx(1)
-    assert np.isfinite([value for _, value in steps]).all()
-    assert np.mean([value for _, value in steps[-4:]]) < np.mean([value for _, value in steps[:4]]) + 0.1
-    assert np.array_equal(weights, list(learn.learn(found, 12, 1))[-1][0])
+def channels(folder, gray, file="default.onnx"):
+    return run_onnx(folder / file, gray[None])
 
 
-def test_the_file_is_a_channel(tmp_path):
-    weights = learn.rounded(np.outer(np.arange(1, 9), np.arange(2, 10)) / 1584)
-    learn.write(weights, tmp_path / "learned.onnx", "x")
-    image = np.random.default_rng(1).integers(0, 256, (64, 96)).astype(np.uint8)
-    camera = stemvo.Camera(80, 80, 48, 32, 96, 64)
-    (channel,) = _core.Stem({"stem.model": str(tmp_path / "learned.onnx"), "stem.tracking_resolution": "half"}).apply(image, camera)
-    at = (image[10:18, 20:28] * weights).sum()
-    assert channel.values.shape == (29, 45) and channel.values[5, 10] == pytest.approx(at, rel=1e-4)
+def test_corners_are_where_the_wall_says(wall):
+    frames = drive.Drive(wall / "drive")
+    before, after = drive.corresponding_corners(frames, 0, 2, 4, 1, 3000, np.random.default_rng(0))
+    assert len(before) > 1000
+    centre = (np.array(SIZE[::-1]) - 1) / 2
+    wall = (before + 1.5 - centre) / FOCAL_PX * WALL_M
+    expected = (wall - 0.8 * np.array([0.11, -0.07])) / (WALL_M - 0.8) * FOCAL_PX + centre - 1.5
+    assert np.abs(after - expected).max() <= 0.5 + 1e-9
+    assert np.abs(after - before).max() > 2
+
+
+def test_hidden_points_are_left_out(wall):
+    depth = wall / "drive" / "sequences" / "00" / "depth" / "000001.npy"
+    np.save(depth, np.full(SIZE, 3.0, np.float32))
+    frames = drive.Drive(wall / "drive")
+    before, _ = drive.corresponding_corners(frames, 0, 1, 4, 1, 3000, np.random.default_rng(0))
+    assert len(before) == 0
+
+
+def test_same_drive_same_bytes(wall):
+    first, second = (learned(wall, out) / "default.onnx" for out in ("a", "b"))
+    assert first.read_bytes() == second.read_bytes()
+    said = metadata.read(first)
+    assert (said["filters"], said["kernel"], said["stride"]) == ("16", "8 8", "2")
+    assert said["command"].startswith("stemvo-lab learn drive --out models --name default --objective matching --kernel 8 ")
+
+
+NORM = ("--kernel", "4", "--stride", "4", "--floor", "3")
+
+
+def test_the_layer_norm_is_the_one_of_the_page(wall, monkeypatch):
+    """channel k = z_k / sqrt(mean z^2 + floor^2): z_k unspoiled by the mean over channels."""
+    made, own = [], learn.learn
+    monkeypatch.setattr(learn, "learn", lambda *given: made.append(own(*given)) or made[-1])
+    out, gray = learned(wall, "out", *NORM), drive.Drive(wall / "drive").gray(1)
+    (stem, ratios), = made
+    assert np.all(np.diff(ratios) < 0)
+    windows = drive.windows(gray, 4)[::4, ::4]
+    z = np.einsum("cyx,hwyx->chw", stem.weights.sum(axis=1), windows) + stem.bias[:, None, None]
+    got = channels(out, gray)
+    assert np.abs(got - z / np.sqrt((z**2).mean(axis=0) + 9.0)).max() < 1e-3
+    assert np.all(got.std(axis=(1, 2)) > 0.01), "a filter is dead on gray"
+
+
+@pytest.mark.parametrize(("shape", "step"), [((), 1), (NORM, 2)])
+def test_the_default_filter_alone_has_the_same_values(wall, shape, step):
+    gray, out = drive.Drive(wall / "drive").gray(1), learned(wall, "out", "--default-filter", "5", *shape)
+    (alone,), with_others = channels(out, gray, "default_filter_5.onnx"), channels(out, gray)[5]
+    assert np.abs(alone[::step, ::step] - with_others).max() <= 1e-6 * np.abs(with_others).max()
+    said = metadata.read(out / "default_filter_5.onnx")
+    assert (said["filters"], said["filter"], said["default_filter"], said["stride"]) == ("16", "5", "5", "2")
+
+
+def test_tracking_has_the_steeper_slope_in_its_worse_direction(wall):
+    """On the pictures themselves: smaller of the slopes' energies along x and y; the noise is 1 for each filter."""
+    gray, ratios = drive.Drive(wall / "drive").gray(1), {}
+    for name in ("tracking", "matching"):
+        out = learned(wall, name, "--objective", name)
+        seen = np.stack([[channels(out, np.roll(gray, (-y, -x), (0, 1))) for x in range(2)] for y in range(2)])[:, :, :, 8:-8, 8:-8]
+        slopes = seen[0, 1] - seen[0, 0], seen[1, 0] - seen[0, 0]
+        ratios[name] = np.min([(slope**2).mean(axis=(1, 2)) for slope in slopes], axis=0)
+    assert ratios["tracking"][0] > 1.1 * ratios["matching"].max(), ratios
+
+
+@pytest.mark.parametrize(("file", "content", "words"), [
+    ("sequences/00/depth/000001.npy", b"broken", "000001.npy"), ("sequences/00/calib.txt", b"P0: 1", "calib.txt"),
+    ("poses/00.txt", b"1 2 3", "00.txt"), ("sequences/00/image_2/000002.png", b"broken", "frame 2 unreadable")])
+def test_errors_are_one_line(wall, file, content, words):
+    (wall / "drive" / file).write_bytes(content)
+    said = learned(wall, "out", code=1)
+    assert said.count("\n") == 1 and words in said, said
+
+
+def test_planted_slopes_for_tracking():
+    """Two even filters with a slope in one direction each, energies 4 and 9: their mixture has 4 * 9 / (4 + 9) in both.
+    An odd filter with 2 and 1 is not mixed in. (A little of both couples the two: a double eigenvalue is no road's.)"""
+    even = np.zeros((2, 16))
+    even[0, [0, 3]] = even[1, [5, 6]] = 0.5**0.5
+    odd = np.zeros(16)
+    odd[[8, 11]] = 0.5**0.5, -(0.5**0.5)
+    slopes = [along * np.outer(filter_, filter_) + own * np.outer(odd, odd) + 1e-3 * np.outer(even.sum(axis=0), even.sum(axis=0))
+              for along, filter_, own in ((4, even[0], 2), (9, even[1], 1))]
+    filters, ratios = discriminant.tracking_filters(slopes, np.eye(16), 4)
+    np.testing.assert_allclose(ratios[[0, 2]], [36 / 13, 1], atol=0.01)
+    np.testing.assert_allclose(np.abs(filters[0] @ even.T), [(9 / 13)**0.5, (4 / 13)**0.5], atol=0.01)
+    np.testing.assert_allclose(np.abs(filters[2]), np.abs(odd), atol=1e-9)

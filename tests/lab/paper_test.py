@@ -31,29 +31,15 @@ def made(tmp_path_factory):
     return folder / "out"
 
 
-def check_latex(text):
-    """Environments and braces close; each row of a table has the columns that it says."""
-    open_ones, plain = [], re.sub(r"\\[&%$#_{}]", "", text)
-    for kind, name in re.findall(r"\\(begin|end)\{([a-z*]+)\}", plain):
-        open_ones.append(name) if kind == "begin" else None
-        assert kind == "begin" or open_ones.pop() == name
-    assert not open_ones and plain.count("{") == plain.count("}")
-    assert not re.search(r"[^\x00-\x7f]", text)
-    for kinds, body in re.findall(r"\\begin\{tabular\}\{([lr]+)\}(.*?)\\end\{tabular\}", plain, re.DOTALL):
-        rows = [line for line in body.splitlines() if line.endswith(r"\\")]
-        assert rows and all(row.count("&") == len(kinds) - 1 for row in rows)
-
-
-def test_latex(made):
-    document = (made / "paper.tex").read_text()
-    check_latex(document)
-    tables = re.findall(r"\\input\{(.+?)\}", document)
+def test_latex_compiles(made):
+    tables = re.findall(r"\\input\{(.+?)\}", (made / "paper.tex").read_text())
     assert tables == ["table1.tex", "table2.tex", "table4.tex"]
-    for name in tables:
-        check_latex((made / name).read_text())
-    assert all((made / name).exists() for name in re.findall(r"\\includegraphics\[.*?\]\{(.+?)\}", document))
-    if shutil.which("pdflatex"):
-        subprocess.run(["pdflatex", "-interaction=batchmode", "-halt-on-error", "paper.tex"], cwd=made, check=True, stdout=subprocess.DEVNULL)
+    for name in tables:  # a column too many is LaTeX's error, one too few is not
+        assert len({line.count(" & ") for line in (made / name).read_text().splitlines() if line.endswith(r"\\")}) == 1
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is missing (tools/setup.sh tex)")
+    subprocess.run(["pdflatex", "-interaction=batchmode", "-halt-on-error", "paper.tex"], cwd=made, check=True, stdout=subprocess.DEVNULL)
+    assert (made / "paper.pdf").stat().st_size > 10000
 
 
 def test_layers_are_counted_beside_the_papers(made):

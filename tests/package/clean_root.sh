@@ -18,7 +18,7 @@ mapfile -t PIP < <(env | grep '^PIP_' || true)
 inside() { chroot "$ROOT" /usr/bin/env -i "${PIP[@]}" PATH=/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@" </dev/null; }
 as_someone() { inside su someone -c "cd && $*"; }
 install() { inside apt-get install -y --no-install-recommends "$@" >"$WORK/apt.log" 2>&1 || { tail "$WORK/apt.log"; exit 1; }; }
-pages() { PYTHONPATH=$SOURCE/tests/python "$SOURCE/build/venv/bin/python" -c "import documented
+pages() { PYTHONPATH=$SOURCE/tests/python python3 -c "import documented
 for block in documented.blocks('$1'):
     if block.place.startswith('$2'): print(block.text)"; }
 expect_file() { [[ -s $ROOT$1 ]] || { echo "expected $1, found none"; exit 1; }; }

@@ -118,7 +118,7 @@ if(NOT output MATCHES "^first +0 +0 +0\n.*\n$" OR NOT output MATCHES "^${lines}$
 endif()
 
 # The same frames as raw gray pixels.
-run("raw frames" "${tests}/../build/venv/bin/python" -c
+run("raw frames" "${tests}/../build/lab/bin/python" -c
     "import sys\nfrom PIL import Image\nopen(sys.argv[1], 'wb').write(b''.join(Image.open(f).convert('L').tobytes() for f in sys.argv[2:]))"
     "${work}/frames.raw" ${frames})
 run("own_source" "${work}/examples/own_source" 1241 376 718.86 718.86 607.19 185.22 10 INPUT_FILE "${work}/frames.raw")
@@ -126,7 +126,7 @@ if(NOT output MATCHES "^0 first +0 +0 +0\n0.1 [a-z_]+ [^\n]+\n0.2 [a-z_]+ [^\n]+
   message(FATAL_ERROR "own_source: expected 4 times, states and positions, found:\n${output}")
 endif()
 
-run("fuse_speed" "${tests}/../build/venv/bin/python" "${CMAKE_CURRENT_LIST_DIR}/fuse_speed.py" "${work}/examples/fuse_speed" "${work}/drive")
+run("fuse_speed" "${tests}/../build/lab/bin/python" "${CMAKE_CURRENT_LIST_DIR}/fuse_speed.py" "${work}/examples/fuse_speed" "${work}/drive")
 
 # Points 4 to 10 m away; the camera goes 0.5 m to the right: the points to the left.
 set(matches "")

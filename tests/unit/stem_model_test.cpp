@@ -35,7 +35,7 @@ TEST(Model, WithoutMetadataTheCommandThatAddsThemIsNamed) {
   const std::string model = tiny_model("wrong_no_metadata");
   EXPECT_THAT(internal::open_model(model).error().message,
               AllOf(HasSubstr(model + ": expected metadata stemvo.network, found none"),
-                    HasSubstr("tools/export_stem.py " + model)));
+                    HasSubstr("stemvo-lab export " + model)));
 }
 
 /// Error of a model that says something else under a key.

@@ -4,8 +4,6 @@
 import dataclasses
 import pathlib
 import re
-import subprocess
-import sys
 
 import click
 import onnx
@@ -14,6 +12,8 @@ import tqdm
 
 import stemvo
 from stemvo.lab import figures, runs, score, tables
+from stemvo.stems import export as exporter
+from stemvo.stems import layer_list, metadata
 
 SEQUENCES = ("00", "02", "05", "06", "08", "09")
 TABLE_1 = {"ConvNeXtXLarge": (297, 332806, 36096, 296710), "EfficientNetV2L": (1031, 1253254, 261216, 992038),
@@ -48,36 +48,17 @@ def plain(name):
 
 def export(weights, layers, out, preprocessing=None):
     """The layers of a weights file (the stem, those named, or `all` that the paper's rule uses), and (layers, filters, used, not used) or None where a file does not tell."""
-    said = _metadata(weights) if weights.suffix == ".onnx" else {}
-    if said:
-        return [_layer(weights)], None
-    tool = pathlib.Path(__file__).resolve().parents[3] / "tools/export_stem.py"
-    if not tool.exists():
-        raise ValueError(f"{weights}: expected an .onnx file that tools/export_stem.py of a checkout wrote")
-    listed = _output(tool, weights, "--list")
-    totals = re.search(r"^layers (\d+), filters (\d+), used (\d+) .*not used (\d+)", listed, re.MULTILINE)
+    if weights.suffix == ".onnx" and "stemvo.network" in (one.key for one in onnx.load(weights, load_external_data=False).metadata_props):
+        return [_layer(weights, metadata.read(weights))], None
+    rows = layer_list.read(weights)
     if layers == "all" and weights.suffix != ".npz":  # which holds one
-        layers = ",".join(re.findall(r"^(\S+) +convolution +\d+  yes$", listed, re.MULTILINE))
+        layers = ",".join(row.name for row in rows if row.used)
     more = [*(["--layers", layers] if layers not in (None, "all") else []), *(["--preprocessing", preprocessing] if preprocessing else [])]
-    written = _output(tool, weights, "--out", out / "models", *more)
-    files = re.findall(r"^(.+\.onnx): ", written, re.MULTILINE)
-    return [_layer(pathlib.Path(file)) for file in files], tuple(map(int, totals.groups()))
+    written, _ = exporter.export(exporter.options_of(weights, "--out", out / "models", *more))
+    return [_layer(file, said) for file, said in written.items()], layer_list.totals(rows)
 
 
-def _output(tool, *arguments):
-    done = subprocess.run([sys.executable, tool, *arguments], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise ValueError((done.stderr or done.stdout).strip().removeprefix("error: "))
-    return done.stdout
-
-
-def _metadata(file):
-    said = onnx.load(file, load_external_data=False).metadata_props
-    return {one.key.removeprefix("stemvo."): one.value for one in said if one.key.startswith("stemvo.")}
-
-
-def _layer(file):
-    said = _metadata(file)
+def _layer(file, said):
     return Layer(said["network"], said["layer"], int(said["filters"]), str(file), int(said["stride"]))
 
 

@@ -39,9 +39,9 @@ RUN_ELSEWHERE = {
     "tools/ablation.py": "tests/python/long/ablation_test.py",
     "tools/long_drives.py": "tests/python/long/long_drives_test.py",
     "tools/planted_camera.py": "tests/python/long/long_drives_test.py",
-    "tools/export_stem.py convnext_xlarge": "tests/python/export_stem_test.py",
-    "tools/export_stem.py efficientnetv2-l": "tests/python/export_stem_test.py",
-    "tools/export_stem.py resnet50.onnx": "tests/python/export_graph_test.py",
+    "stemvo-lab export convnext_xlarge": "tests/lab/export_weights_test.py",
+    "stemvo-lab export efficientnetv2-l": "tests/lab/export_weights_test.py",
+    "stemvo-lab export resnet50.onnx": "tests/lab/export_graph_test.py",
     "stemvo calibrate": "tests/long/calibrate_test.cpp",  # a short drive does not tell of the camera
     "stemvo-lab warps": "tests/lab/warps_test.py",
     "build/lab/bin/ray": "tests/lab/long/ray_test.py",
@@ -51,6 +51,8 @@ RUN_ELSEWHERE = {
 IN_PLACE_OF = [
     (r"--(held-out-)?frames 0:\d+", rf"--\1frames 0:{FRAMES - 1}"),
     (r"\bsynth (.*?)--frames \d+", rf"synth \1--width 620 --height 188 --frames {FRAMES}"),
+    (r"for i in 1 2 3;", "for i in 1;"),
+    (r"\{street,walk\}\{1,2,3\} --objective landing", "{street,walk}1 --objective landing --steps 2"),
     (r"--calib refined.txt", "--calib KITTI/sequences/00/calib.txt"),
     (r"( --model stems/(efficientnetv2b0|mobilenet025|resnet18)\.onnx){3}", ""),
     (r"--model (M\b|stems/efficientnetv2b0.onnx)", "--model default"),

@@ -15,8 +15,8 @@ import onnx.utils
 import onnxruntime
 from onnx import TensorProto, compose, helper, numpy_helper, shape_inference
 
-from stems import onnx_writer, receptive_field
-from stems.weights import WeightsError
+from . import onnx_writer, receptive_field
+from .weights import WeightsError
 
 _ANY_SIZE = (256, 256)  # width, height: even at every level
 

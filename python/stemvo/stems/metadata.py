@@ -6,15 +6,11 @@ import pathlib
 import onnx
 from google.protobuf.message import DecodeError
 
-from stems import onnx_writer
+from . import onnx_writer
 
 KEYS = ("network", "layer", "filters", "kernel", "stride", "padding", "default_filter", "licence", "command")
 OPTIONAL = ("sampling",  # any (where it is missing) or native
             "filter")  # the one filter of `filters` that the file holds
-
-
-class MetadataError(Exception):
-    """One line for the user."""
 
 
 def write(path, model, stem, *, network, layer, licence, command, default_filter=0, sampling="any", only_filter=None, filters=None):
@@ -36,9 +32,9 @@ def read(path):
     try:
         model = onnx.load(path, load_external_data=False)
     except (OSError, DecodeError) as error:
-        raise MetadataError(f"{path}: expected an .onnx file, found: {' '.join(str(error).split())[:200]}") from error
+        raise ValueError(f"{path}: expected an .onnx file, found: {' '.join(str(error).split())[:200]}") from error
     values = {prop.key.removeprefix("stemvo."): prop.value for prop in model.metadata_props if prop.key.startswith("stemvo.")}
     missing = [key for key in KEYS if key not in values]
     if missing:
-        raise MetadataError(f"{path}: expected metadata stemvo.{missing[0]}, found none; tools/export_stem.py writes files that have it")
+        raise ValueError(f"{path}: expected metadata stemvo.{missing[0]}, found none; `stemvo-lab export` writes files that have it")
     return values

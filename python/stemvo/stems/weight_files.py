@@ -5,8 +5,8 @@ import dataclasses
 
 import numpy as np
 
-from stems import keras_files
-from stems.weights import WeightsError
+from . import keras_files
+from .weights import WeightsError
 
 SUFFIXES = (".h5", ".keras", ".safetensors")
 # A pickle can run anything, so it is not read here.

@@ -11,8 +11,8 @@ import zipfile
 
 import numpy as np
 
-from stems import families
-from stems import stem as stem_module
+from . import families
+from . import stem as stem_module
 
 _BATCH_NORM = ("bn_gamma", "bn_beta", "bn_mean", "bn_var", "bn_eps")
 _LAYER_NORM = ("ln_gamma", "ln_beta", "ln_eps")
@@ -21,7 +21,7 @@ _KNOWN = (*_REQUIRED, "conv_b", *_BATCH_NORM, *_LAYER_NORM, "padding", "input_me
           "input_scale", "input_offset")
 
 
-class WeightsError(Exception):
+class WeightsError(ValueError):
     """One line for the user."""
 
 
@@ -92,18 +92,9 @@ def own_padding(arrays):
     on an even size (the odd pixel at the bottom and the right)."""
     if "padding" in arrays:
         return (int(arrays["padding"]),) * 4
-    total = [max(size - int(arrays["stride"]), 0) for size in arrays["conv_w"].shape[2:]]
-    before = [size // 2 for size in total]
-    return (*before, total[0] - before[0], total[1] - before[1])
-
-
-def _check_network(path, arrays, network):
-    """Error: arrays of another stem than a known network's."""
-    filters, _, *kernel = arrays["conv_w"].shape
-    norm = "batch" if "bn_eps" in arrays else "layer" if "ln_eps" in arrays else None
-    wrong = families.mismatch(network, filters, kernel, int(arrays["stride"]), norm)
-    if wrong:
-        raise WeightsError(f"{path}: --network: {wrong}")
+    stride = int(arrays["stride"])
+    (top, bottom), (left, right) = (stem_module.same_padding(size, stride, stride) for size in arrays["conv_w"].shape[2:])
+    return top, left, bottom, right
 
 
 def load(path, padding, network=None):
@@ -111,7 +102,9 @@ def load(path, padding, network=None):
     should hold; a known one is held against the arrays."""
     arrays = _read_arrays(path)
     _check(path, arrays)
-    _check_network(path, arrays, network)
+    filters, _, *kernel = arrays["conv_w"].shape
+    if wrong := families.mismatch(network, filters, kernel, int(arrays["stride"]), "batch" if "bn_eps" in arrays else "layer" if "ln_eps" in arrays else None):
+        raise WeightsError(f"{path}: --network: {wrong}")
     mean, std = _preprocessing(arrays)
     weights = stem_module.fold_scale(arrays["conv_w"].astype(np.float64), std)
     bias = arrays.get("conv_b", np.zeros(weights.shape[0])).astype(np.float64)
@@ -121,8 +114,5 @@ def load(path, padding, network=None):
     layer_norm = None
     if "ln_eps" in arrays:
         layer_norm = stem_module.LayerNorm(*(arrays[key].astype(np.float64) for key in _LAYER_NORM))
-    if padding == "none":
-        padding = (0, 0, 0, 0)
-    elif padding == "same":
-        padding = own_padding(arrays)
-    return stem_module.Stem(weights, bias, int(arrays["stride"]), mean, tuple(padding), layer_norm)
+    padding = (0, 0, 0, 0) if padding == "none" else own_padding(arrays) if padding == "same" else tuple(padding)
+    return stem_module.Stem(weights, bias, int(arrays["stride"]), mean, padding, layer_norm)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from . import pairs
+from ..lab import pairs
 
 SIDE = 88  # input px of a crop: what two levels of the aligner read from starts 6 px off
 CORNERS = 30  # of a pair

@@ -16,7 +16,7 @@ import dataclasses
 
 import numpy as np
 
-from stems import stem as stem_module
+from . import stem as stem_module
 
 # A smaller share of the largest eigenvalue is rounding.
 _RANK = 1e-13

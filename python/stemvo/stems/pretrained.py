@@ -6,30 +6,9 @@ import re
 
 import numpy as np
 
-from stems import families, weight_files
-from stems import stem as stem_module
-from stems.weights import WeightsError
-
-
-@dataclasses.dataclass(frozen=True)
-class StemLayer:
-    """One layer that can be exported: the convolution, or its norm."""
-
-    name: str
-    stem: stem_module.Stem
-
-
-@dataclasses.dataclass(frozen=True)
-class Pretrained:
-    network: str  # "EfficientNetV2-B0", or several joined by " or " that the file does not tell apart
-    layers: tuple  # of StemLayer, the convolution first
-    trained_padding: tuple  # top, left, bottom, right on a picture of `size`
-
-
-def tensorflow_same(kernel, stride, size):
-    """Padding before and after on an axis of `size` pixels (TensorFlow's "same"): the odd pixel after."""
-    total = max((-(-size // stride) - 1) * stride + kernel - size, 0)
-    return total // 2, total - total // 2
+from . import families, weight_files
+from . import stem as stem_module
+from .weights import WeightsError
 
 
 def _padding(layout, size):
@@ -38,8 +17,7 @@ def _padding(layout, size):
         return (0, 0, 0, 0)
     if layout.padding == "symmetric":
         return ((layout.kernel - 1) // 2,) * 4
-    left, right = tensorflow_same(layout.kernel, layout.stride, size[0])
-    top, bottom = tensorflow_same(layout.kernel, layout.stride, size[1])
+    (left, right), (top, bottom) = (stem_module.same_padding(layout.kernel, layout.stride, side) for side in size)
     return (top, left, bottom, right)
 
 
@@ -118,10 +96,6 @@ def _candidates(file, key, layout, filters):
     return found
 
 
-def _known_list():
-    return ", ".join(network.name for network in families.NETWORKS)
-
-
 def identify(file):
     """Layout, layers and networks of a file. Error: of none that is known."""
     layouts = _layouts_of(file)
@@ -134,7 +108,7 @@ def identify(file):
     found = ", ".join(f"{layer.name} {'x'.join(map(str, shape))}" for layer in first
                       for name, shape in layer.shapes.items() if len(shape) > 1)
     blocks = f", {len(_block_names(file, layouts[0][1]))} residual blocks" if layouts else ""
-    raise WeightsError(f"{file.path}: expected the weights of one of {_known_list()}; found other ones: first convolution "
+    raise WeightsError(f"{file.path}: expected the weights of one of {', '.join(network.name for network in families.NETWORKS)}; found other ones: first convolution "
                        f"{found or 'none'}{blocks} in {len(file.layers)} layers (any network can be given whole as .onnx)")
 
 
@@ -148,9 +122,9 @@ def _check_network(file, networks, wanted):
 
 
 def load(path, padding, size, network=None, preprocessing=None):
-    """The stem's layers of a weights file. padding: (top, left, bottom, right), "none" or "same" (as trained, on
-    pictures of `size`, width and height). network: what the file should hold. preprocessing: another one
-    than the table's, for weights trained otherwise."""
+    """The stem's layers of a weights file by name (the convolution, and with its norm), the network ("EfficientNetV2-B0", or several joined
+    by " or " that the file does not tell apart) and its own padding. padding: (top, left, bottom, right), "none" or "same" (as trained, on
+    pictures of `size`, width and height). network: what the file should hold. preprocessing: another one than the table's."""
     file = weight_files.load(path)
     key, layout, convolution, norm, networks = identify(file)
     _check_network(file, networks, network)
@@ -162,8 +136,7 @@ def load(path, padding, size, network=None, preprocessing=None):
     own = _padding(layout, size)
     chosen = (0, 0, 0, 0) if padding == "none" else own if padding == "same" else tuple(padding)
     plain = _convolution(file, layout, convolution, fed, chosen)
-    layers = (StemLayer(convolution.name, plain), StemLayer(norm.name, _with_norm(file, layout, norm, plain)))
-    return Pretrained(" or ".join(item.name for item in networks), layers, own)
+    return {convolution.name: plain, norm.name: _with_norm(file, layout, norm, plain)}, " or ".join(item.name for item in networks), own
 
 
 def _convolution(file, layout, layer, fed, padding):

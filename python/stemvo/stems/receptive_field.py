@@ -13,6 +13,8 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
+from .stem import same_padding
+
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
@@ -76,8 +78,7 @@ def explicit_pads(node, sizes):
     for axis, size in enumerate(sizes):
         kernel = (given["kernel_shape"][axis] - 1) * given.get("dilations", [1, 1])[axis] + 1
         stride = given.get("strides", [1, 1])[axis]
-        total = max((-(-size // stride) - 1) * stride + kernel - size, 0)
-        small, large = total // 2, total - total // 2
+        small, large = same_padding(kernel, stride, size)
         before.append(small if mode == "SAME_UPPER" else large)
         after.append(large if mode == "SAME_UPPER" else small)
     return before + after

@@ -40,6 +40,12 @@ class Stem:
         return tuple(int(size) for size in self.weights.shape[2:])
 
 
+def same_padding(kernel, stride, size):
+    """Before and after on an axis of `size` pixels (TensorFlow's "same"): the odd pixel after."""
+    total = max((-(-size // stride) - 1) * stride + kernel - size, 0)
+    return total // 2, total - total // 2
+
+
 def fold_scale(weights, std):
     """Weights for pixels divided by std (per colour, gray levels) -> weights for the pixels."""
     return weights / np.asarray(std, np.float64).reshape(1, 3, 1, 1)

@@ -1,32 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Shared by the tests of tools/export_stem.py: weights of stems, small files with the structure of Keras' (written without it),
+"""Shared by the tests of `stemvo-lab export`: weights of stems, small files with the structure of Keras' (written without it),
 and what the network makes of a picture, in plain numpy."""
 
-import contextlib
 import io
 import json
 import pathlib
 import re
-import sys
-import tempfile
-import unittest
 import zipfile
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tools"))
-import _environment  # noqa: E402,F401
-
-import h5py  # noqa: E402
-import numpy as np  # noqa: E402
-import onnxruntime  # noqa: E402
-
-import export_stem  # noqa: E402
-from stems import metadata  # noqa: E402
+import h5py
+import numpy as np
+import onnxruntime
+import pytest
+from click.testing import CliRunner
+from stemvo.lab.cli import main
+from stemvo.stems import metadata
 
 IMAGENET = {"input_mean": np.array([0.485, 0.456, 0.406]), "input_std": np.array([0.229, 0.224, 0.225])}
 
 
 def written(text):
-    """What each file that export_stem.py wrote says of itself, with numbers as such."""
+    """What each file that was written says of itself, with numbers as such."""
     entries = []
     for path in re.findall(r"^(.*\.onnx): ", text, re.MULTILINE):
         said = metadata.read(path)
@@ -36,8 +30,9 @@ def written(text):
 
 
 def run_onnx(path, image):
+    """A picture's channels."""
     session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
-    return session.run(["channels"], {"image": image[None].astype(np.float32)})[0][0]
+    return session.run(None, {"image": image[None].astype(np.float32)})[0][0]
 
 
 def plain_stem(arrays, image, padding):
@@ -49,13 +44,8 @@ def plain_stem(arrays, image, padding):
     top, left, bottom, right = padding
     image = np.pad(image.astype(np.float64), ((0, 0), (top, bottom), (left, right)))
     weights, stride = arrays["conv_w"].astype(np.float64), int(arrays["stride"])
-    rows = (image.shape[1] - weights.shape[2]) // stride + 1
-    columns = (image.shape[2] - weights.shape[3]) // stride + 1
-    out = np.zeros((weights.shape[0], rows, columns))
-    for y in range(rows):
-        for x in range(columns):
-            patch = image[:, y * stride:y * stride + weights.shape[2], x * stride:x * stride + weights.shape[3]]
-            out[:, y, x] = (weights * patch).sum(axis=(1, 2, 3))
+    patches = np.lib.stride_tricks.sliding_window_view(image, weights.shape[2:], (1, 2))[:, ::stride, ::stride]
+    out = np.einsum("cdij,dyxij->cyx", weights, patches)
     out += arrays.get("conv_b", np.zeros(weights.shape[0])).reshape(-1, 1, 1)
     if "bn_eps" in arrays:
         gamma, beta, mean, var = (arrays[f"bn_{key}"].reshape(-1, 1, 1) for key in ("gamma", "beta", "mean", "var"))
@@ -118,33 +108,35 @@ def keras_zip(path, layers, config):
         archive.writestr("model.weights.h5", content.getvalue())
 
 
-class Files(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+class Files:
+    def __init__(self, folder):
+        self.folder, self.out = folder, folder / "out"
+
+    def save(self, arrays, name="random.npz"):
+        np.savez(self.folder / name, **arrays)
+        return self.folder / name
 
     def export(self, path, *options):
-        with contextlib.redirect_stdout(io.StringIO()) as said:
-            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "out"), *options]), 0)
-        self.said = said.getvalue()
-        return written(self.said)
+        done = CliRunner().invoke(main, ["export", str(path), "--out", str(self.out), *options])
+        assert done.exit_code == 0, done.output
+        self.said = done.output
+        return written(done.output)
 
-    def check(self, path, arrays, *options, padding=(0, 0, 0, 0), size=(17, 22)):
-        """The exported stem gives what the arrays say. Returns its entry."""
+    def check(self, path, arrays, *options, network=None, padding=(0, 0, 0, 0), size=(17, 22)):
+        """The exported stem gives what the arrays say."""
         entry = self.export(path, *options)[-1]
-        self.assertEqual(entry["padding"], list(padding))
+        assert entry["padding"] == list(padding) and network in (None, entry["network"])
         image = np.random.default_rng(3).uniform(0, 255, (3, *size))
-        got, want = run_onnx(self.folder / "out" / entry["file"], image), plain_stem(arrays, image, padding)
-        self.assertEqual(got.shape, want.shape)
-        error = np.abs(got - want).max() / want.std()
-        self.assertTrue(error < 2e-5, f"error {error} standard deviations")
-        return entry
+        got, want = run_onnx(self.out / entry["file"], image), plain_stem(arrays, image, padding)
+        assert got.shape == want.shape and np.abs(got - want).max() < 2e-5 * want.std()
 
     def error_of(self, path, *options):
         """The one line; nothing may have been written."""
-        with contextlib.redirect_stderr(io.StringIO()) as said:
-            self.assertEqual(export_stem.main([str(path), "--out", str(self.folder / "none"), *options]), 1)
-        self.assertEqual(said.getvalue().count("\n"), 1)
-        self.assertFalse((self.folder / "none").exists())
-        return said.getvalue()
+        done = CliRunner().invoke(main, ["export", str(path), "--out", str(self.folder / "none"), *options])
+        assert (done.exit_code, done.output.count("\n")) == (1, 1) and not (self.folder / "none").exists(), done.output
+        return done.output
+
+
+@pytest.fixture
+def files(tmp_path):
+    return Files(tmp_path)

@@ -1,85 +1,50 @@
 # SPDX-License-Identifier: MIT
-"""A rendered drive (`stemvo synth --depth`): pictures, depth, poses, and patches that show the same
-point of the world in two frames."""
+"""A rendered drive (`stemvo synth --depth`): pictures, depth, poses, and patches that show the same point of the world in two frames."""
 
 import dataclasses
 import pathlib
 
-import matplotlib.image
 import numpy as np
 
-# Depth may differ by this share inside a patch, and between the two frames' views of a point: more is
-# an edge of an object, or a point that something else hides.
+import stemvo
+
+# Depth may differ by this share inside a patch, and between the two frames' views of a point: more is an edge of an object, or a point
+# that something else hides.
 _DEPTH_TOLERANCE = 0.03
 # Where nothing was drawn (the sky) the depth is not finite or not positive: a point this far away.
 _SKY_M = 1e6
-
-# Share of R, G and B in gray: Rec. 601, as in OpenCV.
-LUMA = np.array([0.299, 0.587, 0.114])
-
-
-class DriveError(Exception):
-    """One line for the user."""
+LUMA = np.array([0.299, 0.587, 0.114])  # share of R, G and B in gray: Rec. 601, as in OpenCV
 
 
 class Drive:
     """Frames of DIR/sequences/00 with DIR/poses/00.txt."""
 
     def __init__(self, folder):
-        folder = pathlib.Path(folder)
-        self._sequence = folder / "sequences" / "00"
-        self._images = sorted((self._sequence / "image_2").glob("*.png"))
-        if len(self._images) < 2:
-            raise DriveError(f"{self._sequence / 'image_2'}: expected at least 2 pictures, found {len(self._images)}")
-        self.camera = _camera(self._sequence / "calib.txt")
-        self.world_from_camera = _poses(folder / "poses" / "00.txt", len(self._images))
+        sequence = pathlib.Path(folder) / "sequences/00"
+        self._recording, self._depth = stemvo.read_recording(sequence), sequence / "depth"
+        self.world_from_camera, camera = self._recording.ground_truth, self._recording.camera
+        if self.world_from_camera is None or not len(self) == len(self.world_from_camera) >= 2:
+            raise ValueError(f"{sequence}: expected at least 2 pictures and a pose of each, found {len(self)}")
+        self.camera = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
 
     def __len__(self):
-        return len(self._images)
+        return len(self._recording)
 
     def gray(self, index):
         """H x W, gray levels 0..255."""
-        try:
-            picture = matplotlib.image.imread(self._images[index])
-        except (OSError, SyntaxError, ValueError) as error:
-            raise DriveError(f"{self._images[index]}: expected a PNG, found: {error}") from error
-        if picture.ndim != 3 or picture.dtype != np.float32:
-            raise DriveError(f"{self._images[index]}: expected a colour picture, found shape {picture.shape}")
-        return picture[:, :, :3].astype(np.float64) @ (255.0 * LUMA)
+        picture = self._recording[index][0]
+        if picture is None or picture.ndim != 3:
+            raise ValueError(f"{self._depth.parent}: expected colour pictures, found frame {index} {'gray' if picture is not None else 'unreadable'}")
+        return np.divide(picture, 255, dtype=np.float32).astype(np.float64) @ (255.0 * LUMA)
 
     def depth(self, index):
         """H x W, metres along z; the sky very far away."""
-        file = self._sequence / "depth" / f"{self._images[index].stem}.npy"
+        file = self._depth / f"{index:06d}.npy"
         try:
             depth = np.load(file, allow_pickle=False).astype(np.float64)
         except (OSError, ValueError, EOFError) as error:
-            raise DriveError(f"{file}: expected depth (stemvo synth --depth), found: {error}") from error
+            raise ValueError(f"{file}: expected depth (stemvo synth --depth), found: {error}") from error
         return np.where(np.isfinite(depth) & (depth > 0), depth, _SKY_M)
-
-
-def _camera(file):
-    rows = _lines(file)
-    for row in rows:
-        numbers = row[1:]
-        if row[:1] == ["P2:"] and len(numbers) == 12:
-            return np.array(numbers, np.float64).reshape(3, 4)[:, :3]
-    raise DriveError(f"{file}: expected a row P2: with 12 numbers, found {len(rows)} other rows")
-
-
-def _poses(file, count):
-    rows = _lines(file)
-    if len(rows) != count or any(len(row) != 12 for row in rows):
-        raise DriveError(f"{file}: expected {count} rows of 12 numbers, found {len(rows)} rows")
-    poses = np.tile(np.eye(4), (count, 1, 1))
-    poses[:, :3] = np.array(rows, np.float64).reshape(count, 3, 4)
-    return poses
-
-
-def _lines(file):
-    try:
-        return [line.split() for line in file.read_text(encoding="ascii").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise DriveError(f"{file}: expected a text file, found: {error}") from error
 
 
 def windows(values, size):

@@ -14,8 +14,8 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from stems import fold
-from stems import stem as stem_module
+from . import fold
+from . import stem as stem_module
 
 # Old enough for every ONNX Runtime since 1.7: the graph needs nothing newer.
 IR_VERSION = 7
