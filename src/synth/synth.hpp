@@ -35,7 +35,7 @@ struct SyntheticDriveOptions {
   std::optional<int> width_px = std::nullopt;   ///< nullopt: 1241, with a walk 640
   std::optional<int> height_px = std::nullopt;  ///< nullopt: 376, with a walk 480
   std::string name = "00";                      ///< names the sequence's folder and the pose file
-  bool write_depth = false;  ///< also depth/%06d.npy (float32 metres along z), for `stemvo-lab learn`
+  bool write_depth = false;  ///< also depth/%06d.npy (float32 metres along z), to learn from
 };
 
 /// Called after each batch of frames: frames done, frames in all; false stops (an interrupt).

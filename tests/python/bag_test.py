@@ -8,9 +8,7 @@ import os
 import pathlib
 import subprocess
 import sys
-import tempfile
 import types
-import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "python/stemvo"))  # the file alone: it needs no built module
@@ -18,6 +16,7 @@ sys.path.insert(0, str(ROOT / "python/stemvo"))  # the file alone: it needs no b
 import bag as bag_module  # noqa: E402
 import numpy as np  # noqa: E402
 import PIL.Image  # noqa: E402
+import pytest  # noqa: E402
 import rosbags.highlevel  # noqa: E402
 import rosbags.rosbag1  # noqa: E402
 import rosbags.rosbag2  # noqa: E402
@@ -35,11 +34,10 @@ def scene(index):
     return wall[8:8 + HEIGHT, 2 * index:2 * index + WIDTH]
 
 
-class Bag(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+class TestBag:
+    @pytest.fixture(autouse=True)
+    def set_up(self, tmp_path):
+        self.folder = tmp_path
         self.out = self.folder / "out"
 
     def write(self, kind, encoding="rgb8", topic="/cam0/image_raw", stamps=None, info=True, model="plumb_bob", **said):
@@ -94,75 +92,70 @@ class Bag(unittest.TestCase):
 
     def images(self):
         lines = (self.out / "mav0/cam0/data.csv").read_text(encoding="utf-8").splitlines()
-        self.assertTrue(lines[0].startswith("#"))
+        assert lines[0].startswith("#")
         rows = [line.split(",") for line in lines[1:]]
         return [(int(time), np.asarray(PIL.Image.open(self.out / "mav0/cam0/data" / name))) for time, name in rows]
 
     def expect_error(self, words, *arguments):
         code, said, complaint = self.convert(*arguments)
-        self.assertEqual((code, said, complaint.count("\n")), (1, "", 1), complaint)
-        for word in ("error: ", *words):
-            self.assertIn(word, complaint)
-        self.assertFalse(list(self.folder.glob("*.unfinished")))
+        assert (code, said, complaint.count("\n")) == (1, "", 1), complaint
+        assert all(word in complaint for word in ("error: ", *words)), complaint
+        assert not list(self.folder.glob("*.unfinished"))
 
-    def test_every_kind_of_bag_gives_the_pixels_and_times(self):
-        for kind, encoding in (("bag", "bgr8"), ("bag", "mono8"), ("sqlite3", "rgb8"), ("mcap", "mono16"), ("mcap", "rgb8")):
-            with self.subTest(kind=kind, encoding=encoding), tempfile.TemporaryDirectory() as folder:
-                self.folder, self.out = pathlib.Path(folder), pathlib.Path(folder) / "out"
-                code, _, complaint = self.convert(self.write(kind, encoding), self.out)
-                self.assertEqual(code, 0, complaint)
-                found = self.images()
-                self.assertEqual([time for time, _ in found], [FIRST_NS + index * 10**8 for index in range(COUNT)])
-                for index, (_, pixels) in enumerate(found):
-                    expected = scene(index)[:, :, 1] if encoding.startswith("mono") else scene(index)
-                    if encoding == "mono16":
-                        expected = expected.astype(np.uint16) * 256 + 7
-                    np.testing.assert_array_equal(pixels, expected)
+    @pytest.mark.parametrize(("kind", "encoding"), [("bag", "bgr8"), ("bag", "mono8"), ("sqlite3", "rgb8"), ("mcap", "mono16"), ("mcap", "rgb8")])
+    def test_every_kind_of_bag_gives_the_pixels_and_times(self, kind, encoding):
+        code, _, complaint = self.convert(self.write(kind, encoding), self.out)
+        assert code == 0, complaint
+        found = self.images()
+        assert [time for time, _ in found] == [FIRST_NS + index * 10**8 for index in range(COUNT)]
+        for index, (_, pixels) in enumerate(found):
+            expected = scene(index)[:, :, 1] if encoding.startswith("mono") else scene(index)
+            if encoding == "mono16":
+                expected = expected.astype(np.uint16) * 256 + 7
+            np.testing.assert_array_equal(pixels, expected)
 
     def test_a_lone_mcap_file_and_jpegs_as_they_are(self):
         file = next(self.write("mcap", "jpeg", "/cam0/image_raw/compressed").glob("*.mcap"))
-        self.assertEqual(self.convert(file, self.out)[0], 0)
-        self.assertEqual(len(list((self.out / "mav0/cam0/data").glob("*.jpg"))), COUNT)
-        self.assertLess(np.abs(self.images()[2][1].astype(int) - scene(2)).mean(), 20)
+        assert self.convert(file, self.out)[0] == 0
+        assert len(list((self.out / "mav0/cam0/data").glob("*.jpg"))) == COUNT
+        assert np.abs(self.images()[2][1].astype(int) - scene(2)).mean() < 20
 
     def test_stemvo_runs_on_it(self):
-        self.assertEqual(self.convert(self.write("sqlite3"), self.out)[0], 0)
+        assert self.convert(self.write("sqlite3"), self.out)[0] == 0
         done = subprocess.run([PROGRAM, "run", self.out, "--out", self.folder / "result"], capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("input: EuRoC recording out, 5 frames of 160x120 pixels", done.stderr)
+        assert done.returncode == 0, done.stderr
+        assert "input: EuRoC recording out, 5 frames of 160x120 pixels" in done.stderr
         first = (self.folder / "result/trajectory_tum.txt").read_text(encoding="utf-8").split()[0]
-        self.assertAlmostEqual(float(first), FIRST_NS * 1e-9, places=5)
+        assert float(first) == pytest.approx(FIRST_NS * 1e-9, abs=0.5e-5, rel=0)
 
     def test_late_images_are_left_out(self):
         code, said, _ = self.convert(self.write("bag", stamps=[0, 10, 10, 5, 20]), self.out)
-        self.assertEqual(code, 0)
-        self.assertIn("3 images; 2 of no later time", said)
-        self.assertEqual([time - FIRST_NS for time, _ in self.images()], [0, 10, 20])
+        assert code == 0
+        assert "3 images; 2 of no later time" in said
+        assert [time - FIRST_NS for time, _ in self.images()] == [0, 10, 20]
 
     def test_the_camera_comes_from_a_file_where_the_bag_has_none(self):
         bag = self.write("bag", info=False)
         self.expect_error(["/cam0/camera_info", "--camera FILE"], bag, self.out)
         camera = self.folder / "camera.yaml"
         camera.write_text("resolution: [160, 120]\nintrinsics: [150, 150, 79.5, 59.5]\ndistortion_model: none\n", encoding="utf-8")
-        self.assertEqual(self.convert(bag, self.out, "--camera", camera)[0], 0)
-        self.assertEqual((self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8"), camera.read_text(encoding="utf-8"))
+        assert self.convert(bag, self.out, "--camera", camera)[0] == 0
+        assert (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8") == camera.read_text(encoding="utf-8")
 
-    def test_a_rectified_topic_has_the_camera_of_p(self):
+    @pytest.mark.parametrize(("kind", "encoding", "topic"), [("bag", "rgb8", "/cam0/image_rect"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")])
+    def test_a_rectified_topic_has_the_camera_of_p(self, kind, encoding, topic):
         projection = np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])
-        for kind, encoding, topic in (("bag", "rgb8", "/cam0/image_rect"), ("sqlite3", "rgb8", "/cam0/image_rect_color"), ("mcap", "jpeg", "/cam0/image_rect/compressed")):
-            with self.subTest(topic=topic), tempfile.TemporaryDirectory() as folder:
-                self.folder, self.out = pathlib.Path(folder), pathlib.Path(folder) / "out"
-                code, _, told = self.convert(self.write(kind, encoding, topic, p=projection), self.out)
-                self.assertEqual(code, 0, told)
-                self.assertIn("P without distortion", told)
-                text = (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
-                self.assertIn("intrinsics: [140.0, 141.0, 80.5, 60.5]\ndistortion_model: none\n", text)
+        code, _, told = self.convert(self.write(kind, encoding, topic, p=projection), self.out)
+        assert code == 0, told
+        assert "P without distortion" in told
+        text = (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
+        assert "intrinsics: [140.0, 141.0, 80.5, 60.5]\ndistortion_model: none\n" in text
 
     def test_a_topic_that_may_be_rectified_is_a_warning(self):
         code, _, told = self.convert(self.write("bag", topic="/cam0/direct", p=np.array([140.0, 0, 80.5, 0, 0, 141.0, 60.5, 0, 0, 0, 1, 0])), self.out)
-        self.assertEqual(code, 0, told)
-        self.assertIn("warning: /cam0/camera_info: K and D", told)
-        self.assertIn("intrinsics: [150.0, 151.0, 79.5, 59.5]\ndistortion_model: radial-tangential", (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8"))
+        assert code == 0, told
+        assert "warning: /cam0/camera_info: K and D" in told
+        assert "intrinsics: [150.0, 151.0, 79.5, 59.5]\ndistortion_model: radial-tangential" in (self.out / "mav0/cam0/sensor.yaml").read_text(encoding="utf-8")
 
     def test_parts_of_images_and_skew_are_refused(self):
         self.expect_error(["camera of whole images"], self.write("bag", binning_x=2), self.out)
@@ -180,19 +173,18 @@ class Bag(unittest.TestCase):
         self.expect_error([str(bag)], bag, self.out)
         self.expect_error(["nothing.mcap"], self.folder / "nothing.mcap", self.out)
         self.expect_error(["does not exist, found one"], bag, self.folder)
-        self.assertFalse(self.out.exists())
+        assert not self.out.exists()
 
 
-class Result(unittest.TestCase):
+class TestResult:
     """A result as a bag, read back with rosbags and compared with the numbers it was made of."""
 
     FRAMES, STEP_S = 4, 0.1
     CAMERA = types.SimpleNamespace(fx=150.0, fy=151.0, cx=79.5, cy=59.5, width=WIDTH, height=HEIGHT)
 
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+    @pytest.fixture(autouse=True)
+    def set_up(self, tmp_path):
+        self.folder = tmp_path
         self.result = self.folder / "result"
         self.result.mkdir()
         half = float(np.sin(np.pi / 4))
@@ -239,16 +231,16 @@ class Result(unittest.TestCase):
             return self.recording(recording)
 
         found = self.write(open_recording=open_recording)
-        self.assertEqual(asked, [(7, self.FRAMES)])
-        self.assertEqual(set(found), {"/tf_static", "/landmarks", "/tf", "/odometry", "/camera/image/compressed", "/camera/camera_info"})
-        self.assertEqual(self.latched, {"/tf_static", "/landmarks"})
+        assert asked == [(7, self.FRAMES)]
+        assert set(found) == {"/tf_static", "/landmarks", "/tf", "/odometry", "/camera/image/compressed", "/camera/camera_info"}
+        assert self.latched == {"/tf_static", "/landmarks"}
         times = [round((1.7e9 + self.STEP_S * i) * 1e9) for i in range(self.FRAMES)]
-        self.assertEqual([time for time, _ in found["/odometry"]], times)
+        assert [time for time, _ in found["/odometry"]] == times
         for (time_ns, odometry), (_, tf) in zip(found["/odometry"], found["/tf"]):
             i = times.index(time_ns)
-            self.assertEqual(bag_module.stamp_ns(odometry), time_ns)
-            self.assertEqual((odometry.header.frame_id, odometry.child_frame_id), ("odom", "base_link"))
-            self.assertEqual([(t.header.frame_id, t.child_frame_id, bag_module.stamp_ns(t)) for t in tf.transforms], [("map", "odom", time_ns), ("odom", "base_link", time_ns)])
+            assert bag_module.stamp_ns(odometry) == time_ns
+            assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_link")
+            assert [(t.header.frame_id, t.child_frame_id, bag_module.stamp_ns(t)) for t in tf.transforms] == [("map", "odom", time_ns), ("odom", "base_link", time_ns)]
             np.testing.assert_allclose(self.vector(odometry.pose.pose.position), [2.0 * i, 0, 0], atol=1e-12)  # x is forward
             half = float(np.sin(np.pi / 4))
             turn = [0, 0, -half, half] if i == 3 else [0, 0, 0, 1]  # right is clockwise from above
@@ -257,10 +249,10 @@ class Result(unittest.TestCase):
             np.testing.assert_allclose(self.vector(tf.transforms[1].transform.translation), self.vector(odometry.pose.pose.position))
             # Where the base is in the map: twice as far, and 1 m to the right (-y).
             np.testing.assert_allclose(self.vector(tf.transforms[0].transform.translation) + np.array([2.0 * i, 0, 0]), [4.0 * i, -1, 0], atol=1e-12)
-            self.assertEqual(tf.transforms[0].transform.rotation.w, 1.0)
+            assert tf.transforms[0].transform.rotation.w == 1.0
         first, second, last = found["/odometry"][0][1], found["/odometry"][1][1], found["/odometry"][3][1]
-        self.assertFalse(first.pose.covariance.any())
-        self.assertFalse(self.vector(first.twist.twist.linear)[0])
+        assert not first.pose.covariance.any()
+        assert not self.vector(first.twist.twist.linear)[0]
         np.testing.assert_allclose(second.pose.covariance.reshape(6, 6), np.diag([0.04, 0.01, 0.02, 3e-4, 1e-4, 2e-4]), atol=1e-15)
         np.testing.assert_allclose(self.vector(second.twist.twist.linear), [20, 0, 0], rtol=1e-6)
         np.testing.assert_allclose(second.twist.covariance.reshape(6, 6).diagonal(), [4, 1, 2, 0.03, 0.01, 0.02], rtol=1e-5)
@@ -272,61 +264,57 @@ class Result(unittest.TestCase):
         np.testing.assert_allclose(covariance[1, 5], 2 * 2e-4)
         np.testing.assert_allclose(covariance, covariance.T)
         static = found["/tf_static"][0][1].transforms[0]
-        self.assertEqual((static.header.frame_id, static.child_frame_id), ("base_link", "camera_optical"))
+        assert (static.header.frame_id, static.child_frame_id) == ("base_link", "camera_optical")
         q = static.transform.rotation
         np.testing.assert_allclose([q.x, q.y, q.z, q.w], [-0.5, 0.5, -0.5, 0.5], atol=1e-12)
         self.check_images(found, times)
 
     def check_images(self, found, times):
-        self.assertEqual([time for time, _ in found["/camera/image/compressed"]], [times[0], *times[2:]])
+        assert [time for time, _ in found["/camera/image/compressed"]] == [times[0], *times[2:]]
         image = found["/camera/image/compressed"][1][1]
-        self.assertEqual((image.header.frame_id, image.format, bag_module.stamp_ns(image)), ("camera_optical", "jpeg", times[2]))
+        assert (image.header.frame_id, image.format, bag_module.stamp_ns(image)) == ("camera_optical", "jpeg", times[2])
         pixels = np.asarray(PIL.Image.open(io.BytesIO(image.data.tobytes())))
-        self.assertLess(np.abs(pixels.astype(int) - scene(2)).mean(), 20)
+        assert np.abs(pixels.astype(int) - scene(2)).mean() < 20
         info = found["/camera/camera_info"][0][1]
-        self.assertEqual((info.width, info.height, info.header.frame_id, info.distortion_model), (WIDTH, HEIGHT, "camera_optical", "plumb_bob"))
-        self.assertEqual(list(info.k), [150, 0, 79.5, 0, 151, 59.5, 0, 0, 1])
-        self.assertEqual(list(info.p), [150, 0, 79.5, 0, 0, 151, 59.5, 0, 0, 0, 1, 0])
-        self.assertFalse(info.d.any())
+        assert (info.width, info.height, info.header.frame_id, info.distortion_model) == (WIDTH, HEIGHT, "camera_optical", "plumb_bob")
+        assert list(info.k) == [150, 0, 79.5, 0, 151, 59.5, 0, 0, 1]
+        assert list(info.p) == [150, 0, 79.5, 0, 0, 151, 59.5, 0, 0, 0, 1, 0]
+        assert not info.d.any()
         cloud = found["/landmarks"][0][1]
-        self.assertEqual((cloud.header.frame_id, cloud.width, cloud.height, cloud.point_step, cloud.row_step), ("map", 2, 1, 16, 32))
-        self.assertEqual([(f.name, f.offset, f.datatype) for f in cloud.fields], [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7)])
+        assert (cloud.header.frame_id, cloud.width, cloud.height, cloud.point_step, cloud.row_step) == ("map", 2, 1, 16, 32)
+        assert [(f.name, f.offset, f.datatype) for f in cloud.fields] == [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7)]
         points = cloud.data.view(np.dtype([("xyz", "<f4", 3), ("rgb", "<u4")]))
         np.testing.assert_array_equal(points["xyz"], [[3, -1, -2], [6, -4, -5]])
-        self.assertEqual(list(points["rgb"]), [0x0A141E, 0x28323C])
+        assert list(points["rgb"]) == [0x0A141E, 0x28323C]
 
     def test_a_recording_of_another_result_is_refused(self):
         frames = [(scene(i), 0.0) for i in range(self.FRAMES)]
         larger = types.SimpleNamespace(**vars(self.CAMERA) | {"fx": 300.0, "cx": 159.5, "cy": 119.5, "width": 2 * WIDTH})
         for other in (self.recording(frames[1:]), self.recording(frames, camera=larger), self.recording(frames, timestamps=[0.0, 0.1, 0.19, 0.3])):
-            with self.assertRaisesRegex(bag_module.result_bag.ResultError, "--recording: expected .* another recording"):
+            with pytest.raises(bag_module.result_bag.ResultError, match="--recording: expected .* another recording"):
                 self.write(open_recording=lambda first, count, other=other: other)
-        self.assertEqual(len(self.write(open_recording=lambda first, count: self.recording(frames))["/camera/camera_info"]), self.FRAMES)
+        assert len(self.write(open_recording=lambda first, count: self.recording(frames))["/camera/camera_info"]) == self.FRAMES
 
     def test_a_damaged_result_is_named_with_its_line(self):
         lines = (self.result / "frames.csv").read_text(encoding="utf-8").splitlines()
         for damaged, words in ((lines[2].replace("1700000000.1", "soon"), r"frames.csv:3: .*timestamp_s.*soon"), (lines[2][:30], r"frames.csv:3: expected numbers"),
                                (lines[2].replace(",2,1,", ",2,nan,"), r"frames.csv:3: .*map_\(x y z\).*nan")):
             (self.result / "frames.csv").write_text("\n".join([*lines[:2], damaged, *lines[3:]]), encoding="utf-8")
-            with self.assertRaisesRegex(bag_module.result_bag.ResultError, words):
+            with pytest.raises(bag_module.result_bag.ResultError, match=words):
                 self.write()
         (self.result / "frames.csv").write_text("\n".join(lines), encoding="utf-8")
         (self.result / "map.ply").write_bytes((self.result / "map.ply").read_bytes()[:-40])
-        with self.assertRaisesRegex(bag_module.result_bag.ResultError, "map.ply: expected vertices"):
+        with pytest.raises(bag_module.result_bag.ResultError, match="map.ply: expected vertices"):
             self.write()
 
     def test_the_command_writes_one_file_or_says_why_not(self):
         out = self.folder / "made.mcap"
         with contextlib.redirect_stdout(io.StringIO()) as said:
-            self.assertEqual(bag_module.main([str(self.result), str(out)]), 0)
-        self.assertEqual(said.getvalue(), f"{out}: 4 frames\n")
-        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["made.mcap", "result"])
+            assert bag_module.main([str(self.result), str(out)]) == 0
+        assert said.getvalue() == f"{out}: 4 frames\n"
+        assert sorted(file.name for file in self.folder.iterdir()) == ["made.mcap", "result"]
         (self.result / "frames.csv").write_text("frame,timestamp_s\n0,0\n", encoding="utf-8")
         with contextlib.redirect_stderr(io.StringIO()) as complaint:
-            self.assertEqual(bag_module.main([str(self.result), str(self.folder / "none.mcap")]), 1)
-        self.assertIn("frames.csv: expected rows with poses and variances, found none", complaint.getvalue())
-        self.assertFalse((self.folder / "none.mcap").exists())
-
-
-if __name__ == "__main__":
-    unittest.main()
+            assert bag_module.main([str(self.result), str(self.folder / "none.mcap")]) == 1
+        assert "frames.csv: expected rows with poses and variances, found none" in complaint.getvalue()
+        assert not (self.folder / "none.mcap").exists()

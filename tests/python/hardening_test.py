@@ -4,8 +4,8 @@
 import json
 import os
 import pathlib
+import re
 import subprocess
-import unittest
 
 PROGRAM = pathlib.Path(os.environ["STEMVO_PROGRAM"])
 MODULE = PROGRAM.parent / "libstemvo_video.so"
@@ -17,39 +17,35 @@ def readelf(option, binary=PROGRAM):
     return subprocess.run(["readelf", option, "--wide", binary], check=True, capture_output=True, text=True).stdout
 
 
-class Program(unittest.TestCase):
+class TestProgram:
     def test_is_position_independent(self):
-        self.assertIn("DYN (Position-Independent Executable file)", readelf("--file-header"))
+        assert "DYN (Position-Independent Executable file)" in readelf("--file-header")
 
     def test_is_read_only_once_it_is_relocated(self):
         for binary in (PROGRAM, MODULE, MARKERS):
-            self.assertIn("GNU_RELRO", readelf("--program-headers", binary))
-            self.assertRegex(readelf("--dynamic", binary), r"FLAGS\)\s+BIND_NOW")
+            assert "GNU_RELRO" in readelf("--program-headers", binary)
+            assert re.search(r"FLAGS\)\s+BIND_NOW", readelf("--dynamic", binary))
 
     def test_no_stack_is_executable(self):
         for binary in (PROGRAM, MODULE, MARKERS):
             stack = next(line for line in readelf("--program-headers", binary).splitlines() if "GNU_STACK" in line)
-            self.assertNotIn("E", stack.split("GNU_STACK")[1])
+            assert "E" not in stack.split("GNU_STACK")[1]
 
     def test_starts_without_what_only_videos_need(self):
-        self.assertNotIn("videoio", readelf("--dynamic"))
-        self.assertIn("videoio", readelf("--dynamic", MODULE))
+        assert "videoio" not in readelf("--dynamic")
+        assert "videoio" in readelf("--dynamic", MODULE)
 
     def test_what_only_markers_need_is_no_dependency(self):
         for binary in (PROGRAM, MARKERS):
-            self.assertNotRegex(readelf("--dynamic", binary), "aruco|objdetect")
+            assert not re.search("aruco|objdetect", readelf("--dynamic", binary))
 
     def test_stack_and_buffers_are_guarded(self):
         symbols = readelf("--dyn-syms")
-        self.assertIn("__stack_chk_fail", symbols)
-        self.assertRegex(symbols, r"__\w+_chk@")
+        assert "__stack_chk_fail" in symbols
+        assert re.search(r"__\w+_chk@", symbols)
 
     def test_every_source_is_compiled_with_the_third_level_of_fortify(self):
         """The program itself looks the same with the first."""
         for source in json.loads(COMMANDS.read_text()):
             flags = [word for word in source["command"].split() if "_FORTIFY_SOURCE" in word]
-            self.assertEqual(flags[-1:], ["-D_FORTIFY_SOURCE=3"], source["file"])
-
-
-if __name__ == "__main__":
-    unittest.main()
+            assert flags[-1:] == ["-D_FORTIFY_SOURCE=3"], source["file"]

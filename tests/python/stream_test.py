@@ -5,23 +5,22 @@ import http.server
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
-import tempfile
 import threading
-import unittest
+import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = pathlib.Path(os.environ.get("STEMVO_PROGRAM", ROOT / "build/release/stemvo"))
 FRAMES = 60
 
 
-class Stream(unittest.TestCase):
+class TestStream:
+    @pytest.fixture(scope="class", autouse=True)
     @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = pathlib.Path(folder.name)
+    def set_up(cls, tmp_path_factory):
+        cls.folder = tmp_path_factory.mktemp("of")
         subprocess.run([PROGRAM, "synth", cls.folder / "drive", "--frames", str(FRAMES), "--width", "320", "--height", "96"], check=True, capture_output=True)
         cls.drive = cls.folder / "drive/sequences/00"
 
@@ -35,48 +34,47 @@ class Stream(unittest.TestCase):
     def test_a_line_per_frame_while_it_runs_and_nothing_else(self):
         with self.start() as run:
             first = run.stdout.readline()
-            self.assertIsNone(run.poll(), "the first line comes before the end")
+            assert run.poll() is None, "the first line comes before the end"
             rest, said = run.communicate(timeout=120)
-        self.assertEqual(run.returncode, 0, said)
-        self.assertIn("report: ", said)
+        assert run.returncode == 0, said
+        assert "report: " in said
         rows = [json.loads(line) for line in (first + rest).splitlines()]
-        self.assertEqual([row["frame"] for row in rows], list(range(FRAMES)))
+        assert [row["frame"] for row in rows] == list(range(FRAMES))
         for row, pose in zip(rows, self.poses()):
-            self.assertAlmostEqual(row["timestamp_s"], pose[0], places=6)
+            assert row["timestamp_s"] == pytest.approx(pose[0], abs=0.5e-6, rel=0)
             for number, expected in zip([*row["position"], *row["quaternion_xyzw"]], pose[1:]):
-                self.assertAlmostEqual(number, expected, places=6)
-        self.assertEqual({key: type(value) for key, value in rows[-1].items()}, {
+                assert number == pytest.approx(expected, abs=0.5e-6, rel=0)
+        assert ({key: type(value) for key, value in rows[-1].items()} == {
             "frame": int, "timestamp_s": float, "state": str, "is_measured": bool, "position": list, "quaternion_xyzw": list, "step_variances": list,
             "scale_state": str, "map_id": int, "is_scale_new": bool, "map_from_world": dict})
-        self.assertEqual(rows[-1]["state"], "tracking")
-        self.assertEqual(len(rows[-1]["step_variances"]), 6)
+        assert rows[-1]["state"] == "tracking"
+        assert len(rows[-1]["step_variances"]) == 6
 
     def test_the_example_reads_them(self):
         with self.start("--quiet", "--frames", "0:20") as run:
             example = subprocess.run([sys.executable, ROOT / "examples/follow_stream.py"], stdin=run.stdout, capture_output=True, text=True, check=True)
         lines = example.stdout.splitlines()
-        self.assertEqual(len(lines), 20)
-        self.assertRegex(lines[-1], r"^[0-9.]+ s, \w+: -?[0-9.]+ -?[0-9.]+ -?[0-9.]+, step \+- [0-9.]+$")
+        assert len(lines) == 20
+        assert re.search(r"^[0-9.]+ s, \w+: -?[0-9.]+ -?[0-9.]+ -?[0-9.]+, step \+- [0-9.]+$", lines[-1])
 
     def test_results_are_written_when_nobody_reads_any_more(self):
         with self.start() as run:
             run.stdout.readline()
             run.stdout.close()
             said = run.stderr.read()
-        self.assertEqual(run.returncode, 130, said)
-        self.assertIn("warning: interrupted; the results hold the first", said)
-        self.assertTrue(self.poses())
+        assert run.returncode == 130, said
+        assert "warning: interrupted; the results hold the first" in said
+        assert self.poses()
 
     def test_not_beside_json(self):
         done = subprocess.run([PROGRAM, "run", self.drive, "--stream", "--json"], capture_output=True, text=True, check=False)
-        self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+        assert (done.returncode, done.stdout) == (2, ""), done.stderr
 
 
-class Address(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+class TestAddress:
+    @pytest.fixture(autouse=True)
+    def set_up(self, tmp_path):
+        self.folder = tmp_path
         subprocess.run([PROGRAM, "synth", self.folder / "drive", "--frames", "12", "--width", "320", "--height", "96"], check=True, capture_output=True)
         self.images = sorted((self.folder / "drive/sequences/00/image_2").glob("*.png"))
         (self.folder / "camera.yaml").write_text("resolution: [320, 96]\nintrinsics: [185, 185, 159.5, 47.5]\ndistortion_model: none\n", encoding="utf-8")
@@ -92,10 +90,11 @@ class Address(unittest.TestCase):
                 pass
 
         server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
-        self.addCleanup(server.server_close)
-        self.addCleanup(server.shutdown)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         self.address = f"http://user:secret@127.0.0.1:{server.server_port}"
+        yield
+        server.shutdown()
+        server.server_close()
 
     def run_on(self, recording, name):
         done = subprocess.run([PROGRAM, "run", recording, "--camera", self.folder / "camera.yaml", "--out", self.folder / name], capture_output=True, text=True, check=False)
@@ -103,22 +102,18 @@ class Address(unittest.TestCase):
 
     def test_a_video_behind_an_address_is_the_same_video(self):
         served = self.run_on(f"{self.address}/drive.avi?password=secret", "served_result")
-        self.assertEqual(served.returncode, 0, served.stderr)
-        self.assertIn("input: video drive", served.stderr)
+        assert served.returncode == 0, served.stderr
+        assert "input: video drive" in served.stderr
         local = self.run_on(self.folder / "served/drive.avi", "local_result")
-        self.assertEqual(local.returncode, 0, local.stderr)
+        assert local.returncode == 0, local.stderr
         for name in ("trajectory_tum.txt", "trajectory_map_tum.txt"):
-            self.assertEqual((self.folder / "served_result" / name).read_bytes(), (self.folder / "local_result" / name).read_bytes())
+            assert (self.folder / "served_result" / name).read_bytes() == (self.folder / "local_result" / name).read_bytes()
         texts = [path.read_text(encoding="utf-8") for path in (self.folder / "served_result").iterdir() if path.suffix in {".html", ".json", ".yaml", ".txt", ".csv"}]
-        self.assertGreater(len(texts), 5)
+        assert len(texts) > 5
         for text in [served.stdout, served.stderr, *texts]:
-            self.assertNotIn("secret", text)
+            assert "secret" not in text
 
     def test_nothing_there_is_one_line(self):
         done = self.run_on(f"{self.address}/none.avi", "none")
-        self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, r"^error: http://\*\*\*@[^\n]*none.avi: expected a stream of pictures that FFmpeg can decode, found none\n$")
-
-
-if __name__ == "__main__":
-    unittest.main()
+        assert done.returncode == 1
+        assert re.search(r"^error: http://\*\*\*@[^\n]*none.avi: expected a stream of pictures that FFmpeg can decode, found none\n$", done.stderr)

@@ -1,50 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""tools/ablation.py: the means, the file it writes, and rows that cannot run."""
+"""tools/ablation.py: the file it writes, and rows that cannot run."""
 
 import os
 import pathlib
+import re
 import subprocess
 import sys
-import tempfile
-import unittest
 
 import ablation
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-PROGRAM = os.environ["STEMVO_PROGRAM"]
+PROGRAM, TOOL = os.environ["STEMVO_PROGRAM"], pathlib.Path(__file__).resolve().parents[3] / "tools/ablation.py"
 
 
-def numbers(t_rel, segments):
-    return {"t_rel_percent": t_rel, "r_rel_deg_per_100m": 1.0, "segments": segments}
+def test_every_row_of_a_rendered_drive(tmp_path):
+    subprocess.run([PROGRAM, "synth", tmp_path, "--frames", "20", "--width", "310", "--height", "94"], check=True, capture_output=True)
+    out = tmp_path / "table.md"
+    subprocess.run([sys.executable, TOOL, tmp_path, "--out", out, "--sequences", "00", "--program", PROGRAM], check=True)
+    lines = out.read_text(encoding="utf-8").splitlines()
+    for row in ablation.ROWS:
+        found = [line for line in lines if line.startswith(f"| {row.heading}")]
+        assert len(found) == 1, row.heading
+        told = any(problem.startswith(f"Not possible: {row.heading}") for problem in lines)
+        assert told or found[0].count(" / ") == 4, found[0]  # two sequences' columns, of three errors
+    # Every build can run the defaults.
+    assert re.search(r"(\| \d+\.\d\d( / \d+\.\d\d){2} ){2}\|$", next(line for line in lines if line.startswith("| the defaults")))
 
 
-class Command(unittest.TestCase):
-    def test_every_row_of_a_rendered_drive(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            subprocess.run([PROGRAM, "synth", str(folder), "--frames", "20", "--width", "310", "--height", "94"],
-                           check=True, capture_output=True)
-            out = folder / "table.md"
-            command = [sys.executable, str(ROOT / "tools/ablation.py"), str(folder), "--out", str(out), "--sequences",
-                       "00", "--program", PROGRAM]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            lines = out.read_text(encoding="utf-8").splitlines()
-        for row in ablation.ROWS:
-            found = [line for line in lines if line.startswith(f"| {row.heading}")]
-            self.assertEqual(len(found), 1, row.heading)
-            told = any(problem.startswith(f"Not possible: {row.heading}") for problem in lines)
-            self.assertTrue(told or found[0].count(" / ") == 4, found[0])  # two sequences' columns, of three errors
-        # Every build can run the defaults.
-        self.assertRegex(next(line for line in lines if line.startswith("| the defaults")), r"(\| \d+\.\d\d( / \d+\.\d\d){2} ){2}\|$")
-
-    def test_a_sequence_that_is_not_there_is_wrong_usage(self):
-        with tempfile.TemporaryDirectory() as folder:
-            done = subprocess.run([sys.executable, str(ROOT / "tools/ablation.py"), folder, "--out", f"{folder}/x"],
-                                  capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, 2)
-        self.assertIn("expected a sequence folder", done.stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()
+def test_a_sequence_that_is_not_there_is_wrong_usage(tmp_path):
+    done = subprocess.run([sys.executable, TOOL, tmp_path, "--out", tmp_path / "x"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "expected a sequence folder" in done.stderr

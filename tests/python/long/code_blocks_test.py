@@ -7,11 +7,10 @@ import pathlib
 import re
 import shutil
 import subprocess
-import tempfile
-import unittest
 
 import documented
 import numpy as np
+import pytest
 import yaml
 from exporting import random_arrays
 
@@ -78,12 +77,11 @@ def shortened(command):
     return command
 
 
-class CodeBlocks(unittest.TestCase):
+class TestCodeBlocks:
+    @pytest.fixture(scope="class", autouse=True)
     @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.drives = pathlib.Path(folder.name)
+    def set_up(cls, tmp_path_factory):
+        cls.drives, cls.temporary = tmp_path_factory.mktemp("drives"), tmp_path_factory
         for options in (["KITTI", "--name", "00"], ["KITTI", "--name", "03", "--seed", "3"]):
             cls.synth(*options, "--width", "620", "--height", "188")
         cls.synth("drive", "--width", "640", "--height", "480")
@@ -96,9 +94,7 @@ class CodeBlocks(unittest.TestCase):
 
     def new_folder(self, camera):
         """A reader's folder; blocks of a page follow each other in it."""
-        made = tempfile.TemporaryDirectory()
-        self.addCleanup(made.cleanup)
-        folder = pathlib.Path(made.name)
+        folder = self.temporary.mktemp("reader")
         for entry in self.drives.iterdir():
             (folder / entry.name).symlink_to(entry)
         (folder / "tools").symlink_to(ROOT / "tools")
@@ -127,43 +123,37 @@ class CodeBlocks(unittest.TestCase):
             if not any(lines):
                 continue
             num_run += 1
-            with self.subTest(block.place):
-                page = block.place.split(":")[0]
-                folders[page] = folders.get(page) or self.new_folder(camera)
-                done = self.run_script("\n".join(lines), folders[page])
-                self.assertEqual(done.returncode, 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}")
-        self.assertGreater(num_run, 15)
+            page = block.place.split(":")[0]
+            folders[page] = folders.get(page) or self.new_folder(camera)
+            done = self.run_script("\n".join(lines), folders[page])
+            assert done.returncode == 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}"
+        assert num_run > 15
 
     def test_the_demo(self):
         # `make demo` does this with a program that is built.
         done = subprocess.run([ROOT / "tools/demo.sh"], capture_output=True, text=True, check=False)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("build/demo/out/report.html", done.stdout)
-        self.assertTrue((ROOT / "build/demo/out/map.ply").exists())
+        assert done.returncode == 0, done.stderr
+        assert "build/demo/out/report.html" in done.stdout
+        assert (ROOT / "build/demo/out/map.ply").exists()
 
     def test_camera_files(self):
         for block in documented.blocks("yaml"):
-            with self.subTest(block.place):
-                self.assertIn(block, self.cameras(), "a kind of file that this test does not load")
-                done = self.run_script("stemvo run drive/images --camera camera.yaml --frames 0:3 --out result", self.new_folder(block))
-                self.assertEqual(done.returncode, 0, done.stderr)
+            assert block in self.cameras(), "a kind of file that this test does not load"
+            done = self.run_script("stemvo run drive/images --camera camera.yaml --frames 0:3 --out result", self.new_folder(block))
+            assert done.returncode == 0, done.stderr
 
     def test_programs_are_examples_that_are_compiled(self):
         compiled = {file.read_text().split("\n", 1)[1] for file in (ROOT / "examples").glob("*.cpp")}  # CMake takes them all
         for block in documented.blocks("cpp"):
-            self.assertIn(block.text, compiled, f"{block.place}: no program of examples/, which the test `package` compiles and runs")
+            assert block.text in compiled, f"{block.place}: no program of examples/, which the test `package` compiles and runs"
 
     def test_nothing_else_is_code(self):
         # python: all of them are run by package_test.py; cmake: by package/clean_root.sh. text and mermaid: nothing to run.
-        self.assertLessEqual({block.language for block in documented.blocks()}, {"", "cmake", "cpp", "mermaid", "python", "text", "yaml"})
-        self.assertEqual([block.place for block in documented.blocks("text") if re.search(r"\b(stemvo|make|tools|build)\b", block.text)], [])
+        assert {block.language for block in documented.blocks()} <= {"", "cmake", "cpp", "mermaid", "python", "text", "yaml"}
+        assert [block.place for block in documented.blocks("text") if re.search(r"\b(stemvo|make|tools|build)\b", block.text)] == []
 
     def test_what_runs_elsewhere_is_still_there(self):
         lines = [line for block in documented.blocks("") for line in commands(block)]
         for begin, test in RUN_ELSEWHERE.items():
-            self.assertTrue(any(line.startswith(begin) for line in lines), f"{begin}: on no page any more")
-            self.assertTrue((ROOT / test).exists(), test)
-
-
-if __name__ == "__main__":
-    unittest.main()
+            assert any(line.startswith(begin) for line in lines), f"{begin}: on no page any more"
+            assert (ROOT / test).exists(), test

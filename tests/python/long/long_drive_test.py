@@ -4,11 +4,9 @@
 
 import json
 import os
-import pathlib
 import subprocess
-import tempfile
-import unittest
 
+import pytest
 from drives import watched_run
 
 PROGRAM = os.environ["STEMVO_PROGRAM"]
@@ -18,23 +16,15 @@ MAX_R_REL_DEG_PER_100M = 0.5
 MAX_LENGTH_ERROR = 0.03
 
 
-class LongDrive(unittest.TestCase):
-    def test_errors_are_small_and_the_scale_does_not_drift(self):
-        with tempfile.TemporaryDirectory() as folder:
-            for command in (["synth", "drive", "--frames", str(FRAMES), "--width", "620", "--height", "188"],
-                            # Said, so that other defaults change nothing.
-                            ["run", "drive/sequences/00", "--out", "out", "--set", "odometry.mode=map", "--set", "scale.source=camera_height"]):
-                subprocess.run([PROGRAM, *command], cwd=folder, check=True, capture_output=True)
-            drive = pathlib.Path(folder)
-            metrics = json.loads((drive / "out/metrics.json").read_text())
-            lengths = watched_run.lengths_ratio(drive / "out/trajectory_kitti.txt", drive / "drive/poses/00.txt")
-        self.assertEqual((metrics["frames"], metrics["alignment"]), (FRAMES, "none"))
-        self.assertLessEqual(metrics["t_rel_percent"], MAX_T_REL_PERCENT)
-        self.assertLessEqual(metrics["r_rel_deg_per_100m"], MAX_R_REL_DEG_PER_100M)
-        self.assertGreaterEqual(metrics["tracked_fraction"], 0.99)
-        for ratio in lengths:
-            self.assertAlmostEqual(ratio, 1.0, delta=MAX_LENGTH_ERROR)
-
-
-if __name__ == "__main__":
-    unittest.main()
+def test_errors_are_small_and_the_scale_does_not_drift(tmp_path):
+    for command in (["synth", "drive", "--frames", str(FRAMES), "--width", "620", "--height", "188"],
+                    # Said, so that other defaults change nothing.
+                    ["run", "drive/sequences/00", "--out", "out", "--set", "odometry.mode=map", "--set", "scale.source=camera_height"]):
+        subprocess.run([PROGRAM, *command], cwd=tmp_path, check=True, capture_output=True)
+    metrics = json.loads((tmp_path / "out/metrics.json").read_text())
+    lengths = watched_run.lengths_ratio(tmp_path / "out/trajectory_kitti.txt", tmp_path / "drive/poses/00.txt")
+    assert (metrics["frames"], metrics["alignment"]) == (FRAMES, "none")
+    assert metrics["t_rel_percent"] <= MAX_T_REL_PERCENT
+    assert metrics["r_rel_deg_per_100m"] <= MAX_R_REL_DEG_PER_100M
+    assert metrics["tracked_fraction"] >= 0.99
+    assert lengths == pytest.approx([1.0] * 4, abs=MAX_LENGTH_ERROR, rel=0)

@@ -7,15 +7,15 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
-import tempfile
-import unittest
 
 import documented
 import PIL.Image
 from package_scripts import BAD_INPUT, FITTED, FOUND, RUN, TRACK, VIDEO
+import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ["STEMVO_PROGRAM"]
@@ -31,12 +31,11 @@ def call(*command, **options):
     return done.stdout
 
 
-class Package(unittest.TestCase):
+class TestPackage:
+    @pytest.fixture(scope="class", autouse=True)
     @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = pathlib.Path(folder.name)
+    def set_up(cls, tmp_path_factory):
+        cls.folder = tmp_path_factory.mktemp("of")
         call(sys.executable, "-m", "venv", cls.folder / "venv")
         cls.python = cls.folder / "venv/bin/python"
         call(cls.python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", f"{ROOT}[bag,video,view]", "mypy==2.4.1",
@@ -62,20 +61,19 @@ class Package(unittest.TestCase):
         rows = list(itertools.compress(rows, is_seen))
         lines = (python / name).read_text().splitlines(), list(itertools.compress((program / name).read_text().splitlines(), is_seen))
         if all(is_seen):
-            self.assertEqual(*lines, f"{recording}: {name}")
+            assert lines[0] == lines[1], f"{recording}: {name}"
         for ours, its in zip(*([float(word) for line in side for word in line.split()] for side in lines), strict=True):
-            self.assertAlmostEqual(ours, its, delta=0.01)  # the program has a row for an image it cannot read, Python a gap
+            assert ours == pytest.approx(its, abs=0.01, rel=0)  # the program has a row for an image it cannot read, Python a gap
         states = [[row["state"], int(row["matches"]), int(row["inliers"]), row["scale_state"], float(row["timestamp_s"]), *(row[f"{key}_px"] for key in CAMERA)] for row in rows]
-        self.assertEqual(done["states"], states, recording)
+        assert done["states"] == states, recording
         metrics = json.loads((program / "metrics.json").read_text())
-        self.assertEqual(done["scale_source"], metrics["scale_source"], recording)
+        assert done["scale_source"] == metrics["scale_source"], recording
         if done["errors"]:  # the keys and shapes of metrics.json; of matrices where the program has quaternions
             mine, expected = ((e | e["ate_rmse_m"] | {"ate_rmse_m": sorted(e["ate_rmse_m"])} for e in (done["errors"], metrics)))
             for key, error in mine.items():
-                number = isinstance(error, float)
-                self.assertTrue(abs(error - expected[key]) < 1e-9 if number else error == expected[key], f"{recording}: {key}")
-            self.assertEqual(list(done["errors"]), [key for key in metrics if key in done["errors"]])
-        self.assertEqual(done["true_frames"] is None, metrics["ate_rmse_m"] is None, recording)
+                assert abs(error - expected[key]) < 1e-9 if isinstance(error, float) else error == expected[key], f"{recording}: {key}"
+            assert list(done["errors"]) == [key for key in metrics if key in done["errors"]]
+        assert (done["true_frames"] is None) == (metrics["ate_rmse_m"] is None), recording
         return done
 
     def camera_file(self, name, size, *more):
@@ -90,8 +88,8 @@ class Package(unittest.TestCase):
     def test_kitti(self):
         sequence = self.folder / "drive/sequences/00"
         done = self.compare(sequence)
-        self.assertEqual([done["scale_source"], len(done["states"])], ["camera_height", FRAMES])
-        self.assertLess(len(self.compare(sequence, frames="2:9", masks=["0,150,620,38"])["states"]), FRAMES)
+        assert [done["scale_source"], len(done["states"])] == ["camera_height", FRAMES]
+        assert len(self.compare(sequence, frames="2:9", masks=["0,150,620,38"])["states"]) < FRAMES
 
     def test_a_folder_of_images(self):
         images = self.folder / "plain"
@@ -104,10 +102,10 @@ class Package(unittest.TestCase):
         truth.write_text("".join(f"{100.02 + 0.1 * i} {pose[3]} {pose[7]} {pose[11]} 0 0 0 1\n" for i, pose in enumerate(poses) if i not in (0, 5)))
         lens = ("distortion_model: radial-tangential", "distortion_coefficients: [-0.1, 0.02, 0.001, 0.0]")
         unknown = self.compare(images, camera_file=self.camera_file("lens.yaml", (620, 188), *lens), times=times, ground_truth=truth, tolerance_s=0.03)
-        self.assertEqual([unknown["scale_source"], unknown["true_frames"]], ["none", [i for i in range(FRAMES) if i not in (0, 5)]])
-        self.assertEqual(len(unknown["states"]), FRAMES - 1)
+        assert [unknown["scale_source"], unknown["true_frames"]] == ["none", [i for i in range(FRAMES) if i not in (0, 5)]]
+        assert len(unknown["states"]) == FRAMES - 1
         known = self.compare(images, camera_file=self.camera_file("height.yaml", (620, 188), *lens, "camera_height: 1.65"), times=times)
-        self.assertEqual([known["scale_source"], known["true_frames"]], ["camera_height", None])
+        assert [known["scale_source"], known["true_frames"]] == ["camera_height", None]
 
     def test_large_frames(self):
         large = self.folder / "large"
@@ -116,7 +114,7 @@ class Package(unittest.TestCase):
             PIL.Image.open(file).resize((2480, 752)).save(large / file.name)
         self.compare(large, camera_file=self.camera_file("large.yaml", (2480, 752), "distortion_model: none", "rate_hz: 10"), masks=["0,600,2480,152"])
 
-    @unittest.skipUnless("STEMVO_SHARED_DATA" in os.environ, "STEMVO_SHARED_DATA is not set")
+    @pytest.mark.skipif(not ("STEMVO_SHARED_DATA" in os.environ), reason="STEMVO_SHARED_DATA is not set")
     def test_real_recordings(self):
         data = pathlib.Path(os.environ["STEMVO_SHARED_DATA"])
         camera = self.folder / "freiburg2.yaml"  # as its authors publish it
@@ -130,14 +128,14 @@ class Package(unittest.TestCase):
         camera = self.camera_file("camera.yaml", (620, 188), "distortion_model: none", "camera_height: 1.65")
         tracked = self.run_python(VIDEO, self.folder / "drive/sequences/00/image_2", video, camera, mask)
         call(PROGRAM, "run", video, "--camera", camera, "--mask", mask, "--out", self.folder / "video", "--quiet")
-        self.assertEqual(tracked, (self.folder / "video/trajectory_kitti.txt").read_text())
-        self.assertEqual(tracked.count("\n"), FRAMES)
+        assert tracked == (self.folder / "video/trajectory_kitti.txt").read_text()
+        assert tracked.count("\n") == FRAMES
 
     def test_the_page(self):
         self.test_a_video()  # which leaves drive.avi and camera.yaml
         said = "".join(self.run_python(block.text) for block in documented.blocks("python"))
-        self.assertIn("tracking", said)
-        self.assertIn("ate_rmse_m", said)
+        assert "tracking" in said
+        assert "ate_rmse_m" in said
 
     def test_the_view_is_where_the_report_is(self):
         self.run_python(FITTED)
@@ -156,42 +154,42 @@ class Package(unittest.TestCase):
                                 "result": [self.folder / "seen", "--recording", sequence]}.items():
             file = self.folder / f"{name}.rrd"
             done = self.view(*arguments, "--save", file)
-            self.assertEqual(done.returncode, 0, done.stderr)
+            assert done.returncode == 0, done.stderr
             written = file.read_bytes()
             for entity in (b"/world/truth", b"/world/estimate/camera/image", b"/world/estimate/path/0", b"/plots/inliers", b"/state"):
-                self.assertIn(entity, written, name)
+                assert entity in written, name
         for arguments, text in ((["/nowhere"], "/nowhere/trajectory_kitti.txt"), ([], "expected RESULT"),
                                 (["--live", sequence, "--set", "stem.filtre=1"], "stem.filtre: unknown key")):
             done = self.view(*arguments, "--save", self.folder / "bad.rrd")
-            self.assertNotEqual(done.returncode, 0)
-            self.assertIn(text, done.stderr)
-            self.assertNotIn("Traceback", done.stderr)
+            assert done.returncode != 0
+            assert text in done.stderr
+            assert "Traceback" not in done.stderr
 
     def test_bag(self):
         # bag_test.py reads bags.
         done = subprocess.run([self.python, "-I", "-m", "stemvo.bag", "/nowhere.bag", self.folder / "bag"], capture_output=True, text=True, check=False)
-        self.assertEqual((done.returncode, done.stdout), (1, ""))
-        self.assertRegex(done.stderr, "^error: /nowhere.bag: [^\n]+\n$")
+        assert (done.returncode, done.stdout) == (1, "")
+        assert re.search("^error: /nowhere.bag: [^\n]+\n$", done.stderr)
 
     def test_a_wheel_that_needs_no_library_of_the_system(self):
         wheels = self.folder / "wheels"
         call(ROOT / "tools/wheel.sh", wheels)
         (wheel,) = wheels.glob("*.whl")
-        self.assertIn("manylinux", wheel.name)
+        assert "manylinux" in wheel.name
         call(sys.executable, "-m", "venv", self.folder / "clean")
         python = self.folder / "clean/bin/python"
         call(python, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", wheel)
         code = "import stemvo; print(len(stemvo.read_recording(%r))); print(open('/proc/self/maps').read())" % str(self.folder / "drive/sequences/00")
         done = subprocess.run([python, "-I", "-c", code], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertTrue(done.stdout.startswith(f"{FRAMES}\n"), done.stdout[:100])
-        self.assertLess(wheel.stat().st_size, 40e6)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.startswith(f"{FRAMES}\n"), done.stdout[:100]
+        assert wheel.stat().st_size < 40e6
         for name in ("libavcodec", "libgdal"):  # what videos need, and GPL's codecs
-            self.assertNotIn(name, done.stdout)
+            assert name not in done.stdout
         for name in ("libopencv_core", "libonnxruntime", "libdeflate"):
             loaded = [line for line in done.stdout.splitlines() if name in line]
-            self.assertTrue(loaded, name)
-            self.assertTrue(all(str(self.folder) in line for line in loaded), loaded[0])
+            assert loaded, name
+            assert all(str(self.folder) in line for line in loaded), loaded[0]
 
     def test_run(self):
         self.run_python(RUN, self.folder / "drive/sequences/00")
@@ -201,10 +199,6 @@ class Package(unittest.TestCase):
 
     def test_types(self):
         folder = pathlib.Path(self.run_python("import stemvo; print(stemvo.__path__[0])").strip())
-        self.assertTrue((folder / "py.typed").exists())
+        assert (folder / "py.typed").exists()
         for block in documented.blocks("python"):
             call(self.python, "-m", "mypy", "--strict", "--ignore-missing-imports", "-c", block.text, cwd=self.folder)
-
-
-if __name__ == "__main__":
-    unittest.main()

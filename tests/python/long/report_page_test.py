@@ -10,8 +10,7 @@ import pathlib
 import re
 import shutil
 import subprocess
-import tempfile
-import unittest
+import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 PROGRAM = os.environ.get("STEMVO_PROGRAM", str(ROOT / "build/release/stemvo"))
@@ -36,41 +35,39 @@ def read_positions(file):
     return [(pose[3], pose[7], pose[11]) for pose in poses]
 
 
-@unittest.skipUnless(BROWSER.exists() and pathlib.Path("/usr/bin/chromium").exists(), "tools/setup.sh browser has not run")
-class ReportPage(unittest.TestCase):
+@pytest.mark.skipif(not (BROWSER.exists() and pathlib.Path("/usr/bin/chromium").exists()), reason="tools/setup.sh browser has not run")
+class TestReportPage:
+    @pytest.fixture(scope="class", autouse=True)
     @classmethod
-    def setUpClass(cls):
-        folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(folder.cleanup)
-        cls.folder = pathlib.Path(folder.name)
+    def set_up(cls, tmp_path_factory):
+        cls.folder = tmp_path_factory.mktemp("of")
         call("synth", cls.folder / "drive", "--frames", FRAMES, "--width", 620, "--height", 188)
         call("run", cls.folder / "drive/sequences/00", "--out", cls.folder / "result", "--quiet")
         cls.found = look_at(cls.folder / "result/report.html")
 
     def expect_a_sound_page(self, found):
-        self.assertEqual(found["errors"], [])
-        self.assertEqual([url for url in found["requests"] if not url.startswith(("file:", "data:", "blob:"))], [])
-        self.assertTrue(all(count > 0 for count in found["points"]), found["points"])
-        self.assertTrue(all(count > 1 for count in found["log_ticks"]), found["log_ticks"])
-        self.assertTrue(all(len(colours) == 1 for colours in found["colours"].values()), found["colours"])
+        assert found["errors"] == []
+        assert [url for url in found["requests"] if not url.startswith(("file:", "data:", "blob:"))] == []
+        assert all(count > 0 for count in found["points"]), found["points"]
+        assert all(count > 1 for count in found["log_ticks"]), found["log_ticks"]
+        assert all(len(colours) == 1 for colours in found["colours"].values()), found["colours"]
         for width, seen in found["screens"].items():
-            with self.subTest(width=width):
-                self.expect_a_sound_screen(int(width), seen)
-                self.assertNotEqual(found["light"], seen["dark"])
+            self.expect_a_sound_screen(int(width), seen)
+            assert found["light"] != seen["dark"]
 
     def expect_a_sound_screen(self, width, seen):
-        self.assertLessEqual(seen["width"], width)
+        assert seen["width"] <= width
         for fault in ("titles_in_the_way", "hard_to_read", "slider_stays", "wrong_colours"):
-            self.assertEqual(seen[fault], [], fault)
-        self.assertEqual(set(seen["at_edges_of_spaces"]) - {0}, set())
-        self.assertEqual(seen.get("buttons_over_legend", 0), 0)
-        self.assertTrue(all(moved > 20 for moved in seen.get("swiped", [])), seen)
-        self.assertTrue(all(seen["labels"].values()), seen["labels"])
+            assert seen[fault] == [], fault
+        assert set(seen["at_edges_of_spaces"]) - {0} == set()
+        assert seen.get("buttons_over_legend", 0) == 0
+        assert all(moved > 20 for moved in seen.get("swiped", [])), seen
+        assert all(seen["labels"].values()), seen["labels"]
         for heading in ("Path from above", "Path in space"):
-            self.assertRegex(seen["labels"][heading], LABEL)
+            assert re.search(LABEL, seen["labels"][heading])
         x, z = seen["map"]
         for one, other in ((x, z), (z, x)):  # no more ground than the path needs, and a margin
-            self.assertLess(one["axis"], 1.3 * max(one["path"], 0.65 * other["path"]), seen["map"])
+            assert one["axis"] < 1.3 * max(one["path"], 0.65 * other["path"]), seen["map"]
 
     def test_a_recording_without_ground_truth(self):
         images = self.folder / "plain"
@@ -79,20 +76,20 @@ class ReportPage(unittest.TestCase):
         call("run", images, "--camera", self.folder / "camera.yaml", "--out", self.folder / "plain_result", "--quiet")
         found = look_at(self.folder / "plain_result/report.html")
         self.expect_a_sound_page(found)
-        self.assertIn("Path from above", found["headings"])
-        self.assertNotIn("Error over distance", found["headings"])
-        self.assertIn("Command", found["headings"])
+        assert "Path from above" in found["headings"]
+        assert "Error over distance" not in found["headings"]
+        assert "Command" in found["headings"]
 
     def test_draws_everything_without_errors_or_a_network(self):
         self.expect_a_sound_page(self.found)
-        self.assertIn(f"frames 0:{FRAMES} of 00", self.found["title"])
-        self.assertEqual(self.found["figures"], 7)
-        self.assertEqual(len(self.found["images"]), 7)  # one under the slider
-        self.assertTrue(all(width > 100 for width in self.found["images"]))
+        assert f"frames 0:{FRAMES} of 00" in self.found["title"]
+        assert self.found["figures"] == 7
+        assert len(self.found["images"]) == 7  # one under the slider
+        assert all(width > 100 for width in self.found["images"])
         for caption in self.found["captions"]:
-            self.assertRegex(caption, r"^frame \d+: \w+, \d+ of \d+ matches; flow 0 \(blue\) to \d+ px \(yellow\), outliers red$")
+            assert re.search(r"^frame \d+: \w+, \d+ of \d+ matches; flow 0 \(blue\) to \d+ px \(yellow\), outliers red$", caption)
         for heading in ("Path from above", "Numbers", "Error by segment length", "Tracks and state", "Scale and camera", "Command", "Configuration"):
-            self.assertIn(heading, self.found["headings"])
+            assert heading in self.found["headings"]
 
     def test_figures_say_what_the_files_say(self):
         result, traces = self.folder / "result", self.found["traces"]
@@ -104,7 +101,7 @@ class ReportPage(unittest.TestCase):
 
         def expect(figure, name, axis, values, digits=3):
             for found, value in zip(traces[figure][name][axis], values, strict=True):
-                self.assertAlmostEqual(found, value, digits, f"{figure}, {name}, {axis}")
+                assert found == pytest.approx(value, abs=0.5e-7, rel=0)
 
         expect("Path from above", "estimate", "y", [z for _, _, z in estimate])
         expect("Path from above", "ground truth", "x", [x for x, _, _ in truth])
@@ -113,22 +110,18 @@ class ReportPage(unittest.TestCase):
         expect("Error over distance", "position", "y", off)
         expect("Error over distance", "height, too high is above 0", "y", [b[1] - a[1] for a, b in zip(estimate, truth, strict=True)])
         expect("Tracks and state", "inliers", "y", [int(row["inliers"]) for row in rows])
-        self.assertEqual(traces["Tracks and state"]["state"]["y"], [row["state"] for row in rows])
+        assert traces["Tracks and state"]["state"]["y"] == [row["state"] for row in rows]
         traces["Scale and camera"]["length of a step"]["y"].pop(0)  # the first frame has none
         expect("Scale and camera", "length of a step", "y", [math.dist(a, b) for a, b in itertools.pairwise(estimate)])
         expect("Scale and camera", "principal point, x", "y", [float(row["cx_px"]) - float(rows[0]["cx_px"]) for row in rows])
         expect("Time per stage", "pose", "y", [float(row["pose_ms"]) for row in rows])
-        self.assertAlmostEqual(float(re.search(r", ([\d.]+) m off", self.found["by_keyboard"]).group(1)), off[2], 2)
+        assert float(re.search(r", ([\d.]+) m off", self.found["by_keyboard"]).group(1)) == pytest.approx(off[2], abs=0.5e-7, rel=0)
 
     def test_keyboard_hover_and_wheel(self):
-        self.assertEqual(self.found["images_under_the_slider"], [["frame 0", 320], ["frame 10", 320], ["frame 20", 320]])
-        self.assertTrue(self.found["by_keyboard"].startswith("frame 2: "), self.found["by_keyboard"])
-        self.assertRegex(self.found["hover"], f"frame {FRAMES // 2}: [a-z_]+.* m off")
-        self.assertEqual(self.found["hover"], self.found["by_hover"].replace(", ", ""))
+        assert self.found["images_under_the_slider"] == [["frame 0", 320], ["frame 10", 320], ["frame 20", 320]]
+        assert self.found["by_keyboard"].startswith("frame 2: "), self.found["by_keyboard"]
+        assert re.search(f"frame {FRAMES // 2}: [a-z_]+.* m off", self.found["hover"])
+        assert self.found["hover"] == self.found["by_hover"].replace(", ", "")
         (left, right), (zoomed_left, zoomed_right) = self.found["zoom"]
-        self.assertLess(zoomed_right - zoomed_left, 0.9 * (right - left))
-        self.assertGreater(self.found["scrolled_over_a_chart"], 50)
-
-
-if __name__ == "__main__":
-    unittest.main()
+        assert zoomed_right - zoomed_left < 0.9 * (right - left)
+        assert self.found["scrolled_over_a_chart"] > 50
