@@ -60,7 +60,7 @@ class PatchTracker {
   [[nodiscard]] DoubleArray corners(const ImagePyramid& image) const {
     GridQuota quota(features_, image.channel.pixels.size());
     std::vector<double> found;
-    for (const cv::Point2f& corner : PatchFrontEnd::corners(image, {}, features_)) {
+    for (const cv::Point2f& corner : PointFrontEnd::corners(image, {}, features_)) {
       if (quota.take(corner)) {
         const Eigen::Vector2d uv = image.channel.map.to_input({corner.x, corner.y});
         found.insert(found.end(), {uv.x(), uv.y()});

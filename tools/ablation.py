@@ -40,6 +40,7 @@ ROWS = (
     Row("gray image instead of the learned channel", ("stem.model=gray",)),
     Row("Laplacian of Gaussian", ("stem.model=log",)),
     Row("local contrast", ("stem.model=census",)),
+    Row("Lucas-Kanade instead of patches", ("features.method=klt",)),
     Row("the camera as given", ("camera.refine=off",)),
     Row("SIFT and brute force instead of patches", ("features.method=sift",)),
     Row("ORB and brute force instead of patches", ("features.method=orb",)),

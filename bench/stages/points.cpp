@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Points from image to image: detection, patches, ORB; KLT is OpenCV's, to compare with.
+// Points from image to image: detection, patches, KLT, ORB.
 #include <array>
 #include <utility>
 
@@ -65,15 +65,18 @@ void detection(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::
 
 void patches(State& state) { run_tracker(state, FeatureMethod::kPatch, Stage::kTracking); }
 
+/// Forward and back.
+void klt(State& state) { run_tracker(state, FeatureMethod::kKlt, Stage::kTracking); }
+
 /// OpenCV's tracker alone, there only, on all levels of the pyramid, with as many corners.
 void klt_forward(State& state) {
   const FeatureOptions& features = chain().config.features;
-  const cv::Size window(11, 11);
+  const cv::Size window(features.klt_window, features.klt_window);
   const auto& images = chain().images;
   std::array<std::vector<cv::Mat>, 2> pyramids;
   for (std::size_t i = 0; i < 2; ++i) {
     cv::buildOpticalFlowPyramid(images[images.size() - 2 + i].pixels, pyramids.at(i), window,
-                                features.pyramid_levels - 1);
+                                features.klt_levels - 1);
   }
   std::vector<cv::Point2f> from;
   cv::goodFeaturesToTrack(images[images.size() - 2].pixels, from, features.max_features,
@@ -83,7 +86,7 @@ void klt_forward(State& state) {
     std::vector<cv::Point2f> to;
     std::vector<unsigned char> found;
     cv::calcOpticalFlowPyrLK(pyramids[0], pyramids[1], from, to, found, cv::noArray(), window,
-                             features.pyramid_levels - 1, criteria);
+                             features.klt_levels - 1, criteria);
     benchmark::DoNotOptimize(to.data());
   }
   state.counters["points"] = static_cast<double>(from.size());
@@ -111,6 +114,7 @@ void orb_match(State& state) {
 
 BENCHMARK(detection)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(patches)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(klt)->Name("klt/both_ways")->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(klt_forward)->Name("klt/opencv_forward")->Unit(benchmark::kMillisecond);
 BENCHMARK(orb_detect_and_describe)->Name("orb/detect_and_describe")->Unit(benchmark::kMillisecond);
 BENCHMARK(orb_match)->Name("orb/match")->UseManualTime()->Unit(benchmark::kMillisecond);

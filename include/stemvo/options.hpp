@@ -8,8 +8,8 @@
 
 namespace stemvo {
 
-/// Size of the image that points are tracked on. kAuto: for patches kHalf where the focal length is
-/// 500 px or more, else kInputZoomed; for descriptors kInput.
+/// Size of the image that points are tracked on. kAuto: for patches and KLT kHalf where the focal
+/// length is 500 px or more, else kInputZoomed; for descriptors kInput.
 enum class TrackingResolution {
   kAuto,
   kInput,        ///< the input's
@@ -36,6 +36,7 @@ struct StemOptions {
 
 enum class FeatureMethod {
   kPatch,  ///< corners, tracked by aligning the patch of their first frame
+  kKlt,    ///< corners, tracked by pyramidal Lucas-Kanade from frame to frame
   kOrb,    ///< described and matched (the paper's)
   kSift,   ///< described and matched
 };
@@ -46,11 +47,13 @@ struct FeatureOptions {
   int max_features = 500;  ///< keypoints aimed at per frame
   int grid_columns = 16;   ///< quota per cell = max_features / (columns * rows)
   int grid_rows = 6;
-  double corner_quality = 0.005;  ///< patch: least corner response over the strongest
-  double min_distance_px = 8.0;   ///< patch: between keypoints, in input pixels
-  int pyramid_levels = 4;         ///< patch: over the input's size
-  int fast_threshold = 10;        ///< orb
-  double ratio = 0.8;             ///< sift: best over second-best descriptor distance
+  double corner_quality = 0.005;          ///< patch, klt: least corner response over the strongest
+  double min_distance_px = 8.0;           ///< patch, klt: between keypoints, in input pixels
+  int klt_window = 11;                    ///< klt: input pixels, odd; at least 7 of the image
+  int klt_levels = 4;                     ///< patch, klt: of the pyramid over the input's size
+  double max_forward_backward_px = 0.25;  ///< klt: input pixels
+  int fast_threshold = 10;                ///< orb
+  double ratio = 0.8;                     ///< sift: best over second-best descriptor distance
 };
 
 enum class RobustEstimator { kMagsac, kRansac };

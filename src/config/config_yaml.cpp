@@ -19,7 +19,6 @@ namespace {
 
 /// Keys, and values, that had another name once.
 constexpr std::pair<std::string_view, std::string_view> kRenamed[] = {
-    {"features.klt_levels", "features.pyramid_levels"},
     {"odometry.standing_flow_px", "odometry.stationary_flow_px"},
     {"refine.every", "ba.every_n_keyframes"},
     {"refine.loss_px", "ba.loss_px"},

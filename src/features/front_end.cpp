@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/descriptor_front_end.hpp"
+#include "features/klt_front_end.hpp"
 #include "features/patch_front_end.hpp"
 
 namespace stemvo {
@@ -29,6 +30,9 @@ cv::Mat FrontEnd::with_mask(const cv::Mat& mask) const {
 std::unique_ptr<FrontEnd> create_front_end(const FeatureOptions& options) {
   if (options.method == FeatureMethod::kPatch) {
     return std::make_unique<PatchFrontEnd>(options);
+  }
+  if (options.method == FeatureMethod::kKlt) {
+    return std::make_unique<KltFrontEnd>(options);
   }
   return std::make_unique<DescriptorFrontEnd>(options);
 }

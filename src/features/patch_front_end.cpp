@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -126,6 +125,11 @@ class PatchFrontEnd::Outlook {
   float ratio_;  ///< of the interval to the one before
 };
 
+struct PatchFrontEnd::PatchPyramid : ImagePyramid {
+  using ImagePyramid::ImagePyramid;
+  std::vector<BorderedImage> bordered;  ///< the levels, each in the middle of a larger image
+};
+
 std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& channel,
                                                            const cv::Mat& mask) const {
   const StageTimer timer(Stage::kPyramid);
@@ -133,9 +137,7 @@ std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& c
   image->mask = with_mask(mask);
   image->levels.clear();
   cv::Mat level = channel.pixels;
-  // Over an image of half the input's size begins the second level; the last is for large motions.
-  const int num =
-      std::max(1, options_.pyramid_levels - std::ilogb(channel.map.scale.minCoeff())) + 1;
+  const int num = num_levels(channel.map.scale.minCoeff()) + 1;  // the last for large motions
   for (int i = 0; i < num; ++i) {
     if (i > 0) {
       cv::Mat half;
@@ -153,10 +155,11 @@ std::shared_ptr<const ImagePyramid> PatchFrontEnd::prepare(const ChannelImage& c
   return image;
 }
 
-bool PatchFrontEnd::begin_track(const PatchPyramid& image, const Point& point) {
+bool PatchFrontEnd::begin_track(const ImagePyramid& image, const Point& point) {
   Track track;
   track.warp = {point.uv.x, point.uv.y};
-  if (!cut_patch(image.bordered, point.uv.x, point.uv.y, track.patch)) {
+  const Pyramid pyramid = static_cast<const PatchPyramid&>(image).bordered;
+  if (!cut_patch(pyramid, point.uv.x, point.uv.y, track.patch)) {
     return false;
   }
   if (ended_.empty()) {
@@ -198,7 +201,8 @@ bool PatchFrontEnd::leads_to_points(const Outlook& outlook,
 }
 
 std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& from, View& to) {
-  const Pyramid pyramid = to.image->bordered;
+  const auto& image = static_cast<const PatchPyramid&>(*to.image);
+  const Pyramid pyramid = image.bordered;
   const int coarsest = static_cast<int>(pyramid.size()) - 1;
   const int top = coarsest - 1;
   const int predicted = std::min(kPredictedLevel, top);
@@ -257,7 +261,7 @@ std::vector<std::optional<cv::Point2f>> PatchFrontEnd::track_points(const View& 
         motions.add(point.uv, cv::Point2f(found[i].warp.x, found[i].warp.y) - point.uv);
       }
     }
-    if (accept(found[i], *to.image, to.frame, point, track)) {
+    if (accept(found[i], image, to.frame, point, track)) {
       result[i] = cv::Point2f(track.warp.x, track.warp.y);
     }
   }
@@ -284,7 +288,7 @@ bool PatchFrontEnd::accept(const PatchMatch& found,
   return cut_patch(image.bordered, found.warp.x, found.warp.y, track.patch);
 }
 
-std::optional<cv::Point2f> PatchFrontEnd::match_projection(const PatchPyramid& image,
+std::optional<cv::Point2f> PatchFrontEnd::match_projection(const ImagePyramid& image,
                                                            const Point& point) {
   const auto known = tracks_.find(point.id);
   if (known == tracks_.end()) {
@@ -292,8 +296,8 @@ std::optional<cv::Point2f> PatchFrontEnd::match_projection(const PatchPyramid& i
   }
   Track& track = known->second;
   const PatchMatch found =
-      align_patch(track.patch, image.bordered, {point.uv.x, point.uv.y, track.warp.a, track.warp.b},
-                  kPredictedLevel);
+      align_patch(track.patch, static_cast<const PatchPyramid&>(image).bordered,
+                  {point.uv.x, point.uv.y, track.warp.a, track.warp.b}, kPredictedLevel);
   const cv::Point2f uv(found.warp.x, found.warp.y);
   const cv::Point2f off = uv - point.uv;
   if (found.correlation < kMinAgain || off.dot(off) > kMaxOff_px * kMaxOff_px) {
@@ -304,16 +308,17 @@ std::optional<cv::Point2f> PatchFrontEnd::match_projection(const PatchPyramid& i
   return uv;
 }
 
-void PatchFrontEnd::end_other_tracks() {
+void PatchFrontEnd::end_other_tracks(const std::vector<Point>& last,
+                                     const std::vector<Point>& good,
+                                     const Observations& expected) {
   const auto has = [](const auto& points, auto id_of, int id) {
     const auto found = std::ranges::lower_bound(points, id, {}, id_of);
     return found != points.end() && std::invoke(id_of, *found) == id;
   };
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     const int id = track->first;
-    const bool goes_on = has(last_.points, &Point::id, id) ||
-                         has(last_good_.points, &Point::id, id) ||
-                         has(projections_, &Observation::track_id, id);
+    const bool goes_on = has(last, &Point::id, id) || has(good, &Point::id, id) ||
+                         has(expected, &Observation::track_id, id);
     const auto current = track++;
     if (!goes_on) {
       ended_.push_back(tracks_.extract(current));

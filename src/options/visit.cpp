@@ -12,16 +12,18 @@ namespace {
 
 /// Written so that NaN fails.
 bool is_inside(const Rule& rule, double value) {
-  return std::isfinite(value) && value >= rule.min && value <= rule.max;
+  const bool is_odd = !rule.odd || std::fmod(std::abs(value), 2.0) == 1.0;
+  return std::isfinite(value) && value >= rule.min && value <= rule.max && is_odd;
 }
 
 std::string number_violation(std::string_view kind, double value, const Rule& rule) {
   if (is_inside(rule, value)) {
     return {};
   }
-  const std::string range = std::isfinite(rule.min) && std::isfinite(rule.max)
-                                ? fmt::format(" from {} to {}", rule.min, rule.max)
-                                : "";
+  const std::string range =
+      std::isfinite(rule.min) && std::isfinite(rule.max)
+          ? fmt::format(" {}from {} to {}", rule.odd ? "odd, " : "", rule.min, rule.max)
+          : "";
   return fmt::format("expected {}{}, found {}", kind, range, value);
 }
 

@@ -27,11 +27,13 @@ struct Rule {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double min = -kInfinity;
   double max = kInfinity;
+  bool odd = false;
   std::vector<std::string_view> choices;  ///< of a text; empty: any text but the empty one
 
-  static Rule between(double min, double max) { return {min, max, {}}; }
+  static Rule between(double min, double max) { return {min, max, false, {}}; }
+  static Rule odd_between(double min, double max) { return {min, max, true, {}}; }
   static Rule one_of(std::vector<std::string_view> choices) {
-    return {-kInfinity, kInfinity, std::move(choices)};
+    return {-kInfinity, kInfinity, false, std::move(choices)};
   }
 };
 
@@ -42,7 +44,8 @@ template <>
 inline constexpr std::array<std::string_view, 5> kNames<TrackingResolution>{
     "auto", "input", "input_zoomed", "half", "native"};
 template <>
-inline constexpr std::array<std::string_view, 3> kNames<FeatureMethod>{"patch", "orb", "sift"};
+inline constexpr std::array<std::string_view, 4> kNames<FeatureMethod>{"patch", "klt", "orb",
+                                                                       "sift"};
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<RobustEstimator>{"magsac", "ransac"};
 template <>
@@ -130,8 +133,8 @@ void visit(O& o, V&& v) {
   v("tracking_resolution", o.tracking_resolution, kAny,
     "size of the image to track on: input (the input's), input_zoomed (the same, the frame "
     "enlarged before the filter), half (of the input's), native (the channel's), or auto: for "
-    "patch half where the focal length is 500 px or more, else input_zoomed; for orb and sift "
-    "input");
+    "patch and klt half where the focal length is 500 px or more, else input_zoomed; for orb and "
+    "sift input");
   v("contrast_low_percent", o.contrast_low_percent, Rule::between(0, 100),
     "percentile of the response that becomes black");
   v("contrast_high_percent", o.contrast_high_percent, Rule::between(0, 100),
@@ -143,18 +146,23 @@ void visit(O& o, V&& v) {
 template <Is<FeatureOptions> O, typename V>
 void visit(O& o, V&& v) {
   v("method", o.method, kAny,
-    "patch: corners tracked by the patch of their first frame; orb (the paper's), sift: described "
-    "and matched");
+    "patch: corners tracked by the patch of their first frame; klt: by optical flow from frame to "
+    "frame; orb (the paper's), sift: described and matched");
   v("max_features", o.max_features, Rule::between(8, 100000), "keypoints aimed at per frame");
   v("grid_columns", o.grid_columns, Rule::between(1, 1000),
     "cells across the image, each with its share of the keypoints");
   v("grid_rows", o.grid_rows, Rule::between(1, 1000), "cells down the image");
   v("corner_quality", o.corner_quality, Rule::between(1e-6, 1),
-    "patch: least corner response, as a share of the strongest");
+    "patch, klt: least corner response, as a share of the strongest");
   v("min_distance_px", o.min_distance_px, Rule::between(0, 1000),
-    "patch: between keypoints, input pixels");
-  v("pyramid_levels", o.pyramid_levels, Rule::between(1, 10),
-    "patch: levels of the pyramid, from the input's size on; one more where few points are found");
+    "patch, klt: between keypoints, input pixels");
+  v("klt_window", o.klt_window, Rule::odd_between(3, 201),
+    "klt: side of the window, input pixels, odd; at least 7 pixels of the tracked image");
+  v("klt_levels", o.klt_levels, Rule::between(1, 10),
+    "patch, klt: levels of the pyramid, from the input's size on; patch: one more where few "
+    "points are found");
+  v("max_forward_backward_px", o.max_forward_backward_px, kPixels,
+    "klt: a point tracked there and back must return this close, input pixels");
   v("fast_threshold", o.fast_threshold, Rule::between(1, 254),
     "orb: least step of gray value of a corner");
   v("ratio", o.ratio, Rule::between(0, 1),

@@ -107,7 +107,7 @@ TEST_F(Run, ItsConfigRunsAgain) {
 
 TEST_F(Run, AnyChannelAndFrontEndRuns) {
   for (const std::string model : {"gray", "input_layer", "default"}) {
-    for (const std::string method : {"patch", "orb", "sift"}) {
+    for (const std::string method : {"klt", "orb", "sift"}) {
       const std::string out = out_ + model + method;
       const ProgramResult result =
           run_drive(sequence_, out,

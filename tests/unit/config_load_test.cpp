@@ -132,7 +132,9 @@ TEST_F(ConfigLoad, ValueOutOfRangeNamesTheLine) {
   EXPECT_EQ(error_of("seed: 1\nstem:\n  filter: -2\n"),
             ":3: stem.filter: expected a whole number from -1 to 1000000, found -2");
   EXPECT_EQ(error_of("features:\n  method: surf\n"),
-            ":2: features.method: expected one of patch, orb, sift, found 'surf'");
+            ":2: features.method: expected one of patch, klt, orb, sift, found 'surf'");
+  EXPECT_EQ(error_of("features:\n  klt_window: 20\n"),
+            ":2: features.klt_window: expected a whole number odd, from 3 to 201, found 20");
   EXPECT_EQ(error_of("scale:\n  step_m: nan\n"),
             ":2: scale.step_m: expected a number from 1e-06 to 1000000, found nan");
   EXPECT_EQ(error_of("scale:\n  step_m: inf\n"),

@@ -79,13 +79,13 @@ Distances errors_of_patches(const PlantedPoints& points) {
   return {errors_px, points.from.size()};
 }
 
-/// OpenCV's errors, from the same starts.
+/// OpenCV's errors, called as KltFrontEnd calls it, from the same starts.
 Distances errors_of_lucas_kanade(const PlantedPoints& points) {
-  constexpr int kSide_px = 11;
+  const int side = FeatureOptions().klt_window;
   std::vector<cv::Point2f> found = points.start;
   std::vector<unsigned char> is_found;
   cv::calcOpticalFlowPyrLK(points.before, points.after, points.from, found, is_found, cv::noArray(),
-                           cv::Size(kSide_px, kSide_px), 1,
+                           cv::Size(side, side), 1,
                            {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 15, 0.015},
                            cv::OPTFLOW_USE_INITIAL_FLOW);
   std::vector<double> errors_px;

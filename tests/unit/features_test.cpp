@@ -46,7 +46,7 @@ TEST_P(FrontEndTest, FindsAKnownShiftInInputPixels) {
       front_end_->process(image_of(textured_image(size, {3.25, -1.75}), 2.0, 1.5));
   EXPECT_GT(matches.cur_uv.size(), 150U);
   EXPECT_LE(median_error_px(matches, {-6.5, 3.5}),
-            GetParam() == FeatureMethod::kPatch ? 0.15 : 1.5);
+            GetParam() == FeatureMethod::kPatch || GetParam() == FeatureMethod::kKlt ? 0.15 : 1.5);
 }
 
 TEST_P(FrontEndTest, ABlankOrResizedImageStartsOver) {
@@ -114,9 +114,10 @@ TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
 
 INSTANTIATE_TEST_SUITE_P(Methods,
                          FrontEndTest,
-                         ::testing::Values(FeatureMethod::kPatch,
-                                           FeatureMethod::kOrb,
-                                           FeatureMethod::kSift));
+                         testing::Values(FeatureMethod::kPatch,
+                                         FeatureMethod::kKlt,
+                                         FeatureMethod::kOrb,
+                                         FeatureMethod::kSift));
 
 TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const auto front_end = create_front_end({});
@@ -233,7 +234,8 @@ cv::Mat wide_texture(int shift_px) {
 }
 
 TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
-  FeatureOptions options{.pyramid_levels = 3};
+  FeatureOptions options;
+  options.klt_levels = 3;
   const auto front_end = create_front_end(options);
   static_cast<void>(front_end->process(image_of(wide_texture(0))));
   const Matches far = front_end->process(image_of(wide_texture(60)));
@@ -243,7 +245,8 @@ TEST(PatchFrontEnd, FindsAMotionBeyondTheLevelsAskedForOneLevelUp) {
 
 TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
   const auto found_after_s = [](double interval_s) {
-    FeatureOptions options{.pyramid_levels = 3};
+    FeatureOptions options;
+    options.klt_levels = 3;
     const auto front_end = create_front_end(options);
     for (int i = 0; i < 3; ++i) {
       static_cast<void>(front_end->process(image_of(wide_texture(30 * i)), {i, 0.1 * i}));
@@ -258,7 +261,8 @@ TEST(PatchFrontEnd, LooksAsFarOnAsTheIntervalIsLong) {
 
 TEST(PatchFrontEnd, LooksWhereTheTurnLeadsUnlessItLeadsNowhere) {
   const auto found_by = [](const std::optional<double>& last_shift_px) {
-    FeatureOptions options{.pyramid_levels = 3};
+    FeatureOptions options;
+    options.klt_levels = 3;
     const auto front_end = create_front_end(options);
     const auto show = [&](int shift_px, const std::optional<double>& turn_px) {
       ImageClue clue;

@@ -34,9 +34,10 @@ TEST(OdometryCreate, AnErrorAskedForItsValueThrowsItsMessage) {
 
 TEST(OdometryCreate, AnOptionOutOfRangeIsAnErrorThatNamesIt) {
   Options options;
-  options.features.pyramid_levels = 11;
-  EXPECT_THAT(error_of(options),
-              HasSubstr("features.pyramid_levels: expected a whole number from 1 to 10, found 11"));
+  options.features.klt_window = 10;
+  EXPECT_THAT(
+      error_of(options),
+      HasSubstr("features.klt_window: expected a whole number odd, from 3 to 201, found 10"));
   options = {};
   options.scale.camera_height_m = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(error_of(options), HasSubstr("scale.camera_height_m"));
@@ -184,7 +185,7 @@ TEST(OdometryProcess, HintsThatDoNotFitAreErrorsAndChangeNothing) {
 TEST(OdometryProcess, TinyImagesAreTrackedOrNotButNothingThrows) {
   for (const cv::Size size : {cv::Size(4, 4), {5, 9}, {12, 12}, {40, 6}, {7, 300}}) {
     for (const FeatureMethod method :
-         {FeatureMethod::kPatch, FeatureMethod::kOrb, FeatureMethod::kSift}) {
+         {FeatureMethod::kPatch, FeatureMethod::kKlt, FeatureMethod::kOrb, FeatureMethod::kSift}) {
       Camera camera{50, 50, size.width / 2.0, size.height / 2.0, size.width, size.height};
       Options options;
       options.features.method = method;

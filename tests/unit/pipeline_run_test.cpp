@@ -126,7 +126,7 @@ TEST_F(PipelineRun, TimingIsThereWhereItIsAskedForAndChangesNothingElse) {
   for (const char* name : {"detection", "tracking", "homography", "epipolar geometry"}) {
     EXPECT_GE(timing["stages"][name]["calls"], 1) << name;
   }
-  EXPECT_FALSE(timing["stages"].contains("description")) << "patches are not described";
+  EXPECT_FALSE(timing["stages"].contains("description")) << "klt describes nothing";
   EXPECT_EQ(timing["stages"]["result files"]["calls"], 1);
   EXPECT_EQ(timing["threads"], 1);
   EXPECT_EQ(measured->report.timing->num_frames, 6U);

@@ -18,7 +18,7 @@ from stemvo.lab.rows import Rows
 from stemvo.lab.runs import open_folder, options_of
 
 # A run's odometry made cheap: pairs of frames, fewer points, steps of the true length.
-DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400,
+DEFAULTS = {"odometry.mode": "two_frame", "scale.source": "ground_truth", "features.max_features": 400, "features.klt_window": 23,
             "two_view.estimator": "ransac", "two_view.max_iterations": 200, "two_view.confidence": 0.99}
 KEY = ("model_hash", "layer", "filter", "features", "drive", "drive_hash", "frames", "configuration")
 COLUMNS = (*KEY, "model", *score.ERRORS, "inliers", "tracked", "detected", "reason")

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "features/point_front_end.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -7,7 +9,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "features/grid_quota.hpp"
-#include "features/patch_front_end.hpp"
 #include "timing/stage_timer.hpp"
 
 namespace stemvo {
@@ -35,7 +36,11 @@ bool is_allowed(const cv::Mat& mask, const cv::Point2f& uv) {
 
 }  // namespace
 
-Matches PatchFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
+int PointFrontEnd::num_levels(double scale) const {
+  return std::max(1, options_.klt_levels - std::ilogb(scale));
+}
+
+Matches PointFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const ImageClue& clue) {
   if (last_.image != nullptr &&
       last_.image->channel.pixels.size() != image->channel.pixels.size()) {
     last_ = {};
@@ -47,9 +52,8 @@ Matches PatchFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const 
     *turn = is_known ? std::optional<Eigen::Matrix3d>(*clue.turn * **turn) : std::nullopt;
   }
   Matches matches;
-  View now{
-      std::static_pointer_cast<const PatchPyramid>(std::move(image)), {}, clue.frame, clue.time_s};
-  end_other_tracks();
+  View now{std::move(image), {}, clue.frame, clue.time_s};
+  end_other_tracks(last_.points, last_good_.points, projections_);
   if (last_.image != nullptr) {
     replenish(last_);
     matches = track(last_, now);
@@ -65,7 +69,7 @@ Matches PatchFrontEnd::process(std::shared_ptr<const ImagePyramid> image, const 
 
 /// Nearly every track ended: darkness, a blow, or another place. Where the image before the trouble
 /// tells more than the last one, its tracks go on.
-void PatchFrontEnd::track_from_last_good(View& now, Matches& matches) {
+void PointFrontEnd::track_from_last_good(View& now, Matches& matches) {
   if (last_good_.image == nullptr && !last_.points.empty()) {
     last_good_ = std::move(last_);
     return;
@@ -82,12 +86,12 @@ void PatchFrontEnd::track_from_last_good(View& now, Matches& matches) {
   }
 }
 
-bool PatchFrontEnd::is_lost(const Matches& matches, const View& from) {
+bool PointFrontEnd::is_lost(const Matches& matches, const View& from) {
   return static_cast<double>(matches.cur_uv.size()) <=
          kMinTracked * static_cast<double>(from.points.size());
 }
 
-void PatchFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
+void PointFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
   if (is_inlier.size() != last_.points.size()) {
     return;
   }
@@ -101,7 +105,7 @@ void PatchFrontEnd::remove_outliers(const std::vector<char>& is_inlier) {
   last_.points = std::move(kept);
 }
 
-Matches PatchFrontEnd::track(const View& from, View& to) {
+Matches PointFrontEnd::track(const View& from, View& to) {
   Matches matches;
   matches.prev_frame = from.frame;
   matches.num_keypoints = static_cast<int>(from.points.size());
@@ -124,7 +128,7 @@ Matches PatchFrontEnd::track(const View& from, View& to) {
 }
 
 /// Appends the points that are found.
-void PatchFrontEnd::match_projections(View& view) {
+void PointFrontEnd::match_projections(View& view) {
   const cv::Rect2f inside({}, cv::Size2f(view.image->channel.pixels.size()));
   const std::vector<Point> tracked = view.points;
   for (const Observation& expected : std::exchange(projections_, {})) {
@@ -143,7 +147,7 @@ void PatchFrontEnd::match_projections(View& view) {
   }
 }
 
-std::vector<cv::Point2f> PatchFrontEnd::corners(const ImagePyramid& image,
+std::vector<cv::Point2f> PointFrontEnd::corners(const ImagePyramid& image,
                                                 const cv::Mat& mask,
                                                 const FeatureOptions& options) {
   const std::size_t level = detection_level(image);
@@ -159,10 +163,10 @@ std::vector<cv::Point2f> PatchFrontEnd::corners(const ImagePyramid& image,
   return found;
 }
 
-void PatchFrontEnd::replenish(View& view) {
+void PointFrontEnd::replenish(View& view) {
   const StageTimer timer(Stage::kDetection);
   match_projections(view);
-  const PatchPyramid& image = *view.image;
+  const ImagePyramid& image = *view.image;
   const std::size_t level = detection_level(image);
   const cv::Size size = image.levels[level].size();
   const auto to_pixels = static_cast<float>(1 << level);
