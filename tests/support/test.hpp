@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What nearly every test uses. It is precompiled, so that a test includes little else but what it
-// tests.
+// Nearly every test uses these, so that it includes little else but what it tests.
 #pragma once
 
 #include <algorithm>

@@ -114,10 +114,10 @@ TEST_P(FrontEndTest, APartOfOneImageEndsTheTracksThereAndBeginsNone) {
 
 INSTANTIATE_TEST_SUITE_P(Methods,
                          FrontEndTest,
-                         testing::Values(FeatureMethod::kPatch,
-                                         FeatureMethod::kKlt,
-                                         FeatureMethod::kOrb,
-                                         FeatureMethod::kSift));
+                         ::testing::Values(FeatureMethod::kPatch,
+                                           FeatureMethod::kKlt,
+                                           FeatureMethod::kOrb,
+                                           FeatureMethod::kSift));
 
 TEST(PatchFrontEnd, FollowsTheSamePointsUnderOneIdAndForgetsRejectedOnes) {
   const auto front_end = create_front_end({});
