@@ -2,13 +2,14 @@
 # Thin calls to the scripts and presets; `make help` lists them.
 JOBS ?= $(shell nproc)
 
-.PHONY: help setup build arm64 lab demo test test-all test-long bench format check-format lint docs clean
+.PHONY: help setup build arm64 release lab demo test test-all test-long bench format check-format lint docs clean
 
 help:
 	@echo "make demo          install what is missing, build, render a drive, run on it, show the numbers"
 	@echo "make build         install what is missing, build the program build/release/stemvo"
 	@echo "make lab           install what is missing, build the studies' program build/lab/bin/stemvo-lab (docs/search.md, robustness.md, benchmark.md)"
 	@echo "make arm64         cross-compile for 64-bit ARM: build/arm64/stemvo and its Debian package"
+	@echo "make release       wheels and Debian packages for x86_64 and 64-bit ARM, with their SHA-256: build/dist"
 	@echo "make test          install what is missing, build, run the tests"
 	@echo "make test-all      the same, and the tests that take long"
 	@echo "make bench         time the program against its baselines, SEQUENCE=KITTI/sequences/NN or a rendered drive (docs/performance.md)"
@@ -30,6 +31,9 @@ build: setup
 
 arm64: build
 	@tools/arm64.sh
+
+release: build
+	@tools/release.sh
 
 lab: setup
 	@tools/setup.sh lab

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 # arm64.sh: stemvo for 64-bit ARM, cross-compiled: build/arm64/stemvo, its unit tests, and build/arm64/stemvo_VERSION_arm64.deb. The libraries
 # are Debian's arm64 packages, unpacked into build/arm64-root; ONNX Runtime is that of PyPI's wheel. Programs run under qemu-aarch64.
+# arm64.sh wheel FOLDER: the wheel of the Python package, with all it needs, in FOLDER; tools/wheel.sh must have run (a module's stub is made
+# by importing it, which this machine cannot).
 # arm64.sh test [FILES]: the package in a root of its own (what it depends on is there, and a clip has the path it has here), and unit tests:
 # those of the code in vectors, or FILES of tests/unit ('*': all, which takes half an hour).
 set -euo pipefail
@@ -39,7 +41,7 @@ finish_root() { # finish_root FOLDER
 
 make_root() {
   local packages wheel stamp
-  packages=$(sed -n '/^PACKAGES=(/,/^)/p' tools/setup.sh | grep -oE 'lib[a-z0-9.-]+-dev|nlohmann-json3-dev' | grep -v benchmark)
+  packages=$(sed -n '/^PACKAGES=(/,/^)/p' tools/setup.sh | grep -oE 'lib[a-z0-9.-]+-dev|nlohmann-json3-dev' | grep -v benchmark)\ libpython3-dev
   wheel=$(python3 tools/locked.py base | sed -n 's/^\(onnxruntime==[^ ]*\).*/\1/p')
   stamp="$wheel $packages"
   [[ -f $ROOT/stamp && "$(<"$ROOT/stamp")" == "$stamp" ]] && return
@@ -68,12 +70,26 @@ packages_of_libraries() {
   done | sort -u | paste -sd, | sed 's/,/, /g'
 }
 
+make_wheel() { # make_wheel FOLDER
+  local version tag pip=build/venv-wheel/bin
+  version=$("$pip/python" -c 'import sys; print(*sys.version_info[:2], sep=".")')
+  tag=cp${version/./}
+  install -D "build/python-$tag-$tag-linux_x86_64/python/_core.pyi" "build/python-$tag-$tag-linux_aarch64/python/_core.pyi"
+  rm -rf "$BUILD/wheel"
+  _PYTHON_HOST_PLATFORM=linux-aarch64 SETUPTOOLS_EXT_SUFFIX=.cpython-${version/./}-aarch64-linux-gnu.so \
+    CMAKE_ARGS="--toolchain $PWD/cmake/arm64.cmake -DONNXRUNTIME_ROOT=/opt/onnxruntime -DPython_INCLUDE_DIR=$PWD/$ROOT/usr/include/python$version" \
+    "$pip/pip" wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$BUILD/wheel" --config-settings=build.targets=stemvo_python .
+  PATH=$PWD/$pip:$PATH AUDITWHEEL_LD_LIBRARY_PATH=$PWD/$LIBRARIES auditwheel repair --wheel-dir "$1" "$BUILD"/wheel/stemvo-*.whl >build/setup/auditwheel.log 2>&1 ||
+    { tail -n 20 build/setup/auditwheel.log >&2 && return 1; }
+}
+
 make_root
 cmake -G Ninja -B "$BUILD" --toolchain cmake/arm64.cmake -D CMAKE_BUILD_TYPE=Release -D ONNXRUNTIME_ROOT=/opt/onnxruntime \
   -D "STEMVO_UNIT_TESTS=${2:-features_*_test.cpp;unit/geometry_*_test.cpp;unit/stem_*}" -D CMAKE_SKIP_INSTALL_ALL_DEPENDENCY=ON --log-level=WARNING >build/setup/configure-arm64.log 2>&1 || { cat build/setup/configure-arm64.log && exit 1; }
 cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_app stemvo_video
 (cd "$BUILD" && cpack -G DEB -D CPACK_DEBIAN_PACKAGE_ARCHITECTURE=arm64 -D CPACK_DEBIAN_PACKAGE_SHLIBDEPS=OFF \
   -D "CPACK_DEBIAN_PACKAGE_DEPENDS=$(cd - >/dev/null && packages_of_libraries)" >cpack.log) || { cat "$BUILD/cpack.log" && exit 1; }
+[[ ${1:-} != wheel ]] || make_wheel "$2"
 [[ ${1:-} == test ]] || exit 0
 
 cmake --build "$BUILD" --parallel "$(nproc)" --target stemvo_unit_tests

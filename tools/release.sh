@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# release.sh [FOLDER]: what a release offers, in FOLDER (build/dist): wheels and Debian packages for x86_64 and 64-bit ARM, and their SHA-256.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+readonly OUT=${1:-build/dist}
+rm -rf "$OUT"
+mkdir -p "$OUT"
+tools/wheel.sh "$OUT"
+tools/arm64.sh wheel "$OUT"
+(cd build/release && rm -f stemvo_*.deb && cpack -G DEB >cpack.log) || { cat build/release/cpack.log && exit 1; }
+cp build/release/stemvo_*.deb build/arm64/stemvo_*.deb "$OUT/"
+cd "$OUT" && sha256sum -- *.whl *.deb | tee SHA256SUMS
