@@ -119,12 +119,11 @@ def read_landmarks(file):
 
 
 def check_recording(result, frames, recording):
-    """Its times are the result's, but those that are counted from a rate, which may have been another; its camera is, as far as it was refined."""
-    times, counted = (np.array(times) - times[0] for times in ([frame.time_ns * 1e-9 for frame in frames], recording.timestamps))
-    if len(counted) == len(times) > 1 and np.ptp(np.diff(counted)) < 1e-6:
-        counted *= times[-1] / counted[-1]
-    if len(counted) != len(times) or np.abs(counted - times).max() > 1e-3:
-        raise ResultError(f"--recording: expected {len(times)} frames over {times[-1]:.3f} s at the result's times, found {len(counted)} over {counted[-1]:.3f} s: another recording")
+    """Its times are the result's, but even ones, which a rate may have made in place of --times; its camera is, as far as it was refined."""
+    times, found = (np.array(times) - times[0] for times in ([frame.time_ns * 1e-9 for frame in frames], recording.timestamps))
+    is_counted = len(found) > 1 and np.ptp(np.diff(found)) < 1e-6
+    if len(found) != len(times) or not is_counted and np.abs(found - times).max() > 1e-3:
+        raise ResultError(f"--recording: expected {len(times)} frames over {times[-1]:.3f} s at the result's times, found {len(found)} over {found[-1]:.3f} s: another recording")
     given = recording.camera
     try:
         camera = json.loads((result / "metrics.json").read_text(encoding="utf-8"))["camera"]
