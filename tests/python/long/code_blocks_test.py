@@ -114,7 +114,7 @@ class TestCodeBlocks:
     def cameras(self):
         return [block for block in documented.blocks("yaml") if "intrinsics" in yaml.safe_load(block.text)]
 
-    def test_commands(self):
+    def test_commands(self, subtests):
         (camera,) = self.cameras()
         num_run = 0
         folders = {}
@@ -123,10 +123,11 @@ class TestCodeBlocks:
             if not any(lines):
                 continue
             num_run += 1
-            page = block.place.split(":")[0]
-            folders[page] = folders.get(page) or self.new_folder(camera)
-            done = self.run_script("\n".join(lines), folders[page])
-            assert done.returncode == 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}"
+            with subtests.test(block.place):
+                page = block.place.split(":")[0]
+                folders[page] = folders.get(page) or self.new_folder(camera)
+                done = self.run_script("\n".join(lines), folders[page])
+                assert done.returncode == 0, f"{block.place}: {lines}\n{done.stderr[-2000:]}"
         assert num_run > 15
 
     def test_the_demo(self):
