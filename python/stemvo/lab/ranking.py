@@ -67,17 +67,14 @@ def order(row):
     return group, -row["frames"] if group == 2 else 0, np.inf if by is None else by, row["model"], row["filter"]
 
 
-def draw(file, table, most=40):
+def draw(stem, table, most=40):
     """Errors over those of the best, with intervals: what leaves out 1 is worse."""
-    import matplotlib
-
-    matplotlib.use("svg")
-    import matplotlib.pyplot as plt
+    from stemvo.lab import figures
 
     rows = [row for row in table if row["status"] == "ranked" and np.isfinite(row["over_best_high"])][:most]
     if not rows:
         return
-    figure, axis = plt.subplots(figsize=(7, 0.8 + 0.2 * len(rows)), layout="constrained")
+    figure, (axis,) = figures.sheet(1, height_in=0.8 + 0.2 * len(rows))
     for at, row in enumerate(rows):
         color = "C7" if row["baseline"] else "C0" if row["equal"] else "C1"
         axis.plot([row["over_best_low"], row["over_best_high"]], [at, at], color=color)
@@ -86,5 +83,4 @@ def draw(file, table, most=40):
     axis.set_yticks(range(len(rows)), [f"{row['model']} {row['layer']} {row['filter']}" for row in rows], fontsize=7)
     axis.invert_yaxis()
     axis.set_xlabel("error over the best filter's, 95 % interval (blue: not told from it; gray: baseline)")
-    figure.savefig(file)
-    plt.close(figure)
+    figures.save(figure, stem)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """stemvo-lab robustness: channels compared on disturbed frames."""
 
-import collections
 import dataclasses
 import hashlib
 import json
@@ -133,10 +132,7 @@ def geometric_mean(values):
 
 def summaries(lines, control):
     """Groups in the order of the lines, then all: geometric means over lines that have an interval, and how many are decided for whom."""
-    groups = collections.defaultdict(list)
-    for line in lines:
-        groups[line.group].append(line)
-    result = []
+    groups, result = {group: [line for line in lines if line.group == group] for group in dict.fromkeys(line.group for line in lines)}, []
     for group, found in [*groups.items(), ("all", lines)]:
         rotation, translation = zip(*(line.verdicts[control] for line in found))
         means = [geometric_mean([one.ratio for one in kind if np.isfinite(one.high)]) for kind in (rotation, translation)]
@@ -147,9 +143,9 @@ def summaries(lines, control):
 
 def by_drive(lines, control, drives):
     judged = next(iter(lines[0].rows))
-    found = [[(number(line.rows[one][i]["r_rel_deg_per_100m"]) or 0.0) for line in lines for one in (judged, control)] for i in range(len(drives))]
-    return [{"drive": drive.road, "control": control, "rotation_ratio": geometric_mean([a / b for a, b in zip(one[::2], one[1::2]) if a > 0 and b > 0])}
-            for drive, one in zip(drives, found)]
+    errors = [[[number(row["r_rel_deg_per_100m"]) or 0.0 for row in line.rows[one]] for one in (judged, control)] for line in lines]
+    return [{"drive": drive.road, "control": control, "rotation_ratio": geometric_mean([a / b for a, b in of_drive if a > 0 and b > 0])}
+            for drive, of_drive in zip(drives, np.transpose(errors, (2, 0, 1)))]
 
 
 def words(ratio):
@@ -179,9 +175,8 @@ def write_results(out, lines, drives):
 
     table = pandas.DataFrame([{"disturbance": line.disturbance, "strength": line.strength} | {name: cell(line, name) for name in line.rows}
                               | {f"over {name}": words(verdict[0]) for name, verdict in line.verdicts.items()} for line in lines])
-    text = table.to_string(index=False)
+    text, found = table.to_string(index=False), document(lines, drives)
     if lines[0].verdicts:
-        found = document(lines, drives)
         groups = pandas.DataFrame([{"group": one["group"], "rows": one["rows"], "control": one["control"],
                                     "ratio": f"{one['rotation_ratio']:.2f} ({one['decided_for_judged']}, {one['decided_for_control']})" if one["rotation_ratio"] else "-"}
                                    for one in found["groups"]])
@@ -190,7 +185,7 @@ def write_results(out, lines, drives):
     flat = [{"disturbance": line.disturbance, "strength": line.strength, "channel": name, "drive": drive.road} | {key: row[key] for key in COLUMNS[len(KEY) + 1 : -4]}
             for line in lines for name, rows in line.rows.items() for drive, row in zip(drives, rows)]
     pandas.DataFrame(flat).to_csv(out / "robustness.csv", index=False)
-    (out / "robustness.json").write_text(json.dumps(document(lines, drives), indent=1) + "\n")
+    (out / "robustness.json").write_text(json.dumps(found, indent=1) + "\n")
     (out / "robustness.txt").write_text(text + "\n")
     return text
 

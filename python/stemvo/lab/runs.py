@@ -55,9 +55,8 @@ def options_of(config=None, overrides=(), model=None):
     if config:
         file = config_file(config)
         stemvo.Options.load(file)  # whose message names file and line
-        values = {f"{group}.{key}": value for group, keys in (yaml.safe_load(file.read_text()) or {}).items() if isinstance(keys, dict)
-                  for key, value in keys.items()}
-        values |= {key: value for key, value in yaml.safe_load(file.read_text()).items() if not isinstance(value, dict)}
+        for group, keys in (yaml.safe_load(file.read_text()) or {}).items():
+            values |= {f"{group}.{key}": value for key, value in keys.items()} if isinstance(keys, dict) else {group: keys}
     for line in overrides:
         key, found, value = line.partition("=")
         if not found:
@@ -217,7 +216,9 @@ def run(method, sequence, folder, progress=None):
     folder.mkdir(parents=True, exist_ok=True)
     text = "".join(" ".join(f"{number + 0.0:.12e}" for number in pose[:3].ravel()) + "\n" for pose in poses)
     poses_file.write_text(text)
-    _replace(kept, json.dumps({"inputs": identity, "poses": hashlib.sha256(text.encode()).hexdigest(), "row": row}, indent=1))
+    new = folder / "row.json.new"  # so that a run that is killed leaves no half of a file
+    new.write_text(json.dumps({"inputs": identity, "poses": hashlib.sha256(text.encode()).hexdigest(), "row": row}, indent=1))
+    os.replace(new, kept)
     return row, poses
 
 
@@ -235,10 +236,3 @@ def _compute(method, sequence, row, progress):
     if sequence.truth is not None:
         row |= measure(poses[sequence.recording.ground_truth_frames], sequence.truth, row["alignment"])
     return row, poses
-
-
-def _replace(file, text):
-    """So that a run that is killed leaves no half of a file."""
-    new = file.with_name(file.name + ".new")
-    new.write_text(text)
-    os.replace(new, file)

@@ -47,12 +47,6 @@ def write_images(recording, first, folder):
     return names
 
 
-def quaternion_of(rotation):
-    """w, x, y, z with w >= 0."""
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True)
-    return w, x, y, z
-
-
 def write_colmap(out, camera, names, poses, points):
     """out/sparse/0: the text model, whose points have no observations (colmap point_triangulator finds them)."""
     folder = out / "sparse/0"
@@ -61,7 +55,8 @@ def write_colmap(out, camera, names, poses, points):
     lines = []
     for number, (name, pose) in enumerate(zip(names, np.linalg.inv(poses)), 1):
         if name is not None:
-            lines.append(" ".join([str(number), *(f"{value:.12g}" for value in (*quaternion_of(pose[:3, :3]), *pose[:3, 3])), "1", name]) + "\n\n")
+            turn = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True, scalar_first=True)
+            lines.append(" ".join([str(number), *(f"{value:.12g}" for value in (*turn, *pose[:3, 3])), "1", name]) + "\n\n")
     (folder / "images.txt").write_text("".join(lines))
     (folder / "points3D.txt").write_text("".join(
         " ".join([str(number), *(f"{value:.7g}" for value in position), *map(str, color), "0"]) + "\n"

@@ -196,7 +196,7 @@ def write_results(out, table):
     shown = [name for name in ("model", "layer", "filter", "features", "status", "t_rel_percent", "r_rel_deg_per_100m", "over_best", "over_best_low", "over_best_high", "tracked") if name in frame]
     text = frame[shown].head(40).to_string(index=False, float_format="%.3f", na_rep="-")
     (out / "filters.txt").write_text(text + "\n")
-    ranking.draw(out / "filters.svg", table)
+    ranking.draw(out / "filters", table)
     return text
 
 

@@ -27,13 +27,8 @@ def formatted(frame, decimals):
 
 
 def markdown(frame):
-    rows = [[str(name) for name in frame.columns], ["---"] * len(frame.columns), *frame.values.tolist()]
-    rows[0], rows[2:] = [_plain(text) for text in rows[0]], [[_plain(text) for text in row] for row in rows[2:]]
-    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
-
-
-def _plain(text):
-    return text.replace("|", "\\|")
+    rows = [list(map(str, frame.columns)), ["---"] * len(frame.columns), *frame.values.tolist()]
+    return "".join("| " + " | ".join(text.replace("|", "\\|") for text in row) + " |\n" for row in rows)
 
 
 def latex(frame, caption, notes=()):
